@@ -1,0 +1,53 @@
+#pragma once
+
+// The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
+//   J(η) = J_mismatch(η) + α² J_apriori(ξ(η)),   ξ = centre + axes η,
+// with exact derivatives: J_mismatch is a quadratic form in φ(η), φ a polynomial.
+
+#include <memory>
+
+#include "core/bayes/mismatch_sums.h"
+#include "core/bayes/prior.h"
+#include "core/bayes/region.h"
+#include "core/chaos/basis.h"
+
+namespace polyest {
+
+struct CostValue {
+  double mismatch = 0;
+  double prior = 0;  // J_apriori, not yet weighted; +∞ outside Ω
+  double total = 0;  // mismatch + α² prior
+};
+
+class Cost {
+ public:
+  // sums taken about reference (η_0). regularization = α² ≥ 0.
+  Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, MismatchSums sums,
+       Prior prior, double regularization);
+
+  int dimension() const { return region_.dimension(); }
+  const Region& region() const { return region_; }
+  const Prior& prior() const { return prior_; }
+  double regularization() const { return regularization_; }
+
+  CostValue Evaluate(const ConstVectorRef& eta) const;
+  // gradient is n, with respect to η.
+  CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
+  // n × n, with respect to η.
+  Matrix MismatchHessian(const ConstVectorRef& eta) const;
+  Matrix Hessian(const ConstVectorRef& eta) const;  // of the total
+  // total at W points (W × n) at once by matrix products; +∞ outside Ω. totals is W (resized).
+  void EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const;
+  // d = φ(η) − φ(η_0), for the sums of single channels.
+  Vector BasisDifference(const ConstVectorRef& eta) const;
+
+ private:
+  std::shared_ptr<const Basis> basis_;
+  Region region_;
+  Vector reference_phi_;
+  MismatchSums sums_;
+  Prior prior_;
+  double regularization_;
+};
+
+}  // namespace polyest

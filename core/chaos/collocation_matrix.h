@@ -1,0 +1,43 @@
+#pragma once
+
+// The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by column-pivoted Householder QR; the
+// coefficients c = A⁺ Y of (10) come from the factors and never from an inverse.
+
+#include <absl/status/statusor.h>
+
+#include <Eigen/QR>
+
+#include "core/chaos/basis.h"
+#include "core/common/types.h"
+
+namespace polyest {
+
+class CollocationMatrix {
+ public:
+  // points is Q × n, Q ≥ S. FAILED_PRECONDITION, naming order, terms and points, when A has not
+  // full rank or its condition number passes `most_condition`.
+  static absl::StatusOr<CollocationMatrix> Factor(const Basis& basis, const ConstMatrixRef& points,
+                                                  double most_condition = 1e8);
+
+  int points() const { return static_cast<int>(matrix_.rows()); }  // Q
+  int terms() const { return static_cast<int>(matrix_.cols()); }   // S
+  double condition() const { return condition_; }                  // from the triangular factor
+  const Matrix& matrix() const { return matrix_; }
+
+  // Least-squares coefficients (S × m) of the values (Q × m) at the points, and for each column the
+  // residual variance ‖Y − A c‖² / (Q − S); 0 when Q = S (interpolation shows no residual).
+  // Does not allocate when the results have their sizes already.
+  void Solve(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance);
+
+ private:
+  CollocationMatrix() = default;
+
+  Matrix matrix_;
+  Matrix thin_q_;           // Q × S
+  Matrix triangular_;       // S × S, upper
+  Eigen::VectorXi permutation_;
+  Matrix workspace_;
+  double condition_ = 0;
+};
+
+}  // namespace polyest

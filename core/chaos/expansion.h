@@ -1,0 +1,41 @@
+#pragma once
+
+// A polynomial chaos expansion y(ξ) = Σ_s c_s φ_s(ξ) of m outputs in an orthonormal basis (3).
+//   mean = c_0,   standard deviation = √(Σ_{s≥1} c_s²)      (11)–(13) with the root put right.
+
+#include <memory>
+
+#include "core/chaos/basis.h"
+#include "core/common/types.h"
+
+namespace polyest {
+
+struct DensityEstimate {
+  Vector value;    // bin centres, in the output's unit
+  Vector density;  // normalized to unit area, in 1/unit
+};
+
+class Expansion {
+ public:
+  // coefficients is S × m.
+  Expansion(std::shared_ptr<const Basis> basis, Matrix coefficients);
+
+  const Basis& basis() const { return *basis_; }
+  const Matrix& coefficients() const { return coefficients_; }
+  Vector Mean() const;
+  Vector StandardDeviation() const;
+  Vector Evaluate(const ConstVectorRef& xi) const;
+  // Values (count × m) at low-discrepancy draws of the germs; the same for the same count.
+  Matrix Sample(int count) const;
+
+ private:
+  std::shared_ptr<const Basis> basis_;
+  Matrix coefficients_;
+};
+
+// Normalized histogram of samples (sorting a copy); one bin holding all when they do not vary.
+DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins);
+// Empirical quantile by linear interpolation of the order statistics, 0 ≤ probability ≤ 1.
+double QuantileOfSamples(Vector samples, double probability);
+
+}  // namespace polyest

@@ -1,0 +1,68 @@
+#pragma once
+
+// Germs: the independent standard random variables ξ that carry all uncertainty (1)–(3).
+//
+//   normal          N(0, 1) on ℝ                                   Hermite
+//   uniform         1/2 on [−1, 1]                                 Legendre
+//   beta(α, β)      ∝ (1+ξ)^(α−1) (1−ξ)^(β−1) on [−1, 1]           Jacobi
+//   gamma(shape)    ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)        Laguerre
+//
+// α and β are the statistician's: the paper's "Beta(1,1)" is Beta(2, 2) here.
+
+#include <limits>
+
+#include "core/common/types.h"
+
+namespace polyest {
+
+enum class GermFamily { kNormal, kUniform, kBeta, kGamma };
+
+// Monic three-term recurrence P_{k+1}(ξ) = (ξ − a_k) P_k(ξ) − b_k P_{k−1}(ξ), k = 0 … count − 1;
+// b_0 = 1, the integral of the density.
+struct RecurrenceCoefficients {
+  Vector a;
+  Vector b;
+};
+
+class Germ {
+ public:
+  static Germ Normal();
+  static Germ Uniform();
+  // alpha, beta ≥ 1: below 1 the density is infinite at a bound and has no most likely value.
+  static Germ Beta(double alpha, double beta);
+  // shape ≥ 1, for the same reason.
+  static Germ Gamma(double shape);
+
+  GermFamily family() const { return family_; }
+  double first_shape() const { return first_shape_; }    // α of beta, shape of gamma, else 0
+  double second_shape() const { return second_shape_; }  // β of beta, else 0
+  double Lower() const;                                  // of the support Ω; −∞ for normal
+  double Upper() const;                                  // +∞ for normal and gamma
+  double Mean() const;
+  double StandardDeviation() const;
+  double Mode() const;  // the centre of the support for uniform
+
+  double Density(double xi) const;     // 0 outside the support
+  double LogDensity(double xi) const;  // −∞ outside the support
+  // Derivatives of log ρ inside the open support.
+  double LogDensityDerivative(double xi) const;
+  double LogDensitySecondDerivative(double xi) const;
+  double CumulativeProbability(double xi) const;
+  // The ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1, to 1e-12 relative to
+  // the standard deviation.
+  double Quantile(double probability) const;
+
+  RecurrenceCoefficients Recurrence(int count) const;
+
+  friend bool operator==(const Germ&, const Germ&) = default;
+
+ private:
+  Germ(GermFamily family, double first_shape, double second_shape)
+      : family_(family), first_shape_(first_shape), second_shape_(second_shape) {}
+
+  GermFamily family_;
+  double first_shape_;
+  double second_shape_;
+};
+
+}  // namespace polyest

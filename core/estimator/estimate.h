@@ -1,0 +1,76 @@
+#pragma once
+
+// What the estimator answers.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/bayes/cost.h"
+#include "core/bayes/identifiability.h"
+#include "core/common/types.h"
+
+namespace polyest {
+
+enum class DiagnosticCode {
+  kNotIdentified,        // a parameter or direction on which the data say less than the prior
+  kUndersampled,         // the samples taken do not see what an uncertain parameter changes
+  kExpansionInaccurate,  // the expansion differs from the model by too much; uncertainty widened
+  kModelMisfit,          // residuals far larger than the noise
+  kAtPriorBound,         // the estimate lies on a bound of the prior
+  kMultipleMinima,       // other minima of comparable cost
+  kNotConverged,         // the minimizer gave up
+  kPointsFailed,         // trajectories that could not be integrated were left out
+};
+
+struct Diagnostic {
+  DiagnosticCode code;
+  std::string message;
+};
+
+struct ParameterEstimate {
+  std::string name;
+  std::string unit;
+  double map = 0;      // θ at the minimum of the cost
+  double std_dev = 0;  // from the cost's curvature there; the prior's where that knows less
+  double mean = 0;     // of the posterior
+  double lower95 = 0;  // 2.5 % quantile of the posterior
+  double upper95 = 0;  // 97.5 %
+  double prior_mean = 0;
+  double prior_std_dev = 0;
+  double contraction = 0;  // std_dev ÷ prior_std_dev
+  Verdict verdict = Verdict::kNotIdentified;
+};
+
+struct ChannelEstimate {
+  std::string output;
+  int64_t samples = 0;
+  double chi_squared = 0;    // Σ (z − y)²/R at map
+  double noise_std_dev = 0;  // root mean square of the noise assumed, in the output's unit
+};
+
+struct ExpansionSummary {
+  int order = 0;
+  int terms = 0;   // S
+  int points = 0;  // Q
+  // Worst, over posterior particles, root mean square over the samples of (model − expansion)/σ.
+  double residual_to_noise = 0;
+  int reexpansions = 0;
+  // Model runs in all, in units of the whole record so far.
+  int64_t trajectories = 0;
+};
+
+struct Estimate {
+  std::vector<ParameterEstimate> parameters;
+  Matrix covariance;  // of the parameters, from the curvature
+  CostValue cost;     // at map
+  double regularization = 1;  // α² used
+  std::vector<ChannelEstimate> channels;
+  std::vector<Direction> directions;
+  ExpansionSummary expansion;
+  std::vector<Diagnostic> diagnostics;
+  double time_s = 0;    // of the last sample
+  int64_t samples = 0;  // values ingested, over all channels and runs
+};
+
+}  // namespace polyest

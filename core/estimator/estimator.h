@@ -1,0 +1,53 @@
+#pragma once
+
+// The streaming estimator: append measurements, process them, estimate when asked.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <memory>
+
+#include "core/common/stop.h"
+#include "core/estimator/estimate.h"
+#include "core/estimator/problem.h"
+#include "core/estimator/samples.h"
+
+namespace polyest {
+
+struct EstimatorOptions {
+  int threads = 1;  // for propagation; results do not depend on it
+  // Where samples are kept; in memory when null.
+  std::shared_ptr<SampleStore> store;
+};
+
+class Estimator {
+ public:
+  // `problem` must measure at least one output.
+  static absl::StatusOr<std::unique_ptr<Estimator>> Make(ResolvedProblem problem,
+                                                         EstimatorOptions options = {});
+  ~Estimator();
+
+  const ResolvedProblem& problem() const;
+
+  // Checks the whole of `samples` and stores all of it or, when anything is wrong, nothing.
+  // INVALID_ARGUMENT names row, column, value and rule. Cheap: no numerics.
+  absl::Status Append(const Samples& samples);
+
+  // Takes every stored sample not yet taken into the sums, re-expanding where needed. On a stop
+  // request returns its status; what was taken stays, the next call goes on from there.
+  absl::Status Process(const Stop& stop = {});
+
+  // The estimate from all samples processed. Does not change the estimator: how often it is asked
+  // never changes a later answer. Its cost does not depend on the number of samples.
+  absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop = {}) const;
+
+  int64_t rows_appended() const;
+  int64_t rows_processed() const;
+
+ private:
+  class Implementation;
+  explicit Estimator(std::unique_ptr<Implementation> implementation);
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace polyest

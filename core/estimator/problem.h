@@ -1,0 +1,102 @@
+#pragma once
+
+// What is to be estimated: a model, what of it is uncertain, what drives it and what is measured.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/bayes/noise.h"
+#include "core/bayes/prior.h"
+#include "core/chaos/collocation_points.h"
+#include "core/model/input_signal.h"
+#include "core/model/model.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest {
+
+struct NamedInput {
+  std::string name;  // of one of the model's inputs
+  InputSpecification signal;
+};
+
+struct MeasuredOutput {
+  std::string output;  // one of the model's outputs
+  NoiseModel noise;
+};
+
+struct ExpansionOptions {
+  int order = 3;               // total degree p ≥ 1
+  double points_per_term = 2;  // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise
+  PointSet points = PointSet::kHalton;
+  bool adaptive = true;  // re-expand where the posterior is; false is the paper's fixed expansion
+};
+
+enum class RegularizationMode { kFixed, kLCurve };
+
+struct Problem {
+  std::shared_ptr<const Model> model;
+  // Model parameters, initial states and input amplitudes ("force.amplitude") that are known.
+  // What is named neither here nor among the uncertain has the model's default.
+  std::map<std::string, double> fixed;
+  std::vector<UncertainParameter> uncertain;
+  std::vector<NamedInput> inputs;  // an input not listed is 0
+  std::vector<MeasuredOutput> measured;
+  ExpansionOptions expansion;
+  double regularization = 1;  // α² ≥ 0 of (56)
+  RegularizationMode regularization_mode = RegularizationMode::kFixed;
+  IntegrationOptions integration;
+};
+
+// Limits that keep one problem from taking a machine: past them RESOURCE_EXHAUSTED.
+inline constexpr int64_t kMostTerms = 2'000;    // S
+inline constexpr int64_t kMostPoints = 20'000;  // Q
+
+// A problem whose every name has been found in its model.
+class ResolvedProblem {
+ public:
+  // INVALID_ARGUMENT or RESOURCE_EXHAUSTED name the field, the value and the rule; an unknown name
+  // is answered with the names there are. `measured` may be empty (a propagation needs none).
+  static absl::StatusOr<ResolvedProblem> Make(Problem problem);
+
+  const Problem& problem() const { return problem_; }
+  const Prior& prior() const { return prior_; }
+  int dimension() const { return prior_.dimension(); }                       // n
+  int channels() const { return static_cast<int>(problem_.measured.size()); }  // m
+  const std::vector<int>& outputs() const { return outputs_; }  // the model's columns, by channel
+  const std::vector<std::string>& units() const { return units_; }  // by uncertain parameter
+
+  // One signal for each of the model's inputs, in its order.
+  InputSignals MakeInputs() const;
+  // The streamed inputs: their columns among the model's inputs.
+  const std::vector<int>& streamed_inputs() const { return streamed_inputs_; }
+
+  // An ensemble with one trajectory for each row of thetas (Q × n, the uncertain parameters'
+  // values), reading `outputs` of the model.
+  EnsembleSpecification MakeEnsemble(const ConstMatrixRef& thetas, std::vector<int> outputs,
+                                     int threads) const;
+
+ private:
+  ResolvedProblem(Problem problem, Prior prior)
+      : problem_(std::move(problem)), prior_(std::move(prior)) {}
+
+  struct Target {
+    bool is_amplitude = false;
+    int column = 0;
+  };
+
+  Problem problem_;
+  Prior prior_;
+  Vector base_parameters_;
+  Vector base_amplitudes_;
+  std::vector<Target> targets_;  // where each uncertain parameter goes
+  std::vector<int> outputs_;
+  std::vector<std::string> units_;
+  std::vector<int> streamed_inputs_;
+};
+
+}  // namespace polyest

@@ -1,0 +1,55 @@
+#pragma once
+
+// A mechanical model as a first-order system with named quantities,
+//
+//   dx/dt = f(t, x, θ, u),   x(0) = x_0(θ),   y = h(t, x, θ, u),
+//
+// evaluated for a whole block of collocation points at once. Initial states are parameters like
+// any other (x0, v0, x1_0 …). A model without states is algebraic: y = h(t, θ, u).
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/common/types.h"
+
+namespace polyest {
+
+struct Quantity {
+  std::string name;
+  std::string unit;     // SI, as in "N/m"; "1" for a plain number
+  std::string meaning;  // one line
+  double default_value = 0;  // of a parameter; unused for states, inputs, outputs
+};
+
+struct ModelDescription {
+  std::string name;
+  std::string summary;    // one line
+  std::string equations;  // the equations of motion as text
+  std::string source;     // where they come from
+  std::vector<Quantity> states;
+  std::vector<Quantity> parameters;  // initial states among them
+  std::vector<Quantity> inputs;
+  std::vector<Quantity> outputs;
+
+  std::optional<int> FindParameter(std::string_view parameter) const;
+  std::optional<int> FindInput(std::string_view input) const;
+  std::optional<int> FindOutput(std::string_view output) const;
+};
+
+// Blocks have one row a point and one column a quantity, in the description's order; the number of
+// rows is a multiple of kLanes. A model keeps no state between calls and may be used by several
+// threads at once.
+class Model {
+ public:
+  virtual ~Model() = default;
+  virtual const ModelDescription& description() const = 0;
+  virtual void InitialStates(const ConstBlock& parameters, Block states) const = 0;
+  virtual void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                           const ConstBlock& inputs, Block derivatives) const = 0;
+  virtual void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                       const ConstBlock& inputs, Block outputs) const = 0;
+};
+
+}  // namespace polyest
