@@ -7,7 +7,9 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/bayes/noise.h"
@@ -65,7 +67,7 @@ class ResolvedProblem {
 
   const Problem& problem() const { return problem_; }
   const Prior& prior() const { return prior_; }
-  int dimension() const { return prior_.dimension(); }                       // n
+  int dimension() const { return prior_.dimension(); }                         // n
   int channels() const { return static_cast<int>(problem_.measured.size()); }  // m
   const std::vector<int>& outputs() const { return outputs_; }  // the model's columns, by channel
   const std::vector<std::string>& units() const { return units_; }  // by uncertain parameter
@@ -84,10 +86,18 @@ class ResolvedProblem {
   ResolvedProblem(Problem problem, Prior prior)
       : problem_(std::move(problem)), prior_(std::move(prior)) {}
 
+  // Where a settable name goes: a column of the parameters, or of the amplitudes.
   struct Target {
     bool is_amplitude = false;
     int column = 0;
   };
+
+  static std::optional<Target> FindTarget(const ModelDescription& model, std::string_view name);
+  absl::Status ResolveInputs();
+  absl::Status ResolveParameters();
+  absl::Status ResolveUncertain();
+  absl::Status ResolveMeasured();
+  absl::Status CheckDriven(const std::string& field, const std::string& name, Target target) const;
 
   Problem problem_;
   Prior prior_;
