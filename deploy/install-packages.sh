@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Installs what polyest is built from: packages of Debian 12, those that are missing.
+#
+#   deploy/install-packages.sh            to build and run
+#   deploy/install-packages.sh --tests    to test, benchmark and check the formatting as well
+set -euo pipefail
+
+packages=(
+  build-essential cmake ninja-build ccache pkg-config
+  libeigen3-dev libsundials-dev libnlopt-dev libnlopt-cxx-dev libabsl-dev
+  libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
+  libspdlog-dev libcli11-dev
+)
+test_packages=(
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format python3 python3-grpcio python3-protobuf
+)
+
+say() { echo "install-packages: $*" >&2; }
+
+is_debian_12() {
+  [[ -r /etc/os-release ]] || return 1
+  # shellcheck source=/dev/null
+  (. /etc/os-release && [[ "${ID:-}" == debian && "${VERSION_ID:-}" == 12 ]])
+}
+
+is_installed() {
+  [[ "$(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null)" == installed ]]
+}
+
+install_missing() {
+  local missing=() as_root=() package
+  for package in "${packages[@]}"; do
+    is_installed "$package" || missing+=("$package")
+  done
+  [[ ${#missing[@]} -gt 0 ]] || return 0
+
+  if [[ $EUID -ne 0 ]]; then
+    if ! command -v sudo >/dev/null; then
+      say "missing packages, and neither root nor sudo to install them; as root run:"
+      say "  apt-get install --no-install-recommends ${missing[*]}"
+      return 1
+    fi
+    as_root=(sudo)
+  fi
+  say "installing ${missing[*]}"
+  local apt_get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
+    apt-get --quiet --quiet --option DPkg::Lock::Timeout=300)
+  # apt's own account goes to stderr: stdout belongs to whoever calls.
+  "${apt_get[@]}" update </dev/null >&2 &&
+    "${apt_get[@]}" install --yes --no-install-recommends "${missing[@]}" </dev/null >&2
+}
+
+for argument in "$@"; do
+  case "$argument" in
+    --tests) packages+=("${test_packages[@]}") ;;
+    *)
+      say "unknown argument '$argument'; there is only --tests"
+      exit 2
+      ;;
+  esac
+done
+
+if is_debian_12; then
+  install_missing
+elif command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
+  say "warning: this is not Debian 12; trying packages of the same names"
+  install_missing || say "warning: could not install them all; going on with what is there"
+else
+  say "warning: this is not Debian 12; please see that the equivalents of these are installed:"
+  say "  ${packages[*]}"
+fi
