@@ -1,1 +1,236 @@
-// To be written.
+#include "core/model/input_signal.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/string_view.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <type_traits>
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPi = std::numbers::pi;
+
+absl::Status Violation(absl::string_view kind, absl::string_view field, double value,
+                       absl::string_view rule) {
+  return absl::InvalidArgumentError(absl::StrCat(kind, ": ", field, " ", value, " must be ", rule));
+}
+
+absl::Status RequireFinite(absl::string_view kind, absl::string_view field, double value) {
+  return std::isfinite(value) ? absl::OkStatus() : Violation(kind, field, value, "finite");
+}
+
+absl::Status RequirePositive(absl::string_view kind, absl::string_view field, double value) {
+  return std::isfinite(value) && value > 0 ? absl::OkStatus()
+                                           : Violation(kind, field, value, "finite and above 0");
+}
+
+absl::Status RequireNonnegative(absl::string_view kind, absl::string_view field, double value) {
+  return std::isfinite(value) && value >= 0
+             ? absl::OkStatus()
+             : Violation(kind, field, value, "finite and at least 0");
+}
+
+absl::Status Validate(const ConstantInput& input) {
+  return RequireFinite("constant", "amplitude", input.amplitude);
+}
+
+absl::Status Validate(const StepInput& input) {
+  POLYEST_RETURN_IF_ERROR(RequireFinite("step", "amplitude", input.amplitude));
+  return RequireFinite("step", "timeS", input.time_s);
+}
+
+absl::Status Validate(const SinusoidInput& input) {
+  POLYEST_RETURN_IF_ERROR(RequireFinite("sinusoid", "amplitude", input.amplitude));
+  POLYEST_RETURN_IF_ERROR(RequirePositive("sinusoid", "frequencyHz", input.frequency_hz));
+  return RequireFinite("sinusoid", "phaseRad", input.phase_rad);
+}
+
+absl::Status Validate(const ChirpInput& input) {
+  POLYEST_RETURN_IF_ERROR(RequireFinite("chirp", "amplitude", input.amplitude));
+  POLYEST_RETURN_IF_ERROR(
+      RequireNonnegative("chirp", "startFrequencyHz", input.start_frequency_hz));
+  POLYEST_RETURN_IF_ERROR(RequireNonnegative("chirp", "endFrequencyHz", input.end_frequency_hz));
+  POLYEST_RETURN_IF_ERROR(RequireFinite("chirp", "startS", input.start_s));
+  POLYEST_RETURN_IF_ERROR(RequirePositive("chirp", "durationS", input.duration_s));
+  return RequireFinite("chirp", "phaseRad", input.phase_rad);
+}
+
+absl::Status Validate(const HalfSineBumpInput& input) {
+  POLYEST_RETURN_IF_ERROR(RequireFinite("halfSineBump", "amplitude", input.amplitude));
+  POLYEST_RETURN_IF_ERROR(RequireFinite("halfSineBump", "startS", input.start_s));
+  return RequirePositive("halfSineBump", "durationS", input.duration_s);
+}
+
+absl::Status Validate(const TableInput& input) {
+  POLYEST_RETURN_IF_ERROR(RequireFinite("table", "amplitude", input.amplitude));
+  if (input.time_s.size() != input.value.size()) {
+    return absl::InvalidArgumentError(absl::StrCat("table: timeS has ", input.time_s.size(),
+                                                   " entries and value ", input.value.size(),
+                                                   "; they must be equally many"));
+  }
+  if (input.time_s.empty()) {
+    return absl::InvalidArgumentError("table: timeS has 0 entries; there must be at least 1");
+  }
+  for (size_t i = 0; i < input.time_s.size(); ++i) {
+    POLYEST_RETURN_IF_ERROR(
+        RequireFinite("table", absl::StrCat("timeS[", i, "]"), input.time_s[i]));
+    POLYEST_RETURN_IF_ERROR(RequireFinite("table", absl::StrCat("value[", i, "]"), input.value[i]));
+    if (i > 0 && !(input.time_s[i] > input.time_s[i - 1])) {
+      return Violation("table", absl::StrCat("timeS[", i, "]"), input.time_s[i],
+                       absl::StrCat("above timeS[", i - 1, "] ", input.time_s[i - 1]));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Validate(const StreamedInput& input) {
+  return RequireFinite("streamed", "amplitude", input.amplitude);
+}
+
+// The closed-form shapes. Each is 0 from its end on: there the value from the right is wanted.
+
+double ClosedForm(const ConstantInput&, double) { return 1; }
+
+double ClosedForm(const StepInput& input, double time_s) { return time_s < input.time_s ? 0 : 1; }
+
+double ClosedForm(const SinusoidInput& input, double time_s) {
+  // sin(2π f t + phase)
+  return std::sin(2 * kPi * input.frequency_hz * time_s + input.phase_rad);
+}
+
+double ClosedForm(const ChirpInput& input, double time_s) {
+  if (time_s < input.start_s || time_s >= input.start_s + input.duration_s) return 0;
+  const double tau = time_s - input.start_s;
+  const double sweep_hz = input.end_frequency_hz - input.start_frequency_hz;
+  // sin(2π (f0 τ + (f1 − f0) τ²/(2 T)) + phase)
+  const double cycles = (input.start_frequency_hz + sweep_hz * tau / (2 * input.duration_s)) * tau;
+  return std::sin(2 * kPi * cycles + input.phase_rad);
+}
+
+double ClosedForm(const HalfSineBumpInput& input, double time_s) {
+  if (time_s < input.start_s || time_s >= input.start_s + input.duration_s) return 0;
+  // sin(π (t − start)/T)
+  return std::sin(kPi * (time_s - input.start_s) / input.duration_s);
+}
+
+double FirstAfter(double time_s, double first, double second) {
+  if (time_s < first) return first;
+  return time_s < second ? second : kInfinity;
+}
+
+double ClosedFormBreak(const ConstantInput&, double) { return kInfinity; }
+
+double ClosedFormBreak(const StepInput& input, double time_s) {
+  return FirstAfter(time_s, input.time_s, kInfinity);
+}
+
+double ClosedFormBreak(const SinusoidInput&, double) { return kInfinity; }
+
+double ClosedFormBreak(const ChirpInput& input, double time_s) {
+  return FirstAfter(time_s, input.start_s, input.start_s + input.duration_s);
+}
+
+double ClosedFormBreak(const HalfSineBumpInput& input, double time_s) {
+  return FirstAfter(time_s, input.start_s, input.start_s + input.duration_s);
+}
+
+template <class Input>
+constexpr bool kHasKnots =
+    std::is_same_v<Input, TableInput> || std::is_same_v<Input, StreamedInput>;
+
+}  // namespace
+
+absl::StatusOr<InputSignal> InputSignal::Make(InputSpecification specification) {
+  POLYEST_RETURN_IF_ERROR(
+      std::visit([](const auto& input) { return Validate(input); }, specification));
+  return InputSignal(std::move(specification));
+}
+
+InputSignal::InputSignal(InputSpecification specification)
+    : specification_(std::move(specification)) {
+  if (auto* table = std::get_if<TableInput>(&specification_)) {
+    knot_time_s_ = std::move(table->time_s);
+    knot_value_ = std::move(table->value);
+  }
+}
+
+double InputSignal::default_amplitude() const {
+  return std::visit([](const auto& input) { return input.amplitude; }, specification_);
+}
+
+bool InputSignal::streamed() const { return std::holds_alternative<StreamedInput>(specification_); }
+
+void InputSignal::Append(double time_s, double value) {
+  POLYEST_CHECK(streamed());
+  POLYEST_CHECK(std::isfinite(time_s) && std::isfinite(value));
+  POLYEST_CHECK(knot_time_s_.empty() || time_s > knot_time_s_.back());
+  knot_time_s_.push_back(time_s);
+  knot_value_.push_back(value);
+}
+
+void InputSignal::Clear() {
+  POLYEST_CHECK(streamed());
+  knot_time_s_.clear();
+  knot_value_.clear();
+}
+
+double InputSignal::Shape(double time_s) const {
+  return std::visit(
+      [&]<class Input>(const Input& input) {
+        if constexpr (kHasKnots<Input>) {
+          return BetweenKnots(time_s, input.hold);
+        } else {
+          return ClosedForm(input, time_s);
+        }
+      },
+      specification_);
+}
+
+double InputSignal::NextBreak(double time_s) const {
+  return std::visit(
+      [&]<class Input>(const Input& input) {
+        if constexpr (kHasKnots<Input>) {
+          const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
+          return next == knot_time_s_.end() ? kInfinity : *next;
+        } else {
+          return ClosedFormBreak(input, time_s);
+        }
+      },
+      specification_);
+}
+
+bool InputSignal::Jumps() const {
+  return std::visit(
+      []<class Input>(const Input& input) {
+        if constexpr (kHasKnots<Input>) {
+          return input.hold;
+        } else {
+          // A chirp ends, and with a phase also begins, in the middle of a swing.
+          return std::is_same_v<Input, StepInput> || std::is_same_v<Input, ChirpInput>;
+        }
+      },
+      specification_);
+}
+
+double InputSignal::BetweenKnots(double time_s, bool hold) const {
+  if (knot_time_s_.empty()) return 0;
+  const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
+  if (next == knot_time_s_.begin()) return knot_value_.front();
+  const size_t right = static_cast<size_t>(next - knot_time_s_.begin());
+  const size_t left = right - 1;
+  if (hold || right == knot_time_s_.size()) return knot_value_[left];
+  // u_l + (u_r − u_l) (t − t_l)/(t_r − t_l)
+  const double fraction =
+      (time_s - knot_time_s_[left]) / (knot_time_s_[right] - knot_time_s_[left]);
+  return std::lerp(knot_value_[left], knot_value_[right], fraction);
+}
+
+}  // namespace polyest

@@ -14,10 +14,20 @@
 namespace polyest {
 
 // Every shape's amplitude multiplies it; for a table or a streamed input it defaults to 1.
-struct ConstantInput { double amplitude = 0; };
-struct StepInput { double amplitude = 1; double time_s = 0; };  // 0 before time_s, amplitude from then on
-struct SinusoidInput { double amplitude = 1; double frequency_hz = 1; double phase_rad = 0; };  // amplitude · sin(2π f t + phase)
-// amplitude · sin(2π (f0 τ + (f1 − f0) τ²/(2 T)) + phase), τ = t − start_s, for 0 ≤ τ ≤ T, else 0.
+struct ConstantInput {
+  double amplitude = 0;
+};
+struct StepInput {
+  double amplitude = 1;
+  double time_s = 0;
+};  // 0 before time_s, amplitude from then on
+struct SinusoidInput {
+  double amplitude = 1;
+  double frequency_hz = 1;
+  double phase_rad = 0;
+};  // amplitude · sin(2π f t + phase)
+// amplitude · sin(2π (f0 τ + (f1 − f0) τ²/(2 T)) + phase), τ = t − start_s, for 0 ≤ τ < T, else 0;
+// frequencies ≥ 0.
 struct ChirpInput {
   double amplitude = 1;
   double start_frequency_hz = 0.1;
@@ -26,39 +36,56 @@ struct ChirpInput {
   double duration_s = 10;
   double phase_rad = 0;
 };
-struct HalfSineBumpInput { double amplitude = 1; double start_s = 0; double duration_s = 1; };
+// amplitude · sin(π τ/T), τ = t − start_s, for 0 ≤ τ < T, else 0.
+struct HalfSineBumpInput {
+  double amplitude = 1;
+  double start_s = 0;
+  double duration_s = 1;
+};
 // Knots in strictly increasing time; linear between them (or held), the end values outside.
-struct TableInput { std::vector<double> time_s; std::vector<double> value; bool hold = false; double amplitude = 1; };
+struct TableInput {
+  std::vector<double> time_s;
+  std::vector<double> value;
+  bool hold = false;
+  double amplitude = 1;
+};
 // Values that come with the data; see Append.
-struct StreamedInput { bool hold = false; double amplitude = 1; };
+struct StreamedInput {
+  bool hold = false;
+  double amplitude = 1;
+};
 
 using InputSpecification = std::variant<ConstantInput, StepInput, SinusoidInput, ChirpInput,
                                         HalfSineBumpInput, TableInput, StreamedInput>;
 
 class InputSignal {
  public:
-  // INVALID_ARGUMENT names the field, the value and the rule.
+  // INVALID_ARGUMENT names the field as in a problem file, the value and the rule:
+  // "sinusoid: frequencyHz 0 must be finite and above 0".
   static absl::StatusOr<InputSignal> Make(InputSpecification specification);
 
   double default_amplitude() const;
   bool streamed() const;
-  // A streamed signal's next knot; times strictly increase within a run.
+  // A streamed signal's next knot: finite, times strictly increasing within a run; amortized O(1).
   void Append(double time_s, double value);
   // Forgets the knots of a streamed signal: a new run begins.
   void Clear();
 
   // shape(t). A streamed signal is its first value before its first knot and its last value after
-  // its last; at a jump (step, held knot) the value from the right.
+  // its last, and 0 while it has none. At a jump (step, held knot, end of a chirp) it is the value
+  // from the right; the one from the left is Shape(std::nextafter(break, −∞)).
   double Shape(double time_s) const;
   // The first time strictly after time_s at which shape or its derivative jumps; +∞ if none.
   double NextBreak(double time_s) const;
-  // Whether shape itself jumps at its breaks (step, hold, constant with jumps), so that an
+  // Whether shape itself jumps at its breaks (step, chirp, hold), so that an
   // integrator must also forget the derivative it kept from before.
   bool Jumps() const;
 
  private:
   explicit InputSignal(InputSpecification specification);
-  InputSpecification specification_;
+  double BetweenKnots(double time_s, bool hold) const;
+
+  InputSpecification specification_;  // a table's knots are moved out of it
   std::vector<double> knot_time_s_;
   std::vector<double> knot_value_;
 };

@@ -18,8 +18,8 @@ namespace polyest {
 
 struct Quantity {
   std::string name;
-  std::string unit;     // SI, as in "N/m"; "1" for a plain number
-  std::string meaning;  // one line
+  std::string unit;          // SI, as in "N/m"; "1" for a plain number
+  std::string meaning;       // one line
   double default_value = 0;  // of a parameter; unused for states, inputs, outputs
 };
 
@@ -37,6 +37,10 @@ struct ModelDescription {
   std::optional<int> FindInput(std::string_view input) const;
   std::optional<int> FindOutput(std::string_view output) const;
 };
+
+// The names in order, comma-separated, for messages that list what there is: "m, c, k, x0, v0", or
+// "none".
+std::string ListNames(const std::vector<Quantity>& quantities);
 
 // Blocks have one row a point and one column a quantity, in the description's order; the number of
 // rows is a multiple of kLanes. A model keeps no state between calls and may be used by several

@@ -1,0 +1,119 @@
+#pragma once
+
+// A model whose equations are written once, over a scalar type Real, and evaluated kLanes points
+// at a time with every quantity of the chunk in registers.
+//
+// `Equations` has
+//
+//   static constexpr int kStates, kParameters, kInputs, kOutputs;
+//   static ModelDescription Describe();          // sizes as above, same order
+//   template <class Real> static void
+//     Initial(const std::array<Real, kParameters>&, std::array<Real, kStates>& states);
+//   template <class Real> static void
+//     Derivatives(double time_s, const std::array<Real, kStates>&,
+//                 const std::array<Real, kParameters>&, const std::array<Real, kInputs>&,
+//                 std::array<Real, kStates>& derivatives);
+//   template <class Real> static void
+//     Outputs(double time_s, …the same…, std::array<Real, kOutputs>& outputs);
+//
+// Real is Lane here; double gives the value at a single point. An algebraic model (kStates = 0)
+// leaves out Initial and Derivatives. Locals are declared `const Real`, never `auto`: that would
+// keep an unevaluated Eigen expression. Each column of a block is contiguous.
+
+#include <array>
+
+#include "core/common/check.h"
+#include "core/common/types.h"
+#include "core/model/lane.h"
+#include "core/model/model.h"
+
+namespace polyest {
+
+template <class Equations>
+class LaneModel final : public Model {
+ public:
+  LaneModel() : description_(Equations::Describe()) {
+    POLYEST_CHECK(description_.states.size() == Equations::kStates);
+    POLYEST_CHECK(description_.parameters.size() == Equations::kParameters);
+    POLYEST_CHECK(description_.inputs.size() == Equations::kInputs);
+    POLYEST_CHECK(description_.outputs.size() == Equations::kOutputs);
+  }
+
+  const ModelDescription& description() const override { return description_; }
+
+  void InitialStates(const ConstBlock& parameters, Block states) const override {
+    if constexpr (Equations::kStates > 0) {
+      CheckShape(states, parameters.rows(), Equations::kStates);
+      ForEachChunk(parameters, [&](Eigen::Index row) {
+        std::array<Lane, Equations::kStates> x;
+        Equations::Initial(Load<Equations::kParameters>(parameters, row), x);
+        Store(x, row, states);
+      });
+    }
+  }
+
+  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                   const ConstBlock& inputs, Block derivatives) const override {
+    if constexpr (Equations::kStates > 0) {
+      CheckShape(states, parameters.rows(), Equations::kStates);
+      CheckShape(inputs, parameters.rows(), Equations::kInputs);
+      CheckShape(derivatives, parameters.rows(), Equations::kStates);
+      ForEachChunk(parameters, [&](Eigen::Index row) {
+        std::array<Lane, Equations::kStates> dx;
+        Equations::Derivatives(time_s, Load<Equations::kStates>(states, row),
+                               Load<Equations::kParameters>(parameters, row),
+                               Load<Equations::kInputs>(inputs, row), dx);
+        Store(dx, row, derivatives);
+      });
+    }
+  }
+
+  void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+               const ConstBlock& inputs, Block outputs) const override {
+    CheckShape(states, parameters.rows(), Equations::kStates);
+    CheckShape(inputs, parameters.rows(), Equations::kInputs);
+    CheckShape(outputs, parameters.rows(), Equations::kOutputs);
+    ForEachChunk(parameters, [&](Eigen::Index row) {
+      std::array<Lane, Equations::kOutputs> y;
+      Equations::Outputs(time_s, Load<Equations::kStates>(states, row),
+                         Load<Equations::kParameters>(parameters, row),
+                         Load<Equations::kInputs>(inputs, row), y);
+      Store(y, row, outputs);
+    });
+  }
+
+ private:
+  // A block without columns may have any number of rows: nothing of it is read.
+  template <class AnyBlock>
+  static void CheckShape(const AnyBlock& block, Eigen::Index rows, int columns) {
+    POLYEST_CHECK(block.cols() == columns && (columns == 0 || block.rows() == rows));
+  }
+
+  template <class Chunk>
+  static void ForEachChunk(const ConstBlock& parameters, Chunk chunk) {
+    POLYEST_CHECK(parameters.cols() == Equations::kParameters);
+    POLYEST_CHECK(parameters.rows() % kLanes == 0);
+    for (Eigen::Index row = 0; row < parameters.rows(); row += kLanes) chunk(row);
+  }
+
+  template <int kColumns>
+  static std::array<Lane, kColumns> Load(const ConstBlock& block, Eigen::Index row) {
+    std::array<Lane, kColumns> lanes;
+    for (int j = 0; j < kColumns; ++j) {
+      lanes[j] = Eigen::Map<const Lane>(block.data() + j * block.outerStride() + row);
+    }
+    return lanes;
+  }
+
+  template <size_t kColumns>
+  static void Store(const std::array<Lane, kColumns>& lanes, Eigen::Index row, Block& block) {
+    for (size_t j = 0; j < kColumns; ++j) {
+      const auto column = static_cast<Eigen::Index>(j);
+      Eigen::Map<Lane>(block.data() + column * block.outerStride() + row) = lanes[j];
+    }
+  }
+
+  ModelDescription description_;
+};
+
+}  // namespace polyest
