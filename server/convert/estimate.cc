@@ -1,0 +1,117 @@
+#include "server/convert/estimate.h"
+
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+v1::Identifiability::Verdict ToProto(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kIdentified:
+      return v1::Identifiability::IDENTIFIED;
+    case Verdict::kWeak:
+      return v1::Identifiability::WEAK;
+    case Verdict::kNotIdentified:
+      return v1::Identifiability::NOT_IDENTIFIED;
+  }
+  POLYEST_CHECK(false);
+}
+
+v1::Diagnostic::Code ToProto(DiagnosticCode code) {
+  switch (code) {
+    case DiagnosticCode::kNotIdentified:
+      return v1::Diagnostic::NOT_IDENTIFIED;
+    case DiagnosticCode::kUndersampled:
+      return v1::Diagnostic::UNDERSAMPLED;
+    case DiagnosticCode::kExpansionInaccurate:
+      return v1::Diagnostic::EXPANSION_INACCURATE;
+    case DiagnosticCode::kModelMisfit:
+      return v1::Diagnostic::MODEL_MISFIT;
+    case DiagnosticCode::kAtPriorBound:
+      return v1::Diagnostic::AT_PRIOR_BOUND;
+    case DiagnosticCode::kMultipleMinima:
+      return v1::Diagnostic::MULTIPLE_MINIMA;
+    case DiagnosticCode::kNotConverged:
+      return v1::Diagnostic::NOT_CONVERGED;
+    case DiagnosticCode::kPointsFailed:
+      return v1::Diagnostic::POINTS_FAILED;
+  }
+  POLYEST_CHECK(false);
+}
+
+void ToProto(const ParameterEstimate& parameter, v1::ParameterEstimate& proto) {
+  proto.set_name(parameter.name);
+  proto.set_unit(parameter.unit);
+  proto.set_map(parameter.map);
+  proto.set_std_dev(parameter.std_dev);
+  proto.set_mean(parameter.mean);
+  proto.set_lower95(parameter.lower95);
+  proto.set_upper95(parameter.upper95);
+  proto.set_prior_mean(parameter.prior_mean);
+  proto.set_prior_std_dev(parameter.prior_std_dev);
+  proto.set_contraction(parameter.contraction);
+  proto.set_verdict(ToProto(parameter.verdict));
+}
+
+void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {
+  proto.set_output(channel.output);
+  proto.set_samples(channel.samples);
+  proto.set_chi_squared(channel.chi_squared);
+  proto.set_noise_std_dev(channel.noise_std_dev);
+}
+
+void ToProto(const ExpansionSummary& expansion, v1::ExpansionSummary& proto) {
+  proto.set_order(expansion.order);
+  proto.set_terms(expansion.terms);
+  proto.set_points(expansion.points);
+  proto.set_residual_to_noise(expansion.residual_to_noise);
+  proto.set_reexpansions(expansion.reexpansions);
+  proto.set_trajectories(expansion.trajectories);
+}
+
+// A direction's coefficients are over the estimate's parameters, by name.
+void AddDirections(const Estimate& estimate, v1::Estimate& proto) {
+  for (const Direction& direction : estimate.directions) {
+    v1::Direction& added = *proto.add_directions();
+    added.set_information(direction.information);
+    added.set_verdict(ToProto(direction.verdict));
+    for (size_t i = 0; i < estimate.parameters.size(); ++i) {
+      (*added.mutable_coefficients())[estimate.parameters[i].name] =
+          direction.coefficients[static_cast<Eigen::Index>(i)];
+    }
+  }
+}
+
+}  // namespace
+
+v1::Diagnostic ToProto(const Diagnostic& diagnostic) {
+  v1::Diagnostic proto;
+  proto.set_code(ToProto(diagnostic.code));
+  proto.set_message(diagnostic.message);
+  return proto;
+}
+
+v1::Estimate ToProto(const Estimate& estimate) {
+  v1::Estimate proto;
+  for (const auto& parameter : estimate.parameters) ToProto(parameter, *proto.add_parameters());
+  for (Eigen::Index row = 0; row < estimate.covariance.rows(); ++row) {
+    for (Eigen::Index column = 0; column < estimate.covariance.cols(); ++column) {
+      proto.add_covariance(estimate.covariance(row, column));
+    }
+  }
+  proto.mutable_cost()->set_total(estimate.cost.total);
+  proto.mutable_cost()->set_mismatch(estimate.cost.mismatch);
+  proto.mutable_cost()->set_prior(estimate.cost.prior);
+  for (const auto& channel : estimate.channels) ToProto(channel, *proto.add_channels());
+  AddDirections(estimate, proto);
+  ToProto(estimate.expansion, *proto.mutable_expansion());
+  for (const auto& diagnostic : estimate.diagnostics) {
+    *proto.add_diagnostics() = ToProto(diagnostic);
+  }
+  proto.set_time(estimate.time_s);
+  proto.set_samples(estimate.samples);
+  proto.set_regularization(estimate.regularization);
+  return proto;
+}
+
+}  // namespace polyest

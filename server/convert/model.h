@@ -1,0 +1,11 @@
+#pragma once
+
+#include "core/model/model.h"
+#include "polyest/v1/estimation_service.pb.h"
+
+namespace polyest {
+
+// Named `models/{name}`.
+v1::Model ToProto(const ModelDescription& description);
+
+}  // namespace polyest

@@ -1,0 +1,229 @@
+#include "server/convert/problem.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
+#include <absl/strings/strip.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/common/status.h"
+#include "core/model/catalogue.h"
+#include "server/convert/annotate.h"
+
+namespace polyest {
+namespace {
+
+absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem) {
+  switch (problem.model().source_case()) {
+    case v1::Problem::Model::kBuiltin: {
+      auto model = FindBuiltinModel(problem.model().builtin());
+      // A name that does not exist is here a wrong field of the request, not a missing resource.
+      if (!model.ok()) return InvalidField("model.builtin", model.status().message());
+      return model;
+    }
+    case v1::Problem::Model::SOURCE_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(
+      "model: a model must be named, as in {\"builtin\": \"duffing\"}");
+}
+
+// The prior, and the name of its family for a message.
+std::pair<absl::StatusOr<UncertainParameter>, const char*> ToPrior(
+    const v1::UncertainParameter& parameter) {
+  const std::string& name = parameter.name();
+  switch (parameter.prior_case()) {
+    case v1::UncertainParameter::kUniform: {
+      const auto& prior = parameter.uniform();
+      return {UncertainParameter::Uniform(name, prior.lower(), prior.upper()), "uniform"};
+    }
+    case v1::UncertainParameter::kNormal: {
+      const auto& prior = parameter.normal();
+      return {UncertainParameter::Normal(name, prior.mean(), prior.std_dev()), "normal"};
+    }
+    case v1::UncertainParameter::kBeta: {
+      const auto& prior = parameter.beta();
+      return {
+          UncertainParameter::Beta(name, prior.alpha(), prior.beta(), prior.lower(), prior.upper()),
+          "beta"};
+    }
+    case v1::UncertainParameter::kGamma: {
+      const auto& prior = parameter.gamma();
+      return {UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift()),
+              "gamma"};
+    }
+    case v1::UncertainParameter::PRIOR_NOT_SET:
+      break;
+  }
+  return {absl::InvalidArgumentError(absl::StrFormat(
+              "%s needs a prior: uniform, normal, beta or gamma", name.empty() ? "it" : name)),
+          ""};
+}
+
+// The core names a parameter by its name; a file's reader also wants its place.
+absl::Status AtPlace(int index, const char* family, const std::string& name,
+                     const absl::Status& status) {
+  absl::string_view rule = status.message();
+  absl::ConsumePrefix(&rule, absl::StrCat("uncertain ", name, ": "));
+  absl::ConsumePrefix(&rule, "uncertain: ");
+  if (absl::ConsumePrefix(&rule, absl::StrCat(family, ": "))) {
+    return InvalidField(absl::StrFormat("uncertain[%d].%s", index, family), rule);
+  }
+  return InvalidField(absl::StrFormat("uncertain[%d]", index), rule);
+}
+
+absl::StatusOr<std::vector<UncertainParameter>> ToUncertain(const v1::Problem& problem) {
+  std::vector<UncertainParameter> uncertain;
+  for (int i = 0; i < problem.uncertain_size(); ++i) {
+    auto [parameter, family] = ToPrior(problem.uncertain(i));
+    if (!parameter.ok()) {
+      return AtPlace(i, family, problem.uncertain(i).name(), parameter.status());
+    }
+    uncertain.push_back(*std::move(parameter));
+  }
+  return uncertain;
+}
+
+TableInput ToTable(const v1::Input::Table& table) {
+  return {.time_s = {table.time_s().begin(), table.time_s().end()},
+          .value = {table.value().begin(), table.value().end()},
+          .hold = table.hold(),
+          .amplitude = table.has_amplitude() ? table.amplitude() : 1};
+}
+
+ChirpInput ToChirp(const v1::Input::Chirp& chirp) {
+  return {.amplitude = chirp.amplitude(),
+          .start_frequency_hz = chirp.start_frequency_hz(),
+          .end_frequency_hz = chirp.end_frequency_hz(),
+          .start_s = chirp.start_s(),
+          .duration_s = chirp.duration_s(),
+          .phase_rad = chirp.phase_rad()};
+}
+
+absl::StatusOr<InputSpecification> ToSignal(const v1::Input& input) {
+  switch (input.signal_case()) {
+    case v1::Input::kConstant:
+      return ConstantInput{input.constant().amplitude()};
+    case v1::Input::kStep:
+      return StepInput{input.step().amplitude(), input.step().time_s()};
+    case v1::Input::kSinusoid: {
+      const auto& sinusoid = input.sinusoid();
+      return SinusoidInput{sinusoid.amplitude(), sinusoid.frequency_hz(), sinusoid.phase_rad()};
+    }
+    case v1::Input::kChirp:
+      return ToChirp(input.chirp());
+    case v1::Input::kHalfSineBump: {
+      const auto& bump = input.half_sine_bump();
+      return HalfSineBumpInput{bump.amplitude(), bump.start_s(), bump.duration_s()};
+    }
+    case v1::Input::kTable:
+      return ToTable(input.table());
+    case v1::Input::kStreamed: {
+      const auto& streamed = input.streamed();
+      return StreamedInput{streamed.hold(), streamed.has_amplitude() ? streamed.amplitude() : 1};
+    }
+    case v1::Input::SIGNAL_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s needs a signal: constant, step, sinusoid, chirp, halfSineBump, table or streamed",
+      input.name().empty() ? "it" : input.name()));
+}
+
+absl::StatusOr<std::vector<NamedInput>> ToInputs(const v1::Problem& problem) {
+  std::vector<NamedInput> inputs;
+  for (int i = 0; i < problem.inputs_size(); ++i) {
+    auto signal = ToSignal(problem.inputs(i));
+    if (!signal.ok()) {
+      return InvalidField(absl::StrFormat("inputs[%d]", i), signal.status().message());
+    }
+    inputs.push_back({problem.inputs(i).name(), *std::move(signal)});
+  }
+  return inputs;
+}
+
+std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem) {
+  std::vector<MeasuredOutput> measured;
+  for (const v1::MeasuredOutput& output : problem.measured()) {
+    const auto& noise = output.noise();
+    measured.push_back(
+        {output.output(), {noise.absolute(), noise.relative(), noise.relative_to_max()}});
+  }
+  return measured;
+}
+
+absl::StatusOr<ExpansionOptions> ToExpansion(const v1::ExpansionOptions& given) {
+  ExpansionOptions options;
+  if (given.order() != 0) options.order = given.order();
+  if (given.points_per_term() != 0) options.points_per_term = given.points_per_term();
+  if (given.has_adaptive()) options.adaptive = given.adaptive();
+  switch (given.points()) {
+    case v1::ExpansionOptions::POINTS_UNSPECIFIED:
+      return options;
+    case v1::ExpansionOptions::HALTON:
+      options.points = PointSet::kHalton;
+      return options;
+    case v1::ExpansionOptions::HAMMERSLEY:
+      options.points = PointSet::kHammersley;
+      return options;
+    case v1::ExpansionOptions::GAUSS_TENSOR:
+      options.points = PointSet::kGaussTensor;
+      return options;
+    default:
+      return UnknownEnumerator("expansion.points", given.points());
+  }
+}
+
+absl::StatusOr<IntegrationOptions> ToIntegration(const v1::IntegrationOptions& given) {
+  IntegrationOptions options;
+  if (given.has_relative_tolerance()) options.relative_tolerance = given.relative_tolerance();
+  if (given.has_max_steps()) options.most_steps = given.max_steps();
+  switch (given.method()) {
+    case v1::IntegrationOptions::METHOD_UNSPECIFIED:
+    case v1::IntegrationOptions::AUTO:
+      options.method = IntegrationMethod::kAuto;
+      return options;
+    case v1::IntegrationOptions::EXPLICIT:
+      options.method = IntegrationMethod::kExplicit;
+      return options;
+    case v1::IntegrationOptions::STIFF:
+      options.method = IntegrationMethod::kStiff;
+      return options;
+    default:
+      return UnknownEnumerator("integration.method", given.method());
+  }
+}
+
+absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::RegularizationMode mode) {
+  switch (mode) {
+    case v1::Problem::REGULARIZATION_MODE_UNSPECIFIED:
+    case v1::Problem::FIXED:
+      return RegularizationMode::kFixed;
+    case v1::Problem::L_CURVE:
+      return RegularizationMode::kLCurve;
+    default:
+      return UnknownEnumerator("regularizationMode", mode);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given) {
+  Problem problem;
+  POLYEST_ASSIGN_OR_RETURN(problem.model, ToModel(given));
+  problem.fixed = {given.fixed().begin(), given.fixed().end()};
+  POLYEST_ASSIGN_OR_RETURN(problem.uncertain, ToUncertain(given));
+  POLYEST_ASSIGN_OR_RETURN(problem.inputs, ToInputs(given));
+  problem.measured = ToMeasured(given);
+  POLYEST_ASSIGN_OR_RETURN(problem.expansion, ToExpansion(given.expansion()));
+  if (given.has_regularization()) problem.regularization = given.regularization();
+  POLYEST_ASSIGN_OR_RETURN(problem.regularization_mode,
+                           ToRegularizationMode(given.regularization_mode()));
+  POLYEST_ASSIGN_OR_RETURN(problem.integration, ToIntegration(given.integration()));
+  return ResolvedProblem::Make(std::move(problem));
+}
+
+}  // namespace polyest

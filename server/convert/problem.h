@@ -1,0 +1,16 @@
+#pragma once
+
+// A problem off the wire, or out of a problem file, as the core understands it.
+
+#include <absl/status/statusor.h>
+
+#include "core/estimator/problem.h"
+#include "polyest/v1/problem.pb.h"
+
+namespace polyest {
+
+// Fields left out take the defaults that problem.proto names. A message on failure starts with the
+// field's path in the problem file, as in "uncertain[0].uniform: lower 5 must be below upper 3".
+absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem);
+
+}  // namespace polyest

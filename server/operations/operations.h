@@ -1,0 +1,24 @@
+#pragma once
+
+// Every operation that needs no session, without any transport: the daemon's services and the
+// command line's --local both call these, so that their answers agree to the last digit.
+
+#include <absl/status/statusor.h>
+
+#include "core/common/stop.h"
+#include "polyest/v1/estimation_service.pb.h"
+
+namespace polyest {
+
+// threads is for propagation; answers do not depend on it.
+absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
+                                                 const Stop& stop);
+absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& request, int threads,
+                                                   const Stop& stop);
+absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostRequest& request,
+                                                         int threads, const Stop& stop);
+
+absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request);
+absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request);
+
+}  // namespace polyest
