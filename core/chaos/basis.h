@@ -2,6 +2,13 @@
 
 // The orthonormal polynomial basis (2) of total degree p in n independent germs,
 //   φ_s(ξ) = Π_k P^(k)_{j_sk}(ξ_k),   ∫ φ_s φ_r ρ dξ = δ_sr,   φ_0 = 1.
+//
+// The orthonormal polynomials of one germ follow from its monic recurrence, a_j and b_j, by
+//   √b_{j+1} P_{j+1}(ξ) = (ξ − a_j) P_j(ξ) − √b_j P_{j−1}(ξ),   P_0 = 1.
+// They are themselves terms of the basis, and every other term is the product of two earlier ones:
+// with k the last variable that occurs in φ_s,
+//   φ_s = φ_parent(s) · P^(k)_{j_sk}(ξ_k),   parent(s) = s without its variable k,
+// so that all S values cost one multiplication each and need no memory beside the result.
 
 #include <vector>
 
@@ -21,20 +28,35 @@ class Basis {
   const std::vector<Germ>& germs() const { return germs_; }
   const Eigen::ArrayXXi& indices() const { return indices_; }
 
-  // φ(ξ): xi is n, phi is S. Does not allocate beyond a small stack buffer.
+  // φ(ξ): xi is n, phi is S. Does not allocate.
   void Evaluate(const ConstVectorRef& xi, VectorRef phi) const;
-  // φ and ∂φ: gradient is S × n.
+  // φ and ∂φ: gradient is S × n. Does not allocate.
   void EvaluateWithGradient(const ConstVectorRef& xi, VectorRef phi, MatrixRef gradient) const;
   // Σ_s weights_s ∇²φ_s(ξ): n × n, symmetric.
   Matrix WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& weights) const;
-  // φ at W points at once: points is W × n, values is W × S (resized). Vectorized over the points.
+  // φ at W points at once: points is W × n, values is W × S (resized, which allocates only when its
+  // size changes). Vectorized over the points.
   void EvaluateMany(const ConstMatrixRef& points, Matrix& values) const;
 
  private:
+  // How term s follows from earlier terms.
+  struct Term {
+    int variable;  // k, the last that occurs in it
+    int degree;    // j_sk
+    int parent;    // the term without k; 0, the constant, for a polynomial of one germ alone
+    int single;    // the term P^(k)_{j_sk}; s itself when parent is 0
+    int previous;  // for such a term: P^(k) of one degree less,
+    int second;    // and of two less (−1 for degree 1)
+  };
+
+  void FindTerms();
+
   std::vector<Germ> germs_;
   int order_;
   Eigen::ArrayXXi indices_;
-  std::vector<RecurrenceCoefficients> recurrences_;
+  std::vector<Term> terms_;  // of terms 1 … S − 1
+  Matrix a_;                 // a_j of germ k, (p + 1) × n
+  Matrix sqrt_b_;            // √b_j of germ k, (p + 1) × n
 };
 
 }  // namespace polyest

@@ -33,8 +33,8 @@ class CollocationMatrix {
   CollocationMatrix() = default;
 
   Matrix matrix_;
-  Matrix thin_q_;           // Q × S
-  Matrix triangular_;       // S × S, upper
+  Matrix thin_q_;      // Q × S
+  Matrix triangular_;  // S × S, upper
   Eigen::VectorXi permutation_;
   Matrix workspace_;
   double condition_ = 0;

@@ -1,1 +1,118 @@
-// To be written.
+#include "core/chaos/collocation_points.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/chaos/gauss_rule.h"
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+std::vector<int> FirstPrimes(int count) {
+  std::vector<int> primes;
+  for (int candidate = 2; static_cast<int>(primes.size()) < count; ++candidate) {
+    bool is_prime = true;
+    for (const int prime : primes) {
+      if (prime * prime > candidate) break;
+      if (candidate % prime == 0) {
+        is_prime = false;
+        break;
+      }
+    }
+    if (is_prime) primes.push_back(candidate);
+  }
+  return primes;
+}
+
+// Faure's (1992) permutation of the digits 0 … base − 1, which fixes 0.
+std::vector<int> DigitPermutation(int base) {
+  if (base == 2) return {0, 1};
+  std::vector<int> permutation;
+  if (base % 2 == 0) {
+    const std::vector<int> half = DigitPermutation(base / 2);
+    for (const int digit : half) permutation.push_back(2 * digit);
+    for (const int digit : half) permutation.push_back(2 * digit + 1);
+    return permutation;
+  }
+  const int middle = (base - 1) / 2;
+  permutation = DigitPermutation(base - 1);
+  for (int& digit : permutation) digit += digit >= middle ? 1 : 0;
+  permutation.insert(permutation.begin() + middle, middle);
+  return permutation;
+}
+
+std::vector<int> Digits(int base, bool scrambled) {
+  if (scrambled) return DigitPermutation(base);
+  std::vector<int> digits;
+  for (int digit = 0; digit < base; ++digit) digits.push_back(digit);
+  return digits;
+}
+
+// Σ_i σ(d_i) base^(−i−1) for index = Σ_i d_i base^i; σ(0) = 0.
+double RadicalInverse(int64_t index, int base, const std::vector<int>& digits) {
+  double value = 0, weight = 1;
+  for (; index > 0; index /= base) {
+    weight /= base;
+    value += weight * digits[static_cast<size_t>(index % base)];
+  }
+  return value;
+}
+
+constexpr int kPlainDimensions = 3;
+
+absl::StatusOr<Matrix> GaussTensor(const std::vector<Germ>& germs, int order, int most_points) {
+  const Eigen::Index side = order + 1, n = static_cast<Eigen::Index>(germs.size());
+  Eigen::Index count = 1;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (count > most_points / side) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("expansion.points: a Gauss tensor grid of order ", order, " in ", n,
+                       " uncertain quantities has ", side, "^", n, " points, more than the limit ",
+                       most_points, "; use HALTON"));
+    }
+    count *= side;
+  }
+  Matrix points(count, n);
+  Eigen::Index repeat = count;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Vector nodes = MakeGaussRule(germs[static_cast<size_t>(k)], order + 1).nodes;
+    repeat /= side;  // the last germ varies fastest
+    for (Eigen::Index q = 0; q < count; ++q) points(q, k) = nodes[q / repeat % side];
+  }
+  return points;
+}
+
+}  // namespace
+
+Matrix UnitCubePoints(PointSet set, int dimension, int count) {
+  POLYEST_CHECK(set != PointSet::kGaussTensor && dimension >= 1 && count >= 0);
+  const std::vector<int> primes = FirstPrimes(dimension);
+  Matrix points(count, dimension);
+  int column = 0;
+  if (set == PointSet::kHammersley) {
+    points.col(column++) = (Vector::LinSpaced(count, 0, count - 1).array() + 0.5) / count;
+  }
+  for (int k = 0; column < dimension; ++k, ++column) {
+    const int prime = primes[static_cast<size_t>(k)];
+    const std::vector<int> digits = Digits(prime, k >= kPlainDimensions);
+    for (int q = 0; q < count; ++q) points(q, column) = RadicalInverse(q + 1, prime, digits);
+  }
+  return points;
+}
+
+absl::StatusOr<Matrix> CollocationPoints(PointSet set, const std::vector<Germ>& germs, int order,
+                                         int count, int most_points) {
+  POLYEST_CHECK(!germs.empty() && order >= 0);
+  if (set == PointSet::kGaussTensor) return GaussTensor(germs, order, most_points);
+  Matrix points = UnitCubePoints(set, static_cast<int>(germs.size()), count);
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const Germ& germ = germs[static_cast<size_t>(k)];
+    for (double& coordinate : points.col(k)) coordinate = germ.Quantile(coordinate);
+  }
+  return points;
+}
+
+}  // namespace polyest

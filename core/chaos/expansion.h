@@ -33,7 +33,8 @@ class Expansion {
   Matrix coefficients_;
 };
 
-// Normalized histogram of samples (sorting a copy); one bin holding all when they do not vary.
+// Normalized histogram of finite samples; one bin holding all, of unit width, when they do not
+// vary.
 DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins);
 // Empirical quantile by linear interpolation of the order statistics, 0 ≤ probability ≤ 1.
 double QuantileOfSamples(Vector samples, double probability);

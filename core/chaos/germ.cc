@@ -1,1 +1,332 @@
-// To be written.
+#include "core/chaos/germ.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <unsupported/Eigen/SpecialFunctions>
+
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// log Γ(x), x > 0. The C library's lgamma writes a global sign, which threads would race for.
+double LogGamma(double x) {
+  int sign = 0;
+  return ::lgamma_r(x, &sign);
+}
+
+// log B(α, β)
+double LogBeta(double alpha, double beta) {
+  return LogGamma(alpha) + LogGamma(beta) - LogGamma(alpha + beta);
+}
+
+// factor · log(x), with the limit 0 for factor = 0 even at x = 0.
+double TimesLog(double factor, double x) { return factor == 0 ? 0 : factor * std::log(x); }
+
+// Standard forms: I_u(α, β) on [0, 1], and the regularized incomplete gamma functions P and Q.
+double IncompleteBeta(double alpha, double beta, double u) {
+  if (u <= 0) return 0;
+  if (u >= 1) return 1;
+  return Eigen::numext::betainc(alpha, beta, u);
+}
+
+double LowerIncompleteGamma(double shape, double x) {
+  if (x <= 0) return 0;
+  return std::isinf(x) ? 1 : Eigen::numext::igamma(shape, x);
+}
+
+double UpperIncompleteGamma(double shape, double x) {
+  if (x <= 0) return 1;
+  return std::isinf(x) ? 0 : Eigen::numext::igammac(shape, x);
+}
+
+struct ValueAndSlope {
+  double value;
+  double slope;
+};
+
+// The root of an increasing function between lower and upper (which may be infinite) by Newton's
+// method, safeguarded by bisection. The functions given to it are logarithms of probabilities of
+// log-concave densities, thus concave or convex: Newton's steps then come from one side only and
+// end quadratically, so that a last step of 1e-9, relative to the smaller of scale and x, leaves
+// an error of rounding size.
+template <typename Function>
+double IncreasingRoot(const Function& function, double lower, double upper, double start,
+                      double scale) {
+  double x = start;
+  for (int iteration = 0; iteration < 400; ++iteration) {
+    const ValueAndSlope at_x = function(x);
+    const double step = at_x.value / at_x.slope;
+    if (std::abs(step) <= 1e-9 * std::min(std::abs(x), scale)) return x - step;
+    (at_x.value < 0 ? lower : upper) = x;
+    double next = x - step;
+    // Not a number too lands here: a probability that underflowed has no slope.
+    if (!(next > lower && next < upper)) {
+      next = std::isinf(upper) ? 2 * lower + scale : 0.5 * (lower + upper);
+    }
+    if (next == x) return x;
+    x = next;
+  }
+  return x;
+}
+
+// u with I_u(α, β) = p, p ≤ ½.
+double LowerBetaQuantile(double alpha, double beta, double p) {
+  const double log_beta = LogBeta(alpha, beta);
+  const double log_p = std::log(p);
+  const auto log_ratio = [&](double u) -> ValueAndSlope {
+    const double probability = IncompleteBeta(alpha, beta, u);
+    const double log_density = TimesLog(alpha - 1, u) + (beta - 1) * std::log1p(-u) - log_beta;
+    return {std::log(probability) - log_p, std::exp(log_density) / probability};
+  };
+  // I_u ≤ u^α / (α B) since β ≥ 1, so this start is not above the root.
+  const double start = std::exp((log_p + std::log(alpha) + log_beta) / alpha);
+  const double sum = alpha + beta;
+  const double scale = std::sqrt(alpha * beta / (sum + 1)) / sum;
+  return IncreasingRoot(log_ratio, 0, 1, std::min(start, 0.5), scale);
+}
+
+double GammaDensity(double shape, double x) {
+  return std::exp(TimesLog(shape - 1, x) - x - LogGamma(shape));
+}
+
+// x with P(shape, x) = p, p ≤ ½.
+double LowerGammaQuantile(double shape, double p) {
+  const double log_p = std::log(p);
+  const auto log_ratio = [&](double x) -> ValueAndSlope {
+    const double probability = LowerIncompleteGamma(shape, x);
+    return {std::log(probability) - log_p, GammaDensity(shape, x) / probability};
+  };
+  // P ≤ x^a / Γ(a + 1), so this start is not above the root; the median is below the mean.
+  const double start = std::exp((log_p + LogGamma(shape + 1)) / shape);
+  return IncreasingRoot(log_ratio, 0, shape, start, std::sqrt(shape));
+}
+
+// x with Q(shape, x) = q, q ≤ ½.
+double UpperGammaQuantile(double shape, double q) {
+  const double log_q = std::log(q);
+  const auto log_ratio = [&](double x) -> ValueAndSlope {
+    const double probability = UpperIncompleteGamma(shape, x);
+    return {log_q - std::log(probability), GammaDensity(shape, x) / probability};
+  };
+  return IncreasingRoot(log_ratio, 0, kInfinity, shape, std::sqrt(shape));
+}
+
+}  // namespace
+
+Germ::Germ(GermFamily family, double first_shape, double second_shape)
+    : family_(family), first_shape_(first_shape), second_shape_(second_shape) {
+  switch (family_) {
+    case GermFamily::kNormal:  // 1/√(2π)
+      log_normalization_ = -0.5 * std::log(2 * std::numbers::pi);
+      break;
+    case GermFamily::kUniform:  // 1/2
+      log_normalization_ = -std::numbers::ln2;
+      break;
+    case GermFamily::kBeta:  // 1 / (2^(α+β−1) B(α, β))
+      log_normalization_ = -(first_shape_ + second_shape_ - 1) * std::numbers::ln2 -
+                           LogBeta(first_shape_, second_shape_);
+      break;
+    case GermFamily::kGamma:  // 1 / Γ(shape)
+      log_normalization_ = -LogGamma(first_shape_);
+      break;
+  }
+}
+
+Germ Germ::Normal() { return Germ(GermFamily::kNormal, 0, 0); }
+
+Germ Germ::Uniform() { return Germ(GermFamily::kUniform, 0, 0); }
+
+Germ Germ::Beta(double alpha, double beta) {
+  POLYEST_CHECK(alpha >= 1 && beta >= 1 && std::isfinite(alpha + beta));
+  return Germ(GermFamily::kBeta, alpha, beta);
+}
+
+Germ Germ::Gamma(double shape) {
+  POLYEST_CHECK(shape >= 1 && std::isfinite(shape));
+  return Germ(GermFamily::kGamma, shape, 0);
+}
+
+double Germ::Lower() const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return -kInfinity;
+    case GermFamily::kUniform:
+    case GermFamily::kBeta:
+      return -1;
+    case GermFamily::kGamma:
+      return 0;
+  }
+  return 0;
+}
+
+double Germ::Upper() const {
+  return family_ == GermFamily::kUniform || family_ == GermFamily::kBeta ? 1 : kInfinity;
+}
+
+double Germ::Mean() const {
+  const double alpha = first_shape_, beta = second_shape_;
+  switch (family_) {
+    case GermFamily::kNormal:
+    case GermFamily::kUniform:
+      return 0;
+    case GermFamily::kBeta:  // (α − β) / (α + β)
+      return (alpha - beta) / (alpha + beta);
+    case GermFamily::kGamma:
+      return first_shape_;
+  }
+  return 0;
+}
+
+double Germ::StandardDeviation() const {
+  const double alpha = first_shape_, beta = second_shape_, sum = alpha + beta;
+  switch (family_) {
+    case GermFamily::kNormal:
+      return 1;
+    case GermFamily::kUniform:
+      return 1 / std::numbers::sqrt3;
+    case GermFamily::kBeta:  // 2 √(αβ / (α + β + 1)) / (α + β)
+      return 2 * std::sqrt(alpha * beta / (sum + 1)) / sum;
+    case GermFamily::kGamma:
+      return std::sqrt(first_shape_);
+  }
+  return 0;
+}
+
+double Germ::Mode() const {
+  const double alpha = first_shape_, beta = second_shape_;
+  switch (family_) {
+    case GermFamily::kNormal:
+    case GermFamily::kUniform:
+      return 0;
+    case GermFamily::kBeta:  // (α − β) / (α + β − 2); Beta(1, 1) is the uniform density
+      return alpha + beta > 2 ? (alpha - beta) / (alpha + beta - 2) : 0;
+    case GermFamily::kGamma:
+      return first_shape_ - 1;
+  }
+  return 0;
+}
+
+double Germ::Density(double xi) const { return std::exp(LogDensity(xi)); }
+
+double Germ::LogDensity(double xi) const {
+  if (!(xi >= Lower() && xi <= Upper())) return -kInfinity;
+  switch (family_) {
+    case GermFamily::kNormal:
+      return log_normalization_ - 0.5 * xi * xi;
+    case GermFamily::kUniform:
+      return log_normalization_;
+    case GermFamily::kBeta:
+      return log_normalization_ + TimesLog(first_shape_ - 1, 1 + xi) +
+             TimesLog(second_shape_ - 1, 1 - xi);
+    case GermFamily::kGamma:
+      if (std::isinf(xi)) return -kInfinity;
+      return log_normalization_ + TimesLog(first_shape_ - 1, xi) - xi;
+  }
+  return -kInfinity;
+}
+
+double Germ::LogDensityDerivative(double xi) const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return -xi;
+    case GermFamily::kUniform:
+      return 0;
+    case GermFamily::kBeta:  // (α − 1)/(1 + ξ) − (β − 1)/(1 − ξ)
+      return (first_shape_ - 1) / (1 + xi) - (second_shape_ - 1) / (1 - xi);
+    case GermFamily::kGamma:  // (shape − 1)/ξ − 1
+      return (first_shape_ - 1) / xi - 1;
+  }
+  return 0;
+}
+
+double Germ::LogDensitySecondDerivative(double xi) const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return -1;
+    case GermFamily::kUniform:
+      return 0;
+    case GermFamily::kBeta:  // −(α − 1)/(1 + ξ)² − (β − 1)/(1 − ξ)²
+      return -(first_shape_ - 1) / ((1 + xi) * (1 + xi)) -
+             (second_shape_ - 1) / ((1 - xi) * (1 - xi));
+    case GermFamily::kGamma:  // −(shape − 1)/ξ²
+      return -(first_shape_ - 1) / (xi * xi);
+  }
+  return 0;
+}
+
+double Germ::CumulativeProbability(double xi) const {
+  switch (family_) {
+    case GermFamily::kNormal:  // the complementary error function keeps the lower tail
+      return 0.5 * std::erfc(-xi / std::numbers::sqrt2);
+    case GermFamily::kUniform:
+      return std::clamp(0.5 * (1 + xi), 0.0, 1.0);
+    case GermFamily::kBeta:
+      return IncompleteBeta(first_shape_, second_shape_, 0.5 * (1 + xi));
+    case GermFamily::kGamma:
+      return LowerIncompleteGamma(first_shape_, xi);
+  }
+  return 0;
+}
+
+double Germ::Quantile(double probability) const {
+  POLYEST_CHECK(probability > 0 && probability < 1);
+  // The nearer tail is inverted: 1 − p is exact for p ≥ ½.
+  const bool lower_half = probability <= 0.5;
+  switch (family_) {
+    case GermFamily::kNormal:
+      return Eigen::numext::ndtri(probability);
+    case GermFamily::kUniform:
+      return 2 * probability - 1;
+    case GermFamily::kBeta:  // the upper tail is the lower one of the mirrored density
+      return lower_half ? 2 * LowerBetaQuantile(first_shape_, second_shape_, probability) - 1
+                        : 1 - 2 * LowerBetaQuantile(second_shape_, first_shape_, 1 - probability);
+    case GermFamily::kGamma:
+      return lower_half ? LowerGammaQuantile(first_shape_, probability)
+                        : UpperGammaQuantile(first_shape_, 1 - probability);
+  }
+  return 0;
+}
+
+namespace {
+
+// Jacobi for the weight (1 − ξ)^A (1 + ξ)^B, A = β − 1, B = α − 1:
+//   a_k = (B² − A²) / ((2k+A+B)(2k+A+B+2)),
+//   b_k = 4k(k+A)(k+B)(k+A+B) / ((2k+A+B)² (2k+A+B+1)(2k+A+B−1)).
+void JacobiRecurrence(double alpha, double beta, RecurrenceCoefficients& result) {
+  const double a = beta - 1, b = alpha - 1;
+  for (Eigen::Index i = 0; i < result.a.size(); ++i) {
+    const double k = static_cast<double>(i);
+    const double c = 2 * k + a + b;
+    // The factor A + B of a_0 cancels, which matters when it is zero.
+    result.a[i] = i == 0 ? (b - a) / (c + 2) : (b - a) * (a + b) / (c * (c + 2));
+    if (i > 0) {
+      result.b[i] = 4 * k * (k + a) * (k + b) * (k + a + b) / (c * c * (c + 1) * (c - 1));
+    }
+  }
+}
+
+}  // namespace
+
+RecurrenceCoefficients Germ::Recurrence(int count) const {
+  POLYEST_CHECK(count >= 1);
+  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
+  if (family_ == GermFamily::kBeta) {
+    JacobiRecurrence(first_shape_, second_shape_, result);
+    return result;
+  }
+  for (int k = 0; k < count; ++k) {
+    const double kk = k;
+    if (family_ == GermFamily::kGamma) result.a[k] = 2 * kk + first_shape_;
+    if (k == 0) continue;
+    if (family_ == GermFamily::kNormal) result.b[k] = kk;
+    if (family_ == GermFamily::kUniform) result.b[k] = kk * kk / (4 * kk * kk - 1);
+    if (family_ == GermFamily::kGamma) result.b[k] = kk * (kk + first_shape_ - 1);
+  }
+  return result;
+}
+
+}  // namespace polyest

@@ -57,12 +57,12 @@ class Germ {
   friend bool operator==(const Germ&, const Germ&) = default;
 
  private:
-  Germ(GermFamily family, double first_shape, double second_shape)
-      : family_(family), first_shape_(first_shape), second_shape_(second_shape) {}
+  Germ(GermFamily family, double first_shape, double second_shape);
 
   GermFamily family_;
   double first_shape_;
   double second_shape_;
+  double log_normalization_ = 0;  // log of the density's constant factor
 };
 
 }  // namespace polyest
