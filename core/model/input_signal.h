@@ -6,28 +6,33 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <limits>
-#include <string>
 #include <variant>
 #include <vector>
 
 namespace polyest {
 
-// Every shape's amplitude multiplies it; for a table or a streamed input it defaults to 1.
+// Every shape's amplitude multiplies it; all numbers are finite, times in s. Amplitudes are in the
+// unit of the model's input.
+
 struct ConstantInput {
   double amplitude = 0;
 };
+
+// 0 before time_s, amplitude from then on.
 struct StepInput {
   double amplitude = 1;
   double time_s = 0;
-};  // 0 before time_s, amplitude from then on
+};
+
+// amplitude · sin(2π f t + phase), f > 0.
 struct SinusoidInput {
   double amplitude = 1;
   double frequency_hz = 1;
   double phase_rad = 0;
-};  // amplitude · sin(2π f t + phase)
+};
+
 // amplitude · sin(2π (f0 τ + (f1 − f0) τ²/(2 T)) + phase), τ = t − start_s, for 0 ≤ τ < T, else 0;
-// frequencies ≥ 0.
+// T > 0, f0 and f1 ≥ 0.
 struct ChirpInput {
   double amplitude = 1;
   double start_frequency_hz = 0.1;
@@ -36,19 +41,23 @@ struct ChirpInput {
   double duration_s = 10;
   double phase_rad = 0;
 };
-// amplitude · sin(π τ/T), τ = t − start_s, for 0 ≤ τ < T, else 0.
+
+// amplitude · sin(π τ/T), τ = t − start_s, for 0 ≤ τ < T, else 0; T > 0.
 struct HalfSineBumpInput {
   double amplitude = 1;
   double start_s = 0;
   double duration_s = 1;
 };
-// Knots in strictly increasing time; linear between them (or held), the end values outside.
+
+// One knot or more in strictly increasing time; linear between them (or held), the end values
+// outside.
 struct TableInput {
   std::vector<double> time_s;
   std::vector<double> value;
   bool hold = false;
   double amplitude = 1;
 };
+
 // Values that come with the data; see Append.
 struct StreamedInput {
   bool hold = false;

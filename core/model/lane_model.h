@@ -42,58 +42,59 @@ class LaneModel final : public Model {
   const ModelDescription& description() const override { return description_; }
 
   void InitialStates(const ConstBlock& parameters, Block states) const override {
+    CheckParameters(parameters);
     if constexpr (Equations::kStates > 0) {
       CheckShape(states, parameters.rows(), Equations::kStates);
-      ForEachChunk(parameters, [&](Eigen::Index row) {
+      for (Eigen::Index row = 0; row < parameters.rows(); row += kLanes) {
         std::array<Lane, Equations::kStates> x;
         Equations::Initial(Load<Equations::kParameters>(parameters, row), x);
         Store(x, row, states);
-      });
+      }
     }
   }
 
   void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                    const ConstBlock& inputs, Block derivatives) const override {
+    CheckParameters(parameters);
     if constexpr (Equations::kStates > 0) {
       CheckShape(states, parameters.rows(), Equations::kStates);
       CheckShape(inputs, parameters.rows(), Equations::kInputs);
       CheckShape(derivatives, parameters.rows(), Equations::kStates);
-      ForEachChunk(parameters, [&](Eigen::Index row) {
+      for (Eigen::Index row = 0; row < parameters.rows(); row += kLanes) {
         std::array<Lane, Equations::kStates> dx;
         Equations::Derivatives(time_s, Load<Equations::kStates>(states, row),
                                Load<Equations::kParameters>(parameters, row),
                                Load<Equations::kInputs>(inputs, row), dx);
         Store(dx, row, derivatives);
-      });
+      }
     }
   }
 
   void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                const ConstBlock& inputs, Block outputs) const override {
+    CheckParameters(parameters);
     CheckShape(states, parameters.rows(), Equations::kStates);
     CheckShape(inputs, parameters.rows(), Equations::kInputs);
     CheckShape(outputs, parameters.rows(), Equations::kOutputs);
-    ForEachChunk(parameters, [&](Eigen::Index row) {
+    for (Eigen::Index row = 0; row < parameters.rows(); row += kLanes) {
       std::array<Lane, Equations::kOutputs> y;
       Equations::Outputs(time_s, Load<Equations::kStates>(states, row),
                          Load<Equations::kParameters>(parameters, row),
                          Load<Equations::kInputs>(inputs, row), y);
       Store(y, row, outputs);
-    });
+    }
   }
 
  private:
+  static void CheckParameters(const ConstBlock& parameters) {
+    POLYEST_CHECK(parameters.cols() == Equations::kParameters);
+    POLYEST_CHECK(parameters.rows() % kLanes == 0);
+  }
+
   // A block without columns may have any number of rows: nothing of it is read.
   template <class AnyBlock>
   static void CheckShape(const AnyBlock& block, Eigen::Index rows, int columns) {
     POLYEST_CHECK(block.cols() == columns && (columns == 0 || block.rows() == rows));
-  }
-
-  template <class Chunk>
-  static void ForEachChunk(const ConstBlock& parameters, Chunk chunk) {
-    POLYEST_CHECK(parameters.cols() == Equations::kParameters);
-    POLYEST_CHECK(parameters.rows() % kLanes == 0);
-    for (Eigen::Index row = 0; row < parameters.rows(); row += kLanes) chunk(row);
   }
 
   template <int kColumns>

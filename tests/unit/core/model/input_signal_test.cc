@@ -1,0 +1,241 @@
+#include "core/model/input_signal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kPi = std::numbers::pi;
+// A few roundings of sin's argument, which stays below 100 here.
+constexpr double kRounding = 1e-13;
+
+InputSignal Make(InputSpecification specification) {
+  return InputSignal::Make(std::move(specification)).value();
+}
+
+std::string Refusal(InputSpecification specification) {
+  const absl::Status status = InputSignal::Make(std::move(specification)).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  return std::string(status.message());
+}
+
+double FromTheLeft(const InputSignal& signal, double time_s) {
+  return signal.Shape(std::nextafter(time_s, -kInfinity));
+}
+
+// Every break of the signal after the time given.
+std::vector<double> Breaks(const InputSignal& signal, double time_s) {
+  std::vector<double> breaks;
+  while ((time_s = signal.NextBreak(time_s)) < kInfinity) breaks.push_back(time_s);
+  return breaks;
+}
+
+TEST(ConstantInput, IsOneForever) {
+  const InputSignal signal = Make(ConstantInput{.amplitude = 3});
+  EXPECT_EQ(signal.default_amplitude(), 3);
+  EXPECT_EQ(signal.Shape(-1), 1);
+  EXPECT_EQ(signal.Shape(1e9), 1);
+  EXPECT_EQ(signal.NextBreak(0), kInfinity);
+  EXPECT_FALSE(signal.Jumps());
+  EXPECT_FALSE(signal.streamed());
+}
+
+TEST(StepInput, JumpsAtItsTime) {
+  const InputSignal signal = Make(StepInput{.amplitude = 2, .time_s = 1.5});
+  EXPECT_EQ(signal.default_amplitude(), 2);
+  EXPECT_EQ(FromTheLeft(signal, 1.5), 0);
+  EXPECT_EQ(signal.Shape(1.5), 1);
+  EXPECT_EQ(signal.NextBreak(1.0), 1.5);
+  EXPECT_EQ(signal.NextBreak(1.5), kInfinity);
+  EXPECT_TRUE(signal.Jumps());
+}
+
+TEST(SinusoidInput, TurnsOncePerPeriod) {
+  const InputSignal signal =
+      Make(SinusoidInput{.amplitude = 4, .frequency_hz = 0.5, .phase_rad = kPi / 6});
+  EXPECT_EQ(signal.default_amplitude(), 4);
+  EXPECT_NEAR(signal.Shape(0), 0.5, kRounding);
+  EXPECT_NEAR(signal.Shape(2.0 / 3), std::sin(kPi * 5 / 6), kRounding);
+  EXPECT_NEAR(signal.Shape(1), -0.5, kRounding);
+  EXPECT_NEAR(signal.Shape(2), 0.5, kRounding);
+  EXPECT_EQ(signal.NextBreak(0), kInfinity);
+  EXPECT_FALSE(signal.Jumps());
+}
+
+TEST(ChirpInput, SweepsBetweenItsFrequencies) {
+  const InputSignal signal = Make(ChirpInput{.amplitude = 1,
+                                             .start_frequency_hz = 1,
+                                             .end_frequency_hz = 3,
+                                             .start_s = 2,
+                                             .duration_s = 4,
+                                             .phase_rad = 0.3});
+  // The instantaneous frequency is 1 + (3 − 1) τ/4 Hz; its integral over 0 … τ is τ + τ²/4 cycles.
+  for (const double tau : {0.0, 0.5, 1.0, 3.9}) {
+    EXPECT_NEAR(signal.Shape(2 + tau), std::sin(2 * kPi * (tau + tau * tau / 4) + 0.3), kRounding);
+  }
+}
+
+TEST(ChirpInput, IsZeroOutsideAndJumpsAtItsEnds) {
+  const InputSignal signal = Make(ChirpInput{.start_frequency_hz = 0,
+                                             .end_frequency_hz = 1,
+                                             .start_s = 1,
+                                             .duration_s = 2,
+                                             .phase_rad = kPi / 2});
+  EXPECT_EQ(FromTheLeft(signal, 1), 0);
+  EXPECT_NEAR(signal.Shape(1), 1, kRounding);
+  EXPECT_NEAR(FromTheLeft(signal, 3), 1, kRounding);  // one cycle later
+  EXPECT_EQ(signal.Shape(3), 0);
+  EXPECT_EQ(Breaks(signal, -5), (std::vector<double>{1, 3}));
+  EXPECT_TRUE(signal.Jumps());
+}
+
+TEST(HalfSineBumpInput, RisesToOneAndReturns) {
+  const InputSignal signal =
+      Make(HalfSineBumpInput{.amplitude = 0.05, .start_s = 0.5, .duration_s = 0.2});
+  EXPECT_EQ(signal.default_amplitude(), 0.05);
+  EXPECT_EQ(signal.Shape(0.4), 0);
+  EXPECT_EQ(signal.Shape(0.5), 0);
+  EXPECT_NEAR(signal.Shape(0.55), std::sqrt(0.5), kRounding);
+  EXPECT_NEAR(signal.Shape(0.6), 1, kRounding);
+  EXPECT_NEAR(FromTheLeft(signal, 0.7), 0, kRounding);
+  EXPECT_EQ(signal.Shape(0.7), 0);
+  EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{0.5, 0.7}));
+  EXPECT_EQ(signal.NextBreak(0.5), 0.7);
+  EXPECT_FALSE(signal.Jumps());
+}
+
+TEST(TableInput, IsLinearBetweenItsKnotsAndConstantOutside) {
+  const InputSignal signal =
+      Make(TableInput{.time_s = {1, 2, 4}, .value = {10, 20, -20}, .amplitude = 0.5});
+  EXPECT_EQ(signal.default_amplitude(), 0.5);
+  EXPECT_EQ(signal.Shape(0), 10);
+  EXPECT_EQ(signal.Shape(1), 10);
+  EXPECT_EQ(signal.Shape(1.25), 12.5);
+  EXPECT_EQ(signal.Shape(2), 20);
+  EXPECT_EQ(signal.Shape(3), 0);
+  EXPECT_EQ(signal.Shape(4), -20);
+  EXPECT_EQ(signal.Shape(99), -20);
+  EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{1, 2, 4}));
+  EXPECT_EQ(Breaks(signal, 1), (std::vector<double>{2, 4}));
+  EXPECT_FALSE(signal.Jumps());
+}
+
+TEST(TableInput, HoldsEachValueUntilTheNextKnot) {
+  const InputSignal signal =
+      Make(TableInput{.time_s = {1, 2, 4}, .value = {10, 20, -20}, .hold = true});
+  EXPECT_EQ(signal.default_amplitude(), 1);
+  EXPECT_EQ(signal.Shape(0), 10);
+  EXPECT_EQ(FromTheLeft(signal, 2), 10);
+  EXPECT_EQ(signal.Shape(2), 20);
+  EXPECT_EQ(signal.Shape(3.9), 20);
+  EXPECT_EQ(signal.Shape(4), -20);
+  EXPECT_EQ(signal.Shape(99), -20);
+  EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{1, 2, 4}));
+  EXPECT_TRUE(signal.Jumps());
+}
+
+TEST(TableInput, OfOneKnotIsConstant) {
+  const InputSignal signal = Make(TableInput{.time_s = {1}, .value = {7}});
+  EXPECT_EQ(signal.Shape(0), 7);
+  EXPECT_EQ(signal.Shape(1), 7);
+  EXPECT_EQ(signal.Shape(2), 7);
+}
+
+TEST(StreamedInput, FollowsTheKnotsAppended) {
+  InputSignal signal = Make(StreamedInput{});
+  EXPECT_TRUE(signal.streamed());
+  EXPECT_EQ(signal.default_amplitude(), 1);
+  EXPECT_EQ(signal.Shape(0), 0);
+  EXPECT_EQ(signal.NextBreak(0), kInfinity);
+
+  signal.Append(0, 5);
+  EXPECT_EQ(signal.Shape(-1), 5);
+  EXPECT_EQ(signal.Shape(3), 5);  // the last value stands until more is known
+
+  signal.Append(2, 9);
+  EXPECT_EQ(signal.Shape(0.5), 6);
+  EXPECT_EQ(signal.Shape(3), 9);
+  EXPECT_EQ(Breaks(signal, -1), (std::vector<double>{0, 2}));
+  EXPECT_FALSE(signal.Jumps());
+}
+
+TEST(StreamedInput, HoldsWhenAsked) {
+  InputSignal signal = Make(StreamedInput{.hold = true, .amplitude = 2});
+  signal.Append(0, 5);
+  signal.Append(2, 9);
+  EXPECT_EQ(signal.default_amplitude(), 2);
+  EXPECT_EQ(FromTheLeft(signal, 2), 5);
+  EXPECT_EQ(signal.Shape(2), 9);
+  EXPECT_TRUE(signal.Jumps());
+}
+
+TEST(StreamedInput, BeginsANewRunWhenCleared) {
+  InputSignal signal = Make(StreamedInput{});
+  signal.Append(0, 5);
+  signal.Append(2, 9);
+  signal.Clear();
+  EXPECT_EQ(signal.Shape(1), 0);
+  signal.Append(1, 3);  // earlier than the last knot of the run before
+  EXPECT_EQ(signal.Shape(0), 3);
+  EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{1}));
+}
+
+TEST(StreamedInputDeathTest, TakesOnlyFiniteKnotsInIncreasingTime) {
+  InputSignal signal = Make(StreamedInput{});
+  signal.Append(1, 0);
+  EXPECT_DEATH(signal.Append(1, 0), "time_s");
+  EXPECT_DEATH(signal.Append(2, kNan), "isfinite");
+  EXPECT_DEATH(Make(ConstantInput{}).Append(1, 0), "streamed");
+  EXPECT_DEATH(Make(ConstantInput{}).Clear(), "streamed");
+}
+
+TEST(InputSignal, NamesTheFieldTheValueAndTheRule) {
+  EXPECT_EQ(Refusal(SinusoidInput{.frequency_hz = 0}),
+            "sinusoid: frequencyHz 0 must be finite and above 0");
+  EXPECT_EQ(Refusal(TableInput{.time_s = {0, 1}, .value = {2}}),
+            "table: timeS has 2 entries and value 1; they must be equally many");
+  EXPECT_EQ(Refusal(TableInput{}), "table: timeS has 0 entries; there must be at least 1");
+  EXPECT_EQ(Refusal(TableInput{.time_s = {0, 3, 3}, .value = {0, 0, 0}}),
+            "table: timeS[2] 3 must be above timeS[1] 3");
+}
+
+TEST(InputSignal, RefusesNumbersThatAreNotFinite) {
+  EXPECT_THAT(Refusal(ConstantInput{.amplitude = kNan}), HasSubstr("constant: amplitude"));
+  EXPECT_THAT(Refusal(StepInput{.amplitude = kInfinity}), HasSubstr("step: amplitude"));
+  EXPECT_THAT(Refusal(StepInput{.time_s = kNan}), HasSubstr("step: timeS"));
+  EXPECT_THAT(Refusal(SinusoidInput{.amplitude = kNan}), HasSubstr("sinusoid: amplitude"));
+  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = kInfinity}), HasSubstr("frequencyHz"));
+  EXPECT_THAT(Refusal(SinusoidInput{.phase_rad = kNan}), HasSubstr("phaseRad"));
+  EXPECT_THAT(Refusal(ChirpInput{.amplitude = kNan}), HasSubstr("chirp: amplitude"));
+  EXPECT_THAT(Refusal(ChirpInput{.start_s = kNan}), HasSubstr("startS"));
+  EXPECT_THAT(Refusal(ChirpInput{.phase_rad = kNan}), HasSubstr("phaseRad"));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.amplitude = kNan}), HasSubstr("halfSineBump: amplitude"));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.start_s = kNan}), HasSubstr("startS"));
+  EXPECT_THAT(Refusal(TableInput{.time_s = {kNan}, .value = {0}}), HasSubstr("timeS[0]"));
+  EXPECT_THAT(Refusal(TableInput{.time_s = {0}, .value = {kNan}}), HasSubstr("value[0]"));
+  EXPECT_THAT(Refusal(TableInput{.time_s = {0}, .value = {0}, .amplitude = kNan}),
+              HasSubstr("table: amplitude"));
+  EXPECT_THAT(Refusal(StreamedInput{.amplitude = kNan}), HasSubstr("streamed: amplitude"));
+}
+
+TEST(InputSignal, RefusesFrequenciesAndDurationsWithoutMeaning) {
+  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = -1}), HasSubstr("frequencyHz -1"));
+  EXPECT_THAT(Refusal(ChirpInput{.start_frequency_hz = -1}), HasSubstr("startFrequencyHz -1"));
+  EXPECT_THAT(Refusal(ChirpInput{.end_frequency_hz = -2}), HasSubstr("endFrequencyHz -2"));
+  EXPECT_THAT(Refusal(ChirpInput{.duration_s = 0}), HasSubstr("durationS 0"));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.duration_s = -0.5}), HasSubstr("durationS -0.5"));
+}
+
+}  // namespace
+}  // namespace polyest
