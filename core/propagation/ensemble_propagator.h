@@ -44,10 +44,10 @@ using InputSignals = std::vector<InputSignal>;
 
 // A trajectory that could not be integrated; it is left out from then on.
 struct PointFailure {
-  int point = 0;      // row in the ensemble
-  double time_s = 0;  // the last time it was good
-  int flag = 0;       // the solver's own return code
-  std::string reason; // that code in words
+  int point = 0;       // row in the ensemble
+  double time_s = 0;   // the last time it was good
+  int flag = 0;        // the solver's own return code
+  std::string reason;  // that code in words
 };
 
 struct EnsembleSpecification {

@@ -1,0 +1,61 @@
+#pragma once
+
+// The norm in which a local error e of a block of trajectories is measured, worst point first,
+//
+//   ‖e‖ = max over points p of max over states s of |e_ps| / (rtol · S_ps + atol),
+//
+// so that ‖e‖ ≤ 1 says |e_ps| ≤ rtol · S_ps + atol for every state of every point. The scale S_ps
+// is the largest magnitude that state s of point p has had so far, floored by a thousandth of the
+// largest that any point of the block has had: a point that stays near zero while others move is
+// not resolved down to its rounding errors. atol = 1e-14 in SI units does the same for a block that
+// is at rest altogether.
+//
+// A solver asks for its weights at the beginning of a step. A state that starts from 0 would then
+// have a scale of 0 through the whole step, so the norm also counts the magnitudes in the states
+// at which the right-hand side was evaluated last: at the end of the step under test for
+// Dormand–Prince (its last stage) and for BDF (its corrector).
+
+#include <Eigen/Core>
+
+#include "core/common/types.h"
+
+namespace polyest {
+
+class ErrorScale {
+ public:
+  static constexpr double kAbsoluteTolerance = 1e-14;
+  static constexpr double kBlockShare = 1e-3;
+  // What a norm that is not finite is replaced by: a step to be rejected, yet still a number.
+  static constexpr double kHuge = 1e100;
+
+  ErrorScale(Eigen::Index points, Eigen::Index states, double relative_tolerance);
+
+  // Accepts these states: S grows to them.
+  void Grow(const Eigen::ArrayXXd& states);
+  // 1 / (rtol · S_ps + atol).
+  const Eigen::ArrayXXd& weights() const { return weights_; }
+  // The largest magnitude that state s has had over the block.
+  double block_scale(Eigen::Index state) const { return block_scale_(state); }
+
+  // The states at which the right-hand side was evaluated last; must stay alive until the next.
+  void Watch(const Eigen::ArrayXXd* states) { watched_ = states; }
+
+  // ‖error‖, with kHuge for a point that is not finite; remembers each point's norm.
+  double Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights);
+  // The point with the largest norm at the last call of Norm.
+  Eigen::Index worst_point() const;
+
+ private:
+  double WeightedNorm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights);
+  double GrowingNorm(const Eigen::ArrayXXd& error);
+
+  double relative_tolerance_;
+  Eigen::ArrayXXd largest_;  // own magnitude so far
+  Eigen::ArrayXXd scale_;    // rtol · S + atol
+  Eigen::ArrayXXd weights_;  // 1 / scale_
+  Vector block_scale_;
+  Eigen::ArrayXd point_norm_;
+  const Eigen::ArrayXXd* watched_ = nullptr;
+};
+
+}  // namespace polyest

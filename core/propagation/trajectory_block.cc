@@ -1,0 +1,203 @@
+#include "core/propagation/trajectory_block.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/propagation/bdf_integrator.h"
+#include "core/propagation/erk_integrator.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Steps between two looks at the stop request.
+constexpr int kStepsAtOnce = 500;
+
+Eigen::Index PaddedRows(int points) {
+  return (points + kLanes - 1) / kLanes * static_cast<Eigen::Index>(kLanes);
+}
+
+// Rows first … first + points − 1, then copies of the last of them.
+Eigen::ArrayXXd PaddedCopy(const Matrix& matrix, int first, int points) {
+  Eigen::ArrayXXd copy(PaddedRows(points), matrix.cols());
+  for (Eigen::Index row = 0; row < copy.rows(); ++row) {
+    copy.row(row) = matrix.row(first + std::min<Eigen::Index>(row, points - 1)).array();
+  }
+  return copy;
+}
+
+}  // namespace
+
+TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
+                                 const InputSignals* inputs, int first_point, int points)
+    : specification_(specification),
+      inputs_(inputs),
+      first_point_(first_point),
+      parameters_(PaddedCopy(specification->parameters, first_point, points)),
+      amplitudes_(PaddedCopy(specification->amplitudes, first_point, points)),
+      input_time_s_(std::numeric_limits<double>::quiet_NaN()),
+      point_alive_(points, true),
+      alive_points_(points),
+      stiff_(specification->integration.method == IntegrationMethod::kStiff) {
+  const ModelDescription& description = specification->model->description();
+  const Eigen::Index rows = parameters_.rows();
+  for (const InputSignal& input : *inputs) streamed_ = streamed_ || input.streamed();
+  states_.setZero(rows, static_cast<Eigen::Index>(description.states.size()));
+  input_values_.setZero(rows, amplitudes_.cols());
+  model_outputs_.setZero(rows, static_cast<Eigen::Index>(description.outputs.size()));
+  selected_outputs_.setZero(rows, static_cast<Eigen::Index>(specification->outputs.size()));
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    source_.push_back(std::min(static_cast<int>(row), points - 1));
+  }
+  if (states_.cols() == 0) return;
+  specification->model->InitialStates(parameters_, states_);
+  FailRowsNotFinite(states_, 0, "an initial state is not finite");
+  StartIntegrator(0);
+}
+
+void TrajectoryBlock::StartIntegrator(double time_s) {
+  integrator_.reset();
+  if (!alive()) return;
+  const double tolerance = specification_->integration.relative_tolerance;
+  integrator_ = stiff_ ? MakeBdfIntegrator(this, tolerance, time_s, states_)
+                       : MakeErkIntegrator(this, tolerance, time_s, states_);
+}
+
+void TrajectoryBlock::EvaluateInputs(double time_s) {
+  if (time_s == input_time_s_) return;
+  for (Eigen::Index i = 0; i < amplitudes_.cols(); ++i) {
+    // u_pi(t) = amplitude_pi · shape_i(t)
+    input_values_.col(i) = amplitudes_.col(i) * (*inputs_)[i].Shape(time_s);
+  }
+  input_time_s_ = time_s;
+}
+
+void TrajectoryBlock::Derivatives(double time_s, const ConstBlock& states, Block derivatives) {
+  EvaluateInputs(std::min(time_s, input_limit_s_));
+  specification_->model->Derivatives(time_s, states, parameters_, input_values_, derivatives);
+}
+
+TrajectoryBlock::Break TrajectoryBlock::NextBreak() const {
+  Break next;
+  for (const InputSignal& input : *inputs_) {
+    const double break_s = input.NextBreak(time_s_);
+    if (break_s > next.time_s || break_s == kInfinity) continue;
+    const bool together = break_s == next.time_s;
+    next = {break_s, input.Jumps() || (together && next.jumps)};
+  }
+  return next;
+}
+
+absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef outputs,
+                                      const Stop& stop) {
+  for (int sample = 0; sample < static_cast<int>(times_s.size()); ++sample) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    const double time_s = times_s[sample];
+    POLYEST_CHECK(time_s >= time_s_);
+    if (integrator_) POLYEST_RETURN_IF_ERROR(AdvanceStates(time_s, stop));
+    time_s_ = time_s;
+    ReadOutputs(time_s, sample, outputs);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
+  for (;;) {
+    const Break next = NextBreak();
+    input_limit_s_ = std::nextafter(next.time_s, -kInfinity);
+    if (next.time_s > time_s) {
+      return Reach(time_s, streamed_ ? time_s : next.time_s, stop);
+    }
+    POLYEST_RETURN_IF_ERROR(Reach(next.time_s, next.time_s, stop));
+    time_s_ = next.time_s;
+    if (next.jumps && integrator_) integrator_->Restart();
+  }
+}
+
+absl::Status TrajectoryBlock::Reach(double time_s, double stop_time_s, const Stop& stop) {
+  const int most_steps = specification_->integration.most_steps;
+  const int steps_at_once = std::min(kStepsAtOnce, most_steps);
+  int steps = 0;
+  while (integrator_) {
+    const IntegratorOutcome outcome =
+        integrator_->AdvanceTo(time_s, stop_time_s, steps_at_once, states_);
+    if (outcome.ok) break;
+    steps += steps_at_once;
+    const bool may_change =
+        specification_->integration.method == IntegrationMethod::kAuto && !stiff_;
+    const bool exhausted = outcome.too_many_steps && steps + steps_at_once > most_steps;
+    if (outcome.too_many_steps && !exhausted && !(may_change && integrator_->LooksStiff())) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      continue;
+    }
+    const double good_s = integrator_->time_s();
+    states_ = integrator_->states();
+    if (may_change && outcome.too_many_steps) {
+      stiff_ = true;
+    } else {
+      Fail(outcome.worst_point, good_s, outcome.flag, outcome.reason);
+    }
+    StartIntegrator(good_s);
+    steps = 0;
+  }
+  return absl::OkStatus();
+}
+
+void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) {
+  const std::vector<int>& selected = specification_->outputs;
+  const Eigen::Index columns = selected_outputs_.cols();
+  if (alive()) {
+    EvaluateInputs(time_s);
+    specification_->model->Outputs(time_s, states_, parameters_, input_values_, model_outputs_);
+    for (Eigen::Index j = 0; j < columns; ++j) {
+      selected_outputs_.col(j) = model_outputs_.col(selected[j]);
+    }
+    const int alive_before = alive_points_;
+    FailRowsNotFinite(selected_outputs_, time_s, "an output is not finite");
+    if (alive_points_ < alive_before && states_.cols() > 0) StartIntegrator(time_s);
+  }
+  for (Eigen::Index point = 0; point < std::ssize(point_alive_); ++point) {
+    auto row = outputs.row(first_point_ + point).segment(sample * columns, columns);
+    if (point_alive_[point]) {
+      row = selected_outputs_.row(point).matrix();
+    } else {
+      row.setZero();
+    }
+  }
+}
+
+void TrajectoryBlock::FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s,
+                                        const char* reason) {
+  // x − x is 0 for a number and NaN for all else.
+  if ((values - values).sum() == 0) return;
+  for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
+    if (point_alive_[row] && !values.row(row).isFinite().all()) Fail(row, time_s, 0, reason);
+  }
+}
+
+void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::string reason) {
+  const int point = source_[row];
+  POLYEST_CHECK(point_alive_[point]);
+  point_alive_[point] = false;
+  --alive_points_;
+  failures_.push_back({first_point_ + point, time_s, flag, std::move(reason)});
+  const auto donor = std::find(point_alive_.begin(), point_alive_.end(), true);
+  if (donor == point_alive_.end()) {
+    integrator_.reset();
+    return;
+  }
+  const auto healthy = static_cast<Eigen::Index>(donor - point_alive_.begin());
+  for (Eigen::Index copy = 0; copy < std::ssize(source_); ++copy) {
+    if (source_[copy] != point) continue;
+    source_[copy] = static_cast<int>(healthy);
+    parameters_.row(copy) = parameters_.row(healthy);
+    amplitudes_.row(copy) = amplitudes_.row(healthy);
+    states_.row(copy) = states_.row(healthy);
+  }
+  input_time_s_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace polyest

@@ -1,0 +1,86 @@
+#pragma once
+
+// A block of trajectories: up to kPoints points of an ensemble, advanced by one integrator.
+//
+// Rows beyond the block's own points, up to a multiple of kLanes, carry copies of its last point; a
+// point that fails is replaced by a copy of one that has not, so that the shape stays.
+//
+// An input that jumps at t* is integrated with its left limit up to t* and with its value from the
+// right from there on: while the block is on its way to t*, inputs are evaluated no later than just
+// before it.
+
+#include <absl/status/status.h>
+
+#include <Eigen/Core>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/common/stop.h"
+#include "core/common/types.h"
+#include "core/propagation/ensemble_integrator.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest {
+
+class TrajectoryBlock final : public EnsembleSystem {
+ public:
+  static constexpr int kPoints = 64;
+
+  // Points first_point … first_point + points − 1 of the specification, which must outlive it, as
+  // must the inputs.
+  TrajectoryBlock(const EnsembleSpecification* specification, const InputSignals* inputs,
+                  int first_point, int points);
+
+  Eigen::Index points() const override { return states_.rows(); }
+  Eigen::Index states() const override { return states_.cols(); }
+  void Derivatives(double time_s, const ConstBlock& states, Block derivatives) override;
+
+  // As EnsemblePropagator::Advance, for this block's rows of outputs.
+  absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
+
+  const std::vector<PointFailure>& failures() const { return failures_; }
+
+ private:
+  struct Break {
+    double time_s = std::numeric_limits<double>::infinity();
+    bool jumps = false;
+  };
+
+  void StartIntegrator(double time_s);
+  void EvaluateInputs(double time_s);
+  Break NextBreak() const;
+  absl::Status AdvanceStates(double time_s, const Stop& stop);
+  absl::Status Reach(double time_s, double stop_time_s, const Stop& stop);
+  void ReadOutputs(double time_s, int sample, MatrixRef outputs);
+  void FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s, const char* reason);
+  // The point in that row is left out from now on.
+  void Fail(Eigen::Index row, double time_s, int flag, std::string reason);
+  bool alive() const { return alive_points_ > 0; }
+
+  const EnsembleSpecification* specification_;
+  const InputSignals* inputs_;
+  const int first_point_;
+  bool streamed_ = false;  // a knot yet to come must not change a step already taken
+
+  Eigen::ArrayXXd parameters_;
+  Eigen::ArrayXXd amplitudes_;
+  Eigen::ArrayXXd states_;
+  Eigen::ArrayXXd input_values_;
+  Eigen::ArrayXXd model_outputs_;
+  Eigen::ArrayXXd selected_outputs_;
+  double input_time_s_;  // input_values_ are of this time
+  double input_limit_s_ = std::numeric_limits<double>::infinity();
+
+  std::vector<int> source_;  // the block's own point that each row carries
+  std::vector<bool> point_alive_;
+  int alive_points_;
+  bool stiff_ = false;
+  double time_s_ = 0;
+  std::unique_ptr<EnsembleIntegrator> integrator_;
+  std::vector<PointFailure> failures_;
+};
+
+}  // namespace polyest
