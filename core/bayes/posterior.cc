@@ -1,1 +1,200 @@
-// To be written.
+#include "core/bayes/posterior.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "core/chaos/collocation_points.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kCoverPerParticle = 4;  // points of the cover of the box for each particle
+constexpr int kLeastStartingPoints = 50;
+constexpr double kEffectiveFraction = 0.5;
+constexpr double kShrink = 0.7;           // of the guesses, mixed with 0.3 of the cover
+constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
+constexpr double kStepSpread = 0.5;       // standard deviation of log γ
+constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box widths
+constexpr int kBisections = 50;
+
+// A cover of the box, count × n.
+Matrix CoverOfBox(const Vector& lower, const Vector& upper, int count) {
+  Matrix cover = UnitCubePoints(PointSet::kHalton, static_cast<int>(lower.size()), count);
+  for (Eigen::Index j = 0; j < cover.cols(); ++j) {
+    cover.col(j) = (lower[j] + (upper[j] - lower[j]) * cover.col(j).array()).matrix();
+  }
+  return cover;
+}
+
+class Sampler {
+ public:
+  Sampler(const Cost& cost, const Vector& lower, const Vector& upper, const SamplerOptions& options)
+      : cost_(cost), lower_(lower), upper_(upper), options_(options), generator_(options.seed) {}
+
+  absl::StatusOr<Particles> Run(const Matrix& guesses, const Stop& stop) {
+    POLYEST_RETURN_IF_ERROR(Start(guesses));
+    double beta = 0;
+    while (beta < 1) {
+      const double step = TemperingStep(1 - beta);
+      Resample(step);
+      beta = step >= 1 - beta ? 1 : beta + step;
+      const int sweeps = beta < 1 ? options_.sweeps : options_.final_sweeps;
+      for (int i = 0; i < sweeps; ++i) {
+        POLYEST_RETURN_IF_ERROR(stop.Check());
+        Sweep(beta);
+      }
+    }
+    return std::move(particles_);
+  }
+
+ private:
+  // J at each row; +∞ outside the box.
+  void Evaluate(const Matrix& etas, Vector& costs) const {
+    cost_.EvaluateMany(etas, costs);
+    for (Eigen::Index i = 0; i < etas.rows(); ++i) {
+      const auto row = etas.row(i).transpose().array();
+      if ((row < lower_.array()).any() || (row > upper_.array()).any()) {
+        costs[i] = std::numeric_limits<double>::infinity();
+      }
+    }
+  }
+
+  absl::Status Start(const Matrix& guesses) {
+    const Matrix cover = CoverOfBox(lower_, upper_, kCoverPerParticle * options_.particles);
+    const Eigen::Index g = std::min(guesses.rows(), cover.rows());
+    Matrix start(2 * g + cover.rows(), cover.cols());
+    const auto used = guesses.topRows(g);
+    start << used, kShrink * used + (1 - kShrink) * cover.topRows(g), cover;
+    Vector costs;
+    Evaluate(start, costs);
+    Eigen::Index kept = 0;
+    for (Eigen::Index i = 0; i < start.rows(); ++i) {
+      if (!std::isfinite(costs[i])) continue;
+      start.row(kept) = start.row(i);
+      costs[kept++] = costs[i];
+    }
+    if (kept < kLeastStartingPoints) {
+      return absl::FailedPreconditionError(absl::StrFormat(
+          "only %d of %d starting points of the sampler have a finite cost", kept, start.rows()));
+    }
+    particles_ = {start.topRows(kept), costs.head(kept)};
+    return absl::OkStatus();
+  }
+
+  // Weights e^{−step (J − min J)}, not normalized.
+  Vector Weights(double step) const {
+    return (-step * (particles_.costs.array() - particles_.costs.minCoeff())).exp();
+  }
+
+  // The largest step ≤ most that keeps the effective size (Σ w)²/Σ w² above half of the particles.
+  double TemperingStep(double most) const {
+    const auto keeps_enough = [&](double step) {
+      const Vector w = Weights(step);
+      return w.sum() * w.sum() / w.squaredNorm() >=
+             kEffectiveFraction * static_cast<double>(w.size());
+    };
+    if (keeps_enough(most)) return most;
+    double low = 0;
+    double high = most;
+    for (int i = 0; i < kBisections; ++i) {
+      const double middle = 0.5 * (low + high);
+      (keeps_enough(middle) ? low : high) = middle;
+    }
+    return high;
+  }
+
+  // Systematic resampling to options_.particles: one uniform draw, evenly spaced pointers.
+  void Resample(double step) {
+    const Vector weights = Weights(step);
+    const double spacing = weights.sum() / options_.particles;
+    double pointer = spacing * uniform_(generator_);
+    Particles chosen{Matrix(options_.particles, particles_.etas.cols()),
+                     Vector(options_.particles)};
+    Eigen::Index source = 0;
+    double cumulative = weights[0];
+    for (int i = 0; i < options_.particles; ++i, pointer += spacing) {
+      while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
+      chosen.etas.row(i) = particles_.etas.row(source);
+      chosen.costs[i] = particles_.costs[source];
+    }
+    particles_ = std::move(chosen);
+    Shuffle();
+  }
+
+  // Systematic resampling leaves copies side by side; the halves that move each other must not
+  // depend on that order.
+  void Shuffle() {
+    for (Eigen::Index i = particles_.etas.rows() - 1; i > 0; --i) {
+      const Eigen::Index j = Draw(i + 1);
+      particles_.etas.row(i).swap(particles_.etas.row(j));
+      std::swap(particles_.costs[i], particles_.costs[j]);
+    }
+  }
+
+  // One move of every particle: each half is moved by differences within the other, which leaves
+  // the density invariant though all of a half move at once.
+  void Sweep(double beta) {
+    const Eigen::Index half = particles_.etas.rows() / 2;
+    MoveHalf(beta, 0, half, half, particles_.etas.rows() - half);
+    MoveHalf(beta, half, particles_.etas.rows() - half, 0, half);
+  }
+
+  void MoveHalf(double beta, Eigen::Index first, Eigen::Index count, Eigen::Index other,
+                Eigen::Index other_count) {
+    const Eigen::Index n = particles_.etas.cols();
+    const double scale = 2.38 / std::sqrt(2.0 * static_cast<double>(n));
+    const Vector width = upper_ - lower_;
+    proposal_.resize(count, n);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const bool jump = uniform_(generator_) < kJumpProbability;
+      const double gamma = jump ? 1 : scale * std::exp(kStepSpread * normal_(generator_));
+      const Eigen::Index j = other + Draw(other_count);
+      const Eigen::Index k = other + Draw(other_count);
+      for (Eigen::Index d = 0; d < n; ++d) {
+        proposal_(i, d) = particles_.etas(first + i, d) +
+                          gamma * (particles_.etas(j, d) - particles_.etas(k, d)) +
+                          kJitter * width[d] * normal_(generator_);
+      }
+    }
+    Evaluate(proposal_, proposal_costs_);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double change = proposal_costs_[i] - particles_.costs[first + i];
+      if (std::log(uniform_(generator_)) < -beta * change) {
+        particles_.etas.row(first + i) = proposal_.row(i);
+        particles_.costs[first + i] = proposal_costs_[i];
+      }
+    }
+  }
+
+  Eigen::Index Draw(Eigen::Index count) {
+    return std::min(static_cast<Eigen::Index>(uniform_(generator_) * static_cast<double>(count)),
+                    count - 1);
+  }
+
+  const Cost& cost_;
+  const Vector& lower_;
+  const Vector& upper_;
+  const SamplerOptions& options_;
+  std::mt19937_64 generator_;
+  std::uniform_real_distribution<double> uniform_{0, 1};
+  std::normal_distribution<double> normal_{0, 1};
+  Particles particles_;
+  Matrix proposal_;
+  Vector proposal_costs_;
+};
+
+}  // namespace
+
+absl::StatusOr<Particles> SamplePosterior(const Cost& cost, const Vector& lower,
+                                          const Vector& upper, const Matrix& guesses,
+                                          const SamplerOptions& options, const Stop& stop) {
+  return Sampler(cost, lower, upper, options).Run(guesses, stop);
+}
+
+}  // namespace polyest

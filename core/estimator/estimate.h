@@ -62,8 +62,8 @@ struct ExpansionSummary {
 
 struct Estimate {
   std::vector<ParameterEstimate> parameters;
-  Matrix covariance;  // of the parameters, from the curvature
-  CostValue cost;     // at map
+  Matrix covariance;          // of the parameters, from the curvature
+  CostValue cost;             // at map
   double regularization = 1;  // α² used
   std::vector<ChannelEstimate> channels;
   std::vector<Direction> directions;

@@ -1,1 +1,226 @@
-// To be written.
+#include "core/estimator/estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/common/status.h"
+#include "core/estimator/assessment.h"
+#include "core/estimator/memory_store.h"
+#include "core/estimator/reexpansion.h"
+#include "core/estimator/sample_checks.h"
+
+namespace polyest {
+namespace {
+
+constexpr int64_t kBlockRows = 64;
+// A sample whose expansion residual passes this part of the noise ends the window before it.
+constexpr double kResidualToNoise = 0.1;
+// Where a window ends the expansion is compared with the model: it moves when the posterior's
+// means may be off by this many of its standard deviations, or when fewer check points than this
+// still speak for the posterior.
+constexpr double kMostShift = 0.1;
+constexpr double kLeastEffectiveChecks = 2;
+constexpr double kWindowGrowth = 1.3;
+// After a settlement that did not help, this part of the record so far is taken with its discount
+// before the next one is tried.
+constexpr int64_t kPatience = 8;
+constexpr int kMostSettlementsAtRow = 4;
+
+}  // namespace
+
+class Estimator::Implementation {
+ public:
+  Implementation(ResolvedProblem problem, EstimatorOptions options)
+      : problem_(std::move(problem)),
+        threads_(options.threads),
+        store_(options.store ? std::move(options.store) : std::make_shared<MemoryStore>()),
+        checks_(problem_),
+        particles_(0, problem_.dimension()) {}
+
+  absl::Status Begin() {
+    POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(problem_));
+    POLYEST_ASSIGN_OR_RETURN(expansion_,
+                             RegionalExpansion::Make(problem_, std::move(design), threads_));
+    return absl::OkStatus();
+  }
+
+  const ResolvedProblem& problem() const { return problem_; }
+  int64_t rows_appended() const { return store_->rows(); }
+  int64_t rows_processed() const { return processed_; }
+
+  absl::Status Append(const Samples& samples);
+  absl::Status Process(const Stop& stop);
+  absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
+
+ private:
+  bool adaptive() const { return problem_.problem().expansion.adaptive; }
+  absl::Status Recover(const Stop& stop);
+  absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
+  absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
+  absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::StatusOr<bool> Settle(const Stop& stop);
+
+  ResolvedProblem problem_;
+  int threads_;
+  std::shared_ptr<SampleStore> store_;
+  SampleChecks checks_;
+  std::unique_ptr<RegionalExpansion> expansion_;
+  bool broken_ = false;  // a stop left the expansion between two rows
+  Matrix particles_;     // of the last settlement, germ coordinates
+  int64_t processed_ = 0;
+  int64_t window_end_ = 2;
+  int64_t patient_until_ = 0;  // rows before this one are taken whatever their residual
+  int64_t settled_row_ = -1;
+  int settlements_at_row_ = 0;
+  uint64_t settlements_ = 0;
+  int reexpansions_ = 0;
+  int64_t abandoned_rows_ = 0;  // propagated by expansions given up since
+  RecordSummary summary_;
+};
+
+absl::Status Estimator::Implementation::Append(const Samples& samples) {
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
+  for (size_t k = 0; k < checked.rows.size(); ++k) {
+    POLYEST_RETURN_IF_ERROR(
+        store_->Append(checked.rows[k], checked.RowValues(k), checked.RowNoise(k)));
+  }
+  checks_.Accept(checked);
+  return absl::OkStatus();
+}
+
+absl::Status Estimator::Implementation::Process(const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(Recover(stop));
+  // A window's end that an earlier stop left open.
+  if (adaptive() && processed_ >= window_end_) {
+    POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
+  }
+  RowBlock block;
+  while (processed_ < store_->rows()) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    const int64_t count = std::min(kBlockRows, store_->rows() - processed_);
+    POLYEST_RETURN_IF_ERROR(ReadBlock(*store_, processed_, count, block));
+    broken_ = true;
+    POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
+    if (through) broken_ = false;
+  }
+  return absl::OkStatus();
+}
+
+// After a stop in the middle of a block: the same expansion, propagated again up to the last row
+// taken.
+absl::Status Estimator::Implementation::Recover(const Stop& stop) {
+  if (!broken_) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(
+      expansion_, Replay(problem_, expansion_->design(), *store_, processed_, threads_, stop));
+  broken_ = false;
+  return absl::OkStatus();
+}
+
+// False when the expansion moved and the rest of the block must be propagated again.
+absl::StatusOr<bool> Estimator::Implementation::AbsorbBlock(const RowBlock& block,
+                                                            const Stop& stop) {
+  for (int row = 0; row < block.count(); ++row) {
+    const bool short_of_trajectories = row == expansion_->fitted_rows();
+    const bool coarse = !short_of_trajectories && processed_ >= patient_until_ &&
+                        expansion_->ResidualToNoise(row) > kResidualToNoise;
+    if (short_of_trajectories || (adaptive() && coarse)) {
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(short_of_trajectories, stop));
+      if (moved) return false;
+    }
+    expansion_->Absorb(row);
+    summary_.Add(block, row, problem_.channels());
+    ++processed_;
+    if (adaptive() && processed_ >= window_end_) {
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleAfterWindow(stop));
+      if (moved) return false;
+    }
+  }
+  return true;
+}
+
+// The next row is too coarse for the present expansion, or too few trajectories reach it.
+absl::StatusOr<bool> Estimator::Implementation::SettleBefore(bool short_of_trajectories,
+                                                             const Stop& stop) {
+  if (settled_row_ != processed_) settlements_at_row_ = 0;
+  settled_row_ = processed_;
+  if (adaptive() && processed_ > 0 && settlements_at_row_ < kMostSettlementsAtRow) {
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop));
+    ++settlements_at_row_;
+    if (moved) return true;
+  }
+  if (short_of_trajectories) return expansion_->shortage();
+  patient_until_ = processed_ + 1 + processed_ / kPatience;
+  return false;
+}
+
+absl::StatusOr<bool> Estimator::Implementation::SettleAfterWindow(const Stop& stop) {
+  const Agreement agreement =
+      AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
+  bool moved = false;
+  if (agreement.shift > kMostShift || agreement.effective_checks < kLeastEffectiveChecks) {
+    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop));
+  }
+  window_end_ =
+      std::max(processed_ + 2,
+               static_cast<int64_t>(std::ceil(kWindowGrowth * static_cast<double>(processed_))));
+  return moved;
+}
+
+// True when the expansion moved.
+absl::StatusOr<bool> Estimator::Implementation::Settle(const Stop& stop) {
+  SettleRequest request;
+  request.problem = &problem_;
+  request.store = store_.get();
+  request.rows = processed_;
+  request.guesses = particles_;
+  request.seed = 1000 * (settlements_ + 1);
+  request.threads = threads_;
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, polyest::Settle(*expansion_, request, stop));
+  ++settlements_;
+  particles_ = std::move(settlement.particles);
+  if (!settlement.expansion) return false;
+  abandoned_rows_ += expansion_->propagated_rows() + settlement.propagated_rows;
+  reexpansions_ += settlement.reexpansions;
+  expansion_ = std::move(settlement.expansion);
+  broken_ = false;
+  return true;
+}
+
+absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
+  AssessmentRequest request;
+  request.problem = &problem_;
+  request.expansion = expansion_.get();
+  request.record = &summary_;
+  request.guesses = &particles_;
+  request.reexpansions = reexpansions_;
+  request.propagated_rows = abandoned_rows_ + expansion_->propagated_rows();
+  return Assess(request, stop);
+}
+
+Estimator::Estimator(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
+Estimator::~Estimator() = default;
+
+absl::StatusOr<std::unique_ptr<Estimator>> Estimator::Make(ResolvedProblem problem,
+                                                           EstimatorOptions options) {
+  if (problem.channels() == 0) {
+    return absl::InvalidArgumentError("measured: at least one output must be measured");
+  }
+  auto implementation = std::make_unique<Implementation>(std::move(problem), std::move(options));
+  POLYEST_RETURN_IF_ERROR(implementation->Begin());
+  return std::unique_ptr<Estimator>(new Estimator(std::move(implementation)));
+}
+
+const ResolvedProblem& Estimator::problem() const { return implementation_->problem(); }
+absl::Status Estimator::Append(const Samples& samples) { return implementation_->Append(samples); }
+absl::Status Estimator::Process(const Stop& stop) { return implementation_->Process(stop); }
+absl::StatusOr<Estimate> Estimator::CurrentEstimate(const Stop& stop) const {
+  return implementation_->CurrentEstimate(stop);
+}
+int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
+int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }
+
+}  // namespace polyest

@@ -15,11 +15,11 @@
 namespace polyest {
 
 struct PropagationOptions {
-  double until_s = 0;  // > 0
-  double step_s = 0;   // > 0; times 0, step, 2 step … until
+  double until_s = 0;                // > 0
+  double step_s = 0;                 // > 0; times 0, step, 2 step … until
   std::vector<std::string> outputs;  // empty: the measured ones, or all if none is
   std::vector<double> probabilities = {0.025, 0.5, 0.975};
-  int density_bins = 0;        // 0: no densities
+  int density_bins = 0;          // 0: no densities
   int density_samples = 10'000;  // of the expansion
   int threads = 1;
 

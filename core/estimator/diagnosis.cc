@@ -1,0 +1,138 @@
+#include "core/estimator/diagnosis.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <cmath>
+
+#include "core/estimator/undersampling.h"
+
+namespace polyest {
+namespace {
+
+// χ² of a right model has mean N and standard deviation √(2N); far larger is both many of those
+// and half as much again.
+constexpr double kMisfitDeviations = 6;
+constexpr double kMisfitRatio = 1.5;
+constexpr double kAtBound = 1e-6;  // of the width of Ω
+constexpr size_t kFailuresNamed = 3;
+
+const std::string& Name(const Findings& findings, int i) {
+  return findings.problem->prior().parameters()[static_cast<size_t>(i)].name;
+}
+
+void AddIdentifiability(const Findings& findings, const Estimate& estimate,
+                        std::vector<Diagnostic>& diagnostics) {
+  std::vector<std::string> names;
+  for (const ParameterEstimate& parameter : estimate.parameters) {
+    if (parameter.verdict == Verdict::kNotIdentified) names.push_back(parameter.name);
+  }
+  if (names.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kNotIdentified,
+       absl::StrFormat("the data say less than the prior about %s; what is reported there is the "
+                       "prior's",
+                       absl::StrJoin(names, ", "))});
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    if (parameter.verdict != Verdict::kNotIdentified) continue;
+    const SamplingInformation information = InformationBetweenSamples(
+        *findings.problem, findings.record->beginning(), findings.map_xi, i);
+    if (!information.undersampled) continue;
+    diagnostics.push_back(
+        {DiagnosticCode::kUndersampled,
+         absl::StrFormat("the samples miss what %s changes: as many samples between them would "
+                         "know it %.0f times better than the prior (in variance); sample at other "
+                         "times, or more often",
+                         parameter.name, information.between)});
+  }
+}
+
+void AddMisfit(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
+  for (const ChannelEstimate& channel : estimate.channels) {
+    const auto samples = static_cast<double>(channel.samples);
+    if (channel.chi_squared > kMisfitRatio * samples &&
+        channel.chi_squared > samples + kMisfitDeviations * std::sqrt(2 * samples)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
+                           "prior is wrong, and the uncertainty reported is too small",
+                           channel.output, std::sqrt(channel.chi_squared / samples))});
+    }
+  }
+}
+
+void AddBounds(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  const Prior& prior = findings.problem->prior();
+  for (int i = 0; i < prior.dimension(); ++i) {
+    const double width = prior.upper()[i] - prior.lower()[i];
+    const double scale = std::isfinite(width) ? width : 1;
+    const bool low = findings.map_xi[i] - prior.lower()[i] < kAtBound * scale;
+    const bool high = prior.upper()[i] - findings.map_xi[i] < kAtBound * scale;
+    if (!low && !high) continue;
+    diagnostics.push_back({DiagnosticCode::kAtPriorBound,
+                           absl::StrFormat("%s lies on the %s bound of its prior: the data ask for "
+                                           "values beyond it",
+                                           Name(findings, i), low ? "lower" : "upper")});
+  }
+}
+
+void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  const auto& failures = findings.expansion->failures();
+  if (failures.empty()) return;
+  std::string message = absl::StrFormat(
+      "%d of %d trajectories could not be integrated and were "
+      "left out: ",
+      failures.size(), findings.expansion->points());
+  for (size_t i = 0; i < std::min(failures.size(), kFailuresNamed); ++i) {
+    absl::StrAppendFormat(&message, "%s%s", i == 0 ? "" : "; ",
+                          DescribeFailure(failures[i], findings.problem->prior()));
+  }
+  if (failures.size() > kFailuresNamed) message += "; …";
+  diagnostics.push_back({DiagnosticCode::kPointsFailed, message});
+}
+
+void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.other_minima.empty()) {
+    std::vector<std::string> places;
+    for (const Vector& theta : findings.other_minima) {
+      std::vector<std::string> values;
+      for (int i = 0; i < theta.size(); ++i) {
+        values.push_back(absl::StrFormat("%s = %.6g", Name(findings, i), theta[i]));
+      }
+      places.push_back(absl::StrJoin(values, ", "));
+    }
+    diagnostics.push_back({DiagnosticCode::kMultipleMinima,
+                           absl::StrFormat("the cost has other minima of comparable depth at %s",
+                                           absl::StrJoin(places, " and at "))});
+  }
+  if (!findings.converged) {
+    diagnostics.push_back({DiagnosticCode::kNotConverged,
+                           absl::StrFormat("the minimizer gave up before it had converged: %s",
+                                           findings.minimizer_reason)});
+  }
+}
+
+}  // namespace
+
+std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
+  std::vector<Diagnostic> diagnostics;
+  AddIdentifiability(findings, estimate, diagnostics);
+  if (findings.shift > kInaccurateShift) {
+    diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat(
+             "the expansion of order %d differs from the model by %.3g times the noise; "
+             "estimates may be off by %.3g standard deviations of the fit, by which the "
+             "uncertainty has been widened; raise expansion.order%s",
+             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
+             findings.problem->problem().expansion.adaptive ? "" : " or let it be adaptive")});
+  }
+  AddMisfit(estimate, diagnostics);
+  AddBounds(findings, diagnostics);
+  AddMinima(findings, diagnostics);
+  AddFailures(findings, diagnostics);
+  return diagnostics;
+}
+
+}  // namespace polyest

@@ -1,0 +1,159 @@
+#include "core/estimator/reexpansion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kMostAttempts = 15;
+constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
+constexpr int64_t kReplayRows = 256;
+constexpr double kNegligibleWeight = 1e-3;  // of a check point, relative to the heaviest
+
+bool Stopped(const absl::Status& status) {
+  return absl::IsCancelled(status) || absl::IsDeadlineExceeded(status);
+}
+
+// Loop of one settlement; holds what changes from attempt to attempt.
+class Settler {
+ public:
+  Settler(const RegionalExpansion& present, const SettleRequest& request, const Stop& stop)
+      : present_(present), request_(request), stop_(stop) {}
+
+  absl::StatusOr<Settlement> Run() {
+    result_.particles = request_.guesses;
+    bool may_move = true;
+    for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+      POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
+      if (!sampled) break;
+      const ExpansionDesign& design = expansion().design();
+      const std::vector<int> leaning =
+          LeaningAxes(design, request_.problem->prior(), particles_.etas);
+      if (!leaning.empty()) {
+        POLYEST_ASSIGN_OR_RETURN(const bool moved,
+                                 Move(WidenedRegion(design, particles_.etas, leaning)));
+        if (!moved) break;
+        continue;
+      }
+      if (!may_move) break;
+      const Region region = RegionOfParticles(result_.particles);
+      if (region.Volume() >= kPays * TrustedRegion(design).Volume()) break;
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region));
+      if (!moved) break;
+      may_move = false;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  const RegionalExpansion& expansion() const {
+    return result_.expansion ? *result_.expansion : present_;
+  }
+
+  // False when the sampler finds nowhere to start.
+  absl::StatusOr<bool> Sample(int attempt) {
+    const Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    Vector lower, upper;
+    SamplingBox(expansion().design(), lower, upper);
+    SamplerOptions options;
+    options.seed = request_.seed + static_cast<uint64_t>(attempt);
+    const Matrix guesses = expansion().design().region.ManyToLocal(result_.particles);
+    absl::StatusOr<Particles> particles =
+        SamplePosterior(cost, lower, upper, guesses, options, stop_);
+    if (Stopped(particles.status())) return particles.status();
+    if (!particles.ok()) return false;
+    particles_ = *std::move(particles);
+    result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
+    return true;
+  }
+
+  // False when the expansion there cannot be built; the present one then stays.
+  absl::StatusOr<bool> Move(Region region) {
+    const Vector inside = result_.particles.colwise().mean().transpose();
+    ExpansionDesign design = DesignForRegion(*request_.problem, std::move(region), inside);
+    const Eigen::Index checks =
+        std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
+    design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
+    design.check_costs = particles_.costs.head(checks);
+    absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
+        Replay(*request_.problem, std::move(design), *request_.store, request_.rows,
+               request_.threads, stop_);
+    if (Stopped(moved.status())) return moved.status();
+    if (!moved.ok()) return false;
+    if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
+    result_.expansion = *std::move(moved);
+    ++result_.reexpansions;
+    return true;
+  }
+
+  const RegionalExpansion& present_;
+  const SettleRequest& request_;
+  const Stop& stop_;
+  Particles particles_;
+  Settlement result_;
+};
+
+}  // namespace
+
+absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
+                                  const Stop& stop) {
+  return Settler(present, request, stop).Run();
+}
+
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
+                                                          ExpansionDesign design,
+                                                          const SampleStore& store, int64_t rows,
+                                                          int threads, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(std::unique_ptr<RegionalExpansion> expansion,
+                           RegionalExpansion::Make(problem, std::move(design), threads));
+  RowBlock block;
+  for (int64_t first = 0; first < rows; first += kReplayRows) {
+    const int64_t count = std::min(kReplayRows, rows - first);
+    POLYEST_RETURN_IF_ERROR(ReadBlock(store, first, count, block));
+    POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
+    if (expansion->fitted_rows() < block.count()) return expansion->shortage();
+    for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);
+  }
+  return expansion;
+}
+
+Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
+  const ExpansionDesign& design = expansion.design();
+  const RegionalExpansion::Check check = expansion.Checks();
+  std::vector<double> log_weight, difference, residual;
+  for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
+    const CostValue value = cost.Evaluate(design.check_points.row(i).transpose());
+    if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
+    log_weight.push_back(design.check_costs[i] - value.total);
+    difference.push_back(check.model_mismatch[i] - value.mismatch);
+    residual.push_back(check.residual_to_noise[i]);
+  }
+  Agreement agreement;
+  if (log_weight.empty()) return agreement;
+  const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());
+  double sum = 0, sum_of_squares = 0, mean = 0;
+  for (size_t i = 0; i < log_weight.size(); ++i) {
+    const double weight = std::exp(log_weight[i] - heaviest);
+    sum += weight;
+    sum_of_squares += weight * weight;
+    mean += weight * difference[i];
+    if (weight > kNegligibleWeight) {
+      agreement.residual_to_noise = std::max(agreement.residual_to_noise, residual[i]);
+    }
+  }
+  mean /= sum;
+  agreement.effective_checks = sum * sum / sum_of_squares;
+  double variance = 0;
+  for (size_t i = 0; i < log_weight.size(); ++i) {
+    const double weight = std::exp(log_weight[i] - heaviest) / sum;
+    variance += weight * (difference[i] - mean) * (difference[i] - mean);
+  }
+  agreement.shift = std::sqrt(variance);
+  return agreement;
+}
+
+}  // namespace polyest

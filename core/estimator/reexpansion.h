@@ -1,0 +1,60 @@
+#pragma once
+
+// Re-expansion: moving the expansion to where the posterior is. The prior density and Ω stay the
+// original ones; only the region in which the polynomial interpolates moves.
+//
+// One settlement: sample the posterior on the present expansion; where the particles lean on an
+// edge of the region that is not Ω's, widen that axis and propagate the record again; where the
+// region of the particles is less than half of the present one, move there and propagate again;
+// repeat until neither is needed. The region comes from particles and never from a minimum and its
+// Hessian: in a direction not yet informed the minimum sits anywhere.
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+
+#include "core/estimator/regional_expansion.h"
+
+namespace polyest {
+
+struct SettleRequest {
+  const ResolvedProblem* problem = nullptr;
+  const SampleStore* store = nullptr;
+  int64_t rows = 0;  // of the store that the expansion has absorbed
+  Matrix guesses;    // particles of the settlement before, germ coordinates (may be none)
+  uint64_t seed = 1;
+  int threads = 1;
+};
+
+struct Settlement {
+  std::unique_ptr<RegionalExpansion> expansion;  // null: the present one stays
+  Matrix particles;                              // of the posterior, germ coordinates
+  int reexpansions = 0;
+  int64_t propagated_rows = 0;  // by all but the expansion returned
+};
+
+// Only a stop request makes it not OK; `present` is then untouched and the same call may be made
+// again.
+absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
+                                  const Stop& stop);
+
+// An expansion of the design that has absorbed the first `rows` rows of the store.
+// FAILED_PRECONDITION when it cannot be factored or too few trajectories are left.
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
+                                                          ExpansionDesign design,
+                                                          const SampleStore& store, int64_t rows,
+                                                          int threads, const Stop& stop);
+
+// How far the posterior on the expansion may be trusted, from the check points: with
+// ΔJ = J_mismatch of the model − that of the expansion, the standard deviation of ΔJ over the
+// posterior bounds the error of any posterior mean in units of its standard deviation
+// (Cauchy–Schwarz, to first order in ΔJ).
+struct Agreement {
+  double shift = 0;              // that bound; ≥ 0
+  double effective_checks = 0;   // effective number of check points after reweighting
+  double residual_to_noise = 0;  // worst over the check points that still matter
+};
+
+Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost);
+
+}  // namespace polyest

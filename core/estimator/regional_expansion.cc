@@ -1,0 +1,243 @@
+#include "core/estimator/regional_expansion.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+Matrix Stack(const Matrix& top, const Matrix& bottom) {
+  Matrix stacked(top.rows() + bottom.rows(), top.cols());
+  stacked << top, bottom;
+  return stacked;
+}
+
+}  // namespace
+
+absl::Status ReadBlock(const SampleStore& store, int64_t first, int64_t count, RowBlock& block) {
+  return store.Read(first, count, block.rows, block.values, block.noise);
+}
+
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
+    const ResolvedProblem& problem, ExpansionDesign design, int threads) {
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
+                           CollocationMatrix::Factor(*design.basis, design.points));
+  return std::unique_ptr<RegionalExpansion>(
+      new RegionalExpansion(problem, std::move(design), std::move(matrix), threads));
+}
+
+RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
+                                     CollocationMatrix matrix, int threads)
+    : problem_(problem),
+      design_(std::move(design)),
+      matrix_(std::move(matrix)),
+      threads_(threads),
+      channels_(problem.channels()),
+      reference_phi_(design_.basis->size()),
+      kept_(static_cast<size_t>(design_.points.rows())),
+      check_valid_(static_cast<size_t>(design_.check_points.rows()), true),
+      check_mismatch_(Vector::Zero(design_.check_points.rows())),
+      check_residual_(Vector::Zero(design_.check_points.rows())) {
+  std::iota(kept_.begin(), kept_.end(), 0);
+  design_.basis->Evaluate(design_.reference, reference_phi_);
+  design_.basis->EvaluateMany(design_.check_points, check_phi_);
+  const Matrix xis = design_.region.ManyToGerm(Stack(design_.points, design_.check_points));
+  thetas_.resize(xis.rows(), xis.cols());
+  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
+    thetas_.row(i) = problem_.prior().ToParameters(xis.row(i).transpose()).transpose();
+  }
+}
+
+// A run begins at t = 0 from the initial states, with inputs of its own.
+void RegionalExpansion::StartRun(int run) {
+  run_ = run;
+  propagator_.reset();
+  inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
+  propagator_ = std::make_unique<EnsemblePropagator>(
+      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_), inputs_.get());
+}
+
+absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
+  block_ = block;
+  fitted_rows_ = 0;
+  outputs_.resize(thetas_.rows(), channels_ * block.count());
+  coefficients_.resize(design_.basis->size(), channels_ * block.count());
+  residual_variance_.resize(channels_ * block.count());
+  for (int first = 0; first < block.count() && fitted_rows_ == first;) {
+    int count = 1;
+    const int run = block.rows[static_cast<size_t>(first)].run;
+    while (first + count < block.count() &&
+           block.rows[static_cast<size_t>(first + count)].run == run) {
+      ++count;
+    }
+    if (run != run_) StartRun(run);
+    POLYEST_RETURN_IF_ERROR(PropagateRun(first, count, stop));
+    first += count;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
+  const size_t width = block_.values.size() / block_.rows.size();
+  std::vector<double> times;
+  for (int k = first; k < first + count; ++k) {
+    const double time_s = block_.rows[static_cast<size_t>(k)].time_s;
+    times.push_back(time_s);
+    for (size_t i = 0; i < problem_.streamed_inputs().size(); ++i) {
+      const auto column = static_cast<size_t>(problem_.streamed_inputs()[i]);
+      const size_t value = static_cast<size_t>(k) * width + static_cast<size_t>(channels_) + i;
+      (*inputs_)[column].Append(time_s, block_.values[value]);
+    }
+  }
+  POLYEST_RETURN_IF_ERROR(
+      propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
+  FitRows(first, count);
+  return absl::OkStatus();
+}
+
+// Fits each stretch of rows over which the same trajectories are good.
+void RegionalExpansion::FitRows(int first, int count) {
+  for (int begin = first; begin < first + count;) {
+    shortage_ = DropFailed(begin);
+    if (!shortage_.ok()) return;
+    int end = begin + 1;
+    while (end < first + count && !FailsAt(end)) ++end;
+    const int columns = (end - begin) * channels_;
+    const auto values = outputs_.block(0, begin * channels_, points(), columns);
+    auto coefficients = coefficients_.middleCols(begin * channels_, columns);
+    auto residual = residual_variance_.segment(begin * channels_, columns);
+    if (matrix_.points() == points()) {
+      matrix_.Solve(values, coefficients, residual);
+    } else {
+      matrix_.Solve(values(kept_, Eigen::all), coefficients, residual);
+    }
+    fitted_rows_ = begin = end;
+  }
+}
+
+// Whether a trajectory still in the fit has no output at this row of the block.
+bool RegionalExpansion::FailsAt(int row) const {
+  const auto values = outputs_.block(0, row * channels_, points(), channels_);
+  if (values.allFinite()) return false;
+  for (const int q : kept_) {
+    if (!values.row(q).allFinite()) return true;
+  }
+  return false;
+}
+
+// Leaves out the trajectories without output at this row, and factors again what is left.
+absl::Status RegionalExpansion::DropFailed(int row) {
+  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+    const auto values = outputs_.block(points() + i, row * channels_, 1, channels_);
+    if (!values.allFinite()) check_valid_[static_cast<size_t>(i)] = false;
+  }
+  if (!FailsAt(row)) return absl::OkStatus();
+  NoteFailures();
+  const auto values = outputs_.block(0, row * channels_, points(), channels_);
+  std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
+  const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
+  if (static_cast<int>(kept_.size()) < needed) {
+    const FailedTrajectory& last = failures_.back();
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "only %d of %d trajectories could be integrated to t = %g s and the expansion needs %d; "
+        "the last to fail: %s",
+        kept_.size(), points(), block_.rows[static_cast<size_t>(row)].time_s, needed,
+        DescribeFailure(last, problem_.prior())));
+  }
+  const Matrix left = design_.points(kept_, Eigen::all);
+  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left));
+  return absl::OkStatus();
+}
+
+void RegionalExpansion::NoteFailures() {
+  std::erase_if(failures_, [this](const FailedTrajectory& known) { return known.run == run_; });
+  for (const PointFailure& failure : propagator_->failures()) {
+    failures_.push_back({thetas_.row(failure.point).transpose(), run_, failure.time_s, failure.flag,
+                         failure.reason});
+  }
+}
+
+std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior) {
+  std::string parameters;
+  for (int i = 0; i < prior.dimension(); ++i) {
+    absl::StrAppendFormat(&parameters, "%s%s = %.6g", i == 0 ? "" : ", ",
+                          prior.parameters()[static_cast<size_t>(i)].name, failure.theta[i]);
+  }
+  return absl::StrFormat("%s at t = %g s (run %d): %s (solver flag %d)", parameters, failure.time_s,
+                         failure.run, failure.reason, failure.flag);
+}
+
+double RegionalExpansion::ResidualToNoise(int row) const {
+  double worst = 0;
+  for (int c = 0; c < channels_; ++c) {
+    const double noise = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    if (noise > 0) {
+      worst = std::max(worst, std::sqrt(residual_variance_[row * channels_ + c]) / noise);
+    }
+  }
+  return worst;
+}
+
+void RegionalExpansion::Absorb(int row) {
+  const size_t width = block_.values.size() / block_.rows.size();
+  const int run = block_.rows[static_cast<size_t>(row)].run;
+  if (run != summed_run_) {
+    summed_run_ = run;
+    sums_.emplace_back(static_cast<size_t>(channels_), MismatchSums(design_.basis->size()));
+  }
+  for (int c = 0; c < channels_; ++c) {
+    const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    if (sigma <= 0) continue;  // no sample
+    const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
+    const int column = row * channels_ + c;
+    const auto coefficients = coefficients_.col(column);
+    // e = z − cᵀφ_0,  R = σ² + the residual's variance
+    sums_.back()[static_cast<size_t>(c)].Add(coefficients, z - coefficients.dot(reference_phi_),
+                                             sigma * sigma + residual_variance_[column]);
+    Compare(column, z, sigma);
+    ++absorbed_samples_;
+  }
+  ++absorbed_rows_;
+  propagated_rows_ += thetas_.rows();
+}
+
+// The check points' own trajectories beside the expansion at one sample.
+void RegionalExpansion::Compare(int column, double z, double sigma) {
+  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+    if (!check_valid_[static_cast<size_t>(i)]) continue;
+    const double y = outputs_(points() + i, column);
+    const double error = (z - y) / sigma;
+    const double difference = (y - check_phi_.row(i).dot(coefficients_.col(column))) / sigma;
+    check_mismatch_[i] += 0.5 * error * error;
+    check_residual_[i] += difference * difference;
+  }
+}
+
+MismatchSums RegionalExpansion::ChannelSums(int channel) const {
+  MismatchSums total(design_.basis->size());
+  for (const auto& run : sums_) total.Add(run[static_cast<size_t>(channel)]);
+  return total;
+}
+
+MismatchSums RegionalExpansion::TotalSums() const {
+  MismatchSums total(design_.basis->size());
+  for (int c = 0; c < channels_; ++c) total.Add(ChannelSums(c));
+  return total;
+}
+
+Cost RegionalExpansion::MakeCost(double regularization) const {
+  return Cost(design_.basis, design_.region, design_.reference, TotalSums(), problem_.prior(),
+              regularization);
+}
+
+RegionalExpansion::Check RegionalExpansion::Checks() const {
+  const double samples = std::max<double>(1, static_cast<double>(absorbed_samples_));
+  return {check_mismatch_, (check_residual_ / samples).cwiseSqrt(), check_valid_};
+}
+
+}  // namespace polyest

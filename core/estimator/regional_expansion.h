@@ -1,0 +1,135 @@
+#pragma once
+
+// An expansion on its way along the record: the ensemble of trajectories, the coefficients
+// c_k = A⁺ Y_k (10) of every measured output at every sample time, and the mismatch sums they
+// leave behind. Memory does not grow with the number of samples.
+//
+// The expansion's own error is treated as noise: a sample enters the sums with R = σ² + the
+// residual variance of the fit at its time, so that a region still too wide gives a posterior that
+// is wide and not wrong.
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/chaos/collocation_matrix.h"
+#include "core/estimator/expansion_design.h"
+#include "core/estimator/samples.h"
+
+namespace polyest {
+
+// Consecutive rows of the record, as read from the store: values and noise row by row.
+struct RowBlock {
+  std::vector<SampleRow> rows;
+  std::vector<double> values;
+  std::vector<double> noise;
+
+  int count() const { return static_cast<int>(rows.size()); }
+};
+
+// A trajectory left out, with the parameters that made it fail.
+struct FailedTrajectory {
+  Vector theta;
+  int run = 0;
+  double time_s = 0;
+  int flag = 0;
+  std::string reason;
+};
+
+class RegionalExpansion {
+ public:
+  // FAILED_PRECONDITION when the design's collocation matrix cannot be factored. `problem` must
+  // outlive the expansion.
+  static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
+                                                                 ExpansionDesign design,
+                                                                 int threads);
+
+  // Propagates over a block of rows that follows the rows propagated before, and fits the outputs
+  // of the first fitted_rows(): all, unless too few trajectories are left at the one after, which
+  // shortage() then explains. Only a stop request makes it not OK; the expansion is then of no
+  // further use.
+  absl::Status Propagate(const RowBlock& block, const Stop& stop);
+  int fitted_rows() const { return fitted_rows_; }
+  const absl::Status& shortage() const { return shortage_; }
+  // Of row `row` of the block propagated last: the largest, over the channels with a sample, of
+  // the expansion's residual in units of the noise.
+  double ResidualToNoise(int row) const;
+  // Takes the row into the sums. Rows are absorbed in order, each once.
+  void Absorb(int row);
+
+  const ExpansionDesign& design() const { return design_; }
+  int points() const { return static_cast<int>(design_.points.rows()); }
+  int64_t absorbed_rows() const { return absorbed_rows_; }
+  // Trajectories × rows.
+  int64_t propagated_rows() const { return propagated_rows_; }
+  const std::vector<FailedTrajectory>& failures() const { return failures_; }
+
+  // The sums of one channel over all runs, and of all channels.
+  MismatchSums ChannelSums(int channel) const;
+  MismatchSums TotalSums() const;
+  // The cost on this expansion with α² = regularization.
+  Cost MakeCost(double regularization) const;
+
+  // Agreement with the model itself, at the check points: each one's mismatch from its own
+  // trajectory, and root mean square of (model − expansion)/σ over the samples.
+  struct Check {
+    Vector model_mismatch;
+    Vector residual_to_noise;
+    std::vector<bool> valid;  // the trajectory could be integrated
+  };
+  Check Checks() const;
+
+ private:
+  RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
+                    CollocationMatrix matrix, int threads);
+
+  void StartRun(int run);
+  absl::Status PropagateRun(int first, int count, const Stop& stop);
+  void FitRows(int first, int count);
+  bool FailsAt(int row) const;
+  absl::Status DropFailed(int row);
+  void NoteFailures();
+  void Compare(int column, double z, double sigma);
+
+  const ResolvedProblem& problem_;
+  ExpansionDesign design_;
+  CollocationMatrix matrix_;
+  int threads_;
+  int channels_;
+  Vector reference_phi_;
+  Matrix check_phi_;  // C × S
+
+  Matrix thetas_;          // (Q + C) × n
+  std::vector<int> kept_;  // the collocation points still in the fit
+  std::vector<bool> check_valid_;
+  int run_ = -1;
+  std::unique_ptr<InputSignals> inputs_;
+  std::unique_ptr<EnsemblePropagator> propagator_;
+  std::vector<FailedTrajectory> failures_;
+
+  // Of the block propagated last.
+  RowBlock block_;
+  Matrix outputs_;            // (Q + C) × (m · rows)
+  Matrix coefficients_;       // S × (m · rows)
+  Vector residual_variance_;  // m · rows
+  int fitted_rows_ = 0;
+  absl::Status shortage_;
+
+  std::vector<std::vector<MismatchSums>> sums_;  // by run met, then channel
+  int summed_run_ = -1;
+  Vector check_mismatch_;
+  Vector check_residual_;  // Σ ((model − expansion)/σ)²
+  int64_t absorbed_rows_ = 0;
+  int64_t absorbed_samples_ = 0;
+  int64_t propagated_rows_ = 0;
+};
+
+// One line that names parameters, time, run and the solver's flag.
+std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior);
+
+// Reads rows [first, first + count) of the store.
+absl::Status ReadBlock(const SampleStore& store, int64_t first, int64_t count, RowBlock& block);
+
+}  // namespace polyest

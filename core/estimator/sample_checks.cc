@@ -1,0 +1,157 @@
+#include "core/estimator/sample_checks.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+std::vector<double> RowOf(const std::vector<double>& all, size_t rows, size_t row) {
+  const size_t width = all.size() / rows;
+  const auto begin = all.begin() + static_cast<std::ptrdiff_t>(row * width);
+  return {begin, begin + static_cast<std::ptrdiff_t>(width)};
+}
+
+bool Missing(const SampleColumn& column, size_t row) {
+  return !column.missing.empty() && column.missing[row];
+}
+
+}  // namespace
+
+std::vector<double> CheckedSamples::RowValues(size_t row) const {
+  return RowOf(values, rows.size(), row);
+}
+
+std::vector<double> CheckedSamples::RowNoise(size_t row) const {
+  return RowOf(noise, rows.size(), row);
+}
+
+SampleChecks::SampleChecks(const ResolvedProblem& problem) : problem_(problem) {
+  for (const MeasuredOutput& measured : problem.problem().measured) {
+    names_.push_back(measured.output);
+  }
+  for (const int column : problem.streamed_inputs()) {
+    names_.push_back(
+        problem.problem().model->description().inputs[static_cast<size_t>(column)].name);
+  }
+  position_.largest = Vector::Zero(problem.channels());
+}
+
+absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const {
+  POLYEST_RETURN_IF_ERROR(CheckColumns(samples));
+  POLYEST_RETURN_IF_ERROR(CheckTimes(samples));
+  POLYEST_RETURN_IF_ERROR(CheckValues(samples));
+  CheckedSamples checked;
+  checked.after = position_;
+  const auto channels = static_cast<size_t>(problem_.channels());
+  const size_t width = names_.size();
+  checked.values.assign(samples.rows() * width, std::numeric_limits<double>::quiet_NaN());
+  checked.noise.assign(samples.rows() * channels, 0);
+  for (const SampleColumn& column : samples.columns) {
+    const auto found = std::find(names_.begin(), names_.end(), column.name);
+    const auto place = static_cast<size_t>(found - names_.begin());
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      if (Missing(column, k)) continue;
+      const double z = column.value[k];
+      checked.values[k * width + place] = z;
+      if (place >= channels) continue;
+      double& largest = checked.after.largest[static_cast<Eigen::Index>(place)];
+      largest = std::max(largest, std::abs(z));
+      checked.noise[k * channels + place] =
+          problem_.problem().measured[place].noise.StandardDeviation(z, largest);
+    }
+  }
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    checked.rows.push_back({samples.run.empty() ? 0 : samples.run[k], samples.time_s[k]});
+  }
+  checked.after.rows += static_cast<int64_t>(samples.rows());
+  checked.after.run = checked.rows.back().run;
+  checked.after.time_s = checked.rows.back().time_s;
+  return checked;
+}
+
+absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
+  if (samples.rows() == 0) return absl::InvalidArgumentError("the measurements have no rows");
+  if (!samples.run.empty() && samples.run.size() != samples.rows()) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("run: %d values for %d rows", samples.run.size(), samples.rows()));
+  }
+  std::set<std::string> seen;
+  for (const SampleColumn& column : samples.columns) {
+    if (std::find(names_.begin(), names_.end(), column.name) == names_.end()) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("column \"%s\" is neither a measured output nor a streamed input of the "
+                          "problem; it has %s",
+                          column.name, absl::StrJoin(names_, ", ")));
+    }
+    if (!seen.insert(column.name).second) {
+      return absl::InvalidArgumentError(absl::StrFormat("column %s is given twice", column.name));
+    }
+    if (column.value.size() != samples.rows() ||
+        (!column.missing.empty() && column.missing.size() != samples.rows())) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "column %s: %d values for %d rows", column.name, column.value.size(), samples.rows()));
+    }
+  }
+  for (size_t i = static_cast<size_t>(problem_.channels()); i < names_.size(); ++i) {
+    if (!seen.contains(names_[i])) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("column %s is missing: the input is streamed", names_[i]));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
+  RecordPosition before = position_;
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    const double time_s = samples.time_s[k];
+    const int run = samples.run.empty() ? 0 : samples.run[k];
+    if (!std::isfinite(time_s) || time_s < 0) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("row %d, column t: %g must be a finite time ≥ 0", k, time_s));
+    }
+    if (before.rows == 0 ? run != 0 : run < before.run) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("row %d, column run: %d after %d; runs start at 0 and never decrease", k,
+                          run, before.run));
+    }
+    if (before.rows > 0 && run == before.run && time_s <= before.time_s) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("row %d, column t: %.17g after %.17g; times must increase within a run",
+                          k, time_s, before.time_s));
+    }
+    before.run = run;
+    before.time_s = time_s;
+    ++before.rows;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SampleChecks::CheckValues(const Samples& samples) const {
+  for (const SampleColumn& column : samples.columns) {
+    const auto found = std::find(names_.begin(), names_.end(), column.name);
+    const bool input = found - names_.begin() >= problem_.channels();
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      if (Missing(column, k)) {
+        if (!input) continue;
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "row %d, column %s: a streamed input needs a value in every row", k, column.name));
+      }
+      if (!std::isfinite(column.value[k])) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "row %d, column %s: %g must be a finite number", k, column.name, column.value[k]));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace polyest

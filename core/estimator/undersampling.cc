@@ -1,0 +1,82 @@
+#include "core/estimator/undersampling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/identifiability.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kPhases = 8;  // equal parts of an interval between samples
+
+struct Times {
+  std::vector<double> time_s;  // of every phase of every interval, from t = 0 or the sample before
+  std::vector<int> row;        // of the sample that ends the interval
+};
+
+Times FineTimes(const RowBlock& beginning) {
+  Times times;
+  double before = 0;
+  for (int k = 0; k < beginning.count(); ++k) {
+    const double after = beginning.rows[static_cast<size_t>(k)].time_s;
+    for (int phase = 1; phase <= kPhases; ++phase) {
+      times.time_s.push_back(phase == kPhases ? after
+                                              : before + (after - before) * phase / kPhases);
+      times.row.push_back(k);
+    }
+    before = after;
+  }
+  return times;
+}
+
+}  // namespace
+
+SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
+                                              const RowBlock& beginning, const Vector& map_xi,
+                                              int parameter) {
+  SamplingInformation information;
+  if (beginning.count() == 0 || !problem.streamed_inputs().empty()) return information;
+  const Prior& prior = problem.prior();
+  Matrix xis = map_xi.transpose().replicate(2, 1);
+  const double step = 0.5 * prior.GermStandardDeviation()[parameter];
+  xis(0, parameter) = std::max(prior.lower()[parameter], map_xi[parameter] - step);
+  xis(1, parameter) = std::min(prior.upper()[parameter], map_xi[parameter] + step);
+  const double distance =
+      (xis(1, parameter) - xis(0, parameter)) / prior.GermStandardDeviation()[parameter];
+  Matrix thetas(2, prior.dimension());
+  for (int i = 0; i < 2; ++i)
+    thetas.row(i) = prior.ToParameters(xis.row(i).transpose()).transpose();
+
+  const InputSignals inputs = problem.MakeInputs();
+  EnsemblePropagator propagator(problem.MakeEnsemble(thetas, problem.outputs(), 1), &inputs);
+  const Times times = FineTimes(beginning);
+  const int m = problem.channels();
+  Matrix outputs(2, m * static_cast<Eigen::Index>(times.time_s.size()));
+  if (!propagator.Advance(times.time_s, outputs, Stop()).ok() || !outputs.allFinite()) {
+    return information;
+  }
+  Vector by_phase = Vector::Zero(kPhases);
+  Vector largest = Vector::Zero(m);
+  for (Eigen::Index column = 0; column < outputs.cols(); ++column) {
+    largest[column % m] = std::max(largest[column % m], outputs.col(column).cwiseAbs().maxCoeff());
+  }
+  for (size_t i = 0; i < times.time_s.size(); ++i) {
+    for (int c = 0; c < m; ++c) {
+      if (beginning.noise[static_cast<size_t>(times.row[i] * m + c)] <= 0) continue;  // no sample
+      const auto column = static_cast<Eigen::Index>(i) * m + c;
+      const double sigma =
+          problem.problem().measured[static_cast<size_t>(c)].noise.StandardDeviation(
+              outputs.col(column).mean(), largest[c]);
+      const double slope = (outputs(1, column) - outputs(0, column)) / distance / sigma;
+      by_phase[static_cast<Eigen::Index>(i) % kPhases] += slope * slope;
+    }
+  }
+  information.at_samples = by_phase[kPhases - 1];
+  information.between = by_phase.maxCoeff();
+  information.undersampled =
+      information.at_samples < kWeakInformation && information.between > kIdentifiedInformation;
+  return information;
+}
+
+}  // namespace polyest
