@@ -11,8 +11,8 @@
 namespace polyest {
 
 struct Curvature {
-  Matrix covariance;          // of θ, n × n
-  Vector standard_deviation;  // of θ
+  Matrix covariance;              // of θ, n × n
+  Vector standard_deviation;      // of θ
   bool limited_by_prior = false;  // in at least one direction
 };
 

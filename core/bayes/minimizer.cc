@@ -1,1 +1,400 @@
-// To be written.
+#include "core/bayes/minimizer.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <new>
+#include <nlopt.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// What the solver sees instead of +∞: far above anything else once the function is scaled.
+constexpr double kHuge = 1e20;
+// A constraint is active, or held, to this much of the unit box.
+constexpr double kActive = 1e-10;
+// SLSQP is started again from its result, with fresh curvature, at most so often.
+constexpr int kMostRestarts = 8;
+constexpr int kMostNewtonSteps = 6;
+
+std::string InWords(int code) {
+  switch (code) {
+    case nlopt::SUCCESS:
+      return "converged";
+    case nlopt::STOPVAL_REACHED:
+      return "the stop value was reached";
+    case nlopt::FTOL_REACHED:
+      return "the value no longer changes";
+    case nlopt::XTOL_REACHED:
+      return "the point no longer moves";
+    case nlopt::MAXEVAL_REACHED:
+      return "the most evaluations were spent";
+    case nlopt::MAXTIME_REACHED:
+      return "the time was spent";
+    case nlopt::FAILURE:
+      return "the solver failed";
+    case nlopt::INVALID_ARGS:
+      return "the solver refused its arguments";
+    case nlopt::OUT_OF_MEMORY:
+      return "the solver ran out of memory";
+    case nlopt::ROUNDOFF_LIMITED:
+      return "rounding errors end progress";
+    case nlopt::FORCED_STOP:
+      return "stopped on request";
+    default:
+      return "unknown return code of the solver";
+  }
+}
+
+// The problem in u = (x − lower)/(upper − lower), where the box is the unit cube, every constraint
+// row has unit length and the function is divided by `function_scale`.
+class UnitProblem {
+ public:
+  UnitProblem(const MinimizationProblem& problem, const Stop& stop)
+      : problem_(problem), stop_(stop), width_(problem.upper - problem.lower) {
+    POLYEST_CHECK(width_.allFinite() && width_.minCoeff() >= 0);
+    POLYEST_CHECK(problem.constraint.rows() == problem.bound.size());
+    // a (lower + W u) ≤ bound, over the length of a W
+    const Eigen::Index n = width_.size();
+    rows_.resize(problem.constraint.rows(), n);
+    bounds_.resize(problem.constraint.rows());
+    Eigen::Index kept = 0;
+    for (Eigen::Index i = 0; i < problem.constraint.rows(); ++i) {
+      const Vector row = problem.constraint.row(i).transpose().cwiseProduct(width_);
+      const double length = row.norm();
+      if (!(length > 0)) continue;
+      rows_.row(kept) = row.transpose() / length;
+      bounds_[kept++] = (problem.bound[i] - problem.constraint.row(i).dot(problem.lower)) / length;
+    }
+    rows_.conservativeResize(kept, n);
+    bounds_.conservativeResize(kept);
+  }
+
+  Eigen::Index dimension() const { return width_.size(); }
+  const Matrix& rows() const { return rows_; }
+  const Vector& bounds() const { return bounds_; }
+  double function_scale() const { return function_scale_; }
+  void set_function_scale(double scale) { function_scale_ = scale; }
+  int evaluations() const { return evaluations_; }
+  bool stopped() const { return stopped_; }
+  bool PollStop() { return stopped_ = stopped_ || !stop_.Check().ok(); }
+
+  Vector ToPoint(const Vector& u) const {
+    const Vector x = problem_.lower + width_.cwiseProduct(u);
+    return x.cwiseMax(problem_.lower).cwiseMin(problem_.upper);
+  }
+  Vector ToUnit(const Vector& x) const {
+    Vector u(x.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      u[i] = width_[i] > 0 ? (x[i] - problem_.lower[i]) / width_[i] : 0;
+      if (!std::isfinite(u[i])) u[i] = 0.5;
+    }
+    return u;
+  }
+
+  // Scaled value; +∞ where it or its gradient is not finite (the gradient is then 0).
+  double Value(const Vector& u, Vector* gradient) {
+    ++evaluations_;
+    const Vector x = ToPoint(u);
+    Vector slope(x.size());
+    double value = problem_.function(x, gradient == nullptr ? nullptr : &slope) / function_scale_;
+    if (gradient != nullptr) {
+      *gradient = slope.cwiseProduct(width_) / function_scale_;
+      if (!gradient->allFinite() || !std::isfinite(value)) {
+        gradient->setZero();
+        value = kInfinity;
+      }
+    }
+    return std::isfinite(value) ? value : kInfinity;
+  }
+
+  // The nearest point of the box and the constraints, by Dykstra's alternating projections.
+  Vector Project(Vector u) const {
+    u = u.cwiseMax(0).cwiseMin(1);
+    if (MostViolated(u) <= 0) return u;
+    Matrix correction = Matrix::Zero(u.size(), rows_.rows() + 1);
+    for (int sweep = 0; sweep < 2000; ++sweep) {
+      const Vector before = u;
+      for (Eigen::Index i = 0; i < rows_.rows(); ++i) {
+        const Vector from = u + correction.col(i);
+        const double excess = rows_.row(i).dot(from) - bounds_[i];
+        u = from - std::max(0.0, excess) * rows_.row(i).transpose();
+        correction.col(i) = from - u;
+      }
+      const Vector from = u + correction.rightCols<1>();
+      u = from.cwiseMax(0).cwiseMin(1);
+      correction.rightCols<1>() = from - u;
+      if ((u - before).cwiseAbs().maxCoeff() < 1e-14 && MostViolated(u) < 1e-14) break;
+    }
+    return u;
+  }
+
+  double MostViolated(const Vector& u) const {
+    return rows_.rows() == 0 ? 0 : (rows_ * u - bounds_).maxCoeff();
+  }
+
+  bool Feasible(const Vector& u) const {
+    return u.minCoeff() >= 0 && u.maxCoeff() <= 1 && MostViolated(u) <= kActive;
+  }
+
+ private:
+  const MinimizationProblem& problem_;
+  const Stop& stop_;
+  Vector width_;
+  Matrix rows_;
+  Vector bounds_;
+  double function_scale_ = 1;
+  int evaluations_ = 0;
+  bool stopped_ = false;
+};
+
+// NLopt's callback for the function.
+struct Callback {
+  UnitProblem* problem;
+  nlopt::opt* solver;
+};
+
+double CallFunction(const std::vector<double>& u, std::vector<double>& gradient, void* data) {
+  const Callback& callback = *static_cast<Callback*>(data);
+  if (callback.problem->PollStop()) callback.solver->force_stop();
+  const Vector point = Eigen::Map<const Vector>(u.data(), static_cast<Eigen::Index>(u.size()));
+  Vector slope;
+  const double value = callback.problem->Value(point, gradient.empty() ? nullptr : &slope);
+  if (!gradient.empty()) Eigen::Map<Vector>(gradient.data(), slope.size()) = slope;
+  return std::min(value, kHuge);
+}
+
+// … and for all constraints at once: rows u − bounds ≤ 0, the gradient row-major.
+void CallConstraints(unsigned count, double* result, unsigned n, const double* u, double* gradient,
+                     void* data) {
+  const UnitProblem& problem = *static_cast<UnitProblem*>(data);
+  const Eigen::Map<const Vector> point(u, n);
+  Eigen::Map<Vector>(result, count) = problem.rows() * point - problem.bounds();
+  if (gradient == nullptr) return;
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<RowMajor>(gradient, count, n) = problem.rows();
+}
+
+struct Run {
+  Vector point;
+  int code = nlopt::FAILURE;
+};
+
+// One run of SLSQP.
+Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions& options) {
+  std::vector<double> u(start.data(), start.data() + start.size());
+  Run run{start};
+  try {
+    nlopt::opt solver(nlopt::LD_SLSQP, static_cast<unsigned>(start.size()));
+    Callback callback{&problem, &solver};
+    solver.set_min_objective(CallFunction, &callback);
+    solver.set_lower_bounds(0);
+    solver.set_upper_bounds(1);
+    if (problem.rows().rows() > 0) {
+      solver.add_inequality_mconstraint(
+          CallConstraints, &problem,
+          std::vector<double>(static_cast<size_t>(problem.rows().rows()), kActive));
+    }
+    solver.set_xtol_abs(options.relative_step);
+    solver.set_xtol_rel(0);
+    solver.set_ftol_rel(0);
+    solver.set_maxeval(std::max(1, options.most_evaluations));
+    double value = 0;
+    try {
+      run.code = solver.optimize(u, value);
+    } catch (const nlopt::roundoff_limited&) {
+      run.code = nlopt::ROUNDOFF_LIMITED;
+    } catch (const nlopt::forced_stop&) {
+      run.code = nlopt::FORCED_STOP;
+    }
+  } catch (const std::invalid_argument&) {
+    run.code = nlopt::INVALID_ARGS;
+  } catch (const std::bad_alloc&) {
+    run.code = nlopt::OUT_OF_MEMORY;
+  } catch (const std::exception&) {
+    run.code = nlopt::FAILURE;
+  }
+  const Vector end = Eigen::Map<const Vector>(u.data(), start.size());
+  if (end.allFinite()) run.point = problem.Project(end);
+  return run;
+}
+
+// Orthonormal basis of the directions that keep the constraints active at u: of those whose
+// multiplier is positive, so that leaving them would raise the function.
+Matrix FreeDirections(const UnitProblem& problem, const Vector& u, const Vector& gradient) {
+  const Eigen::Index n = u.size();
+  std::vector<Vector> normals;  // outward
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (u[i] <= kActive) normals.push_back(-Vector::Unit(n, i));
+    if (u[i] >= 1 - kActive) normals.push_back(Vector::Unit(n, i));
+  }
+  for (Eigen::Index i = 0; i < problem.rows().rows(); ++i) {
+    if (problem.rows().row(i).dot(u) >= problem.bounds()[i] - kActive) {
+      normals.push_back(problem.rows().row(i).transpose());
+    }
+  }
+  while (!normals.empty()) {
+    Matrix active(n, static_cast<Eigen::Index>(normals.size()));
+    for (size_t i = 0; i < normals.size(); ++i)
+      active.col(static_cast<Eigen::Index>(i)) = normals[i];
+    Eigen::ColPivHouseholderQR<Matrix> factors(active);
+    const Vector multipliers = factors.solve(-gradient);  // gradient + active · multipliers = 0
+    Eigen::Index worst = 0;
+    if (multipliers.minCoeff(&worst) >= 0) {
+      const Matrix q = factors.householderQ() * Matrix::Identity(n, n);
+      return q.rightCols(n - factors.rank());
+    }
+    normals.erase(normals.begin() + worst);
+  }
+  return Matrix::Identity(n, n);
+}
+
+// Zᵀ ∇²f Z by central differences of the gradient along the columns of Z; infinite where f is not
+// finite or where the box leaves no room for them.
+Matrix ReducedHessian(UnitProblem& problem, const Vector& u, const Matrix& z) {
+  constexpr double kStep = 1e-5;
+  Matrix hessian(z.cols(), z.cols());
+  Vector forward(u.size()), backward(u.size());
+  for (Eigen::Index i = 0; i < z.cols(); ++i) {
+    double step = kStep;
+    for (Eigen::Index j = 0; j < u.size(); ++j) {
+      const double slope = std::abs(z(j, i));
+      if (slope > kActive) step = std::min(step, std::min(u[j], 1 - u[j]) / slope);
+    }
+    const double valid = problem.Value(u + step * z.col(i), &forward) +
+                         problem.Value(u - step * z.col(i), &backward);
+    hessian.col(i) = z.transpose() * (forward - backward) / (2 * step);
+    if (!std::isfinite(valid) || step < kStep / 1000) return hessian.setConstant(kInfinity);
+  }
+  return (hessian + hessian.transpose()) / 2;
+}
+
+enum class Polish { kConverged, kSaddle, kUnsure };
+
+// Newton's method from the gradient alone on the free directions: near a minimum differences of
+// values are rounding long before the gradient is. At a saddle `u` is moved down from it.
+Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector& u) {
+  constexpr double kFlat = 1e-13;  // × the largest curvature: no curvature at all
+  constexpr double kKick = 1e-3;
+  Vector gradient(u.size());
+  double value = problem.Value(u, &gradient);
+  for (int step = 0; step < kMostNewtonSteps && std::isfinite(value); ++step) {
+    const Matrix z = FreeDirections(problem, u, gradient);
+    if (z.cols() == 0) return Polish::kConverged;
+    const Matrix hessian = ReducedHessian(problem, u, z);
+    if (!hessian.allFinite()) return Polish::kUnsure;
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(hessian);
+    const Vector& curvature = eigen.eigenvalues();
+    const double largest = curvature.cwiseAbs().maxCoeff();
+    if (curvature[0] < -1e-6 * largest) {
+      u = problem.Project(u + kKick * z * eigen.eigenvectors().col(0));
+      return Polish::kSaddle;
+    }
+    if (curvature[0] <= kFlat * largest) return Polish::kUnsure;
+    // p = −Z (Zᵀ H Z)⁻¹ Zᵀ g; the decrement gᵀ Z (Zᵀ H Z)⁻¹ Zᵀ g is what a full step gains, twice
+    const Matrix root =
+        z * eigen.eigenvectors() * curvature.cwiseSqrt().cwiseInverse().asDiagonal();
+    const Vector p = -root * (root.transpose() * gradient);
+    if (p.cwiseAbs().maxCoeff() <= options.relative_step) return Polish::kConverged;
+    const Vector next = problem.Project(u + p);
+    Vector next_gradient(u.size());
+    const double next_value = problem.Value(next, &next_gradient);
+    const double decrement = (root.transpose() * gradient).squaredNorm();
+    const double next_decrement = (root.transpose() * next_gradient).squaredNorm();
+    if (!std::isfinite(next_value) || !(next_decrement < decrement)) {
+      // No better gradient is to be had; as good as the digits of the value if that shows nothing.
+      return decrement <= 1e-14 * std::abs(value) ? Polish::kConverged : Polish::kUnsure;
+    }
+    u = next;
+    value = next_value;
+    gradient = next_gradient;
+  }
+  return Polish::kUnsure;
+}
+
+// The first point on the way from the start to the middle of the box at which f is finite, and
+// the function scaled so that its steepest slope there is 1.
+Vector PrepareStart(UnitProblem& problem, const Vector& start) {
+  const Vector centre = problem.Project(Vector::Constant(start.size(), 0.5));
+  Vector gradient(start.size());
+  for (const double fraction : {0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.6, 1.0}) {
+    const Vector u = start + fraction * (centre - start);
+    if (!std::isfinite(problem.Value(u, &gradient))) continue;
+    const double slope = gradient.cwiseAbs().maxCoeff();
+    if (slope > 0) problem.set_function_scale(problem.function_scale() * slope);
+    return u;
+  }
+  return start;
+}
+
+bool IsSuccess(int code) {
+  return code == nlopt::SUCCESS || code == nlopt::FTOL_REACHED || code == nlopt::XTOL_REACHED;
+}
+
+Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
+                     const MinimizerOptions& options, const Stop& stop) {
+  UnitProblem problem(original, stop);
+  Vector u = PrepareStart(problem, problem.Project(problem.ToUnit(start)));
+  double value = problem.Value(u, nullptr);
+  Minimum minimum;
+  for (int restart = 0; restart <= kMostRestarts && std::isfinite(value); ++restart) {
+    const Run run = RunSolver(problem, u, options);
+    minimum.code = run.code;
+    Vector next = run.point;
+    Polish polish = Polish::kUnsure;
+    if (!problem.PollStop()) polish = PolishPoint(problem, options, next);
+    const double next_value = problem.Value(next, nullptr);
+    const bool moved = (next - u).cwiseAbs().maxCoeff() > options.relative_step;
+    const bool lower = next_value < value;
+    if (next_value <= value || polish == Polish::kSaddle) {
+      u = next;
+      value = next_value;
+    }
+    minimum.converged = polish == Polish::kConverged ||
+                        (polish == Polish::kUnsure && !(moved && lower) && IsSuccess(run.code));
+    if (minimum.converged || problem.stopped() || !std::isfinite(next_value)) break;
+    if (problem.evaluations() >= options.most_evaluations) break;
+  }
+  minimum.point = problem.ToPoint(problem.Project(u));
+  minimum.value = original.function(minimum.point, nullptr);
+  minimum.evaluations = problem.evaluations() + 1;
+  minimum.reason = std::isfinite(value) ? InWords(minimum.code) : "the function is not finite";
+  if (!std::isfinite(minimum.value)) minimum.value = kInfinity;
+  if (problem.stopped()) minimum.converged = false;
+  return minimum;
+}
+
+}  // namespace
+
+std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
+                                const MinimizerOptions& options, const Stop& stop) {
+  POLYEST_CHECK(starts.rows() > 0 && starts.cols() == problem.lower.size());
+  std::vector<Minimum> found;
+  for (Eigen::Index i = 0; i < starts.rows(); ++i) {
+    found.push_back(MinimizeFrom(problem, starts.row(i).transpose(), options, stop));
+    if (!stop.Check().ok()) break;
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Minimum& a, const Minimum& b) { return a.value < b.value; });
+  const Vector tolerance = options.same_point * (problem.upper - problem.lower);
+  std::vector<Minimum> distinct;
+  for (Minimum& minimum : found) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Minimum& other) {
+      return ((minimum.point - other.point).cwiseAbs().array() <= tolerance.array()).all();
+    });
+    // A run that gave up is no minimum, unless it is the lowest there is.
+    if (!known && (distinct.empty() || minimum.converged)) distinct.push_back(std::move(minimum));
+  }
+  return distinct;
+}
+
+}  // namespace polyest

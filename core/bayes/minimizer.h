@@ -15,7 +15,7 @@ namespace polyest {
 struct MinimizationProblem {
   // Value at x; fills gradient when it is not null. May return +∞ (outside Ω).
   std::function<double(const Vector& x, Vector* gradient)> function;
-  Vector lower;       // of x; finite
+  Vector lower;  // of x; finite
   Vector upper;
   Matrix constraint;  // rows a with aᵀx ≤ bound; may have no rows
   Vector bound;
@@ -32,8 +32,8 @@ struct Minimum {
   Vector point;
   double value = 0;
   bool converged = false;
-  int code = 0;         // NLopt's own
-  std::string reason;   // in words
+  int code = 0;        // NLopt's own
+  std::string reason;  // in words
   int evaluations = 0;
 };
 

@@ -1,1 +1,36 @@
-// To be written.
+#include "core/bayes/mismatch_sums.h"
+
+#include <algorithm>
+
+#include "core/common/check.h"
+
+namespace polyest {
+
+MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {}
+
+void MismatchSums::Add(const ConstVectorRef& coefficients, double error, double variance) {
+  POLYEST_CHECK(coefficients.size() == b_.size() && variance > 0);
+  const double weight = 1 / variance;
+  // G += c cᵀ/R, a column at a time: both triangles, so that all memory is walked in order
+  for (Eigen::Index j = 0; j < b_.size(); ++j) {
+    g_.col(j) += weight * (coefficients[j] * coefficients);
+  }
+  b_ += (weight * error) * coefficients;  // b += c e/R
+  w_ += weight * error * error;           // w += e²/R
+  ++count_;
+}
+
+void MismatchSums::Add(const MismatchSums& other) {
+  POLYEST_CHECK(other.b_.size() == b_.size());
+  g_ += other.g_;
+  b_ += other.b_;
+  w_ += other.w_;
+  count_ += other.count_;
+}
+
+double MismatchSums::ChiSquared(const ConstVectorRef& d) const {
+  // dᵀ G d − 2 bᵀ d + w; a sum of squares, so that below 0 is rounding
+  return std::max(0.0, d.dot(g_ * d) - 2 * b_.dot(d) + w_);
+}
+
+}  // namespace polyest

@@ -1,1 +1,37 @@
-// To be written.
+#include "core/bayes/region.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/common/check.h"
+
+namespace polyest {
+
+Region Region::WholePrior(int dimension) {
+  return Region(Vector::Zero(dimension), Matrix::Identity(dimension, dimension));
+}
+
+Region::Region(Vector centre, Matrix axes)
+    : centre_(std::move(centre)), axes_(std::move(axes)), factors_(axes_) {
+  POLYEST_CHECK(axes_.rows() == centre_.size() && axes_.cols() == centre_.size());
+  POLYEST_CHECK(std::abs(factors_.determinant()) > 0);
+}
+
+double Region::Volume() const { return std::abs(factors_.determinant()); }
+
+Vector Region::ToGerm(const ConstVectorRef& eta) const { return centre_ + axes_ * eta; }
+
+Vector Region::ToLocal(const ConstVectorRef& xi) const { return factors_.solve(xi - centre_); }
+
+Matrix Region::ManyToGerm(const ConstMatrixRef& etas) const {
+  Matrix xis(etas.rows(), etas.cols());
+  xis.noalias() = etas * axes_.transpose();
+  xis.rowwise() += centre_.transpose();
+  return xis;
+}
+
+Matrix Region::ManyToLocal(const ConstMatrixRef& xis) const {
+  return factors_.solve((xis.rowwise() - centre_.transpose()).transpose()).transpose();
+}
+
+}  // namespace polyest
