@@ -20,7 +20,7 @@ struct Duffing {
         .summary = "An oscillator with a cubic polynomial spring, driven by a force",
         .equations = "m x'' + c x' + k x + k2 x^2 + k3 x^3 = force + offset",
         .source =
-            "G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918; "
+            "G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz, 1918; "
             "with a quadratic and a constant term as in the silverbox benchmark",
         .states = {{"x", "m", "displacement"}, {"v", "m/s", "velocity"}},
         .parameters = {{"m", "kg", "mass", 1},
