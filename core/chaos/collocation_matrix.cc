@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 
@@ -11,11 +11,17 @@
 namespace polyest {
 namespace {
 
-// Largest over smallest singular value of the triangular factor, which has those of A.
+// Largest over smallest singular value of the triangular factor R, which has those of A. They are
+// the upper half of the eigenvalues of [0 R; Rᵀ 0], found without squaring the condition number.
 double Condition(const Matrix& triangular) {
-  const Vector singular_values = Eigen::BDCSVD<Matrix>(triangular).singularValues();
-  const double smallest = singular_values[singular_values.size() - 1];
-  return smallest > 0 ? singular_values[0] / smallest : std::numeric_limits<double>::infinity();
+  const Eigen::Index terms = triangular.cols();
+  Matrix bordered = Matrix::Zero(2 * terms, 2 * terms);
+  bordered.topRightCorner(terms, terms) = triangular;
+  bordered.bottomLeftCorner(terms, terms) = triangular.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(bordered, Eigen::EigenvaluesOnly);
+  const double smallest = solver.eigenvalues()[terms],
+               largest = solver.eigenvalues()[2 * terms - 1];
+  return smallest > 0 ? largest / smallest : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace

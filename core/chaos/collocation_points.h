@@ -13,7 +13,15 @@ enum class PointSet { kHalton, kHammersley, kGaussTensor };
 
 // The first `count` points of the low-discrepancy sequence in the open unit cube, count × n;
 // (Halton: radical inverses in the first n primes of 1, 2, …; Hammersley: its first coordinate is
-// (i + ½)/count.) Not for kGaussTensor.
+// (i + ½)/count, the others are Halton's first n − 1). Not for kGaussTensor.
+//
+// The digits in the primes from 7 on are permuted. In two large primes the plain sequence starts
+// as two rising ramps that hardly differ: with 182 points in 12 dimensions the collocation matrix
+// of order 2 has condition number 68. With the permutations of H. Faure, "Good permutations for
+// extreme discrepancy", J. Number Theory 42 (1992), it has 5.3, less than independent random
+// points (6 to 7). They follow from σ_2 = (0, 1) by σ_{2m} = (2σ_m, 2σ_m + 1) and, for odd b, by
+// lifting the digits of σ_{b−1} from (b−1)/2 on by one and putting (b−1)/2 in the middle; zero
+// stays zero. The primes 2, 3 and 5 stay plain, so that few dimensions give Halton's own points.
 Matrix UnitCubePoints(PointSet set, int dimension, int count);
 
 // Collocation points in germ coordinates, Q × n: unit-cube points through each germ's quantile
