@@ -1,0 +1,265 @@
+#include "core/chaos/germ.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "core/chaos/gauss_rule.h"
+
+namespace polyest {
+namespace {
+
+const std::vector<Germ>& AllGerms() {
+  static const std::vector<Germ> germs = {
+      Germ::Normal(),       Germ::Uniform(),  Germ::Beta(2, 2),    Germ::Beta(1, 1),
+      Germ::Beta(1.5, 4.2), Germ::Beta(1, 3), Germ::Beta(30, 2.5), Germ::Gamma(1),
+      Germ::Gamma(2.7),     Germ::Gamma(50)};
+  return germs;
+}
+
+std::string Name(const Germ& germ) {
+  return "family " + std::to_string(static_cast<int>(germ.family())) + " (" +
+         std::to_string(germ.first_shape()) + ", " + std::to_string(germ.second_shape()) + ")";
+}
+
+// ∫ f ρ dξ by the trapezoidal rule after a substitution that makes the integrand fall off doubly
+// exponentially at both ends, where that rule converges exponentially. It knows the density alone.
+double Integral(const Germ& germ, const std::function<double(double)>& f) {
+  constexpr double kStep = 1.0 / 64;
+  double sum = 0;
+  for (int i = -12 * 64; i <= 12 * 64; ++i) {
+    const double t = i * kStep;
+    double xi = t, slope = 1;
+    if (germ.family() == GermFamily::kGamma) {
+      xi = std::exp(t - std::exp(-t));
+      slope = xi * (1 + std::exp(-t));
+    } else if (germ.family() != GermFamily::kNormal) {
+      const double s = std::numbers::pi / 2 * std::sinh(t);
+      xi = std::tanh(s);
+      slope = std::numbers::pi / 2 * std::cosh(t) / (std::cosh(s) * std::cosh(s));
+    }
+    const double density = germ.Density(xi) * slope;
+    if (density > 1e-280) sum += kStep * density * f(xi);
+  }
+  return sum;
+}
+
+// P_0 … P_order of the germ at ξ by the recurrence.
+Vector Polynomials(const Germ& germ, int order, double xi) {
+  const RecurrenceCoefficients recurrence = germ.Recurrence(order + 1);
+  Vector values(order + 1);
+  values[0] = 1;
+  for (int k = 0; k < order; ++k) {
+    double next = (xi - recurrence.a[k]) * values[k];
+    if (k > 0) next -= std::sqrt(recurrence.b[k]) * values[k - 1];
+    values[k + 1] = next / std::sqrt(recurrence.b[k + 1]);
+  }
+  return values;
+}
+
+TEST(Germ, DensityHasUnitAreaAndTheStatedMoments) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    EXPECT_NEAR(Integral(germ, [](double) { return 1; }), 1, 1e-12);
+    const double mean = germ.Mean(), deviation = germ.StandardDeviation();
+    EXPECT_NEAR(Integral(germ, [](double xi) { return xi; }), mean, 1e-12 * (1 + std::abs(mean)));
+    EXPECT_NEAR(Integral(germ, [&](double xi) { return (xi - mean) * (xi - mean); }),
+                deviation * deviation, 1e-12 * (1 + mean * mean));
+  }
+}
+
+TEST(Germ, PolynomialsAreOrthonormalUnderTheDensityUpToOrderTen) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    for (int i = 0; i <= 10; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        const double product = Integral(germ, [&](double xi) {
+          const Vector values = Polynomials(germ, i, xi);
+          return values[i] * values[j];
+        });
+        // Rounding grows with the cancellation between the lobes of the integrand.
+        EXPECT_NEAR(product, i == j ? 1 : 0, 1e-9) << i << ", " << j;
+      }
+    }
+  }
+}
+
+TEST(Germ, PolynomialsAreTheTextbookOnes) {
+  for (const double x : {-0.9, -0.3, 0.0, 0.4, 1.0}) {
+    // Hermite He_5 / √5!
+    EXPECT_NEAR(Polynomials(Germ::Normal(), 5, x)[5],
+                (std::pow(x, 5) - 10 * std::pow(x, 3) + 15 * x) / std::sqrt(120), 1e-14);
+    // Legendre √7 (5x³ − 3x)/2
+    EXPECT_NEAR(Polynomials(Germ::Uniform(), 3, x)[3], std::sqrt(7) * (5 * x * x * x - 3 * x) / 2,
+                1e-14);
+    // Under ¾(1 − x²), the paper's (40)–(41) put right: √5 x, √(7/8)(5x² − 1), √(15/8)(7x³ − 3x)
+    const Vector jacobi = Polynomials(Germ::Beta(2, 2), 3, x);
+    EXPECT_NEAR(jacobi[1], std::sqrt(5) * x, 1e-14);
+    EXPECT_NEAR(jacobi[2], std::sqrt(7.0 / 8) * (5 * x * x - 1), 1e-14);
+    EXPECT_NEAR(jacobi[3], std::sqrt(15.0 / 8) * (7 * x * x * x - 3 * x), 1e-13);
+    // Laguerre (x³ − 9x² + 18x − 6)/6; generalized (x² − 6x + 6)/(2√3)
+    const double y = 1 + x;
+    EXPECT_NEAR(Polynomials(Germ::Gamma(1), 3, y)[3], (y * y * y - 9 * y * y + 18 * y - 6) / 6,
+                1e-14);
+    EXPECT_NEAR(Polynomials(Germ::Gamma(2), 2, y)[2],
+                (y * y - 6 * y + 6) / (2 * std::numbers::sqrt3), 1e-14);
+  }
+}
+
+TEST(Germ, BetaOneOneIsUniform) {
+  const Germ beta = Germ::Beta(1, 1), uniform = Germ::Uniform();
+  EXPECT_TRUE(beta.Recurrence(8).a.isZero(0));
+  EXPECT_TRUE(beta.Recurrence(8).b.isApprox(uniform.Recurrence(8).b, 1e-15));
+  EXPECT_EQ(beta.Mode(), 0);
+  EXPECT_NEAR(beta.Density(-1), 0.5, 1e-15);
+  EXPECT_NEAR(beta.Quantile(0.3), -0.4, 1e-14);
+}
+
+TEST(Germ, LogDensityDerivativesAreThoseOfTheLogDensity) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    for (const double p : {0.1, 0.5, 0.8}) {
+      const double xi = germ.Quantile(p), h = 1e-3 * germ.StandardDeviation();
+      const auto difference = [&](auto f) {  // five points: error O(h⁴)
+        return (f(xi - 2 * h) - 8 * f(xi - h) + 8 * f(xi + h) - f(xi + 2 * h)) / (12 * h);
+      };
+      const double scale = 1 / germ.StandardDeviation();
+      EXPECT_NEAR(germ.LogDensityDerivative(xi),
+                  difference([&](double x) { return germ.LogDensity(x); }), 1e-7 * scale);
+      EXPECT_NEAR(germ.LogDensitySecondDerivative(xi),
+                  difference([&](double x) { return germ.LogDensityDerivative(x); }),
+                  1e-7 * scale * scale);
+    }
+  }
+}
+
+TEST(Germ, ModeIsWhereTheDensityIsLargest) {
+  for (const Germ& germ : AllGerms()) {
+    const double mode = germ.Mode(), step = 0.01 * germ.StandardDeviation();
+    EXPECT_GE(germ.Density(mode), germ.Density(mode - step)) << Name(germ);
+    EXPECT_GE(germ.Density(mode), germ.Density(mode + step)) << Name(germ);
+  }
+}
+
+TEST(Germ, DensityVanishesOutsideTheSupport) {
+  EXPECT_EQ(Germ::Uniform().Density(1.0001), 0);
+  EXPECT_EQ(Germ::Beta(2, 3).Density(-1.0001), 0);
+  EXPECT_EQ(Germ::Gamma(2).Density(-1e-9), 0);
+  EXPECT_EQ(Germ::Beta(2, 3).LogDensity(1), -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(Germ::Gamma(1).Density(0), 1);
+}
+
+TEST(Germ, CumulativeProbabilitiesAgreeWithClosedForms) {
+  for (const double u : {1e-8, 0.01, 0.3, 0.5, 0.77, 0.999}) {
+    const double xi = 2 * u - 1;  // rounded: compare at the u that it means
+    const double v = (1 + xi) / 2;
+    EXPECT_NEAR(Germ::Beta(2, 2).CumulativeProbability(xi) / (v * v * (3 - 2 * v)), 1, 1e-13);
+    EXPECT_NEAR(Germ::Beta(5, 1).CumulativeProbability(xi) / std::pow(v, 5), 1, 1e-13);
+    EXPECT_NEAR(Germ::Beta(1, 7).CumulativeProbability(xi) / -std::expm1(7 * std::log1p(-v)), 1,
+                1e-13);
+  }
+  for (const double x : {1e-8, 0.1, 1.0, 4.0, 30.0}) {
+    EXPECT_NEAR(Germ::Gamma(1).CumulativeProbability(x) / -std::expm1(-x), 1, 1e-13);
+    // P(3/2, x) = erf √x − 2 √(x/π) e^(−x), which cancels for small x.
+    if (x > 0.01) {
+      EXPECT_NEAR(Germ::Gamma(1.5).CumulativeProbability(x),
+                  std::erf(std::sqrt(x)) - 2 * std::sqrt(x / std::numbers::pi) * std::exp(-x),
+                  1e-14);
+    }
+  }
+  EXPECT_NEAR(Germ::Normal().CumulativeProbability(-10) / 7.619853024160527e-24, 1, 1e-13);
+}
+
+TEST(Germ, QuantilesAreThePublishedOnes) {
+  EXPECT_NEAR(Germ::Normal().Quantile(0.975), 1.959963984540054, 1e-14);
+  EXPECT_NEAR(Germ::Normal().Quantile(0.5), 0, 1e-15);
+  EXPECT_NEAR(Germ::Normal().Quantile(1e-10), -6.361340902404056, 1e-13);
+  // χ² with 10 degrees of freedom, 95 %: 18.307038053275146 = 2 · Gamma(5)
+  EXPECT_NEAR(2 * Germ::Gamma(5).Quantile(0.95), 18.307038053275146, 1e-12);
+  for (const double p : {1e-12, 1e-6, 0.2, 0.5, 0.50001, 0.9, 1 - 1e-9}) {
+    EXPECT_NEAR(Germ::Gamma(1).Quantile(p) / -std::log1p(-p), 1, 1e-13) << p;
+    // u²(3 − 2u) = p has the root u = ½ + sin(asin(2p − 1)/3).
+    EXPECT_NEAR(Germ::Beta(2, 2).Quantile(p), 2 * std::sin(std::asin(2 * p - 1) / 3),
+                p < 1e-7 || p > 1 - 1e-7 ? 1e-7 : 1e-14)  // the sine form cancels in the tails
+        << p;
+  }
+}
+
+TEST(Germ, QuantileInvertsCumulativeProbability) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    for (const double p : {1e-10, 1e-6, 0.001, 0.1, 0.4, 0.5, 0.6, 0.9, 0.999, 1 - 1e-6}) {
+      const double xi = germ.Quantile(p);
+      ASSERT_GT(xi, germ.Lower());
+      ASSERT_LT(xi, germ.Upper());
+      // An error of 1e-12 standard deviations in ξ, and the rounding of the probability.
+      const double allowed = germ.Density(xi) * 1e-12 * germ.StandardDeviation() + 1e-14 * p;
+      EXPECT_NEAR(germ.CumulativeProbability(xi), p, allowed + 2e-16) << p;
+    }
+  }
+}
+
+TEST(Germ, QuantileKeepsTheFarTails) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    for (const double p : {1e-300, 1e-100, 1 - 1e-15}) {
+      const double xi = germ.Quantile(p);
+      EXPECT_TRUE(std::isfinite(xi));
+      EXPECT_GE(xi, germ.Lower());
+      EXPECT_LE(xi, germ.Upper());
+    }
+    EXPECT_LE(germ.Quantile(1e-300), germ.Quantile(1e-100));
+    EXPECT_LE(germ.Quantile(1e-100), germ.Quantile(1e-10));
+  }
+}
+
+TEST(Germ, QuantileFollowsTheNormalLimitForLargeShapes) {
+  // Wilson and Hilferty's cube-root approximation of the gamma quantile is good to O(1/shape)
+  // standard deviations.
+  const double shape = 1e4, z = 1.959963984540054;
+  const double cube = 1 - 1 / (9 * shape) + z / (3 * std::sqrt(shape));
+  EXPECT_NEAR(Germ::Gamma(shape).Quantile(0.975), shape * cube * cube * cube, 1e-2);
+  // A beta density of equal large shapes is normal with the same standard deviation, to O(1/shape).
+  const Germ beta = Germ::Beta(1e4, 1e4);
+  EXPECT_NEAR(beta.Quantile(0.975) / beta.StandardDeviation(), z, 1e-3);
+}
+
+TEST(GaussRule, IntegratesPolynomialsExactly) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    const GaussRule rule = MakeGaussRule(germ, 5);
+    EXPECT_NEAR(rule.weights.sum(), 1, 1e-13);
+    const double mean = germ.Mean(), scale = germ.StandardDeviation();
+    for (int degree = 1; degree <= 9; ++degree) {
+      const auto power = [&](double xi) { return std::pow((xi - mean) / scale, degree); };
+      double sum = 0, magnitude = 0;
+      for (int i = 0; i < 5; ++i) {
+        sum += rule.weights[i] * power(rule.nodes[i]);
+        magnitude += rule.weights[i] * std::abs(power(rule.nodes[i]));
+      }
+      EXPECT_NEAR(sum, Integral(germ, power), 1e-11 * magnitude) << degree;
+    }
+  }
+}
+
+TEST(GaussRule, OfThreeLegendreNodesIsTheTextbookOne) {
+  const GaussRule rule = MakeGaussRule(Germ::Uniform(), 3);
+  EXPECT_NEAR(rule.nodes[0], -std::sqrt(0.6), 1e-14);
+  EXPECT_NEAR(rule.nodes[1], 0, 1e-14);
+  EXPECT_NEAR(rule.weights[0], 5.0 / 18, 1e-14);
+  EXPECT_NEAR(rule.weights[1], 8.0 / 18, 1e-14);
+}
+
+TEST(GermDeathTest, ShapesBelowOneAndCertainProbabilitiesAreProgrammersErrors) {
+  EXPECT_DEATH(Germ::Beta(0.5, 2), "check failed");
+  EXPECT_DEATH(Germ::Gamma(0.9), "check failed");
+  EXPECT_DEATH(Germ::Uniform().Quantile(0), "check failed");
+}
+
+}  // namespace
+}  // namespace polyest
