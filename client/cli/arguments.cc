@@ -1,0 +1,205 @@
+#include "client/cli/arguments.h"
+
+#include <absl/strings/str_replace.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include "client/cli/exit_status.h"
+
+namespace polyest {
+namespace {
+
+const std::map<std::string, Format> kFormats = {{"table", Format::kTable},
+                                                {"json", Format::kJson},
+                                                {"jsonl", Format::kJsonLines},
+                                                {"csv", Format::kCsv}};
+
+std::string CheckServer(const std::string& server) {
+  const size_t colon = server.rfind(':');
+  int port = 0;
+  if (colon != std::string::npos && colon > 0) {
+    const char* const end = server.data() + server.size();
+    const auto result = std::from_chars(server.data() + colon + 1, end, port);
+    if (result.ec == std::errc() && result.ptr == end && port >= 1 && port <= 65535) return "";
+  }
+  return "\"" + server + "\" must be HOST:PORT, the port from 1 to 65535";
+}
+
+// Options shared by several commands.
+class Parser {
+ public:
+  Parser() : app_("Estimates uncertain parameters of mechanical models from measurements.") {
+    app_.name("polyest");
+    app_.set_version_flag("--version", "polyest " POLYEST_VERSION);
+    app_.require_subcommand(1);
+    app_.footer(
+        "Exit status: 0 success, 2 bad usage or input, 3 server unreachable or refused, 1 else.");
+    const int cores = static_cast<int>(std::thread::hardware_concurrency());
+    place_.threads = std::clamp(cores, 1, 256);
+    paper_.threads = place_.threads;
+    AddEstimate();
+    AddStream();
+    AddPropagate();
+    AddCost();
+    AddModels();
+    AddPaper();
+  }
+
+  CLI::App& app() { return app_; }
+
+  Command Result() {
+    const std::string name = app_.get_subcommands().front()->get_name();
+    if (name == "estimate") return Placed(estimate_);
+    if (name == "stream") return Placed(stream_);
+    if (name == "propagate") return Placed(propagate_);
+    if (name == "cost") return Placed(cost_);
+    if (name == "models") return Placed(models_);
+    return paper_;
+  }
+
+ private:
+  template <typename Arguments>
+  Command Placed(Arguments arguments) const {
+    arguments.place = place_;
+    return arguments;
+  }
+
+  CLI::Option* AddServer(CLI::App& command) {
+    command
+        .add_option("--deadline", place_.deadline_s, "Give up after this many seconds; 0: never")
+        ->check(CLI::Range(0.0, 1e9));
+    return command.add_option("--server", place_.server, "The daemon to ask, HOST:PORT")
+        ->check(CLI::Validator(CheckServer, "HOST:PORT"));
+  }
+
+  void AddPlace(CLI::App& command) {
+    CLI::Option* const server = AddServer(command);
+    command.add_flag("--local", local_, "Compute in this process (the default)")->excludes(server);
+    command.add_option("--threads", place_.threads, "Threads for computing in this process")
+        ->check(CLI::Range(1, 256))
+        ->capture_default_str();
+  }
+
+  static void AddProblem(CLI::App& command, std::string& file) {
+    command.add_option("problem", file, "The problem, a JSON file")->required();
+  }
+
+  static void AddFormat(CLI::App& command, Format& format, std::vector<std::string> names) {
+    std::map<std::string, Format> formats;
+    std::string list;
+    for (const std::string& name : names) {
+      formats[name] = kFormats.at(name);
+      list += (list.empty() ? "" : ", ") + name;
+    }
+    const auto check = [formats, list](const std::string& name) {
+      if (formats.count(name) != 0) return std::string();
+      return "\"" + name + "\" must be one of " + list;
+    };
+    command
+        .add_option_function<std::string>(
+            "--format", [formats, &format](const std::string& name) { format = formats.at(name); },
+            "How to print: " + list + " (default " + names.front() + ")")
+        ->check(CLI::Validator(check, "FORMAT"));
+  }
+
+  void AddEstimate() {
+    CLI::App& command = *app_.add_subcommand("estimate", "Estimate from a data file");
+    AddProblem(command, estimate_.problem_file);
+    command.add_option("data", estimate_.data_file, "The measurements, a CSV file")->required();
+    AddPlace(command);
+    AddFormat(command, estimate_.format, {"table", "json"});
+  }
+
+  void AddStream() {
+    CLI::App& command =
+        *app_.add_subcommand("stream", "Stream data to a daemon, printing each estimate");
+    AddProblem(command, stream_.problem_file);
+    command.add_option("data", stream_.data_file, "The measurements, a CSV file, or -")->required();
+    AddServer(command)->required();
+    command.add_option("--batch", stream_.batch_rows, "Rows a message")
+        ->check(CLI::Range(1, 100'000))
+        ->capture_default_str();
+    command
+        .add_option("--rate", stream_.rate,
+                    "Send this many times as fast as the data's time; 0: at once")
+        ->check(CLI::Range(0.0, 1e9));
+    command.add_option("--session", stream_.session, "The session to create, or to resume");
+    AddFormat(command, stream_.format, {"table", "jsonl"});
+  }
+
+  void AddPropagate() {
+    CLI::App& command =
+        *app_.add_subcommand("propagate", "Predict the outputs over time from the prior");
+    AddProblem(command, propagate_.problem_file);
+    command.add_option("--until", propagate_.until_s, "The last time, s")->required();
+    command.add_option("--step", propagate_.step_s, "From one time to the next, s")->required();
+    AddPlace(command);
+    AddFormat(command, propagate_.format, {"table", "json", "csv"});
+  }
+
+  void AddCost() {
+    CLI::App& command =
+        *app_.add_subcommand("cost", "The cost over one or two uncertain parameters");
+    AddProblem(command, cost_.problem_file);
+    command.add_option("data", cost_.data_file, "The measurements, a CSV file")->required();
+    command
+        .add_option("--parameter", cost_.parameters,
+                    "A parameter to vary, at most two (default: the first two)")
+        ->expected(1)
+        ->take_all();
+    command.add_option("--grid", cost_.grid_points, "Points an axis; 0: 201 for one, 41 for two")
+        ->check(CLI::Range(0, 1001));
+    AddPlace(command);
+    AddFormat(command, cost_.format, {"json", "csv"});
+  }
+
+  void AddModels() {
+    CLI::App& command = *app_.add_subcommand("models", "List the built-in models, or describe one");
+    command.add_option("name", models_.name, "A model's name");
+    AddPlace(command);
+    AddFormat(command, models_.format, {"table", "json"});
+  }
+
+  void AddPaper() {
+    CLI::App& command = *app_.add_subcommand("paper", "Rerun the paper's experiments");
+    command.add_option("figure", paper_.figure, "One experiment's name (default: all)");
+    command.add_option("--plot", paper_.plot_file, "Draw the figure into this SVG file");
+    command.add_option("--threads", paper_.threads, "Threads for computing")
+        ->check(CLI::Range(1, 256))
+        ->capture_default_str();
+  }
+
+  CLI::App app_;
+  Place place_;
+  bool local_ = false;
+  EstimateArguments estimate_;
+  StreamArguments stream_;
+  PropagateArguments propagate_;
+  CostArguments cost_;
+  ModelsArguments models_;
+  PaperOptions paper_;
+};
+
+}  // namespace
+
+std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,
+                                          std::ostream& err) {
+  Parser parser;
+  try {
+    parser.app().parse(argc, argv);
+    return parser.Result();
+  } catch (const CLI::Success& success) {
+    return parser.app().exit(success, out, err);
+  } catch (const CLI::ParseError& error) {
+    err << "polyest: " << absl::StrReplaceAll(error.what(), {{"\n", " "}}) << "; see polyest --help"
+        << std::endl;
+    return static_cast<int>(kExitBadInput);
+  }
+}
+
+}  // namespace polyest

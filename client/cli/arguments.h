@@ -1,0 +1,70 @@
+#pragma once
+
+// The command line, parsed: one struct a command.
+
+#include <ostream>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "client/paper/paper_command.h"
+
+namespace polyest {
+
+enum class Format { kTable, kJson, kJsonLines, kCsv };
+
+// Where a command runs.
+struct Place {
+  std::string server;     // HOST:PORT; empty: in this process
+  double deadline_s = 0;  // 0: none
+  int threads = 1;        // in this process
+};
+
+struct EstimateArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  Format format = Format::kTable;
+};
+
+struct StreamArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;  // "-": standard input
+  int batch_rows = 30;
+  double rate = 0;      // times as fast as the data's own time; 0: as fast as possible
+  std::string session;  // its id; empty: the daemon chooses
+  Format format = Format::kTable;
+};
+
+struct PropagateArguments {
+  Place place;
+  std::string problem_file;
+  double until_s = 0;
+  double step_s = 0;
+  Format format = Format::kTable;
+};
+
+struct CostArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  std::vector<std::string> parameters;
+  int grid_points = 0;  // 0: the default
+  Format format = Format::kJson;
+};
+
+struct ModelsArguments {
+  Place place;
+  std::string name;  // empty: all
+  Format format = Format::kTable;
+};
+
+using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                             ModelsArguments, PaperOptions>;
+
+// A command, or the exit status after help, version or an error have been printed.
+std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,
+                                          std::ostream& err);
+
+}  // namespace polyest

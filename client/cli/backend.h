@@ -1,0 +1,31 @@
+#pragma once
+
+// The operations that need no session, in this process or by a daemon: the same answers.
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+
+#include "client/cli/arguments.h"
+#include "client/cpp/client.h"
+#include "polyest/v1/estimation_service.pb.h"
+
+namespace polyest {
+
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  virtual absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) = 0;
+  virtual absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) = 0;
+  virtual absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
+      const v1::EvaluateCostRequest& request) = 0;
+  virtual absl::StatusOr<v1::ListModelsResponse> ListModels(
+      const v1::ListModelsRequest& request) = 0;
+  virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;
+};
+
+ClientOptions ToClientOptions(const Place& place);
+
+std::unique_ptr<Backend> MakeBackend(const Place& place);
+
+}  // namespace polyest

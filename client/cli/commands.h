@@ -1,0 +1,18 @@
+#pragma once
+
+// The commands. Each prints its answer to `out`, errors in one line to `err`, and returns the exit
+// status.
+
+#include <ostream>
+
+#include "client/cli/arguments.h"
+
+namespace polyest {
+
+int RunCommand(const EstimateArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const PropagateArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const CostArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ModelsArguments& arguments, std::ostream& out, std::ostream& err);
+
+}  // namespace polyest

@@ -1,0 +1,53 @@
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cpp/data_file.h"
+#include "client/cpp/problem_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const CostArguments& arguments) {
+  v1::EvaluateCostRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadProblemFile(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
+  request.set_grid_points(arguments.grid_points);
+  auto response = MakeBackend(arguments.place)->EvaluateCost(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  return response;
+}
+
+// One row a point of the grid: its coordinates and the three costs.
+void PrintCsv(const v1::EvaluateCostResponse& cost, std::ostream& out) {
+  for (const auto& axis : cost.axes()) out << axis.parameter() << ',';
+  out << "mismatch,prior,total\n";
+  const int inner = cost.axes_size() == 2 ? cost.axes(1).value_size() : 1;
+  for (int i = 0; i < cost.total_size(); ++i) {
+    out << FormatExact(cost.axes(0).value(i / inner)) << ',';
+    if (cost.axes_size() == 2) out << FormatExact(cost.axes(1).value(i % inner)) << ',';
+    out << FormatExact(cost.mismatch(i)) << ',' << FormatExact(cost.prior(i)) << ','
+        << FormatExact(cost.total(i)) << '\n';
+  }
+}
+
+}  // namespace
+
+int RunCommand(const CostArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = EvaluateCost(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kCsv) {
+    PrintCsv(*response, out);
+  } else {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

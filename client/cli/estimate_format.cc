@@ -1,0 +1,145 @@
+#include "client/cli/estimate_format.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+
+#include "client/cli/number_format.h"
+#include "client/cli/text_table.h"
+
+namespace polyest {
+namespace {
+
+// A plain number has the unit "1", which nobody reads.
+std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
+
+std::string DiagnosticText(v1::Diagnostic::Code code) {
+  switch (code) {
+    case v1::Diagnostic::NOT_IDENTIFIED:
+      return "not identified";
+    case v1::Diagnostic::UNDERSAMPLED:
+      return "undersampled";
+    case v1::Diagnostic::EXPANSION_INACCURATE:
+      return "expansion inaccurate";
+    case v1::Diagnostic::MODEL_MISFIT:
+      return "model misfit";
+    case v1::Diagnostic::AT_PRIOR_BOUND:
+      return "at a bound of the prior";
+    case v1::Diagnostic::MULTIPLE_MINIMA:
+      return "several minima";
+    case v1::Diagnostic::NOT_CONVERGED:
+      return "not converged";
+    case v1::Diagnostic::POINTS_FAILED:
+      return "trajectories failed";
+    default:
+      return absl::StrCat("diagnostic ", static_cast<int>(code));
+  }
+}
+
+void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
+  TextTable table(
+      {"parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior", "verdict"});
+  for (const v1::ParameterEstimate& p : estimate.parameters()) {
+    table.AddRow({p.name(), FormatUncertain(p.map(), p.std_dev()), UnitText(p.unit()),
+                  absl::StrCat(FormatValue(p.lower95(), p.std_dev()), " … ",
+                               FormatValue(p.upper95(), p.std_dev())),
+                  FormatUncertain(p.prior_mean(), p.prior_std_dev()),
+                  FormatNumber(p.contraction(), 2), VerdictText(p.verdict())});
+  }
+  table.Print(out);
+}
+
+void PrintChannels(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.channels().empty()) return;
+  TextTable table({"channel", "samples", "χ²", "χ²/samples", "noise sd"});
+  for (const v1::ChannelEstimate& c : estimate.channels()) {
+    const bool any = c.samples() > 0;
+    table.AddRow({c.output(), absl::StrCat(c.samples()), any ? FormatNumber(c.chi_squared()) : "-",
+                  any ? FormatNumber(c.chi_squared() / static_cast<double>(c.samples()), 3) : "-",
+                  any ? FormatNumber(c.noise_std_dev(), 3) : "-"});
+  }
+  out << '\n';
+  table.Print(out);
+}
+
+void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.directions().empty()) return;
+  TextTable table({"direction (in prior sd)", "data/prior information", "verdict"});
+  for (const v1::Direction& d : estimate.directions()) {
+    table.AddRow(
+        {DirectionText(d, estimate), FormatNumber(d.information(), 2), VerdictText(d.verdict())});
+  }
+  out << '\n';
+  table.Print(out);
+}
+
+void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
+  const v1::Cost& cost = estimate.cost();
+  out << absl::StrFormat("\ncost: %.4g = %.4g mismatch + %.4g × %.4g prior\n", cost.total(),
+                         cost.mismatch(), estimate.regularization(), cost.prior());
+  const v1::ExpansionSummary& e = estimate.expansion();
+  out << absl::StrFormat(
+      "expansion: order %d, %d terms, %d points, %d re-expansions, %d trajectories; differs from "
+      "the model by %.2g of the noise\n",
+      e.order(), e.terms(), e.points(), e.reexpansions(), e.trajectories(), e.residual_to_noise());
+}
+
+}  // namespace
+
+std::string VerdictText(v1::Identifiability::Verdict verdict) {
+  switch (verdict) {
+    case v1::Identifiability::IDENTIFIED:
+      return "identified";
+    case v1::Identifiability::WEAK:
+      return "weak";
+    case v1::Identifiability::NOT_IDENTIFIED:
+      return "not identified";
+    default:
+      return "-";
+  }
+}
+
+std::string DirectionText(const v1::Direction& direction, const v1::Estimate& estimate) {
+  constexpr double kTooSmall = 0.05;
+  std::string text;
+  for (const v1::ParameterEstimate& parameter : estimate.parameters()) {
+    const auto found = direction.coefficients().find(parameter.name());
+    if (found == direction.coefficients().end()) continue;
+    const double coefficient = found->second;
+    if (std::abs(coefficient) < kTooSmall) continue;
+    const bool negative = coefficient < 0;
+    absl::StrAppend(&text, text.empty() ? (negative ? "−" : "") : (negative ? " − " : " + "),
+                    absl::StrFormat("%.2f ", std::abs(coefficient)), parameter.name());
+  }
+  return text;
+}
+
+void PrintDiagnostics(const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics,
+                      std::ostream& out) {
+  if (!diagnostics.empty()) out << '\n';
+  for (const v1::Diagnostic& diagnostic : diagnostics) {
+    out << "note: " << DiagnosticText(diagnostic.code()) << ": " << diagnostic.message() << '\n';
+  }
+}
+
+void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
+  out << absl::StrFormat("%d samples up to t = %.6g s\n\n", estimate.samples(), estimate.time());
+  PrintParameters(estimate, out);
+  PrintChannels(estimate, out);
+  PrintDirections(estimate, out);
+  PrintSummary(estimate, out);
+  PrintDiagnostics(estimate.diagnostics(), out);
+}
+
+std::string EstimateLine(const v1::Estimate& estimate) {
+  std::string line = absl::StrFormat("t = %.6g s", estimate.time());
+  for (const v1::ParameterEstimate& p : estimate.parameters()) {
+    const std::string unit = UnitText(p.unit());
+    absl::StrAppend(&line, "  ", p.name(), " = ", FormatUncertain(p.map(), p.std_dev()),
+                    unit.empty() ? "" : " ", unit);
+  }
+  return line;
+}
+
+}  // namespace polyest

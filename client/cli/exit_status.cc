@@ -1,0 +1,51 @@
+#include "client/cli/exit_status.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+
+namespace polyest {
+
+ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return kExitOk;
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kAlreadyExists:
+    case absl::StatusCode::kOutOfRange:
+    case absl::StatusCode::kFailedPrecondition:
+      return kExitBadInput;
+    case absl::StatusCode::kResourceExhausted:
+      return server.empty() ? kExitBadInput : kExitServer;
+    case absl::StatusCode::kUnavailable:
+    case absl::StatusCode::kAborted:
+    case absl::StatusCode::kUnimplemented:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kUnauthenticated:
+      return kExitServer;
+    case absl::StatusCode::kDeadlineExceeded:
+      return server.empty() ? kExitFailure : kExitServer;
+    default:
+      return kExitFailure;
+  }
+}
+
+int Report(const absl::Status& status, absl::string_view server, std::ostream& err) {
+  const ExitStatus exit_status = ExitStatusOf(status, server);
+  std::string message = absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}});
+  if (message.empty()) message = absl::StatusCodeToString(status.code());
+  if (exit_status == kExitServer) message = absl::StrCat("server ", server, ": ", message);
+  err << "polyest: " << message << std::endl;
+  return exit_status;
+}
+
+absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
+                    absl::string_view data_file) {
+  if (!absl::IsInvalidArgument(status)) return status;
+  const bool of_data = absl::StartsWith(status.message(), "measurements");
+  return absl::InvalidArgumentError(
+      absl::StrCat(of_data ? data_file : problem_file, ": ", status.message()));
+}
+
+}  // namespace polyest

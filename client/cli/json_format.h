@@ -1,0 +1,13 @@
+#pragma once
+
+#include <google/protobuf/message.h>
+
+#include <string>
+
+namespace polyest {
+
+// The canonical JSON of a message, fields with their default value included, over several lines or
+// in one; without a line end.
+std::string ToJson(const google::protobuf::Message& message, bool several_lines);
+
+}  // namespace polyest

@@ -1,0 +1,44 @@
+// The `polyest` command.
+
+#include <exception>
+#include <iostream>
+#include <type_traits>
+#include <variant>
+
+#include "client/cli/arguments.h"
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "client/paper/paper_command.h"
+
+namespace {
+
+int Run(const polyest::Command& command) {
+  return std::visit(
+      [](const auto& arguments) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(arguments)>, polyest::PaperOptions>) {
+          return polyest::RunPaper(arguments, std::cout, std::cerr);
+        } else {
+          return polyest::RunCommand(arguments, std::cout, std::cerr);
+        }
+      },
+      command);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const auto parsed = polyest::ParseArguments(argc, argv, std::cout, std::cerr);
+    if (const int* status = std::get_if<int>(&parsed)) return *status;
+    const int status = Run(std::get<polyest::Command>(parsed));
+    std::cout.flush();
+    if (status == polyest::kExitOk && !std::cout) {
+      std::cerr << "polyest: the answer could not be written to the standard output" << std::endl;
+      return polyest::kExitFailure;
+    }
+    return status;
+  } catch (const std::exception& error) {
+    std::cerr << "polyest: " << error.what() << std::endl;
+    return polyest::kExitFailure;
+  }
+}

@@ -1,0 +1,89 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+
+#include <memory>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/text_table.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+// All pages as one.
+absl::StatusOr<v1::ListModelsResponse> ListAll(Backend& backend) {
+  v1::ListModelsResponse all;
+  v1::ListModelsRequest request;
+  do {
+    POLYEST_ASSIGN_OR_RETURN(const v1::ListModelsResponse page, backend.ListModels(request));
+    all.mutable_models()->MergeFrom(page.models());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return all;
+}
+
+std::string ShortName(const v1::Model& model) {
+  return std::string(absl::StripPrefix(model.name(), "models/"));
+}
+
+void PrintList(const v1::ListModelsResponse& list, std::ostream& out) {
+  TextTable table({"model", "summary"});
+  for (const v1::Model& model : list.models()) table.AddRow({ShortName(model), model.summary()});
+  table.Print(out);
+}
+
+void PrintQuantities(const std::string& title,
+                     const google::protobuf::RepeatedPtrField<v1::Model::Quantity>& quantities,
+                     bool defaults, std::ostream& out) {
+  if (quantities.empty()) return;
+  std::vector<std::string> header = {title, "unit"};
+  if (defaults) header.push_back("default");
+  header.push_back("meaning");
+  TextTable table(std::move(header));
+  for (const auto& quantity : quantities) {
+    std::vector<std::string> row = {quantity.name(), quantity.unit()};
+    if (defaults) row.push_back(FormatNumber(quantity.default_value(), 6));
+    row.push_back(quantity.meaning());
+    table.AddRow(std::move(row));
+  }
+  out << '\n';
+  table.Print(out);
+}
+
+void PrintModel(const v1::Model& model, std::ostream& out) {
+  out << ShortName(model) << ": " << model.summary() << "\n\n" << model.equations() << '\n';
+  PrintQuantities("state", model.states(), false, out);
+  PrintQuantities("parameter", model.parameters(), true, out);
+  PrintQuantities("input", model.inputs(), false, out);
+  PrintQuantities("output", model.outputs(), false, out);
+  if (!model.source().empty()) out << "\nsource: " << model.source() << '\n';
+}
+
+// Prints an answer, or reports why there is none.
+template <typename Response, typename PrintTable>
+int Print(const absl::StatusOr<Response>& response, const ModelsArguments& arguments,
+          PrintTable print_table, std::ostream& out, std::ostream& err) {
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else {
+    print_table(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+int RunCommand(const ModelsArguments& arguments, std::ostream& out, std::ostream& err) {
+  const std::unique_ptr<Backend> backend = MakeBackend(arguments.place);
+  if (arguments.name.empty()) return Print(ListAll(*backend), arguments, PrintList, out, err);
+  v1::GetModelRequest request;
+  request.set_name(absl::StrCat("models/", arguments.name));
+  return Print(backend->GetModel(request), arguments, PrintModel, out, err);
+}
+
+}  // namespace polyest

@@ -1,0 +1,52 @@
+#include "client/cli/number_format.h"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace polyest {
+namespace {
+
+// The decimal exponent of the leading digit after rounding to two significant digits, so that
+// 0.0996 counts as 0.10.
+int LeadingExponent(double value) {
+  const std::string text = absl::StrFormat("%.1e", value);
+  int exponent = 0;
+  (void)absl::SimpleAtoi(text.substr(text.find('e') + 1), &exponent);
+  return exponent;
+}
+
+}  // namespace
+
+std::string FormatValue(double value, double standard_deviation) {
+  if (!std::isfinite(standard_deviation) || standard_deviation <= 0 || !std::isfinite(value)) {
+    return FormatNumber(value, 6);
+  }
+  const int decimals = 1 - LeadingExponent(standard_deviation);
+  if (decimals >= -4 && decimals <= 8 && std::abs(value) < 1e7) {
+    return absl::StrFormat("%.*f", std::max(decimals, 0), value);
+  }
+  const int digits = value == 0 ? 1 : LeadingExponent(std::abs(value)) + decimals;
+  return absl::StrFormat("%.*e", std::clamp(digits, 1, 15), value);
+}
+
+std::string FormatUncertain(double value, double standard_deviation) {
+  return absl::StrCat(FormatValue(value, standard_deviation), " ± ",
+                      FormatValue(standard_deviation, standard_deviation));
+}
+
+std::string FormatNumber(double value, int digits) {
+  return absl::StrFormat("%.*g", digits, value);
+}
+
+std::string FormatExact(double value) {
+  char text[32];
+  const auto result = std::to_chars(text, text + sizeof(text), value);
+  return std::string(text, result.ptr);
+}
+
+}  // namespace polyest

@@ -1,0 +1,20 @@
+#pragma once
+
+// Numbers as a person wants to read them.
+
+#include <string>
+
+namespace polyest {
+
+// A value with the decimals that its uncertainty leaves: two significant digits of
+// `standard_deviation`, as in 40.6612 beside 0.0052. Six significant digits when the uncertainty is
+// 0 or not finite.
+std::string FormatValue(double value, double standard_deviation);
+// "40.6612 ± 0.0052".
+std::string FormatUncertain(double value, double standard_deviation);
+// At most `digits` significant digits.
+std::string FormatNumber(double value, int digits = 4);
+// All digits that tell it from its neighbours: what is read back is the same number.
+std::string FormatExact(double value);
+
+}  // namespace polyest

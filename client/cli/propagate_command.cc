@@ -1,0 +1,101 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/text_table.h"
+#include "client/cpp/problem_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+absl::StatusOr<v1::PropagateResponse> Propagate(const PropagateArguments& arguments) {
+  v1::PropagateRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadProblemFile(arguments.problem_file));
+  request.set_until(arguments.until_s);
+  request.set_step(arguments.step_s);
+  auto response = MakeBackend(arguments.place)->Propagate(request);
+  if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
+  return response;
+}
+
+std::string Percent(double probability) { return FormatNumber(100 * probability) + " %"; }
+
+// One table an output.
+void PrintTables(const v1::PropagateResponse& propagation, std::ostream& out) {
+  const int quantiles = propagation.probabilities_size();
+  for (const auto& output : propagation.outputs()) {
+    const std::string unit = output.unit() == "1" ? "" : absl::StrCat(" (", output.unit(), ")");
+    out << output.name() << unit << '\n';
+    std::vector<std::string> header = {"t (s)", "mean", "sd"};
+    for (const double probability : propagation.probabilities()) {
+      header.push_back(Percent(probability));
+    }
+    header.push_back("residual");
+    TextTable table(std::move(header), TextTable::Align::kRight);
+    for (int k = 0; k < propagation.time_size(); ++k) {
+      const double sd = output.std_dev(k);
+      std::vector<std::string> row = {FormatNumber(propagation.time(k), 6),
+                                      FormatValue(output.mean(k), sd), FormatNumber(sd, 3)};
+      for (int q = 0; q < quantiles; ++q) {
+        row.push_back(FormatValue(output.quantiles(k * quantiles + q), sd));
+      }
+      row.push_back(FormatNumber(output.residual(k), 2));
+      table.AddRow(std::move(row));
+    }
+    table.Print(out);
+    out << '\n';
+  }
+  out << absl::StrFormat("expansion: order %d, %d terms, %d points\n", propagation.order(),
+                         propagation.terms(), propagation.points());
+  PrintDiagnostics(propagation.diagnostics(), out);
+}
+
+// One row a time: x.mean, x.stdDev, x.q0.025 …, x.residual for each output.
+void PrintCsv(const v1::PropagateResponse& propagation, std::ostream& out) {
+  out << 't';
+  for (const auto& output : propagation.outputs()) {
+    out << ',' << output.name() << ".mean," << output.name() << ".stdDev";
+    for (const double probability : propagation.probabilities()) {
+      out << ',' << output.name() << ".q" << FormatExact(probability);
+    }
+    out << ',' << output.name() << ".residual";
+  }
+  out << '\n';
+  const int quantiles = propagation.probabilities_size();
+  for (int k = 0; k < propagation.time_size(); ++k) {
+    out << FormatExact(propagation.time(k));
+    for (const auto& output : propagation.outputs()) {
+      out << ',' << FormatExact(output.mean(k)) << ',' << FormatExact(output.std_dev(k));
+      for (int q = 0; q < quantiles; ++q) {
+        out << ',' << FormatExact(output.quantiles(k * quantiles + q));
+      }
+      out << ',' << FormatExact(output.residual(k));
+    }
+    out << '\n';
+  }
+}
+
+}  // namespace
+
+int RunCommand(const PropagateArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = Propagate(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else if (arguments.format == Format::kCsv) {
+    PrintCsv(*response, out);
+  } else {
+    PrintTables(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

@@ -1,0 +1,170 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <istream>
+#include <memory>
+#include <optional>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/json_format.h"
+#include "client/cli/stream_session.h"
+#include "client/cpp/client.h"
+#include "client/cpp/data_file.h"
+#include "client/cpp/measurement_stream.h"
+#include "client/cpp/problem_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+// Says when a batch is due, by the data's own time.
+class Pace {
+ public:
+  Pace(double rate, const Interrupt& interrupt) : rate_(rate), interrupt_(interrupt) {}
+
+  // Waits until the batch's last row would have been measured. Runs follow upon one another.
+  void Wait(const v1::Measurements& batch) {
+    if (rate_ == 0) return;
+    for (int row = 0; row < batch.time_size(); ++row) {
+      const int run = batch.run().empty() ? 0 : batch.run(row);
+      if (run_ < 0) elapsed_s_ = -batch.time(row);
+      elapsed_s_ += batch.time(row) - (run_ == run ? time_s_ : 0);
+      run_ = run;
+      time_s_ = batch.time(row);
+    }
+    const std::chrono::duration<double> due(elapsed_s_ / rate_);
+    interrupt_.WaitUntil(start_ +
+                         std::chrono::duration_cast<std::chrono::steady_clock::duration>(due));
+  }
+
+ private:
+  const double rate_;
+  const Interrupt& interrupt_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double elapsed_s_ = 0;
+  int run_ = -1;  // before the first row
+  double time_s_ = 0;
+};
+
+class StreamCommand {
+ public:
+  StreamCommand(const StreamArguments& arguments, std::ostream& out, std::ostream& err)
+      : arguments_(arguments),
+        out_(out),
+        err_(err),
+        client_(arguments.place.server, ToClientOptions(arguments.place)) {}
+
+  // The last estimate, none without samples.
+  absl::StatusOr<std::optional<v1::Estimate>> Run() {
+    POLYEST_ASSIGN_OR_RETURN(problem_, ReadProblemFile(arguments_.problem_file));
+    if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
+    const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(arguments_.data_file, ": cannot be opened: ", std::strerror(errno)));
+    }
+    auto last = Read(descriptor, arguments_.data_file);
+    close(descriptor);
+    return last;
+  }
+
+  bool interrupted() const { return interrupt_.Requested(); }
+
+ private:
+  using LastEstimate = absl::StatusOr<std::optional<v1::Estimate>>;
+
+  LastEstimate Read(int descriptor, const std::string& name) {
+    InterruptibleInput input(descriptor, interrupt_);
+    std::istream in(&input);
+    auto reader = DataReader::Open(in, name, ColumnsOf(problem_));
+    if (interrupted()) return std::nullopt;
+    POLYEST_RETURN_IF_ERROR(reader.status());
+    // Before anything is created, so that a file that is no good leaves nothing behind.
+    auto first = reader->Read(arguments_.batch_rows);
+    if (interrupted()) return std::nullopt;
+    POLYEST_RETURN_IF_ERROR(first.status());
+    auto session = OpenSession(client_, problem_, arguments_.session);
+    if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);
+    auto last = Send(*session, *reader, *std::move(first));
+    if (!last.ok()) return InFile(last.status(), arguments_.problem_file, name);
+    return last;
+  }
+
+  LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch) {
+    MeasurementStream stream(client_, session.name, {}, Callbacks());
+    POLYEST_RETURN_IF_ERROR(stream.Open());
+    if (isatty(STDERR_FILENO) != 0) err_ << "streaming to " << session.name << std::endl;
+    Pace pace(arguments_.rate, interrupt_);
+    int64_t skipped = 0;
+    while (batch.time_size() > 0) {
+      if (session.resumed_after_s) skipped += RemoveRowsUpTo(*session.resumed_after_s, batch);
+      if (batch.time_size() > 0) {
+        pace.Wait(batch);
+        POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
+      }
+      if (interrupted()) break;
+      auto next = reader.Read(arguments_.batch_rows);
+      if (interrupted()) break;  // what was read may end in the midst of a row
+      POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
+    }
+    if (session.resumed_after_s) {
+      err_ << absl::StrFormat("polyest: resumed %s after t = %g s, %d rows were there already\n",
+                              session.name, *session.resumed_after_s, skipped);
+    }
+    return stream.Finish();
+  }
+
+  MeasurementStreamCallbacks Callbacks() {
+    return {
+        .estimate =
+            [this](const v1::Estimate& estimate) {
+              if (arguments_.format == Format::kJsonLines) {
+                out_ << ToJson(estimate, /*several_lines=*/false) << std::endl;
+              } else {
+                out_ << EstimateLine(estimate) << std::endl;
+              }
+            },
+        .acknowledgement = nullptr,
+        .connection =
+            [this](const std::string& sentence) { err_ << "polyest: " << sentence << std::endl; },
+    };
+  }
+
+  const StreamArguments& arguments_;
+  std::ostream& out_;
+  std::ostream& err_;
+  const Interrupt interrupt_;
+  Client client_;
+  v1::Problem problem_;
+};
+
+}  // namespace
+
+int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream& err) {
+  StreamCommand command(arguments, out, err);
+  const auto last = command.Run();
+  if (!last.ok()) return Report(last.status(), arguments.place.server, err);
+  if (!last->has_value()) {
+    const std::string why = command.interrupted() ? "interrupted before the first estimate"
+                                                  : "the data have no samples to estimate from";
+    return Report(
+        command.interrupted() ? absl::CancelledError(why) : absl::InvalidArgumentError(why),
+        arguments.place.server, err);
+  }
+  if (arguments.format == Format::kTable) {
+    out << '\n';
+    PrintEstimate(**last, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

@@ -1,0 +1,59 @@
+#include "client/cli/stream_session.h"
+
+#include <absl/strings/str_cat.h>
+#include <google/protobuf/util/message_differencer.h>
+
+#include "core/common/status.h"
+
+namespace polyest {
+
+absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
+                                          const std::string& id) {
+  v1::CreateSessionRequest create;
+  *create.mutable_problem() = problem;
+  create.set_session_id(id);
+  const auto created = client.CreateSession(create);
+  if (created.ok()) return StreamSession{created->name(), std::nullopt};
+  if (!absl::IsAlreadyExists(created.status())) return created.status();
+
+  v1::GetSessionRequest get;
+  get.set_name(absl::StrCat("sessions/", id));
+  POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client.GetSession(get));
+  if (!google::protobuf::util::MessageDifferencer::Equals(session.problem(), problem)) {
+    return absl::AlreadyExistsError(absl::StrCat("session ", id,
+                                                 " exists and has another problem; resuming it "
+                                                 "needs the same one, or choose another name"));
+  }
+  StreamSession resumed{session.name(), std::nullopt};
+  if (session.samples() > 0) {
+    v1::GetEstimateRequest request;
+    request.set_session(session.name());
+    POLYEST_ASSIGN_OR_RETURN(const v1::EstimateResponse response, client.GetEstimate(request));
+    resumed.resumed_after_s = response.estimate().time();
+  }
+  return resumed;
+}
+
+int RemoveRowsUpTo(double time_s, v1::Measurements& batch) {
+  int rows = 0;
+  while (rows < batch.time_size() && batch.time(rows) <= time_s &&
+         (batch.run().empty() || batch.run(rows) == 0)) {
+    ++rows;
+  }
+  batch.mutable_time()->erase(batch.time().begin(), batch.time().begin() + rows);
+  if (!batch.run().empty()) {
+    batch.mutable_run()->erase(batch.run().begin(), batch.run().begin() + rows);
+  }
+  for (auto& channel : *batch.mutable_channels()) {
+    auto& values = *channel.mutable_values();
+    values.erase(values.begin(), values.begin() + rows);
+    google::protobuf::RepeatedField<int32_t> missing;
+    for (const int32_t row : channel.missing()) {
+      if (row >= rows) missing.Add(row - rows);
+    }
+    *channel.mutable_missing() = missing;
+  }
+  return rows;
+}
+
+}  // namespace polyest

@@ -1,0 +1,117 @@
+#include "client/cpp/client.h"
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/channel_arguments.h>
+
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+using Stub = v1::EstimationService::Stub;
+
+std::shared_ptr<grpc::Channel> Connect(const std::string& server, const ClientOptions& options) {
+  grpc::ChannelArguments arguments;
+  const int keepalive_ms = static_cast<int>(options.keepalive.count());
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, keepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  arguments.SetMaxReceiveMessageSize(options.most_response_bytes);
+  // A stream that reconnects has delays of its own; the channel's must not outlast them.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5'000);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1'000);
+  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+}
+
+}  // namespace
+
+absl::Status FromGrpc(const grpc::Status& status) {
+  // The codes of both are the same numbers.
+  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+}
+
+Client::Client(const std::string& server, ClientOptions options)
+    : server_(server),
+      options_(options),
+      stub_(v1::EstimationService::NewStub(Connect(server, options))) {}
+
+template <typename Response, typename Request>
+absl::StatusOr<Response> Client::Call(Method<Response, Request> method, const Request& request) {
+  grpc::ClientContext context;
+  if (options_.deadline) {
+    context.set_deadline(std::chrono::system_clock::now() + *options_.deadline);
+  }
+  Response response;
+  const grpc::Status status = (stub_.get()->*method)(&context, request, &response);
+  if (!status.ok()) return FromGrpc(status);
+  return response;
+}
+
+absl::StatusOr<v1::ListModelsResponse> Client::ListModels(const v1::ListModelsRequest& request) {
+  return Call(&Stub::ListModels, request);
+}
+
+absl::StatusOr<v1::Model> Client::GetModel(const v1::GetModelRequest& request) {
+  return Call(&Stub::GetModel, request);
+}
+
+absl::StatusOr<v1::EstimateResponse> Client::Estimate(const v1::EstimateRequest& request) {
+  return Call(&Stub::Estimate, request);
+}
+
+absl::StatusOr<v1::PropagateResponse> Client::Propagate(const v1::PropagateRequest& request) {
+  return Call(&Stub::Propagate, request);
+}
+
+absl::StatusOr<v1::EvaluateCostResponse> Client::EvaluateCost(
+    const v1::EvaluateCostRequest& request) {
+  return Call(&Stub::EvaluateCost, request);
+}
+
+absl::StatusOr<v1::Session> Client::CreateSession(const v1::CreateSessionRequest& request) {
+  return Call(&Stub::CreateSession, request);
+}
+
+absl::StatusOr<v1::Session> Client::GetSession(const v1::GetSessionRequest& request) {
+  return Call(&Stub::GetSession, request);
+}
+
+absl::StatusOr<v1::ListSessionsResponse> Client::ListSessions(
+    const v1::ListSessionsRequest& request) {
+  return Call(&Stub::ListSessions, request);
+}
+
+absl::Status Client::DeleteSession(const v1::DeleteSessionRequest& request) {
+  return Call(&Stub::DeleteSession, request).status();
+}
+
+absl::StatusOr<v1::AddMeasurementsResponse> Client::AddMeasurements(
+    const v1::AddMeasurementsRequest& request) {
+  return Call(&Stub::AddMeasurements, request);
+}
+
+absl::StatusOr<v1::EstimateResponse> Client::GetEstimate(const v1::GetEstimateRequest& request) {
+  return Call(&Stub::GetEstimate, request);
+}
+
+absl::Status Client::WatchSession(
+    const v1::WatchSessionRequest& request,
+    const std::function<bool(const v1::EstimateResponse&)>& estimate) {
+  grpc::ClientContext context;
+  const auto reader = stub_->WatchSession(&context, request);
+  v1::EstimateResponse response;
+  while (reader->Read(&response)) {
+    if (estimate(response)) continue;
+    context.TryCancel();
+    reader->Finish();
+    return absl::OkStatus();
+  }
+  return FromGrpc(reader->Finish());
+}
+
+}  // namespace polyest

@@ -1,0 +1,71 @@
+#pragma once
+
+// The daemon's calls as functions.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "polyest/v1/estimation_service.grpc.pb.h"
+
+namespace polyest {
+
+struct ClientOptions {
+  // How long a call may take; none: as long as it takes.
+  std::optional<std::chrono::milliseconds> deadline;
+  // Silence after which the connection is probed; the daemon's own, or it would refuse the probes.
+  std::chrono::milliseconds keepalive{20'000};
+  // The longest answer taken.
+  int most_response_bytes = 64 << 20;
+};
+
+// A gRPC status as the same absl::Status.
+absl::Status FromGrpc(const grpc::Status& status);
+
+// Threads may share a client. Every function fails with the daemon's status; UNAVAILABLE when the
+// daemon cannot be reached, DEADLINE_EXCEEDED when it did not answer in time.
+class Client {
+ public:
+  // `server` is HOST:PORT. Connects on the first call.
+  explicit Client(const std::string& server, ClientOptions options = {});
+
+  absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request);
+  absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request);
+  absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request);
+  absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request);
+  absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const v1::EvaluateCostRequest& request);
+  absl::StatusOr<v1::Session> CreateSession(const v1::CreateSessionRequest& request);
+  absl::StatusOr<v1::Session> GetSession(const v1::GetSessionRequest& request);
+  absl::StatusOr<v1::ListSessionsResponse> ListSessions(const v1::ListSessionsRequest& request);
+  absl::Status DeleteSession(const v1::DeleteSessionRequest& request);
+  absl::StatusOr<v1::AddMeasurementsResponse> AddMeasurements(
+      const v1::AddMeasurementsRequest& request);
+  absl::StatusOr<v1::EstimateResponse> GetEstimate(const v1::GetEstimateRequest& request);
+  // Calls `estimate` with each one until it returns false (then OK) or the daemon ends the stream.
+  absl::Status WatchSession(const v1::WatchSessionRequest& request,
+                            const std::function<bool(const v1::EstimateResponse&)>& estimate);
+
+  // For MeasurementStream.
+  v1::EstimationService::Stub& stub() { return *stub_; }
+  const std::string& server() const { return server_; }
+
+ private:
+  template <typename Response, typename Request>
+  using Method = grpc::Status (v1::EstimationService::Stub::*)(grpc::ClientContext*, const Request&,
+                                                               Response*);
+  template <typename Response, typename Request>
+  absl::StatusOr<Response> Call(Method<Response, Request> method, const Request& request);
+
+  std::string server_;
+  ClientOptions options_;
+  std::unique_ptr<v1::EstimationService::Stub> stub_;
+};
+
+}  // namespace polyest

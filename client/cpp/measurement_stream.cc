@@ -1,0 +1,236 @@
+#include "client/cpp/measurement_stream.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest {
+
+// One connection. The stream's mutex guards it; it never touches itself after OnDone has let go of
+// that, so the stream may then delete it. There is always a read under way until `ended`, which
+// keeps the call alive while the stream starts writes from outside a reaction.
+class MeasurementStream::Connection
+    : public grpc::ClientBidiReactor<v1::StreamMeasurementsRequest,
+                                     v1::StreamMeasurementsResponse> {
+ public:
+  explicit Connection(MeasurementStream& stream) : stream_(stream) {}
+
+  // The first message: names the session and says how often estimates are wanted.
+  void Start() {
+    auto hello = std::make_shared<v1::StreamMeasurementsRequest>();
+    hello->set_session(stream_.session_);
+    if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
+    stream_.client_.stub().async()->StreamMeasurements(&context_, this);
+    StartRead(&response_);
+    Write(std::move(hello));
+    StartCall();
+  }
+
+  bool writable() const { return !writing_ && !ended_ && !half_closed_; }
+  bool done() const { return status_.has_value(); }
+  const absl::Status& status() const { return *status_; }
+
+  void Write(std::shared_ptr<const v1::StreamMeasurementsRequest> request) {
+    writing_ = std::move(request);
+    StartWrite(writing_.get());
+  }
+  void HalfClose() {
+    half_closed_ = true;
+    StartWritesDone();
+  }
+  void Cancel() { context_.TryCancel(); }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      const Lock lock(stream_.mutex_);
+      ended_ = true;
+      return;
+    }
+    stream_.Take(response_);
+    response_.Clear();
+    StartRead(&response_);
+  }
+  void OnWriteDone(bool ok) override {
+    const Lock lock(stream_.mutex_);
+    writing_ = nullptr;
+    if (ok) stream_.Write();
+  }
+  void OnDone(const grpc::Status& status) override {
+    const Lock lock(stream_.mutex_);
+    status_ = FromGrpc(status);
+    stream_.changed_.notify_all();
+  }
+
+ private:
+  MeasurementStream& stream_;
+  grpc::ClientContext context_;
+  v1::StreamMeasurementsResponse response_;
+  std::shared_ptr<const v1::StreamMeasurementsRequest> writing_;  // gRPC's until OnWriteDone
+  bool ended_ = false;
+  bool half_closed_ = false;
+  std::optional<absl::Status> status_;
+};
+
+MeasurementStream::MeasurementStream(Client& client, std::string session,
+                                     MeasurementStreamOptions options,
+                                     MeasurementStreamCallbacks callbacks)
+    : client_(client),
+      session_(std::move(session)),
+      options_(std::move(options)),
+      callbacks_(std::move(callbacks)) {
+  POLYEST_CHECK(options_.most_unacknowledged >= 1);
+  POLYEST_CHECK(options_.most_attempts >= 0);
+}
+
+MeasurementStream::~MeasurementStream() {
+  Lock lock(mutex_);
+  if (!connection_) return;
+  connection_->Cancel();
+  changed_.wait(lock, [this] { return connection_->done(); });
+}
+
+void MeasurementStream::Tell(const std::string& sentence) const {
+  if (callbacks_.connection) callbacks_.connection(sentence);
+}
+
+// Writes the next batch, or half-closes after the last, if the connection is free. Locked.
+void MeasurementStream::Write() {
+  if (!connection_ || !connection_->writable()) return;
+  if (written_ < pending_.size()) {
+    connection_->Write(pending_[written_++]);
+  } else if (finishing_) {
+    connection_->HalfClose();
+  }
+}
+
+void MeasurementStream::Take(const v1::StreamMeasurementsResponse& response) {
+  if (response.has_acknowledgement()) {
+    {
+      const Lock lock(mutex_);
+      while (!pending_.empty() &&
+             pending_.front()->sequence() <= response.acknowledgement().sequence()) {
+        pending_.pop_front();
+        written_ -= std::min<size_t>(written_, 1);
+      }
+      attempts_ = 0;
+      changed_.notify_all();
+    }
+    if (callbacks_.acknowledgement) callbacks_.acknowledgement(response.acknowledgement());
+  } else if (response.has_estimate()) {
+    {
+      const Lock lock(mutex_);
+      last_estimate_ = response.estimate();
+    }
+    if (callbacks_.estimate) callbacks_.estimate(response.estimate());
+  }
+}
+
+// Locked, and no connection under way.
+absl::Status MeasurementStream::ForgetAcknowledged(int64_t sequence) {
+  const int64_t first = last_sequence_ - static_cast<int64_t>(pending_.size()) + 1;
+  if (sequence > last_sequence_) {
+    return absl::AbortedError(absl::StrCat(session_, " has batch ", sequence,
+                                           ", the last one sent is ", last_sequence_,
+                                           ": another client writes to it"));
+  }
+  if (sequence < first - 1) {
+    return absl::DataLossError(absl::StrCat(session_, " has batches up to ", sequence,
+                                            ", but acknowledged them up to ", first - 1));
+  }
+  while (!pending_.empty() && pending_.front()->sequence() <= sequence) pending_.pop_front();
+  written_ = 0;
+  return absl::OkStatus();
+}
+
+absl::Status MeasurementStream::Connect() {
+  v1::GetSessionRequest request;
+  request.set_name(session_);
+  POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client_.GetSession(request));
+  const Lock lock(mutex_);
+  if (!connection_) {
+    last_sequence_ = session.last_sequence();
+  } else {
+    POLYEST_RETURN_IF_ERROR(ForgetAcknowledged(session.last_sequence()));
+  }
+  connection_ = std::make_unique<Connection>(*this);
+  connection_->Start();
+  return absl::OkStatus();
+}
+
+absl::Status MeasurementStream::Open() {
+  POLYEST_CHECK(!connection_);
+  return Connect();
+}
+
+// Locked, with a connection that is done: connects again or says why not.
+absl::Status MeasurementStream::Recover(Lock& lock) {
+  absl::Status status = connection_->status();
+  if (status.ok()) return absl::InternalError("the daemon ended the stream before its end");
+  // After a break the daemon may still hold the old connection as the session's writer.
+  while (absl::IsUnavailable(status) || (attempts_ > 0 && absl::IsAborted(status))) {
+    if (attempts_ == options_.most_attempts) return status;
+    const auto delay =
+        std::min(options_.longest_delay, options_.first_delay * (1 << std::min(attempts_, 20)));
+    ++attempts_;
+    lock.unlock();
+    Tell(absl::StrFormat("connection lost (%s); trying again in %g s", status.message(),
+                         static_cast<double>(delay.count()) / 1000));
+    std::this_thread::sleep_for(delay);
+    status = Connect();
+    if (status.ok()) Tell("connected again");
+    lock.lock();
+  }
+  if (absl::IsNotFound(status)) {
+    return absl::NotFoundError(absl::StrCat(
+        "the daemon has lost ", session_, " and the batches it had acknowledged, up to number ",
+        last_sequence_ - static_cast<int64_t>(pending_.size()),
+        " (it was restarted without a data directory, or the session was deleted)"));
+  }
+  return status;
+}
+
+absl::Status MeasurementStream::Send(v1::Measurements batch) {
+  auto request = std::make_shared<v1::StreamMeasurementsRequest>();
+  request->set_session(session_);
+  *request->mutable_measurements() = std::move(batch);
+
+  Lock lock(mutex_);
+  POLYEST_CHECK(connection_ && !finishing_);
+  const size_t most = static_cast<size_t>(options_.most_unacknowledged);
+  while (connection_->done() || pending_.size() >= most) {
+    if (connection_->done()) {
+      POLYEST_RETURN_IF_ERROR(Recover(lock));
+    } else {
+      changed_.wait(lock);
+    }
+  }
+  request->set_sequence(++last_sequence_);
+  pending_.push_back(std::move(request));
+  Write();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::optional<v1::Estimate>> MeasurementStream::Finish() {
+  Lock lock(mutex_);
+  POLYEST_CHECK(connection_ && !finishing_);
+  finishing_ = true;
+  Write();
+  while (true) {
+    changed_.wait(lock, [this] { return connection_->done(); });
+    if (connection_->status().ok()) break;
+    POLYEST_RETURN_IF_ERROR(Recover(lock));
+  }
+  if (!pending_.empty()) {
+    return absl::InternalError(absl::StrCat("the daemon ended the stream with ", pending_.size(),
+                                            " batches not acknowledged"));
+  }
+  return last_estimate_;
+}
+
+}  // namespace polyest

@@ -1,0 +1,94 @@
+#pragma once
+
+// Batches of measurements into a session, estimates out, over a connection that may break.
+//
+// A batch is kept until the daemon has acknowledged it. When the connection breaks, the next Send
+// or Finish connects again, asks for the last batch that the session has, and sends what came
+// after. So nothing is lost and nothing is counted twice.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "client/cpp/client.h"
+
+namespace polyest {
+
+struct MeasurementStreamOptions {
+  // Send waits while this many batches are not acknowledged, ≥ 1.
+  int most_unacknowledged = 16;
+  // How often estimates are wanted; none: after every batch.
+  std::optional<v1::StreamMeasurementsRequest::EstimatePolicy> estimates;
+  // Before the first attempt to connect again; doubles up to the longest.
+  std::chrono::milliseconds first_delay{100};
+  std::chrono::milliseconds longest_delay{5'000};
+  // Attempts without an acknowledgement in between, ≥ 0; then the stream fails.
+  int most_attempts = 16;
+};
+
+// Called from a thread of gRPC, one at a time, except `connection`: from within Send and Finish.
+struct MeasurementStreamCallbacks {
+  std::function<void(const v1::Estimate&)> estimate;
+  std::function<void(const v1::Acknowledgement&)> acknowledgement;
+  // One sentence on a connection that was lost or is back.
+  std::function<void(const std::string&)> connection;
+};
+
+// For one thread. After a function has failed, the stream is of no more use.
+class MeasurementStream {
+ public:
+  // `session` is `sessions/{id}` and exists; `client` outlives the stream.
+  MeasurementStream(Client& client, std::string session, MeasurementStreamOptions options,
+                    MeasurementStreamCallbacks callbacks);
+  // Drops what is under way.
+  ~MeasurementStream();
+  MeasurementStream(const MeasurementStream&) = delete;
+  MeasurementStream& operator=(const MeasurementStream&) = delete;
+
+  // Connects; once, before anything else. Batches are numbered on from the session's last.
+  absl::Status Open();
+  // Hands over one batch; waits while too many are not acknowledged. NOT_FOUND: the daemon has lost
+  // the session. UNAVAILABLE: no connection after all attempts.
+  absl::Status Send(v1::Measurements batch);
+  // No more batches: waits for all acknowledgements and the last estimate, none if the session has
+  // no samples.
+  absl::StatusOr<std::optional<v1::Estimate>> Finish();
+
+ private:
+  class Connection;
+  using Lock = std::unique_lock<std::mutex>;
+
+  absl::Status Connect();
+  absl::Status Recover(Lock& lock);
+  absl::Status ForgetAcknowledged(int64_t sequence);
+  void Write();
+  void Take(const v1::StreamMeasurementsResponse& response);
+  void Tell(const std::string& sentence) const;
+
+  Client& client_;
+  const std::string session_;
+  const MeasurementStreamOptions options_;
+  const MeasurementStreamCallbacks callbacks_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<Connection> connection_;
+  // Not acknowledged, in order; the first `written_` were handed to the present connection.
+  std::deque<std::shared_ptr<const v1::StreamMeasurementsRequest>> pending_;
+  size_t written_ = 0;
+  int64_t last_sequence_ = 0;  // of the last batch handed over
+  int attempts_ = 0;           // to connect again, since the last acknowledgement
+  bool finishing_ = false;
+  std::optional<v1::Estimate> last_estimate_;
+};
+
+}  // namespace polyest
