@@ -1,0 +1,101 @@
+#include "server/daemon/daemon.h"
+
+#include <absl/strings/str_format.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/server_builder.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "core/common/status.h"
+#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/service/estimation_service.h"
+
+namespace polyest {
+namespace {
+
+// The clients ping every 20 s, also while no call is open.
+constexpr int kShortestPingIntervalMs = 10'000;
+constexpr int kKeepaliveTimeMs = 60'000;
+constexpr int kKeepaliveTimeoutMs = 20'000;
+// Streams of one connection.
+constexpr int kMostConcurrentStreams = 1'000;
+// Unary calls that may wait, beside one task for each session's stream.
+constexpr int kWaitingCalls = 1'000;
+// What the last bytes of calls already ended may take.
+constexpr std::chrono::seconds kFlushTime{1};
+
+int Threads(int requested) {
+  if (requested > 0) return requested;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+google::protobuf::Timestamp Now() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(since);
+  google::protobuf::Timestamp now;
+  now.set_seconds(seconds.count());
+  now.set_nanos(static_cast<int32_t>(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(since - seconds).count()));
+  return now;
+}
+
+void SetKeepalive(grpc::ServerBuilder& builder) {
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             kShortestPingIntervalMs);
+}
+
+}  // namespace
+
+Daemon::Daemon(const DaemonOptions& options)
+    : options_(options),
+      address_(options.listen),
+      executor_(Threads(options.threads), options.most_sessions + kWaitingCalls),
+      sessions_(executor_, static_cast<size_t>(options.most_sessions), Now),
+      service_(MakeEstimationService({executor_, sessions_, calls_, stop_.get_token()})) {}
+
+absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& options) {
+  std::unique_ptr<Daemon> daemon(new Daemon(options));
+  POLYEST_RETURN_IF_ERROR(daemon->Listen());
+  return daemon;
+}
+
+absl::Status Daemon::Listen() {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort(address_.ToString(), grpc::InsecureServerCredentials(), &address_.port);
+  // Otherwise a second daemon on the same port would silently take half of the connections.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostConcurrentStreams);
+  builder.SetMaxReceiveMessageSize(options_.most_message_mb * 1024 * 1024);
+  SetKeepalive(builder);
+  builder.RegisterService(service_.get());
+  server_ = builder.BuildAndStart();
+  if (server_ == nullptr) {
+    return absl::UnavailableError(absl::StrFormat(
+        "cannot listen on %s: the port is in use or the address is not this machine's",
+        options_.listen.ToString()));
+  }
+  server_->GetHealthCheckService()->SetServingStatus(v1::EstimationService::service_full_name(),
+                                                     true);
+  return absl::OkStatus();
+}
+
+void Daemon::Stop() {
+  if (server_ == nullptr) return;
+  server_->GetHealthCheckService()->SetServingStatus(false);
+  calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
+  stop_.request_stop();
+  server_->Shutdown(std::chrono::system_clock::now() + kFlushTime);
+  server_->Wait();
+  server_ = nullptr;
+}
+
+Daemon::~Daemon() { Stop(); }
+
+}  // namespace polyest

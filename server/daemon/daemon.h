@@ -1,0 +1,57 @@
+#pragma once
+
+// The daemon's life: everything that serves, from the sockets to the sessions, and its orderly end.
+
+#include <absl/status/statusor.h>
+#include <grpcpp/impl/service_type.h>
+#include <grpcpp/server.h>
+
+#include <chrono>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "server/daemon/listen_address.h"
+#include "server/execution/executor.h"
+#include "server/service/open_calls.h"
+#include "server/sessions/session_store.h"
+
+namespace polyest {
+
+struct DaemonOptions {
+  ListenAddress listen{"127.0.0.1", 50051};
+  int threads = 0;  // of the numerics; 0: one a core
+  int most_sessions = 1'000;
+  int most_message_mb = 64;
+  std::chrono::seconds drain_timeout{10};
+};
+
+class Daemon {
+ public:
+  // UNAVAILABLE when the address cannot be listened on.
+  static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
+  // Drains first.
+  ~Daemon();
+
+  // Where it listens, with the port chosen.
+  const ListenAddress& address() const { return address_; }
+
+  // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
+  // sockets: at most the drain time-out, past which what is left is cancelled.
+  void Stop();
+
+ private:
+  explicit Daemon(const DaemonOptions& options);
+  absl::Status Listen();
+
+  const DaemonOptions options_;
+  ListenAddress address_;
+  std::stop_source stop_;
+  OpenCalls calls_;
+  Executor executor_;
+  MemorySessionStore sessions_;
+  std::unique_ptr<grpc::Service> service_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace polyest

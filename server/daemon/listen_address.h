@@ -1,0 +1,19 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <string>
+
+namespace polyest {
+
+// HOST:PORT, where HOST is a name, an IPv4 address or an IPv6 address in brackets.
+struct ListenAddress {
+  std::string host;  // with its brackets
+  int port = 0;      // 0: any free one
+
+  // INVALID_ARGUMENT for anything else.
+  static absl::StatusOr<ListenAddress> Parse(const std::string& text);
+  std::string ToString() const;
+};
+
+}  // namespace polyest

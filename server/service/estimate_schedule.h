@@ -1,0 +1,58 @@
+#pragma once
+
+// When a stream's client wants an estimate.
+
+#include <absl/status/status.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "polyest/v1/estimation_service.pb.h"
+
+namespace polyest {
+
+class EstimateSchedule {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Policy = v1::StreamMeasurementsRequest::EstimatePolicy;
+
+  absl::Status Set(const Policy& policy) {
+    if (policy.every_batches() < 0) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "estimates.everyBatches: %d must not be negative", policy.every_batches()));
+    }
+    const auto interval = std::chrono::seconds(policy.min_interval().seconds()) +
+                          std::chrono::nanoseconds(policy.min_interval().nanos());
+    if (interval.count() < 0 || policy.min_interval().seconds() > kLongestIntervalSeconds) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "estimates.minInterval: must lie between 0 and %d s", kLongestIntervalSeconds));
+    }
+    every_batches_ = std::max(1, policy.every_batches());
+    min_interval_ = interval;
+    only_last_ = policy.only_last();
+    return absl::OkStatus();
+  }
+
+  // Whether the batch that has just been taken is to be followed by an estimate.
+  bool Due(Clock::time_point now) {
+    ++batches_;
+    if (only_last_ || batches_ < every_batches_) return false;
+    if (last_ && now - *last_ < min_interval_) return false;
+    batches_ = 0;
+    last_ = now;
+    return true;
+  }
+
+ private:
+  static constexpr int64_t kLongestIntervalSeconds = 86'400;
+
+  int every_batches_ = 1;
+  std::chrono::nanoseconds min_interval_{0};
+  bool only_last_ = false;
+  int batches_ = 0;  // since the last estimate
+  std::optional<Clock::time_point> last_;
+};
+
+}  // namespace polyest

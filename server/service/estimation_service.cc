@@ -1,0 +1,236 @@
+#include "server/service/estimation_service.h"
+
+#include <functional>
+#include <utility>
+
+#include "core/common/status.h"
+#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/operations/names.h"
+#include "server/operations/operations.h"
+#include "server/operations/pages.h"
+#include "server/service/measurement_stream.h"
+#include "server/service/session_watch.h"
+#include "server/service/unary_call.h"
+
+namespace polyest {
+namespace {
+
+// Propagations of one call run on the call's own thread: the executor's threads serve the calls.
+constexpr int kThreadsPerCall = 1;
+
+absl::StatusOr<std::shared_ptr<Session>> FindSession(const SessionStore& sessions,
+                                                     const std::string& field,
+                                                     const std::string& name) {
+  POLYEST_RETURN_IF_ERROR(ResourceId(field, "sessions", name).status());
+  return sessions.Get(name);
+}
+
+absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionStore& sessions,
+                                                  const v1::ListSessionsRequest& request) {
+  POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+  if (!request.page_token().empty() &&
+      !ResourceId("pageToken", "sessions", request.page_token()).ok()) {
+    return UnknownPageToken(request.page_token());
+  }
+  // One more than asked for tells whether there is another page.
+  auto page = sessions.List(request.page_token(), page_size + 1);
+  v1::ListSessionsResponse response;
+  if (page.size() > page_size) {
+    page.pop_back();
+    response.set_next_page_token(page.back()->name());
+  }
+  for (const auto& session : page) {
+    *response.add_sessions() = session->Describe();
+    response.mutable_sessions()->rbegin()->clear_problem();
+  }
+  return response;
+}
+
+class EstimationService final : public v1::EstimationService::CallbackService {
+ public:
+  explicit EstimationService(ServiceContext context) : context_(std::move(context)) {}
+
+  using Unary = grpc::ServerUnaryReactor;
+  using Context = grpc::CallbackServerContext;
+
+  Unary* ListModels(Context* context, const v1::ListModelsRequest* request,
+                    v1::ListModelsResponse* response) override;
+  Unary* GetModel(Context* context, const v1::GetModelRequest* request,
+                  v1::Model* response) override;
+
+  Unary* Estimate(Context* context, const v1::EstimateRequest* request,
+                  v1::EstimateResponse* response) override;
+  Unary* Propagate(Context* context, const v1::PropagateRequest* request,
+                   v1::PropagateResponse* response) override;
+  Unary* EvaluateCost(Context* context, const v1::EvaluateCostRequest* request,
+                      v1::EvaluateCostResponse* response) override;
+
+  Unary* CreateSession(Context* context, const v1::CreateSessionRequest* request,
+                       v1::Session* response) override;
+  Unary* GetSession(Context* context, const v1::GetSessionRequest* request,
+                    v1::Session* response) override;
+  Unary* ListSessions(Context* context, const v1::ListSessionsRequest* request,
+                      v1::ListSessionsResponse* response) override;
+  Unary* DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
+                       google::protobuf::Empty* response) override;
+
+  Unary* AddMeasurements(Context* context, const v1::AddMeasurementsRequest* request,
+                         v1::AddMeasurementsResponse* response) override;
+  Unary* GetEstimate(Context* context, const v1::GetEstimateRequest* request,
+                     v1::EstimateResponse* response) override;
+  grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>*
+  StreamMeasurements(Context* context) override;
+  grpc::ServerWriteReactor<v1::EstimateResponse>* WatchSession(
+      Context* context, const v1::WatchSessionRequest* request) override;
+
+ private:
+  using Work = std::function<absl::Status(const Stop&)>;
+
+  Unary* OnExecutor(Context* context, Work work);
+  // The session is `field` of the request; its work runs on its strand.
+  Unary* OnStrand(Context* context, const std::string& field, const std::string& session,
+                  std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)> work);
+  // A new estimate for those who watch a session that is fed by unary calls.
+  void EstimateForObservers(const std::shared_ptr<Session>& session);
+
+  ServiceContext context_;
+};
+
+EstimationService::Unary* EstimationService::OnExecutor(Context* context, Work work) {
+  return UnaryCall::Start(
+      context_.calls, context,
+      [this](Task task) { return context_.executor.Submit(std::move(task)); }, std::move(work));
+}
+
+EstimationService::Unary* EstimationService::OnStrand(
+    Context* context, const std::string& field, const std::string& session,
+    std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)> work) {
+  auto found = FindSession(context_.sessions, field, session);
+  if (!found.ok()) return FinishAtOnce(context, found.status());
+  return UnaryCall::Start(
+      context_.calls, context,
+      [found = *found](Task task) { return found->strand().Submit(std::move(task)); },
+      [found = *found, work = std::move(work)](const Stop& stop) { return work(found, stop); });
+}
+
+EstimationService::Unary* EstimationService::ListModels(Context* context,
+                                                        const v1::ListModelsRequest* request,
+                                                        v1::ListModelsResponse* response) {
+  return FinishAtOnce(context, Deliver(polyest::ListModels(*request), response));
+}
+
+EstimationService::Unary* EstimationService::GetModel(Context* context,
+                                                      const v1::GetModelRequest* request,
+                                                      v1::Model* response) {
+  return FinishAtOnce(context, Deliver(polyest::GetModel(*request), response));
+}
+
+EstimationService::Unary* EstimationService::Estimate(Context* context,
+                                                      const v1::EstimateRequest* request,
+                                                      v1::EstimateResponse* response) {
+  return OnExecutor(context, [=](const Stop& stop) {
+    return Deliver(RunEstimate(*request, kThreadsPerCall, stop), response);
+  });
+}
+
+EstimationService::Unary* EstimationService::Propagate(Context* context,
+                                                       const v1::PropagateRequest* request,
+                                                       v1::PropagateResponse* response) {
+  return OnExecutor(context, [=](const Stop& stop) {
+    return Deliver(RunPropagate(*request, kThreadsPerCall, stop), response);
+  });
+}
+
+EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
+                                                          const v1::EvaluateCostRequest* request,
+                                                          v1::EvaluateCostResponse* response) {
+  return OnExecutor(context, [=](const Stop& stop) {
+    return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop), response);
+  });
+}
+
+EstimationService::Unary* EstimationService::CreateSession(Context* context,
+                                                           const v1::CreateSessionRequest* request,
+                                                           v1::Session* response) {
+  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
+    POLYEST_ASSIGN_OR_RETURN(const auto session,
+                             context_.sessions.Create(request->session_id(), request->problem()));
+    *response = session->Describe();
+    return absl::OkStatus();
+  });
+}
+
+EstimationService::Unary* EstimationService::GetSession(Context* context,
+                                                        const v1::GetSessionRequest* request,
+                                                        v1::Session* response) {
+  const auto session = FindSession(context_.sessions, "name", request->name());
+  if (session.ok()) *response = (*session)->Describe();
+  return FinishAtOnce(context, session.status());
+}
+
+EstimationService::Unary* EstimationService::ListSessions(Context* context,
+                                                          const v1::ListSessionsRequest* request,
+                                                          v1::ListSessionsResponse* response) {
+  return FinishAtOnce(context, Deliver(ListPage(context_.sessions, *request), response));
+}
+
+EstimationService::Unary* EstimationService::DeleteSession(Context* context,
+                                                           const v1::DeleteSessionRequest* request,
+                                                           google::protobuf::Empty*) {
+  absl::Status status = ResourceId("name", "sessions", request->name()).status();
+  if (status.ok()) status = context_.sessions.Delete(request->name());
+  return FinishAtOnce(context, status);
+}
+
+EstimationService::Unary* EstimationService::AddMeasurements(
+    Context* context, const v1::AddMeasurementsRequest* request,
+    v1::AddMeasurementsResponse* response) {
+  return OnStrand(
+      context, "session", request->session(),
+      [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
+        POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
+                                 session->Add(request->sequence(), request->measurements()));
+        POLYEST_RETURN_IF_ERROR(session->Process(stop));
+        EstimateForObservers(session);
+        return absl::OkStatus();
+      });
+}
+
+void EstimationService::EstimateForObservers(const std::shared_ptr<Session>& session) {
+  if (!session->observed()) return;
+  // Refused, or failed, it is left to the next batch: the observers miss one between.
+  session->strand()
+      .Submit(
+          [session, stop = context_.stop] { session->CurrentEstimate(Stop(stop)).IgnoreError(); })
+      .IgnoreError();
+}
+
+EstimationService::Unary* EstimationService::GetEstimate(Context* context,
+                                                         const v1::GetEstimateRequest* request,
+                                                         v1::EstimateResponse* response) {
+  return OnStrand(context, "session", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
+                    POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate,
+                                             session->CurrentEstimate(stop));
+                    *response->mutable_estimate() = *estimate;
+                    return absl::OkStatus();
+                  });
+}
+
+grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>*
+EstimationService::StreamMeasurements(Context* context) {
+  return new MeasurementStream(context_, *context);
+}
+
+grpc::ServerWriteReactor<v1::EstimateResponse>* EstimationService::WatchSession(
+    Context* context, const v1::WatchSessionRequest* request) {
+  return new SessionWatch(context_, *context, request->session());
+}
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeEstimationService(ServiceContext context) {
+  return std::make_unique<EstimationService>(std::move(context));
+}
+
+}  // namespace polyest

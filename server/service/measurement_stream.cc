@@ -1,0 +1,207 @@
+#include "server/service/measurement_stream.h"
+
+#include <absl/strings/str_format.h>
+
+#include <utility>
+
+#include "core/common/status.h"
+#include "server/operations/names.h"
+#include "server/service/call_stop.h"
+#include "server/service/status_mapping.h"
+
+namespace polyest {
+
+MeasurementFlow::MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call)
+    : context_(context), stop_(CallStop(call, stop_source_.get_token())) {}
+
+void MeasurementFlow::OnStart(MeasurementReactor* reactor, const absl::Status& admitted) {
+  std::lock_guard lock(mutex_);
+  reactor_ = reactor;
+  if (!admitted.ok()) End(admitted);
+  Advance();
+}
+
+void MeasurementFlow::OnRead(bool ok) {
+  std::lock_guard lock(mutex_);
+  reading_ = false;
+  if (!ok) {
+    half_closed_ = true;
+    if (session_ == nullptr) {
+      End(absl::InvalidArgumentError("session: the first message of a stream must name one"));
+    }
+  } else if (!draining_ && !end_) {
+    Take(std::move(reading_into_));
+  }
+  Advance();
+}
+
+void MeasurementFlow::Take(v1::StreamMeasurementsRequest request) {
+  if (const absl::Status attached = Attach(request); !attached.ok()) return End(attached);
+  inbox_.push_back(std::move(request));
+}
+
+absl::Status MeasurementFlow::Attach(const v1::StreamMeasurementsRequest& request) {
+  if (session_ != nullptr) {
+    if (request.session().empty() || request.session() == session_->name()) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrFormat("session: \"%s\" is not the stream's own, %s",
+                                                      request.session(), session_->name()));
+  }
+  POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", request.session()).status());
+  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(request.session()));
+  POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this()));
+  session_ = std::move(session);
+  return absl::OkStatus();
+}
+
+void MeasurementFlow::OnWritten(bool ok) {
+  std::lock_guard lock(mutex_);
+  writing_ = false;
+  outbox_.pop_front();
+  if (!ok) Break(absl::CancelledError("the client does not read any more"));
+  Advance();
+}
+
+void MeasurementFlow::OnCancelled() {
+  std::lock_guard lock(mutex_);
+  Break(absl::CancelledError("the call was cancelled"));
+  Advance();
+}
+
+void MeasurementFlow::OnClosed() {
+  std::lock_guard lock(mutex_);
+  stop_source_.request_stop();
+  End(absl::NotFoundError(absl::StrFormat("%s has been deleted", session_->name())));
+  Advance();
+}
+
+void MeasurementFlow::Drain() {
+  std::lock_guard lock(mutex_);
+  draining_ = true;
+  if (session_ == nullptr) End(ShuttingDown());
+  Advance();
+}
+
+// What was received and not acknowledged is left to the client to send again.
+void MeasurementFlow::End(const absl::Status& status) {
+  if (!end_) end_ = status;
+  inbox_.clear();
+}
+
+// As End, when nothing can be sent any more.
+void MeasurementFlow::Break(const absl::Status& status) {
+  stop_source_.request_stop();
+  End(status);
+  // The first one belongs to gRPC while it is being written.
+  while (outbox_.size() > (writing_ ? 1 : 0)) outbox_.pop_back();
+}
+
+void MeasurementFlow::Advance() {
+  if (finished_ || reactor_ == nullptr) return;
+  if (!writing_ && !outbox_.empty()) {
+    writing_ = true;
+    reactor_->StartWrite(&outbox_.front());
+  }
+  StartWork();
+  if (!reading_ && !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox &&
+      outbox_.size() < kOutbox) {
+    reading_ = true;
+    reactor_->StartRead(&reading_into_);
+  }
+  FinishIfIdle();
+}
+
+void MeasurementFlow::StartWork() {
+  const bool last = half_closed_ || draining_;
+  if (working_ || end_ || outbox_.size() >= kOutbox || (inbox_.empty() && !last)) return;
+  working_ = true;
+  const absl::Status accepted =
+      session_->strand().Submit([flow = shared_from_this()] { flow->Work(); });
+  if (accepted.ok()) return;
+  working_ = false;
+  End(accepted);
+}
+
+void MeasurementFlow::FinishIfIdle() {
+  if (!end_ || working_ || writing_ || !outbox_.empty()) return;
+  finished_ = true;
+  // Before the client hears of the end: it may come back at once.
+  if (session_ != nullptr) session_->ReleaseWriter();
+  reactor_->Finish(ToGrpc(*end_));
+}
+
+void MeasurementFlow::OnDone() {
+  std::lock_guard lock(mutex_);
+  reactor_ = nullptr;
+}
+
+void MeasurementFlow::Work() {
+  std::unique_lock lock(mutex_);
+  // A turn takes what is there, and no more: other sessions wait for theirs.
+  for (size_t turn = 0; turn < kInbox && !end_ && outbox_.size() < kOutbox; ++turn) {
+    const bool last = inbox_.empty();
+    if (last && !half_closed_ && !draining_) break;
+    v1::StreamMeasurementsRequest request;
+    if (!last) {
+      request = std::move(inbox_.front());
+      inbox_.pop_front();
+    }
+    const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
+    lock.unlock();
+    const absl::Status answered = last ? AnswerLast() : Answer(request);
+    lock.lock();
+    if (!answered.ok()) End(answered);
+    if (last) End(at_end);
+    Advance();
+  }
+  working_ = false;
+  Advance();
+}
+
+absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& request) {
+  if (request.has_estimates()) POLYEST_RETURN_IF_ERROR(schedule_.Set(request.estimates()));
+  if (!request.has_measurements()) {
+    if (request.sequence() == 0) return absl::OkStatus();
+    return absl::InvalidArgumentError(
+        absl::StrFormat("measurements: batch %d has none", request.sequence()));
+  }
+  v1::StreamMeasurementsResponse response;
+  POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
+                           session_->Add(request.sequence(), request.measurements()));
+  POLYEST_RETURN_IF_ERROR(session_->Process(stop_));
+  Send(std::move(response));
+  if (schedule_.Due(EstimateSchedule::Clock::now())) return SendEstimate();
+  return absl::OkStatus();
+}
+
+absl::Status MeasurementFlow::AnswerLast() {
+  return session_->samples() > 0 ? SendEstimate() : absl::OkStatus();
+}
+
+absl::Status MeasurementFlow::SendEstimate() {
+  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->CurrentEstimate(stop_));
+  v1::StreamMeasurementsResponse response;
+  *response.mutable_estimate() = *estimate;
+  Send(std::move(response));
+  return absl::OkStatus();
+}
+
+void MeasurementFlow::Send(v1::StreamMeasurementsResponse response) {
+  std::lock_guard lock(mutex_);
+  outbox_.push_back(std::move(response));
+  Advance();
+}
+
+MeasurementStream::MeasurementStream(ServiceContext& context, grpc::CallbackServerContext& call)
+    : flow_(std::make_shared<MeasurementFlow>(context, call)) {
+  auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+  const absl::Status admitted = ticket.status();
+  if (admitted.ok()) ticket_ = *std::move(ticket);
+  flow_->OnStart(this, admitted);
+}
+
+void MeasurementStream::OnDone() {
+  flow_->OnDone();
+  delete this;
+}
+
+}  // namespace polyest

@@ -1,0 +1,65 @@
+#include "server/service/open_calls.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+namespace polyest {
+
+absl::Status ShuttingDown() { return absl::UnavailableError("the daemon is shutting down"); }
+
+absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
+    Kind kind, std::weak_ptr<Drainable> stream) {
+  std::lock_guard lock(mutex_);
+  if (draining_) return ShuttingDown();
+  if (kind != Kind::kUnary) {
+    if (open(kind) >= kMostStreams) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the daemon serves at most ", kMostStreams, " streams at a time"));
+    }
+    auto& streams = streams_[static_cast<int>(kind)];
+    // Those that ended are swept out when they outnumber the rest.
+    if (streams.size() > 2 * static_cast<size_t>(open(kind)) + 8) {
+      std::erase_if(streams, [](const auto& one) { return one.expired(); });
+    }
+    streams.push_back(std::move(stream));
+  }
+  ++open(kind);
+  return std::make_unique<Ticket>(*this, kind);
+}
+
+void OpenCalls::Leave(Kind kind) {
+  std::lock_guard lock(mutex_);
+  --open(kind);
+  left_.notify_all();
+}
+
+void OpenCalls::DrainKind(Kind kind) {
+  std::vector<std::weak_ptr<Drainable>> streams;
+  {
+    std::lock_guard lock(mutex_);
+    streams.swap(streams_[static_cast<int>(kind)]);
+  }
+  for (const auto& stream : streams) {
+    if (auto open_stream = stream.lock()) open_stream->Drain();
+  }
+}
+
+void OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
+  {
+    std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  DrainKind(Kind::kWriter);
+  {
+    // Watchers end after them, so that they see the writers' last estimates.
+    std::unique_lock lock(mutex_);
+    left_.wait_until(lock, deadline,
+                     [this] { return open(Kind::kUnary) + open(Kind::kWriter) == 0; });
+  }
+  DrainKind(Kind::kWatcher);
+  std::unique_lock lock(mutex_);
+  left_.wait_until(lock, deadline, [this] { return open(Kind::kWatcher) == 0; });
+}
+
+}  // namespace polyest

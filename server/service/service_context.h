@@ -1,0 +1,20 @@
+#pragma once
+
+#include <stop_token>
+
+#include "server/execution/executor.h"
+#include "server/service/open_calls.h"
+#include "server/sessions/session_store.h"
+
+namespace polyest {
+
+// What the service's calls share; outlives them all.
+struct ServiceContext {
+  Executor& executor;
+  SessionStore& sessions;
+  OpenCalls& calls;
+  // Asked for when the drain's time is over: ends work that no call waits for.
+  std::stop_token stop;
+};
+
+}  // namespace polyest

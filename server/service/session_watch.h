@@ -1,0 +1,75 @@
+#pragma once
+
+// WatchSession: every new estimate of a session, to any number of observers. Between the session
+// and an observer there is room for one estimate; a newer one takes its place, so that a slow
+// observer misses those between but never the last.
+
+#include <grpcpp/support/server_callback.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+
+#include "polyest/v1/estimation_service.pb.h"
+#include "server/service/service_context.h"
+
+namespace polyest {
+
+using WatchReactor = grpc::ServerWriteReactor<v1::EstimateResponse>;
+
+// The state of one watch; outlives its reactor, for the session may still hold it.
+class WatchFlow final : public SessionObserver,
+                        public Drainable,
+                        public std::enable_shared_from_this<WatchFlow> {
+ public:
+  WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call);
+
+  void OnStart(WatchReactor* reactor, const absl::Status& admitted, const std::string& session);
+  void OnWritten(bool ok);
+  void OnCancelled();
+  void OnDone();
+
+  void OnEstimate(const SharedEstimate& estimate) override;
+  void OnClosed() override;
+  void Drain() override;
+
+ private:
+  // With the mutex held.
+  absl::Status Attach(const std::string& session);
+  void End(const absl::Status& status);
+  void Advance();
+
+  // On the strand.
+  void Register();
+
+  ServiceContext& context_;
+  std::stop_source stop_source_;
+  const Stop stop_;
+
+  std::mutex mutex_;
+  WatchReactor* reactor_ = nullptr;
+  std::shared_ptr<Session> session_;
+  SharedEstimate pending_;
+  v1::EstimateResponse written_;  // gRPC's while writing_
+  bool writing_ = false;
+  bool registering_ = false;
+  bool finished_ = false;
+  std::optional<absl::Status> end_;  // how the watch ends, once nothing is pending
+};
+
+class SessionWatch final : public WatchReactor {
+ public:
+  SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
+               const std::string& session);
+
+  void OnWriteDone(bool ok) override { flow_->OnWritten(ok); }
+  void OnCancel() override { flow_->OnCancelled(); }
+  void OnDone() override;
+
+ private:
+  std::shared_ptr<WatchFlow> flow_;
+  std::unique_ptr<OpenCalls::Ticket> ticket_;
+};
+
+}  // namespace polyest

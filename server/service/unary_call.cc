@@ -1,0 +1,48 @@
+#include "server/service/unary_call.h"
+
+#include "core/common/status.h"
+#include "server/service/call_stop.h"
+#include "server/service/status_mapping.h"
+
+namespace polyest {
+
+grpc::ServerUnaryReactor* UnaryCall::Start(OpenCalls& calls, grpc::CallbackServerContext* context,
+                                           const Submit& submit, Work work) {
+  auto ticket = calls.Enter(OpenCalls::Kind::kUnary);
+  if (!ticket.ok()) return FinishAtOnce(context, ticket.status());
+  auto* call = new UnaryCall;
+  call->ticket_ = *std::move(ticket);
+  call->state_->reactor = call;
+  auto run = [state = call->state_, stop = CallStop(*context, call->state_->stop.get_token()),
+              work = std::move(work)] {
+    absl::Status status = stop.Check();
+    if (status.ok()) status = work(stop);
+    Finish(*state, status);
+  };
+  const absl::Status accepted = submit(std::move(run));
+  if (!accepted.ok()) Finish(*call->state_, accepted);
+  return call;
+}
+
+void UnaryCall::Finish(State& state, const absl::Status& status) {
+  std::lock_guard lock(state.mutex);
+  state.reactor->grpc::ServerUnaryReactor::Finish(ToGrpc(status));
+}
+
+void UnaryCall::OnCancel() { state_->stop.request_stop(); }
+
+void UnaryCall::OnDone() {
+  const std::shared_ptr<State> state = state_;
+  const std::unique_ptr<OpenCalls::Ticket> ticket = std::move(ticket_);
+  { std::lock_guard lock(state->mutex); }
+  delete this;
+}
+
+grpc::ServerUnaryReactor* FinishAtOnce(grpc::CallbackServerContext* context,
+                                       const absl::Status& status) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+}  // namespace polyest
