@@ -1,0 +1,63 @@
+#include "client/paper/paper_command.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <fstream>
+
+#include "client/paper/experiments.h"
+#include "client/paper/figures.h"
+#include "client/paper/report.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+absl::Status WriteFile(const std::string& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+  stream << text;
+  stream.close();
+  if (!stream) return absl::UnavailableError(absl::StrCat("--plot: cannot write ", file));
+  return absl::OkStatus();
+}
+
+absl::Status RunFigure(const std::string& figure, const PaperOptions& options, std::ostream& out) {
+  POLYEST_ASSIGN_OR_RETURN(Experiment experiment, MakeExperiment(figure));
+  absl::StatusOr<ExperimentResult> result = RunExperiment(experiment, options.threads);
+  if (!result.ok()) {
+    // Whatever an experiment of ours trips over is no fault of the command line's.
+    return absl::InternalError(absl::StrCat("figure ", figure, ": ", result.status().message()));
+  }
+  PrintExperiment(*result, out);
+  if (options.plot_file.empty()) return absl::OkStatus();
+  return WriteFile(options.plot_file, RenderSvg(MakePlot(*result)));
+}
+
+int Fail(const absl::Status& status, std::ostream& err) {
+  err << status.message() << "\n";
+  return absl::IsInvalidArgument(status) ? 2 : 1;
+}
+
+}  // namespace
+
+int RunPaper(const PaperOptions& options, std::ostream& out, std::ostream& err) {
+  if (!options.figure.empty()) {
+    const absl::Status status = RunFigure(options.figure, options, out);
+    return status.ok() ? 0 : Fail(status, err);
+  }
+  if (!options.plot_file.empty()) {
+    return Fail(absl::InvalidArgumentError(absl::StrCat(
+                    "--plot: ", options.plot_file, " needs a figure to plot; give one of them")),
+                err);
+  }
+  const char* separator = "";
+  for (const std::string& figure : PaperFigures()) {
+    out << separator;
+    const absl::Status status = RunFigure(figure, options, out);
+    if (!status.ok()) return Fail(status, err);
+    separator = "\n";
+  }
+  return 0;
+}
+
+}  // namespace polyest
