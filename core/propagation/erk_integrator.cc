@@ -3,16 +3,70 @@
 #include <arkode/arkode_erkstep.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "core/common/check.h"
-#include "core/propagation/sundials_block.h"
+#include "core/propagation/sundials_integrator.h"
 
 namespace polyest {
 namespace {
 
-const char* InWords(int flag) {
+class ErkIntegrator final : public SundialsIntegrator {
+ public:
+  ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+                const ConstBlock& states);
+  ~ErkIntegrator() override { ERKStepFree(&memory_); }
+  bool LooksStiff() override;
+
+ private:
+  void SetFirstStep(double step_s) override { ERKStepSetInitStep(memory_, step_s); }
+  int Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+             double* reached_s) override;
+  int Interpolate(double time_s, N_Vector states) override {
+    return ERKStepGetDky(memory_, time_s, 0, states);
+  }
+  double InternalTime() const override;
+  int Reset(double time_s, N_Vector states) override {
+    return ERKStepReset(memory_, time_s, states);
+  }
+  const char* InWords(int flag) const override;
+  double LargestRate();
+
+  void* memory_ = nullptr;
+  long steps_looked_at_ = 0;
+};
+
+ErkIntegrator::ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+                             const ConstBlock& states)
+    : SundialsIntegrator(system, relative_tolerance, time_s, states),
+      memory_(ERKStepCreate(RightHandSide, time_s, vector(), context())) {
+  // More rejections than the default seven: the first step is a guess.
+  constexpr int kMostErrorTestFailures = 30;
+  const bool accepted =
+      memory_ != nullptr &&
+      ERKStepSetErrHandlerFn(memory_, IgnoreMessage, nullptr) == ARK_SUCCESS &&
+      ERKStepSetUserData(memory_, static_cast<SundialsIntegrator*>(this)) == ARK_SUCCESS &&
+      ERKStepSetTableNum(memory_, ARKODE_DORMAND_PRINCE_7_4_5) == ARK_SUCCESS &&
+      ERKStepWFtolerances(memory_, ErrorWeights) == ARK_SUCCESS &&
+      ERKStepSetMaxErrTestFails(memory_, kMostErrorTestFailures) == ARK_SUCCESS &&
+      ERKStepSetMaxHnilWarns(memory_, -1) == ARK_SUCCESS;
+  POLYEST_CHECK(accepted);
+}
+
+int ErkIntegrator::Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+                          double* reached_s) {
+  ERKStepSetMaxNumSteps(memory_, most_steps);
+  ERKStepSetStopTime(memory_, stop_time_s);
+  return ERKStepEvolve(memory_, time_s, states, reached_s, ARK_NORMAL);
+}
+
+double ErkIntegrator::InternalTime() const {
+  double time_s = 0;
+  ERKStepGetCurrentTime(memory_, &time_s);
+  return time_s;
+}
+
+const char* ErkIntegrator::InWords(int flag) const {
   switch (flag) {
     case ARK_SUCCESS:
     case ARK_TSTOP_RETURN:
@@ -22,7 +76,7 @@ const char* InWords(int flag) {
     case ARK_TOO_MUCH_ACC:
       return "the tolerance is below rounding errors";
     case ARK_ERR_FAILURE:
-      return "the step size fell without an acceptable error";
+      return "no step size gives an acceptable error";
     case ARK_RHSFUNC_FAIL:
     case ARK_FIRST_RHSFUNC_ERR:
     case ARK_REPTD_RHSFUNC_ERR:
@@ -41,103 +95,48 @@ const char* InWords(int flag) {
     case ARK_BAD_T:
       return "the time asked for lies outside the last step";
     default:
-      return "the solver failed";
+      return "the solver failed with a code of its own";
   }
 }
 
-class ErkIntegrator final : public EnsembleIntegrator {
- public:
-  ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
-                const ConstBlock& states);
-  ~ErkIntegrator() override { ERKStepFree(&memory_); }
-
-  double time_s() const override { return block_.time_s; }
-  ConstBlock states() const override { return EnsembleValues(block_.vector.get()); }
-  IntegratorOutcome AdvanceTo(double time_s, double stop_time_s, int most_steps,
-                              Block states) override;
-  void Restart() override;
-  bool LooksStiff() override;
-
- private:
-  int Evolve(double time_s, double stop_time_s, int most_steps);
-  IntegratorOutcome Outcome(int flag, double advance_s);
-
-  SundialsBlock block_;
-  void* memory_ = nullptr;
-  double covered_s_;  // dense output reaches to here
-  bool started_ = false;
-};
-
-ErkIntegrator::ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
-                             const ConstBlock& states)
-    : block_(system, relative_tolerance, time_s, states), covered_s_(time_s) {
-  memory_ =
-      ERKStepCreate(SundialsBlock::RightHandSide, time_s, block_.vector.get(), block_.context);
-  POLYEST_CHECK(memory_ != nullptr);
-  // More rejections than the default seven: the first step is a guess.
-  constexpr int kMostErrorTestFailures = 30;
-  const bool accepted =
-      ERKStepSetErrHandlerFn(memory_, SundialsBlock::IgnoreMessage, nullptr) == ARK_SUCCESS &&
-      ERKStepSetUserData(memory_, &block_) == ARK_SUCCESS &&
-      ERKStepSetTableNum(memory_, ARKODE_DORMAND_PRINCE_7_4_5) == ARK_SUCCESS &&
-      ERKStepWFtolerances(memory_, SundialsBlock::ErrorWeights) == ARK_SUCCESS &&
-      ERKStepSetMaxErrTestFails(memory_, kMostErrorTestFailures) == ARK_SUCCESS &&
-      ERKStepSetMaxHnilWarns(memory_, -1) == ARK_SUCCESS;
-  POLYEST_CHECK(accepted);
-}
-
-int ErkIntegrator::Evolve(double time_s, double stop_time_s, int most_steps) {
-  if (!started_) {
-    ERKStepSetInitStep(memory_, block_.FirstStep(time_s - block_.time_s));
-    started_ = true;
+// The largest |λ| of ∂f/∂x over the points, by a few power iterations from the last local error, in
+// which a mode at the limit of stability stands out:
+//   v ← (f(x + v) − f(x)) ÷ |λ|, |λ| = max_s |(J v)_s| w_s ÷ max_s |v_s| w_s for each point.
+double ErkIntegrator::LargestRate() {
+  const Eigen::ArrayXXd x = states();
+  const Eigen::ArrayXXd weights = scale().weights();
+  const OwnedVector error(N_VClone(vector()));
+  ERKStepGetEstLocalErrors(memory_, error.get());
+  Eigen::ArrayXXd direction = EnsembleValues(error.get());
+  Eigen::ArrayXXd rates(x.rows(), x.cols()), moved(x.rows(), x.cols());
+  system()->Derivatives(time_s(), x, rates);
+  double largest = 0;
+  constexpr int kIterations = 4;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    // A few tolerances long: small enough to be linear, large enough against rounding errors.
+    const Eigen::ArrayXd norm =
+        (direction * weights).abs().rowwise().maxCoeff().max(std::numeric_limits<double>::min());
+    direction.colwise() /= norm;
+    system()->Derivatives(time_s(), x + direction, moved);
+    direction = moved - rates;
+    largest = (direction * weights).abs().rowwise().maxCoeff().maxCoeff();
   }
-  ERKStepSetMaxNumSteps(memory_, most_steps);
-  // There is no way to take a stop time back, so that "none" is one that is never reached.
-  ERKStepSetStopTime(memory_, std::min(stop_time_s, std::numeric_limits<double>::max()));
-  return ERKStepEvolve(memory_, time_s, block_.vector.get(), &block_.time_s, ARK_NORMAL);
+  return largest;
 }
 
-IntegratorOutcome ErkIntegrator::Outcome(int flag, double advance_s) {
-  IntegratorOutcome outcome;
-  if (flag >= 0) return outcome;
-  outcome.ok = false;
-  outcome.flag = flag;
-  outcome.reason = InWords(flag);
-  outcome.worst_point = block_.scale.worst_point();
-  outcome.too_many_steps = flag == ARK_TOO_MUCH_WORK;
-  // Many steps that lead nowhere: more of them will not help.
-  constexpr double kStandstill = 1e-13;
-  if (outcome.too_many_steps && !(advance_s > kStandstill * std::abs(block_.time_s))) {
-    outcome.too_many_steps = false;
-    outcome.reason = "the step size fell below the resolution of time";
-  }
-  return outcome;
+bool ErkIntegrator::LooksStiff() {
+  constexpr long kStepsBetweenLooks = 500;
+  long steps = 0;
+  ERKStepGetNumSteps(memory_, &steps);
+  if (steps - steps_looked_at_ < kStepsBetweenLooks) return false;
+  steps_looked_at_ = steps;
+  double step_s = 0;
+  ERKStepGetLastStep(memory_, &step_s);
+  // On the negative real axis the method is stable for h |λ| ≤ 3.3; steps that accuracy limits are
+  // many times shorter at the tolerances in use.
+  constexpr double kNearTheLimit = 2;
+  return step_s * LargestRate() > kNearTheLimit;
 }
-
-IntegratorOutcome ErkIntegrator::AdvanceTo(double time_s, double stop_time_s, int most_steps,
-                                           Block states) {
-  POLYEST_CHECK(time_s >= block_.time_s && stop_time_s >= time_s);
-  int flag = ARK_SUCCESS;
-  const double before_s = block_.time_s;
-  if (time_s > covered_s_) {
-    flag = Evolve(time_s, stop_time_s, most_steps);
-    ERKStepGetCurrentTime(memory_, &covered_s_);
-    covered_s_ = std::max(covered_s_, block_.time_s);
-  } else if (time_s > block_.time_s) {
-    flag = ERKStepGetDky(memory_, time_s, 0, block_.vector.get());
-    if (flag == ARK_SUCCESS) block_.time_s = time_s;
-  }
-  if (flag >= 0) states = block_.values();
-  return Outcome(flag, block_.time_s - before_s);
-}
-
-void ErkIntegrator::Restart() {
-  const int flag = ERKStepReset(memory_, block_.time_s, block_.vector.get());
-  POLYEST_CHECK(flag == ARK_SUCCESS);
-  covered_s_ = block_.time_s;
-}
-
-bool ErkIntegrator::LooksStiff() { return false; }
 
 }  // namespace
 

@@ -66,6 +66,10 @@ void TrajectoryBlock::StartIntegrator(double time_s) {
                        : MakeErkIntegrator(this, tolerance, time_s, states_);
 }
 
+bool TrajectoryBlock::MayChangeMethod() const {
+  return specification_->integration.method == IntegrationMethod::kAuto && !stiff_;
+}
+
 void TrajectoryBlock::EvaluateInputs(double time_s) {
   if (time_s == input_time_s_) return;
   for (Eigen::Index i = 0; i < amplitudes_.cols(); ++i) {
@@ -98,8 +102,8 @@ absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef
     const double time_s = times_s[sample];
     POLYEST_CHECK(time_s >= time_s_);
     if (integrator_) POLYEST_RETURN_IF_ERROR(AdvanceStates(time_s, stop));
-    time_s_ = time_s;
     ReadOutputs(time_s, sample, outputs);
+    time_s_ = time_s;
   }
   return absl::OkStatus();
 }
@@ -124,18 +128,18 @@ absl::Status TrajectoryBlock::Reach(double time_s, double stop_time_s, const Sto
   while (integrator_) {
     const IntegratorOutcome outcome =
         integrator_->AdvanceTo(time_s, stop_time_s, steps_at_once, states_);
-    if (outcome.ok) break;
     steps += steps_at_once;
-    const bool may_change =
-        specification_->integration.method == IntegrationMethod::kAuto && !stiff_;
-    const bool exhausted = outcome.too_many_steps && steps + steps_at_once > most_steps;
-    if (outcome.too_many_steps && !exhausted && !(may_change && integrator_->LooksStiff())) {
+    const bool may_go_on = outcome.too_many_steps && steps + steps_at_once <= most_steps;
+    const bool change = MayChangeMethod() && (outcome.ok || outcome.too_many_steps) &&
+                        (integrator_->LooksStiff() || !(outcome.ok || may_go_on));
+    if (!change && outcome.ok) break;
+    if (!change && may_go_on) {
       POLYEST_RETURN_IF_ERROR(stop.Check());
       continue;
     }
     const double good_s = integrator_->time_s();
     states_ = integrator_->states();
-    if (may_change && outcome.too_many_steps) {
+    if (change) {
       stiff_ = true;
     } else {
       Fail(outcome.worst_point, good_s, outcome.flag, outcome.reason);
@@ -156,7 +160,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
       selected_outputs_.col(j) = model_outputs_.col(selected[j]);
     }
     const int alive_before = alive_points_;
-    FailRowsNotFinite(selected_outputs_, time_s, "an output is not finite");
+    FailRowsNotFinite(selected_outputs_, time_s_, "an output is not finite");
     if (alive_points_ < alive_before && states_.cols() > 0) StartIntegrator(time_s);
   }
   for (Eigen::Index point = 0; point < std::ssize(point_alive_); ++point) {

@@ -50,6 +50,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   };
 
   void StartIntegrator(double time_s);
+  bool MayChangeMethod() const;
   void EvaluateInputs(double time_s);
   Break NextBreak() const;
   absl::Status AdvanceStates(double time_s, const Stop& stop);

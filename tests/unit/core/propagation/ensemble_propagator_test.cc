@@ -1,88 +1,305 @@
 #include "core/propagation/ensemble_propagator.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
+#include <limits>
 #include <numbers>
-#include <utility>
+#include <stop_token>
 #include <vector>
 
-#include "core/model/catalogue.h"
+#include "tests/unit/core/propagation/ensemble.h"
+#include "tests/unit/core/propagation/oscillator.h"
 
 namespace polyest {
 namespace {
 
-std::shared_ptr<const Model> Builtin(const char* name) { return *FindBuiltinModel(name); }
+// A step adds at most the tolerance, relative to each state's own amplitude, to displacement and
+// velocity; the free motion does not magnify it. No test here takes more than 500 steps, so that
+// the global error, relative to the amplitude, stays below
+constexpr double kMostErrorsInTolerances = 1000;
 
-// Every parameter at its default for all points.
-Matrix DefaultParameters(const Model& model, int points) {
-  const auto& parameters = model.description().parameters;
-  Matrix values(points, static_cast<Eigen::Index>(parameters.size()));
-  for (Eigen::Index j = 0; j < values.cols(); ++j) {
-    values.col(j).setConstant(parameters[j].default_value);
-  }
-  return values;
+// Oscillators of 0.8 to 1 Hz, lightly damped; every third one starts at x = 0.
+Oscillator Slow(int point) {
+  return {1 + 0.003 * point, 0.1 + 0.002 * point, 30.0 + 0.1 * point, point % 3 == 0 ? 0.0 : 1.0,
+          1.0};
 }
 
-int ParameterIndex(const Model& model, const char* name) {
-  return *model.description().FindParameter(name);
+void Set(Ensemble& ensemble, int point, const Oscillator& oscillator) {
+  ensemble.Set("m", point, oscillator.m);
+  ensemble.Set("c", point, oscillator.c);
+  ensemble.Set("k", point, oscillator.k);
+  ensemble.Set("x0", point, oscillator.x0);
+  ensemble.Set("v0", point, oscillator.v0);
 }
 
-InputSignal Signal(InputSpecification specification) {
-  return *InputSignal::Make(std::move(specification));
+Ensemble SlowOscillators(int points, double tolerance) {
+  Ensemble ensemble("mass_spring_damper", points, {"x"});
+  for (int point = 0; point < points; ++point) Set(ensemble, point, Slow(point));
+  ensemble.specification.integration.relative_tolerance = tolerance;
+  return ensemble;
 }
 
-// x(t), v(t) of m ẍ + c ẋ + k x = 0.
-struct Oscillator {
-  double m, c, k, x0, v0;
-  double X(double t) const {
-    const double d = c / (2 * m), w = std::sqrt(k / m - d * d);
-    return std::exp(-d * t) * (x0 * std::cos(w * t) + (v0 + d * x0) / w * std::sin(w * t));
-  }
-};
-
-class EnsembleOfOscillators : public ::testing::Test {
- protected:
-  void SetUp() override { Make(20); }
-  void Make(int points) {
-    specification_.model = Builtin("mass_spring_damper");
-    const Model& model = *specification_.model;
-    specification_.parameters = DefaultParameters(model, points);
-    specification_.amplitudes = Matrix::Zero(points, 1);
-    specification_.outputs = {*model.description().FindOutput("x")};
-    oscillators_.clear();
-    for (int p = 0; p < points; ++p) {
-      const Oscillator o{1 + 0.01 * p, 0.1 + 0.02 * p, 30.0 + p, p % 3 == 0 ? 0.0 : 1.0, 1.0};
-      oscillators_.push_back(o);
-      const std::pair<const char*, double> values[] = {
-          {"m", o.m}, {"c", o.c}, {"k", o.k}, {"x0", o.x0}, {"v0", o.v0}};
-      for (const auto& [name, value] : values) {
-        specification_.parameters(p, ParameterIndex(model, name)) = value;
-      }
-    }
-    inputs_ = {Signal(ConstantInput{0})};
-  }
-  EnsembleSpecification specification_;
-  InputSignals inputs_;
-  std::vector<Oscillator> oscillators_;
-};
-
-TEST_F(EnsembleOfOscillators, FollowsTheClosedForm) {
-  specification_.integration.relative_tolerance = 1e-9;
-  EnsemblePropagator propagator(specification_, &inputs_);
-  std::vector<double> times;
-  for (int i = 0; i <= 100; ++i) times.push_back(0.05 * i);
-  Matrix x(20, times.size());
-  ASSERT_TRUE(propagator.Advance(times, x, Stop()).ok());
-  EXPECT_TRUE(propagator.failures().empty());
+double ErrorOfSlowPoint(const Matrix& x, int point, const std::vector<double>& times_s) {
   double worst = 0;
-  for (int p = 0; p < 20; ++p) {
-    for (size_t i = 0; i < times.size(); ++i) {
-      worst = std::max(worst, std::abs(x(p, i) - oscillators_[p].X(times[i])));
+  for (size_t i = 0; i < times_s.size(); ++i) {
+    worst = std::max(worst, std::abs(x(point, i) - Slow(point).Free(times_s[i])));
+  }
+  return worst;
+}
+
+double WorstErrorOfSlow(const Matrix& x, const std::vector<double>& times_s) {
+  double worst = 0;
+  for (int point = 0; point < x.rows(); ++point) {
+    worst = std::max(worst, ErrorOfSlowPoint(x, point, times_s));
+  }
+  return worst;
+}
+
+TEST(EnsemblePropagator, FollowsTheClosedFormOfDampedOscillatorsWithinItsTolerance) {
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  for (const double tolerance : {1e-4, 1e-7, 1e-10}) {
+    Ensemble ensemble = SlowOscillators(20, tolerance);
+    const double error = WorstErrorOfSlow(ensemble.Propagate(times_s), times_s);
+    EXPECT_LT(error, kMostErrorsInTolerances * tolerance);
+    EXPECT_GT(error, 0);
+  }
+}
+
+TEST(EnsemblePropagator, GainsAccuracyInProportionToTheTolerance) {
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  const auto error = [&](double tolerance) {
+    Ensemble ensemble = SlowOscillators(8, tolerance);
+    return WorstErrorOfSlow(ensemble.Propagate(times_s), times_s);
+  };
+  // Local errors in proportion to the tolerance, steps in proportion to its fifth root.
+  EXPECT_LT(error(1e-8), 1e-2 * error(1e-5));
+  EXPECT_LT(error(1e-11), 1e-2 * error(1e-8));
+}
+
+TEST(EnsemblePropagator, TreatsEachPointOfAnyNumberAlike) {
+  const std::vector<double> times_s = TimesUntil(2, 0.1);
+  for (const int points : {1, 7, 8, 9, 64, 65}) {
+    Ensemble ensemble = SlowOscillators(points, 1e-8);
+    EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s),
+              kMostErrorsInTolerances * 1e-8)
+        << points;
+  }
+}
+
+TEST(EnsemblePropagator, GivesTheSameBitsForAnyCutOfTheTimes) {
+  const std::vector<double> times_s = TimesUntil(3, 0.07);
+  Ensemble ensemble = SlowOscillators(20, 1e-7);
+  ensemble.Drive("force", StepInput{1, 1.0}, 3.0);
+  const Matrix at_once = ensemble.Propagate(times_s);
+  EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
+  Matrix in_pieces(20, 0);
+  for (size_t first = 0, count = 1; first < times_s.size(); first += count, ++count) {
+    const size_t end = std::min(first + count, times_s.size());
+    const Matrix piece =
+        ensemble.Advance(propagator, {times_s.begin() + first, times_s.begin() + end});
+    in_pieces.conservativeResize(20, in_pieces.cols() + piece.cols());
+    in_pieces.rightCols(piece.cols()) = piece;
+    count = end - first;
+  }
+  EXPECT_EQ(at_once, in_pieces);
+}
+
+TEST(EnsemblePropagator, GivesTheSameBitsForAnyNumberOfThreads) {
+  const std::vector<double> times_s = TimesUntil(1, 0.05);
+  Ensemble ensemble = SlowOscillators(150, 1e-7);
+  const Matrix alone = ensemble.Propagate(times_s);
+  for (const int threads : {2, 3}) {
+    ensemble.specification.threads = threads;
+    EXPECT_EQ(ensemble.Propagate(times_s), alone) << threads;
+  }
+}
+
+TEST(EnsemblePropagator, ReadsTheInitialStateAtTimeZero) {
+  Ensemble ensemble = SlowOscillators(9, 1e-7);
+  const Matrix x = ensemble.Propagate({0, 0, 0});
+  for (int point = 0; point < 9; ++point) {
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(x(point, i), Slow(point).x0);
+  }
+}
+
+TEST(EnsemblePropagator, IntegratesUpToAJumpWithTheLeftAndFromItWithTheRightValue) {
+  const Oscillator oscillator{2, 0, 50, 0, 0};
+  const double w = std::sqrt(oscillator.k / oscillator.m);
+  const double jump_s = 0.73;
+  const double force_n = 10;
+  for (const IntegrationMethod method : {IntegrationMethod::kExplicit, IntegrationMethod::kStiff}) {
+    Ensemble ensemble("mass_spring_damper", 3, {"x", "a"});
+    for (int point = 0; point < 3; ++point) Set(ensemble, point, oscillator);
+    ensemble.Drive("force", StepInput{1, jump_s}, force_n);
+    ensemble.specification.integration.relative_tolerance = 1e-9;
+    ensemble.specification.integration.method = method;
+    const std::vector<double> times_s{0.5, std::nextafter(jump_s, 0.0), jump_s, 0.9, 2.5};
+    const Matrix y = ensemble.Propagate(times_s);
+    EXPECT_TRUE(ensemble.failures.empty());
+    for (size_t i = 0; i < times_s.size(); ++i) {
+      // x = F/k (1 − cos ω(t − t*)), ẍ = F/m cos ω(t − t*) from t* on
+      const double tau = times_s[i] - jump_s;
+      const double x = tau < 0 ? 0 : force_n / oscillator.k * (1 - std::cos(w * tau));
+      const double a = tau < 0 ? 0 : force_n / oscillator.m * std::cos(w * tau);
+      // An input that is wrong over a part of the one step at the jump would show with 1e-3.
+      EXPECT_NEAR(y(1, 2 * i), x, 1e-6) << times_s[i];
+      EXPECT_NEAR(y(1, 2 * i + 1), a, 2e-5) << times_s[i];
     }
   }
-  EXPECT_LT(worst, 1e-7);
+}
+
+TEST(EnsemblePropagator, StartsAccuratelyFromRestUnderABump) {
+  const Oscillator oscillator{2, 0, 50, 0, 0};
+  Ensemble ensemble("mass_spring_damper", 1, {"x"});
+  Set(ensemble, 0, oscillator);
+  ensemble.Drive("force", HalfSineBumpInput{1, 0.5, 0.2}, 10);
+  ensemble.specification.integration.relative_tolerance = 1e-8;
+  const std::vector<double> times_s = TimesUntil(0.7, 0.02);
+  const Matrix x = ensemble.Propagate(times_s);
+  const double w = std::sqrt(oscillator.k / oscillator.m);
+  const double big_w = std::numbers::pi / 0.2;
+  for (size_t i = 0; i < times_s.size(); ++i) {
+    const double tau = std::max(times_s[i] - 0.5, 0.0);
+    // x = F (sin Ωτ − Ω/ω sin ωτ)/(m (ω² − Ω²))
+    const double exact = 10 * (std::sin(big_w * tau) - big_w / w * std::sin(w * tau)) /
+                         (oscillator.m * (w * w - big_w * big_w));
+    EXPECT_NEAR(x(0, i), exact, 1e-7) << times_s[i];
+  }
+}
+
+class StreamedForce : public ::testing::TestWithParam<bool> {
+ protected:
+  StreamedForce() : ensemble_("mass_spring_damper", 10, {"x"}) {
+    for (int i = 0; i <= 60; ++i) {
+      time_s_.push_back(0.05 * i + 0.01 * (i % 3));
+      value_.push_back(std::sin(1.7 * i) * 20);
+    }
+    time_s_[0] = 0;
+    for (int point = 0; point < 10; ++point) Set(ensemble_, point, oscillator_);
+    ensemble_.Drive("force", StreamedInput{GetParam(), 1}, 1.0);
+    ensemble_.specification.integration.relative_tolerance = 1e-9;
+  }
+  Matrix KnotByKnot() {
+    EnsemblePropagator propagator(ensemble_.specification, &ensemble_.inputs);
+    Matrix x(10, time_s_.size());
+    for (size_t i = 0; i < time_s_.size(); ++i) {
+      ensemble_.inputs[0].Append(time_s_[i], value_[i]);
+      x.col(i) = ensemble_.Advance(propagator, {time_s_[i]});
+    }
+    return x;
+  }
+
+  const Oscillator oscillator_{1, 0, 40, 0.1, 0.5};
+  std::vector<double> time_s_;
+  std::vector<double> value_;
+  Ensemble ensemble_;
+};
+
+TEST_P(StreamedForce, GivesTheClosedFormThroughItsKnots) {
+  const Matrix x = KnotByKnot();
+  const std::vector<double> exact = oscillator_.ThroughKnots(time_s_, value_, GetParam());
+  for (size_t i = 0; i < time_s_.size(); ++i) EXPECT_NEAR(x(3, i), exact[i], 1e-6) << i;
+}
+
+TEST_P(StreamedForce, GivesTheSameBitsWhenAllKnotsAreKnownBefore) {
+  const Matrix knot_by_knot = KnotByKnot();
+  ensemble_.inputs[0].Clear();
+  for (size_t i = 0; i < time_s_.size(); ++i) ensemble_.inputs[0].Append(time_s_[i], value_[i]);
+  EXPECT_EQ(ensemble_.Propagate(time_s_), knot_by_knot);
+}
+
+INSTANTIATE_TEST_SUITE_P(LinearAndHeld, StreamedForce, ::testing::Bool());
+
+TEST(EnsemblePropagator, KeepsTheAccuracyOfOneFastPointAmongManySlowOnes) {
+  const Oscillator fast{1, 0, 3600, 1, 0};
+  const std::vector<double> times_s = TimesUntil(1, 0.05);
+  for (const double tolerance : {1e-6, 1e-9}) {
+    Ensemble ensemble = SlowOscillators(64, tolerance);
+    Set(ensemble, 40, fast);
+    const Matrix x = ensemble.Propagate(times_s);
+    for (size_t i = 0; i < times_s.size(); ++i) {
+      EXPECT_NEAR(x(40, i), fast.Free(times_s[i]), kMostErrorsInTolerances * tolerance);
+    }
+  }
+}
+
+TEST(EnsemblePropagator, KeepsThePointsOfSmallAmplitudeAsAccurateAsTheOthers) {
+  // A hundredth of the others' amplitude: their common largest magnitude would let through errors
+  // a hundred times as large in proportion.
+  Ensemble ensemble = SlowOscillators(8, 1e-6);
+  const Oscillator small{1, 0, 400, 0.01, 0};
+  Set(ensemble, 5, small);
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  const Matrix x = ensemble.Propagate(times_s);
+  for (size_t i = 0; i < times_s.size(); ++i) {
+    EXPECT_NEAR(x(5, i), small.Free(times_s[i]), 0.01 * kMostErrorsInTolerances * 1e-6);
+  }
+}
+
+// A stiff oscillator: the fast mode decays in a microsecond, the slow one as e^{−t}.
+class StiffOscillators : public ::testing::TestWithParam<IntegrationMethod> {};
+
+TEST_P(StiffOscillators, AreFollowedInFewSteps) {
+  Ensemble ensemble("mass_spring_damper", 12, {"x"});
+  std::vector<Oscillator> oscillators;
+  for (int point = 0; point < 12; ++point) {
+    oscillators.push_back({1, 1e6 * (1 + point), 1e6 * (1 + 1.1 * point), 1, 0});
+    Set(ensemble, point, oscillators.back());
+  }
+  ensemble.specification.integration.method = GetParam();
+  // An explicit method needs t c/(3.3 m) ≈ 18 million steps.
+  ensemble.specification.integration.most_steps = 5000;
+  const std::vector<double> times_s = TimesUntil(5, 0.5);
+  const Matrix x = ensemble.Propagate(times_s);
+  EXPECT_TRUE(ensemble.failures.empty());
+  for (int point = 0; point < 12; ++point) {
+    for (size_t i = 0; i < times_s.size(); ++i) {
+      EXPECT_NEAR(x(point, i), oscillators[point].Free(times_s[i]), kMostErrorsInTolerances * 1e-7);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(StiffAndAuto, StiffOscillators,
+                         ::testing::Values(IntegrationMethod::kStiff, IntegrationMethod::kAuto));
+
+TEST(EnsemblePropagator, FollowsTheClosedFormWithTheStiffMethodToo) {
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  Ensemble ensemble = SlowOscillators(20, 1e-8);
+  ensemble.specification.integration.method = IntegrationMethod::kStiff;
+  EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s), kMostErrorsInTolerances * 1e-8);
+}
+
+TEST(EnsemblePropagator, EvaluatesAnAlgebraicModel) {
+  Ensemble ensemble("mass_spring_frequency", 3, {"omega"});
+  ensemble.Set("k", 1, 800.0);
+  ensemble.Set("m", 1, 2.0);
+  const Matrix omega = ensemble.Propagate({0, 1.5});
+  EXPECT_DOUBLE_EQ(omega(1, 0), 20);
+  EXPECT_DOUBLE_EQ(omega(1, 1), 20);
+  EXPECT_DOUBLE_EQ(omega(2, 0), 2 * std::numbers::pi);
+}
+
+TEST(EnsemblePropagator, StopsOnRequest) {
+  Ensemble ensemble = SlowOscillators(8, 1e-7);
+  EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
+  std::stop_source source;
+  source.request_stop();
+  Matrix x(8, 1);
+  const std::vector<double> times_s{1.0};
+  EXPECT_EQ(propagator.Advance(times_s, x, Stop(source.get_token())).code(),
+            absl::StatusCode::kCancelled);
+}
+
+TEST(IntegrationOptions, NameTheValueThatIsWrong) {
+  IntegrationOptions options;
+  EXPECT_TRUE(options.Validate().ok());
+  options.relative_tolerance = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("relative_tolerance: nan"));
+  options = {};
+  options.most_steps = 0;
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("most_steps: 0"));
 }
 
 }  // namespace

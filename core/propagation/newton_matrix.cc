@@ -1,0 +1,46 @@
+#include "core/propagation/newton_matrix.h"
+
+#include <cmath>
+#include <limits>
+
+namespace polyest {
+
+NewtonMatrix::NewtonMatrix(EnsembleSystem* system)
+    : system_(system),
+      jacobian_(system->points(), system->states() * system->states()),
+      moved_(system->points(), system->states()),
+      rates_(system->points(), system->states()),
+      moved_rates_(system->points(), system->states()),
+      lu_(system->points(), system->states()) {}
+
+void NewtonMatrix::Differentiate(double time_s, const Eigen::ArrayXXd& states,
+                                 const ErrorScale& scale) {
+  const Eigen::Index count = states.cols();
+  const double root_epsilon = std::sqrt(std::numeric_limits<double>::epsilon());
+  system_->Derivatives(time_s, states, rates_);
+  moved_ = states;
+  for (Eigen::Index s = 0; s < count; ++s) {
+    // A block whose state s has been 0 so far says nothing about its size: then one SI unit.
+    const double size = scale.block_scale(s) > 0 ? scale.block_scale(s) : 1;
+    moved_.col(s) += root_epsilon * states.col(s).abs().max(size);
+    system_->Derivatives(time_s, moved_, moved_rates_);
+    // ∂f/∂x_s ≈ (f(x + δ e_s) − f(x))/δ, with the δ that the sum has left
+    for (Eigen::Index i = 0; i < count; ++i) {
+      jacobian_.col(s * count + i) =
+          (moved_rates_.col(i) - rates_.col(i)) / (moved_.col(s) - states.col(s));
+    }
+    moved_.col(s) = states.col(s);
+  }
+}
+
+void NewtonMatrix::Factor(double gamma) {
+  const Eigen::Index count = rates_.cols();
+  for (Eigen::Index s = 0; s < count; ++s) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      lu_.Set(i, s, (i == s ? 1.0 : 0.0) - gamma * jacobian_.col(s * count + i));
+    }
+  }
+  lu_.Factor();
+}
+
+}  // namespace polyest

@@ -1,0 +1,137 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/unit/core/propagation/ensemble.h"
+#include "tests/unit/core/propagation/oscillator.h"
+
+namespace polyest {
+namespace {
+
+const std::vector<double> kTimes = TimesUntil(4, 0.1);
+
+// Softening springs k − |k3| x² whose potential has a ridge at x = √(k/|k3|).
+Ensemble SofteningSprings(int points) {
+  Ensemble ensemble("duffing", points, {"x", "v"});
+  ensemble.Set("c", 0);
+  ensemble.Set("k3", -1);
+  for (int point = 0; point < points; ++point) ensemble.Set("x0", point, 0.2 + 0.01 * point);
+  ensemble.specification.integration.relative_tolerance = 1e-8;
+  return ensemble;
+}
+
+// From x0 beyond the ridge the motion reaches infinity at a finite time,
+//   t* = ∫_{x0}^∞ dx/√((x⁴ − x0⁴)/2 − (x² − x0²)),
+// here by the midpoint rule after x = x0/(1 − s²), which takes away the root at x0.
+double BlowUpTime(double x0) {
+  double sum = 0;
+  constexpr int kCells = 20'000;
+  for (int i = 0; i < kCells; ++i) {
+    const double s = (i + 0.5) / kCells;
+    const double x = x0 / (1 - s * s);
+    const double dx = 2 * x0 * s / ((1 - s * s) * (1 - s * s));
+    sum += dx / std::sqrt((std::pow(x, 4) - std::pow(x0, 4)) / 2 - (x * x - x0 * x0)) / kCells;
+  }
+  return sum;
+}
+
+class PointFailures : public ::testing::TestWithParam<IntegrationMethod> {};
+
+TEST_P(PointFailures, NameThePointThatBlowsUpAndTheTime) {
+  Ensemble ensemble = SofteningSprings(20);
+  ensemble.specification.integration.method = GetParam();
+  ensemble.Set("x0", 13, 2.0);
+  const Matrix y = ensemble.Propagate(kTimes);
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  const PointFailure& failure = ensemble.failures[0];
+  EXPECT_EQ(failure.point, 13);
+  EXPECT_NEAR(failure.time_s, BlowUpTime(2.0), 1e-4);
+  EXPECT_FALSE(failure.reason.empty());
+  EXPECT_TRUE(y.allFinite());
+  EXPECT_EQ(y.row(13).tail(40), Matrix::Zero(1, 40));
+  EXPECT_EQ(y(13, 0), 2.0);
+}
+
+TEST_P(PointFailures, LeaveTheOthersAsAccurateAsWithoutThem) {
+  Ensemble ensemble = SofteningSprings(20);
+  ensemble.specification.integration.method = GetParam();
+  const Matrix without = ensemble.Propagate(kTimes);
+  EXPECT_TRUE(ensemble.failures.empty());
+  ensemble.Set("x0", 3, 2.0);
+  ensemble.Set("x0", 19, 3.0);  // the padding copies it
+  const Matrix with = ensemble.Propagate(kTimes);
+  ASSERT_EQ(ensemble.failures.size(), 2u);
+  EXPECT_EQ(ensemble.failures[0].point, 3);
+  EXPECT_EQ(ensemble.failures[1].point, 19);
+  for (int point = 0; point < 20; ++point) {
+    if (point == 3 || point == 19) continue;
+    // Both have their own errors of some hundred steps of 1e-8.
+    EXPECT_LT((with - without).row(point).cwiseAbs().maxCoeff(), 1e-6) << point;
+  }
+}
+
+TEST_P(PointFailures, MayTakeAllPoints) {
+  Ensemble ensemble = SofteningSprings(10);
+  ensemble.specification.integration.method = GetParam();
+  for (int point = 0; point < 10; ++point) ensemble.Set("x0", point, 2 + 0.1 * point);
+  const Matrix y = ensemble.Propagate(kTimes);
+  ASSERT_EQ(ensemble.failures.size(), 10u);
+  for (int point = 0; point < 10; ++point) EXPECT_EQ(ensemble.failures[point].point, point);
+  EXPECT_TRUE(y.allFinite());
+}
+
+TEST_P(PointFailures, IncludeDerivativesThatAreNotFiniteFromTheStart) {
+  Ensemble ensemble = SofteningSprings(9);
+  ensemble.specification.integration.method = GetParam();
+  ensemble.Set("m", 4, 0.0);
+  const Matrix y = ensemble.Propagate(kTimes);
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  EXPECT_EQ(ensemble.failures[0].point, 4);
+  EXPECT_LT(ensemble.failures[0].time_s, 1e-20);  // ERKStep names the end of its last attempt
+  EXPECT_TRUE(y.allFinite());
+  EXPECT_NE(y(5, 79), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllMethods, PointFailures,
+                         ::testing::Values(IntegrationMethod::kExplicit, IntegrationMethod::kStiff,
+                                           IntegrationMethod::kAuto));
+
+TEST(PointFailures, IncludeInitialStatesThatAreNotFinite) {
+  Ensemble ensemble = SofteningSprings(9);
+  ensemble.Set("x0", 8, std::numeric_limits<double>::quiet_NaN());
+  ensemble.Set("v0", 2, std::numeric_limits<double>::infinity());
+  const EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
+  ASSERT_EQ(propagator.failures().size(), 2u);
+  EXPECT_EQ(propagator.failures()[0].point, 2);
+  EXPECT_EQ(propagator.failures()[1].point, 8);
+  EXPECT_THAT(propagator.failures()[1].reason, ::testing::HasSubstr("initial state"));
+}
+
+TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
+  Ensemble ensemble("mass_spring_frequency", 4, {"omega"});
+  ensemble.Set("k", 2, -1.0);
+  const Matrix omega = ensemble.Propagate({0, 1});
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  EXPECT_EQ(ensemble.failures[0].point, 2);
+  EXPECT_EQ(omega(2, 0), 0);
+  EXPECT_GT(omega(1, 1), 0);
+}
+
+TEST(PointFailures, NameTheStepsThatRanOut) {
+  Ensemble ensemble("mass_spring_damper", 8, {"x"});
+  ensemble.Set("v0", 1.0);
+  ensemble.Set("k", 3, 1e8);  // 5 kHz
+  ensemble.specification.integration.method = IntegrationMethod::kExplicit;
+  ensemble.specification.integration.most_steps = 1000;
+  ensemble.Propagate({0, 1});
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  EXPECT_EQ(ensemble.failures[0].point, 3);
+  EXPECT_THAT(ensemble.failures[0].reason, ::testing::HasSubstr("too many steps"));
+  EXPECT_LT(ensemble.failures[0].time_s, 1);
+}
+
+}  // namespace
+}  // namespace polyest
