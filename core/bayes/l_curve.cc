@@ -1,0 +1,98 @@
+#include "core/bayes/l_curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace polyest {
+namespace {
+
+constexpr int kPointsPerDecade = 4;
+constexpr int kDecades = 4;  // on either side of α² = 1
+// Below this part of the largest one a term is what rounding left of it.
+constexpr double kResolved = 1e-10;
+// Each leg of the L must be as long as a doubling.
+const double kLeastLeg = std::log(2.0);
+
+// A point of the curve, its logarithms; both legs are functions of τ = log α².
+struct LogPoint {
+  size_t index;
+  double tau;
+  double mismatch;  // log J_mismatch
+  double prior;     // log (J_apriori − min J_apriori)
+};
+
+double PriorAtModes(const Prior& prior) {
+  Vector modes(prior.dimension());
+  for (int i = 0; i < prior.dimension(); ++i) modes[i] = prior.parameters()[i].germ.Mode();
+  return prior.NegativeLogDensity(modes);
+}
+
+std::vector<LogPoint> ResolvedPoints(const std::vector<LCurvePoint>& points, double least_prior) {
+  double largest_mismatch = 0;
+  double largest_prior = 0;
+  for (const LCurvePoint& point : points) {
+    if (!std::isfinite(point.cost.mismatch) || !std::isfinite(point.cost.prior)) continue;
+    largest_mismatch = std::max(largest_mismatch, point.cost.mismatch);
+    largest_prior = std::max(largest_prior, point.cost.prior - least_prior);
+  }
+  std::vector<LogPoint> resolved;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const CostValue& cost = points[i].cost;
+    const double prior = cost.prior - least_prior;
+    if (!std::isfinite(cost.mismatch) || !std::isfinite(prior)) continue;
+    if (!(cost.mismatch > kResolved * largest_mismatch)) continue;
+    if (!(prior > kResolved * largest_prior)) continue;
+    resolved.push_back(
+        {i, std::log(points[i].regularization), std::log(cost.mismatch), std::log(prior)});
+  }
+  return resolved;
+}
+
+// Curvature at b of the curve through three points, positive where an L bends:
+//   κ = (x′ y″ − x″ y′)/(x′² + y′²)^{3/2},  x = log J_mismatch, y = log prior term, ′ = d/dτ.
+double BendAt(const LogPoint& a, const LogPoint& b, const LogPoint& c) {
+  const double left = b.tau - a.tau;
+  const double right = c.tau - b.tau;
+  const auto first = [&](double at_a, double at_b, double at_c) {
+    return ((at_b - at_a) / left * right + (at_c - at_b) / right * left) / (left + right);
+  };
+  const auto second = [&](double at_a, double at_b, double at_c) {
+    return 2 * ((at_c - at_b) / right - (at_b - at_a) / left) / (left + right);
+  };
+  const double x1 = first(a.mismatch, b.mismatch, c.mismatch);
+  const double y1 = first(a.prior, b.prior, c.prior);
+  const double x2 = second(a.mismatch, b.mismatch, c.mismatch);
+  const double y2 = second(a.prior, b.prior, c.prior);
+  const double speed = std::hypot(x1, y1);
+  return speed > 0 ? (x1 * y2 - x2 * y1) / (speed * speed * speed) : 0;
+}
+
+}  // namespace
+
+LCurve ChooseByLCurve(const std::function<CostValue(double regularization)>& minimum,
+                      const Prior& prior) {
+  LCurve curve;
+  // From the most weight down: each minimum is near the one before, the first near the prior's.
+  for (int i = kDecades * kPointsPerDecade; i >= -kDecades * kPointsPerDecade; --i) {
+    const double regularization = std::pow(10.0, static_cast<double>(i) / kPointsPerDecade);
+    curve.points.push_back({regularization, minimum(regularization)});
+  }
+  std::reverse(curve.points.begin(), curve.points.end());
+
+  const std::vector<LogPoint> points = ResolvedPoints(curve.points, PriorAtModes(prior));
+  double sharpest = 0;
+  for (size_t i = 1; i + 1 < points.size(); ++i) {
+    const double upright = points.front().prior - points[i].prior;
+    const double lying = points.back().mismatch - points[i].mismatch;
+    if (upright < kLeastLeg || lying < kLeastLeg) continue;
+    const double bend = BendAt(points[i - 1], points[i], points[i + 1]);
+    if (!(bend > sharpest)) continue;
+    sharpest = bend;
+    curve.regularization = curve.points[points[i].index].regularization;
+    curve.corner_found = true;
+  }
+  return curve;
+}
+
+}  // namespace polyest
