@@ -28,6 +28,10 @@ class Germ {
  public:
   static Germ Normal();
   static Germ Uniform();
+  // Up to this shape the cumulative probabilities and quantiles keep their accuracy; far beyond it
+  // the incomplete beta and gamma functions run out of terms. Larger ones are the caller's to
+  // refuse.
+  static constexpr double kMostShape = 1e5;
   // alpha, beta ≥ 1: below 1 the density is infinite at a bound and has no most likely value.
   static Germ Beta(double alpha, double beta);
   // shape ≥ 1, for the same reason.
@@ -48,8 +52,9 @@ class Germ {
   double LogDensityDerivative(double xi) const;
   double LogDensitySecondDerivative(double xi) const;
   double CumulativeProbability(double xi) const;
-  // The ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1, to 1e-12 relative to
-  // the standard deviation.
+  // The ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1, to 1e-12 of the
+  // standard deviation for shapes up to 1000 and to 1e-9 up to kMostShape: log Γ rounds in
+  // proportion to shape · log(shape).
   double Quantile(double probability) const;
 
   RecurrenceCoefficients Recurrence(int count) const;

@@ -183,9 +183,10 @@ TEST(Germ, QuantilesAreThePublishedOnes) {
   EXPECT_NEAR(2 * Germ::Gamma(5).Quantile(0.95), 18.307038053275146, 1e-12);
   for (const double p : {1e-12, 1e-6, 0.2, 0.5, 0.50001, 0.9, 1 - 1e-9}) {
     EXPECT_NEAR(Germ::Gamma(1).Quantile(p) / -std::log1p(-p), 1, 1e-13) << p;
-    // u²(3 − 2u) = p has the root u = ½ + sin(asin(2p − 1)/3).
+    // u²(3 − 2u) = p has the root u = ½ + sin(asin(2p − 1)/3). The rounding of 2p − 1 reaches the
+    // arcsine divided by 2√(p(1 − p)).
     EXPECT_NEAR(Germ::Beta(2, 2).Quantile(p), 2 * std::sin(std::asin(2 * p - 1) / 3),
-                p < 1e-7 || p > 1 - 1e-7 ? 1e-7 : 1e-14)  // the sine form cancels in the tails
+                1e-15 + 1e-16 / std::sqrt(p * (1 - p)))
         << p;
   }
 }
@@ -227,6 +228,21 @@ TEST(Germ, QuantileFollowsTheNormalLimitForLargeShapes) {
   // A beta density of equal large shapes is normal with the same standard deviation, to O(1/shape).
   const Germ beta = Germ::Beta(1e4, 1e4);
   EXPECT_NEAR(beta.Quantile(0.975) / beta.StandardDeviation(), z, 1e-3);
+}
+
+TEST(Germ, KeepsItsAccuracyUpToTheLargestShape) {
+  for (const double shape : {1e3, 1e4, Germ::kMostShape}) {
+    // P(a, a) = ½ + 1/(3 √(2πa)) + O(a^(−3/2)); by symmetry I_½(a, a) = ½.
+    const double expected = 0.5 + 1 / (3 * std::sqrt(2 * std::numbers::pi * shape));
+    const double allowed = 1e-9 + std::pow(shape, -1.5);
+    EXPECT_NEAR(Germ::Gamma(shape).CumulativeProbability(shape), expected, allowed);
+    EXPECT_NEAR(Germ::Beta(shape, shape).CumulativeProbability(0), 0.5, 1e-9);
+    for (const Germ& germ : {Germ::Gamma(shape), Germ::Beta(shape, 3)}) {
+      for (const double p : {1e-6, 0.3, 0.99}) {
+        EXPECT_NEAR(germ.CumulativeProbability(germ.Quantile(p)), p, 1e-9) << Name(germ);
+      }
+    }
+  }
 }
 
 TEST(GaussRule, IntegratesPolynomialsExactly) {
