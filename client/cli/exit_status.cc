@@ -20,6 +20,7 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
       return server.empty() ? kExitBadInput : kExitServer;
     case absl::StatusCode::kUnavailable:
     case absl::StatusCode::kAborted:
+    case absl::StatusCode::kDataLoss:
     case absl::StatusCode::kUnimplemented:
     case absl::StatusCode::kPermissionDenied:
     case absl::StatusCode::kUnauthenticated:

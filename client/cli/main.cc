@@ -1,5 +1,7 @@
 // The `polyest` command.
 
+#include <grpc/support/log.h>
+
 #include <exception>
 #include <iostream>
 #include <type_traits>
@@ -27,6 +29,8 @@ int Run(const polyest::Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // What matters of gRPC's own messages comes back as a status.
+  gpr_set_log_function([](gpr_log_func_args*) {});
   try {
     const auto parsed = polyest::ParseArguments(argc, argv, std::cout, std::cerr);
     if (const int* status = std::get_if<int>(&parsed)) return *status;

@@ -187,7 +187,7 @@ absl::Status MeasurementStream::Recover(Lock& lock) {
     lock.lock();
   }
   if (absl::IsNotFound(status)) {
-    return absl::NotFoundError(absl::StrCat(
+    return absl::DataLossError(absl::StrCat(
         "the daemon has lost ", session_, " and the batches it had acknowledged, up to number ",
         last_sequence_ - static_cast<int64_t>(pending_.size()),
         " (it was restarted without a data directory, or the session was deleted)"));

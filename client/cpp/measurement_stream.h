@@ -56,7 +56,7 @@ class MeasurementStream {
 
   // Connects; once, before anything else. Batches are numbered on from the session's last.
   absl::Status Open();
-  // Hands over one batch; waits while too many are not acknowledged. NOT_FOUND: the daemon has lost
+  // Hands over one batch; waits while too many are not acknowledged. DATA_LOSS: the daemon has lost
   // the session. UNAVAILABLE: no connection after all attempts.
   absl::Status Send(v1::Measurements batch);
   // No more batches: waits for all acknowledgements and the last estimate, none if the session has

@@ -1,0 +1,134 @@
+// What the command answers, in this process and by a daemon.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "polyest/v1/estimation_service.pb.h"
+#include "tests/integration/cli/command_test.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+class AnswersTest : public CommandTest {
+ protected:
+  // The same command in this process and by a daemon.
+  void ExpectSameAnswer(const std::vector<std::string>& arguments) {
+    const Finished local = Run(arguments);
+    ASSERT_EQ(local.exit_status, 0) << local.err;
+    EXPECT_THAT(local.err, IsEmpty());
+    EXPECT_FALSE(local.out.empty());
+    std::vector<std::string> with_server = arguments;
+    with_server.insert(with_server.end(), {"--server", daemon_.address()});
+    const Finished remote = Run(with_server);
+    ASSERT_EQ(remote.exit_status, 0) << remote.err;
+    EXPECT_EQ(local.out, remote.out);
+  }
+
+  DaemonProcess daemon_;
+};
+
+TEST_F(AnswersTest, EstimatesAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(200));
+  ExpectSameAnswer({"estimate", Example("oscillator.json"), data, "--format", "json"});
+  ExpectSameAnswer({"estimate", Example("oscillator.json"), data});
+}
+
+TEST_F(AnswersTest, PropagationsAgreeToTheLastDigit) {
+  const std::vector<std::string> command = {
+      "propagate", Example("forced.json"), "--until", "2", "--step", "0.5"};
+  for (const char* const format : {"table", "json", "csv"}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--format", format});
+    ExpectSameAnswer(arguments);
+  }
+}
+
+TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(20));
+  ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5"});
+  ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
+}
+
+TEST_F(AnswersTest, ModelsAgree) {
+  ExpectSameAnswer({"models"});
+  ExpectSameAnswer({"models", "--format", "json"});
+  ExpectSameAnswer({"models", "duffing"});
+  ExpectSameAnswer({"models", "duffing", "--format", "json"});
+}
+
+TEST_F(CommandTest, FindsTheTruthOfTheDemonstrationRecord) {
+  const Finished run =
+      Run({"estimate", Example("oscillator.json"), Example("oscillator.csv"), "--format", "json"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  ASSERT_EQ(estimate.parameters_size(), 2);
+  // The constants of generate_demo.cc; four standard deviations hold but for one record in 10⁴.
+  const auto& k = estimate.parameters(0);
+  const auto& c = estimate.parameters(1);
+  EXPECT_NEAR(k.map(), 41.3, 4 * k.std_dev());
+  EXPECT_NEAR(c.map(), 0.23, 4 * c.std_dev());
+  EXPECT_LT(k.std_dev(), 0.02);
+  EXPECT_LT(c.std_dev(), 0.005);
+  EXPECT_EQ(k.verdict(), v1::Identifiability::IDENTIFIED);
+  EXPECT_EQ(estimate.samples(), 1000);
+}
+
+TEST_F(CommandTest, PrintsATableThatAPersonCanRead) {
+  const std::string data = File("data.csv", DemoRows(100));
+  const Finished run = Run({"estimate", Example("oscillator.json"), data});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, StartsWith("100 samples up to t = 5 s\n"));
+  EXPECT_THAT(run.out, HasSubstr("identified"));
+  EXPECT_THAT(run.out, HasSubstr("N/m"));
+}
+
+TEST_F(CommandTest, PrintsOneCsvRowATimeOfAPropagation) {
+  const Finished run = Run(
+      {"propagate", Example("forced.json"), "--until", "1", "--step", "0.25", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(6));
+  EXPECT_EQ(lines[0], "t,x.mean,x.stdDev,x.q0.025,x.q0.5,x.q0.975,x.residual");
+  EXPECT_THAT(lines[5], StartsWith("1,"));
+}
+
+TEST_F(CommandTest, PrintsOneCsvRowAPointOfTheCost) {
+  const std::string data = File("data.csv", DemoRows(20));
+  const Finished run = Run({"cost", Example("oscillator.json"), data, "--grid", "3", "--parameter",
+                            "k", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(4));
+  EXPECT_EQ(lines[0], "k,mismatch,prior,total");
+  EXPECT_THAT(lines[1], StartsWith("31.584,"));
+  EXPECT_THAT(lines[3], StartsWith("47.376,"));
+}
+
+TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
+  const std::string plot = folder_ / "figure.svg";
+  const Finished run = Run({"paper", "5", "--plot", plot});
+  EXPECT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_FALSE(run.out.empty());
+  EXPECT_GT(std::filesystem::file_size(plot), 100u);
+}
+
+TEST_F(CommandTest, ExplainsItself) {
+  const Finished help = Run({"--help"});
+  EXPECT_EQ(help.exit_status, 0);
+  for (const char* const command : {"estimate", "stream", "propagate", "cost", "models", "paper"}) {
+    EXPECT_THAT(help.out, HasSubstr(command));
+    EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
+  }
+  const Finished version = Run({"--version"});
+  EXPECT_EQ(version.exit_status, 0);
+  EXPECT_THAT(version.out, StartsWith("polyest "));
+}
+
+}  // namespace
+}  // namespace polyest

@@ -1,0 +1,217 @@
+// What the command says to bad usage, bad input and bad connections.
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "client/cpp/client.h"
+#include "tests/integration/cli/command_test.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+constexpr char kProblem[] = R"({
+  "model": {"builtin": "mass_spring_damper"},
+  "fixed": {"m": 1.0, "x0": 1.0},
+  "uncertain": [{"name": "k", "uniform": {"lower": 31.584, "upper": 47.376}}],
+  "measured": [{"output": "x", "noise": {"absolute": 0.01}}],
+  "expansion": {"order": 3}
+})";
+constexpr char kData[] = "t,x\n0.1,0.8\n0.2,0.3\n";
+
+class ErrorsTest : public CommandTest {
+ protected:
+  // A problem like the good one, but for one text.
+  static std::string Changed(const std::string& from, const std::string& to) {
+    const std::string problem = absl::StrReplaceAll(kProblem, {{from, to}});
+    EXPECT_NE(problem, kProblem);
+    return problem;
+  }
+
+  // Estimates in this process; the one line of its error.
+  std::string Refused(const std::string& problem, const std::string& data) {
+    const Finished run = Run({"estimate", File("problem.json", problem), File("data.csv", data)});
+    return OneLine(run, 2);
+  }
+
+  static std::string OneLine(const Finished& run, int exit_status) {
+    EXPECT_EQ(run.exit_status, exit_status) << run.err;
+    EXPECT_THAT(run.out, IsEmpty());
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    EXPECT_THAT(run.err, AllOf(StartsWith("polyest: "), EndsWith("\n")));
+    return run.err;
+  }
+
+  // No server is there: it was, and has gone.
+  static std::string GoneAddress() {
+    DaemonProcess daemon;
+    return daemon.address();
+  }
+};
+
+TEST_F(ErrorsTest, TheGoodCaseIsGood) {
+  EXPECT_EQ(Run({"estimate", File("problem.json", kProblem), File("data.csv", kData)}).exit_status,
+            0);
+}
+
+TEST_F(ErrorsTest, NamesThatAreMissingOrUnknown) {
+  EXPECT_THAT(Refused(Changed("\"name\": \"k\"", "\"name\": \"stiffness\""), kData),
+              AllOf(HasSubstr("problem.json: uncertain[0]"), HasSubstr("stiffness"), HasSubstr("k"),
+                    HasSubstr("x0")));
+  EXPECT_THAT(Refused(Changed("\"name\": \"k\", ", ""), kData),
+              HasSubstr("problem.json: uncertain[0]"));
+  EXPECT_THAT(Refused(Changed("\"x0\"", "\"y0\""), kData),
+              AllOf(HasSubstr("problem.json: fixed.y0"), HasSubstr("v0")));
+  EXPECT_THAT(Refused(Changed("mass_spring_damper", "spring"), kData),
+              AllOf(HasSubstr("problem.json: model.builtin"), HasSubstr("duffing")));
+  EXPECT_THAT(Refused(Changed("\"expansion\"", "\"expnsion\""), kData),
+              HasSubstr("problem.json: expnsion: there is no field of this name"));
+}
+
+TEST_F(ErrorsTest, APriorWithoutWidth) {
+  EXPECT_THAT(Refused(Changed("\"lower\": 31.584", "\"lower\": 50"), kData),
+              AllOf(HasSubstr("problem.json: uncertain[0].uniform: "), HasSubstr("50"),
+                    HasSubstr("47.376")));
+  EXPECT_THAT(Refused(Changed("\"lower\": 31.584", "\"lower\": 47.376"), kData),
+              HasSubstr("problem.json: uncertain[0].uniform: "));
+}
+
+TEST_F(ErrorsTest, AnOrderTooHighForMemory) {
+  EXPECT_THAT(Refused(Changed("\"order\": 3", "\"order\": 1000000"), kData),
+              AllOf(HasSubstr("expansion"), HasSubstr("order")));
+}
+
+TEST_F(ErrorsTest, AChannelThatTheModelLacks) {
+  EXPECT_THAT(Refused(Changed("\"output\": \"x\"", "\"output\": \"y\""), "t,y\n0,1\n"),
+              AllOf(HasSubstr("problem.json: measured[0]"), HasSubstr("y"), HasSubstr("x")));
+  EXPECT_THAT(Refused(kProblem, "t,y\n0,1\n"),
+              HasSubstr("data.csv:1: unknown column \"y\"; the problem's columns are t, run, x"));
+}
+
+TEST_F(ErrorsTest, DataThatAreNoNumbers) {
+  EXPECT_THAT(Refused(kProblem, "t,x\n0.1,nan\n"),
+              HasSubstr("data.csv:2: column x: \"nan\" must be finite"));
+  EXPECT_THAT(Refused(kProblem, "t,x\n0.1,abc\n"),
+              HasSubstr("data.csv:2: column x: \"abc\" must be a number"));
+}
+
+TEST_F(ErrorsTest, TimesThatGoBack) {
+  EXPECT_THAT(Refused(kProblem, "t,x\n0.2,1\n0.1,1\n"),
+              HasSubstr("data.csv:3: column t: 0.1 must be later than 0.2 of the row before"));
+}
+
+TEST_F(ErrorsTest, EmptyFiles) {
+  EXPECT_THAT(Refused(kProblem, ""), HasSubstr("data.csv: is empty"));
+  EXPECT_THAT(Refused("", kData), HasSubstr("problem.json: is empty"));
+  EXPECT_THAT(Refused(kProblem, "t,x\n"), HasSubstr("data.csv: has no rows"));
+}
+
+TEST_F(ErrorsTest, FilesThatAreNotThere) {
+  EXPECT_THAT(OneLine(Run({"estimate", "/nowhere/p.json", "/nowhere/d.csv"}), 2),
+              HasSubstr("/nowhere/p.json: cannot be opened"));
+}
+
+TEST_F(ErrorsTest, TheDaemonSaysTheSame) {
+  DaemonProcess daemon;
+  const std::string problem = File("p.json", Changed("\"lower\": 31.584", "\"lower\": 50"));
+  const std::string data = File("d.csv", kData);
+  const std::string local = OneLine(Run({"estimate", problem, data}), 2);
+  EXPECT_EQ(OneLine(Run({"estimate", problem, data, "--server", daemon.address()}), 2), local);
+  EXPECT_EQ(OneLine(Run({"stream", problem, data, "--server", daemon.address()}), 2), local);
+}
+
+TEST_F(ErrorsTest, AMessageTooLarge) {
+  DaemonProcess daemon({"--max-message-mb", "1"});
+  // Two doubles a row: a little more than 1 MiB.
+  std::string data = "t,x\n";
+  for (int i = 1; i <= 70'000; ++i) absl::StrAppend(&data, i, ",0\n");
+  EXPECT_THAT(OneLine(Run({"estimate", File("p.json", kProblem), File("d.csv", data), "--server",
+                           daemon.address()}),
+                      3),
+              AllOf(HasSubstr(daemon.address()), HasSubstr("larger than max"),
+                    HasSubstr("can be streamed")));
+}
+
+TEST_F(ErrorsTest, ASessionThatDoesNotExist) {
+  DaemonProcess daemon;
+  Client client(daemon.address());
+  v1::GetSessionRequest request;
+  request.set_name("sessions/nowhere");
+  const auto session = client.GetSession(request);
+  EXPECT_EQ(session.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(session.status().message(), HasSubstr("nowhere"));
+}
+
+TEST_F(ErrorsTest, ASessionNameThatIsNone) {
+  DaemonProcess daemon;
+  EXPECT_THAT(OneLine(Run({"stream", File("p.json", kProblem), File("d.csv", kData), "--server",
+                           daemon.address(), "--session", "No Name"}),
+                      2),
+              HasSubstr("No Name"));
+}
+
+TEST_F(ErrorsTest, AServerThatCannotBeReached) {
+  const std::string gone = GoneAddress();
+  const std::string problem = File("p.json", kProblem);
+  const std::string data = File("d.csv", kData);
+  for (const char* const command : {"estimate", "stream"}) {
+    EXPECT_THAT(OneLine(Run({command, problem, data, "--server", gone}), 3),
+                HasSubstr(absl::StrCat("server ", gone)));
+  }
+  EXPECT_THAT(OneLine(Run({"models", "--server", gone}), 3), HasSubstr(gone));
+}
+
+TEST_F(ErrorsTest, ADeadlineThatPasses) {
+  DaemonProcess daemon;
+  EXPECT_THAT(OneLine(Run({"propagate", File("p.json", kProblem), "--until", "1000", "--step",
+                           "0.001", "--server", daemon.address(), "--deadline", "0.001"}),
+                      3),
+              HasSubstr("eadline"));
+}
+
+TEST_F(ErrorsTest, AnUnknownModelOrFigure) {
+  EXPECT_THAT(OneLine(Run({"models", "spring"}), 2), HasSubstr("duffing"));
+  const Finished figure = Run({"paper", "99"});
+  EXPECT_EQ(figure.exit_status, 2);
+  EXPECT_THAT(figure.out, IsEmpty());
+  EXPECT_THAT(figure.err, HasSubstr("99"));
+}
+
+TEST_F(ErrorsTest, BadUsage) {
+  const std::string problem = File("p.json", kProblem);
+  const std::string data = File("d.csv", kData);
+  OneLine(Run({}), 2);
+  OneLine(Run({"estmate"}), 2);
+  EXPECT_THAT(OneLine(Run({"estimate", problem}), 2), HasSubstr("data"));
+  EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--format", "xml"}), 2),
+              AllOf(HasSubstr("xml"), HasSubstr("table, json")));
+  EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--format", "jsonl"}), 2),
+              HasSubstr("jsonl"));
+  EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--local", "--server", "a:1"}), 2),
+              HasSubstr("--local"));
+  for (const char* const server : {"host", "host:", "host:0", "host:70000", ":1", "host:1x"}) {
+    EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
+                HasSubstr("HOST:PORT"));
+  }
+  EXPECT_THAT(OneLine(Run({"stream", problem, data}), 2), HasSubstr("--server"));
+  for (const char* const batch : {"0", "-1", "x"}) {
+    EXPECT_THAT(OneLine(Run({"stream", problem, data, "--server", "a:1", "--batch", batch}), 2),
+                HasSubstr("--batch"));
+  }
+  OneLine(Run({"stream", problem, data, "--server", "a:1", "--rate", "-1"}), 2);
+  OneLine(Run({"propagate", problem, "--until", "1"}), 2);
+  OneLine(Run({"propagate", problem, "--until", "1", "--step", "0"}), 2);
+  OneLine(Run({"propagate", problem, "--until", "nan", "--step", "1"}), 2);
+  EXPECT_THAT(OneLine(Run({"cost", problem, data, "--grid", "1"}), 2), HasSubstr("1"));
+}
+
+}  // namespace
+}  // namespace polyest

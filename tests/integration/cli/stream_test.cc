@@ -1,0 +1,142 @@
+// `polyest stream` against a daemon.
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+
+#include "tests/integration/cli/command_test.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class StreamTest : public CommandTest {
+ protected:
+  std::vector<std::string> Command(const std::string& data,
+                                   const std::vector<std::string>& options) const {
+    std::vector<std::string> arguments = {"stream", Example("oscillator.json"), data, "--server",
+                                          daemon_.address()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return arguments;
+  }
+
+  // What `estimate` makes of the first rows of the demonstration record.
+  v1::Estimate EstimateOf(int rows) const {
+    const Finished run = Run({"estimate", Example("oscillator.json"),
+                              File("whole.csv", DemoRows(rows)), "--format", "json"});
+    EXPECT_EQ(run.exit_status, 0) << run.err;
+    return ParseEstimate(run.out);
+  }
+
+  // The last line, which must be an estimate, without its sequence number and what the checks on
+  // the way have cost.
+  static v1::Estimate LastEstimate(const std::string& lines) {
+    v1::Estimate estimate = ParseEstimate(Lines(lines).back());
+    estimate.clear_sequence();
+    return estimate;
+  }
+
+  static void ExpectSame(v1::Estimate a, v1::Estimate b) {
+    a.mutable_expansion()->clear_trajectories();
+    b.mutable_expansion()->clear_trajectories();
+    EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(a, b))
+        << a.DebugString() << b.DebugString();
+  }
+
+  DaemonProcess daemon_;
+};
+
+TEST_F(StreamTest, EndsWithTheEstimateOfTheWholeRecord) {
+  const Finished run = Run(Command(File("d.csv", DemoRows(100)), {"--format", "jsonl"}));
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_GE(lines.size(), 2u);
+  int64_t sequence = 0;
+  for (const std::string& line : lines) {
+    const v1::Estimate estimate = ParseEstimate(line);
+    EXPECT_GE(estimate.sequence(), sequence);
+    sequence = estimate.sequence();
+  }
+  EXPECT_EQ(sequence, 4);  // 100 rows, 30 a batch
+  ExpectSame(LastEstimate(run.out), EstimateOf(100));
+}
+
+TEST_F(StreamTest, DoesNotDependOnHowRowsAreCutIntoBatches) {
+  const std::string data = File("d.csv", DemoRows(60));
+  const Finished small = Run(Command(data, {"--format", "jsonl", "--batch", "7"}));
+  const Finished large = Run(Command(data, {"--format", "jsonl", "--batch", "1000"}));
+  ASSERT_EQ(small.exit_status, 0) << small.err;
+  ASSERT_EQ(large.exit_status, 0) << large.err;
+  ExpectSame(LastEstimate(small.out), LastEstimate(large.out));
+}
+
+TEST_F(StreamTest, ReadsStandardInputAndPrintsATableAtTheEnd) {
+  const Finished run = Run(Command("-", {"--rate", "1000"}), DemoRows(60));
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, StartsWith("t = "));
+  EXPECT_THAT(run.out, AllOf(HasSubstr("  k = "), HasSubstr("\n60 samples up to t = 3 s\n")));
+}
+
+TEST_F(StreamTest, ResumesASessionWhereItEnded) {
+  const Finished first =
+      Run(Command(File("d.csv", DemoRows(45)), {"--format", "jsonl", "--session", "rig-1"}));
+  ASSERT_EQ(first.exit_status, 0) << first.err;
+  const Finished second =
+      Run(Command(File("d.csv", DemoRows(100)), {"--format", "jsonl", "--session", "rig-1"}));
+  ASSERT_EQ(second.exit_status, 0) << second.err;
+  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s, 45 rows"));
+  ExpectSame(LastEstimate(second.out), EstimateOf(100));
+}
+
+TEST_F(StreamTest, DoesNotMixProblemsInASession) {
+  const std::string data = File("d.csv", DemoRows(30));
+  ASSERT_EQ(Run(Command(data, {"--session", "rig-1"})).exit_status, 0);
+  const std::string other = File("other.json", R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "uncertain": [{"name": "k", "uniform": {"lower": 30, "upper": 50}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}]
+  })");
+  const Finished run =
+      Run({"stream", other, data, "--server", daemon_.address(), "--session", "rig-1"});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("session rig-1 exists and has another problem"));
+}
+
+TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
+  std::vector<std::string> arguments = Command("-", {});
+  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
+  Process process(arguments);
+  process.Write(DemoRows(60));
+  // The first estimate has come; the input stays open.
+  EXPECT_THAT(process.ReadLine(), StartsWith("t = 1.5 s"));
+  process.Signal(SIGINT);
+  EXPECT_THAT(process.ReadAll(), HasSubstr("samples up to t = "));
+  EXPECT_EQ(process.Wait(), 0) << process.Errors();
+}
+
+TEST_F(StreamTest, StopsAtABadRowAndSaysWhich) {
+  const Finished run = Run(Command("-", {}), DemoRows(35) + "1,2,3\n");
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("standard input:37: the row has 3 cells, the header has 2"));
+}
+
+TEST_F(StreamTest, SaysThatARestartedDaemonHasLostTheSession) {
+  std::vector<std::string> arguments = Command("-", {});
+  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
+  Process process(arguments);
+  process.Write(DemoRows(30));
+  EXPECT_THAT(process.ReadLine(), StartsWith("t = 1.5 s"));
+  daemon_.Kill();
+  DaemonProcess restarted({}, daemon_.address());
+  process.CloseInput();
+  process.ReadAll();
+  EXPECT_EQ(process.Wait(), 3);
+  EXPECT_THAT(process.Errors(),
+              AllOf(HasSubstr("connection lost"), HasSubstr("has lost sessions/")));
+}
+
+}  // namespace
+}  // namespace polyest

@@ -1,0 +1,146 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <sstream>
+
+#include "client/cli/estimate_format.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/text_table.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+v1::Estimate ExampleEstimate() {
+  v1::Estimate estimate;
+  auto& k = *estimate.add_parameters();
+  k.set_name("k");
+  k.set_unit("N/m");
+  k.set_map(40.661234);
+  k.set_std_dev(0.0052);
+  k.set_mean(40.6613);
+  k.set_lower95(40.6511);
+  k.set_upper95(40.6715);
+  k.set_prior_mean(39.48);
+  k.set_prior_std_dev(4.56);
+  k.set_contraction(0.00114);
+  k.set_verdict(v1::Identifiability::IDENTIFIED);
+  auto& mu = *estimate.add_parameters();
+  mu = k;
+  mu.set_name("mu");
+  mu.set_unit("1");
+  mu.set_verdict(v1::Identifiability::NOT_IDENTIFIED);
+  auto& x = *estimate.add_channels();
+  x.set_output("x");
+  x.set_samples(200);
+  x.set_chi_squared(198.4);
+  x.set_noise_std_dev(0.01);
+  auto& direction = *estimate.add_directions();
+  direction.set_information(7.7e5);
+  (*direction.mutable_coefficients())["mu"] = -0.1;
+  (*direction.mutable_coefficients())["k"] = 0.99;
+  direction.set_verdict(v1::Identifiability::IDENTIFIED);
+  estimate.mutable_cost()->set_total(101.2);
+  auto& diagnostic = *estimate.add_diagnostics();
+  diagnostic.set_code(v1::Diagnostic::UNDERSAMPLED);
+  diagnostic.set_message("two samples a period are not enough");
+  estimate.set_time(10);
+  estimate.set_samples(200);
+  estimate.set_sequence(7);
+  return estimate;
+}
+
+TEST(FormatValue, KeepsTwoDigitsOfTheUncertainty) {
+  EXPECT_EQ(FormatUncertain(40.661234, 0.0052), "40.6612 ± 0.0052");
+  EXPECT_EQ(FormatUncertain(40.661234, 0.00996), "40.661 ± 0.010");
+  EXPECT_EQ(FormatUncertain(39.48, 4.56), "39.5 ± 4.6");
+  EXPECT_EQ(FormatUncertain(1000.4, 223.6), "1000 ± 224");
+  EXPECT_EQ(FormatUncertain(-0.000123456, 1.2e-8), "-1.23456e-04 ± 1.2e-08");
+  EXPECT_EQ(FormatUncertain(1.23456e9, 1.5e5), "1.23456e+09 ± 1.5e+05");
+}
+
+TEST(FormatValue, ManagesWithoutAnUncertainty) {
+  EXPECT_EQ(FormatValue(1.23456789, 0), "1.23457");
+  EXPECT_EQ(FormatValue(0, 1e-12), "0.0e+00");
+  EXPECT_EQ(FormatValue(2, std::numeric_limits<double>::infinity()), "2");
+}
+
+TEST(FormatExact, IsReadBackAsTheSameNumber) {
+  EXPECT_EQ(FormatExact(0.1), "0.1");
+  EXPECT_EQ(std::stod(FormatExact(1.0 / 3)), 1.0 / 3);
+  EXPECT_EQ(FormatExact(std::numeric_limits<double>::infinity()), "inf");
+}
+
+TEST(TextTable, AlignsByWhatIsSeen) {
+  TextTable left({"a", "value", "unit"});
+  left.AddRow({"long", "1 ± 2", "N"});
+  left.AddRow({"b", "1", ""});
+  std::ostringstream out;
+  left.Print(out);
+  EXPECT_EQ(out.str(), "a     value  unit\nlong  1 ± 2  N\nb     1\n");
+
+  TextTable right({"t", "x"}, TextTable::Align::kRight);
+  right.AddRow({"10", "−1"});
+  std::ostringstream numbers;
+  right.Print(numbers);
+  EXPECT_EQ(numbers.str(), " t   x\n10  −1\n");
+}
+
+TEST(PrintEstimate, SaysInWordsWhatIsKnown) {
+  std::ostringstream out;
+  PrintEstimate(ExampleEstimate(), out);
+  const std::string text = out.str();
+  EXPECT_THAT(text, HasSubstr("200 samples up to t = 10 s"));
+  EXPECT_THAT(text, HasSubstr("k          40.6612 ± 0.0052  N/m   40.6511 … 40.6715  39.5 ± 4.6"));
+  EXPECT_THAT(text, HasSubstr("not identified\n"));
+  EXPECT_THAT(text, HasSubstr("x        200      198.4  0.992       0.01"));
+  EXPECT_THAT(text, HasSubstr("0.99 k − 0.10 mu"));
+  EXPECT_THAT(text, HasSubstr("note: undersampled: two samples a period are not enough\n"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
+}
+
+TEST(PrintEstimate, DividesByNoSamples) {
+  v1::Estimate estimate = ExampleEstimate();
+  estimate.mutable_channels(0)->set_samples(0);
+  std::ostringstream out;
+  PrintEstimate(estimate, out);
+  EXPECT_THAT(out.str(), HasSubstr("x        0        -   -           -\n"));
+}
+
+TEST(EstimateLine, ShowsTimeAndEveryParameter) {
+  EXPECT_EQ(EstimateLine(ExampleEstimate()),
+            "t = 10 s  k = 40.6612 ± 0.0052 N/m  mu = 40.6612 ± 0.0052");
+}
+
+TEST(DirectionText, LeavesOutWhatIsTooSmallToMatter) {
+  v1::Estimate estimate = ExampleEstimate();
+  v1::Direction direction;
+  (*direction.mutable_coefficients())["k"] = -1;
+  (*direction.mutable_coefficients())["mu"] = 0.01;
+  EXPECT_EQ(DirectionText(direction, estimate), "−1.00 k");
+}
+
+TEST(ToJson, HasTheContractsNames) {
+  const std::string json = ToJson(ExampleEstimate(), /*several_lines=*/false);
+  EXPECT_EQ(json.find('\n'), std::string::npos);
+  EXPECT_THAT(json, HasSubstr(R"("parameters":[{"name":"k","unit":"N/m","map":40.661234,)"
+                              R"("stdDev":0.0052,"mean":40.6613,"lower95":40.6511,)"
+                              R"("upper95":40.6715,"priorMean":39.48,"priorStdDev":4.56,)"
+                              R"("contraction":0.00114,"verdict":"IDENTIFIED"})"));
+  EXPECT_THAT(json, HasSubstr(R"("chiSquared":198.4,"noiseStdDev":0.01)"));
+  EXPECT_THAT(json, HasSubstr(R"("diagnostics":[{"code":"UNDERSAMPLED")"));
+  EXPECT_THAT(json, HasSubstr(R"("time":10,"samples":"200","sequence":"7")"));
+}
+
+TEST(ToJson, PrintsWhatHasItsDefault) {
+  const std::string json = ToJson(v1::Estimate(), /*several_lines=*/true);
+  EXPECT_THAT(json, HasSubstr("\"covariance\": []"));
+  EXPECT_THAT(json, HasSubstr("\"time\": 0"));
+}
+
+}  // namespace
+}  // namespace polyest

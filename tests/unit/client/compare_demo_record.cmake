@@ -1,0 +1,5 @@
+execute_process(COMMAND ${GENERATOR} ${NAME} OUTPUT_VARIABLE written COMMAND_ERROR_IS_FATAL ANY)
+file(READ ${RECORD} committed)
+if(NOT written STREQUAL committed)
+  message(FATAL_ERROR "${RECORD} is not what its generator writes")
+endif()

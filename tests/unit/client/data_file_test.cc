@@ -1,0 +1,211 @@
+#include "client/cpp/data_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <sstream>
+
+namespace polyest {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+const DataColumns kColumns = {{"x", "v"}, {"force"}};
+const DataColumns kMeasuredOnly = {{"x", "v"}, {}};
+
+absl::StatusOr<v1::Measurements> ReadAll(const std::string& text,
+                                         const DataColumns& columns = kMeasuredOnly) {
+  std::istringstream in(text);
+  auto reader = DataReader::Open(in, "data.csv", columns);
+  if (!reader.ok()) return reader.status();
+  return reader->Read(std::numeric_limits<int64_t>::max());
+}
+
+// What a file that is no good is answered with.
+std::string ErrorOf(const std::string& text, const DataColumns& columns = kMeasuredOnly) {
+  const auto data = ReadAll(text, columns);
+  EXPECT_EQ(data.status().code(), absl::StatusCode::kInvalidArgument) << text;
+  return std::string(data.status().message());
+}
+
+TEST(DataReader, ReadsColumnsByName) {
+  const auto data = ReadAll("t,v,x,force\n0,1,2,3\n0.5,-1e-3,2.5,+4\n", kColumns);
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_THAT(data->time(), ElementsAre(0, 0.5));
+  EXPECT_THAT(data->run(), IsEmpty());
+  ASSERT_THAT(data->channels(), SizeIs(3));
+  EXPECT_EQ(data->channels(0).name(), "v");
+  EXPECT_THAT(data->channels(0).values(), ElementsAre(1, -1e-3));
+  EXPECT_EQ(data->channels(1).name(), "x");
+  EXPECT_THAT(data->channels(1).values(), ElementsAre(2, 2.5));
+  EXPECT_EQ(data->channels(2).name(), "force");
+  EXPECT_THAT(data->channels(2).values(), ElementsAre(3, 4));
+}
+
+TEST(DataReader, ReadsEveryDigit) {
+  const auto data = ReadAll("t,x\n0.1,6.0221407599999999e23\n");
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_EQ(data->time(0), 0.1);
+  EXPECT_EQ(data->channels(0).values(0), 6.0221407599999999e23);
+}
+
+TEST(DataReader, TakesAnEmptyCellForAMissingSample) {
+  const auto data = ReadAll("t,x,v\n0,,2\n1,3,\n2,4,\n");
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_THAT(data->channels(0).missing(), ElementsAre(0));
+  EXPECT_THAT(data->channels(0).values(), ElementsAre(0, 3, 4));
+  EXPECT_THAT(data->channels(1).missing(), ElementsAre(1, 2));
+}
+
+TEST(DataReader, AcceptsCarriageReturnsSpacesBlankLinesAMarkAndNoLastLineEnd) {
+  const auto data = ReadAll("\xEF\xBB\xBFt, x\r\n\r\n0 ,1\r\n 1,\t2\r\n\r\n2,3");
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_THAT(data->time(), ElementsAre(0, 1, 2));
+  EXPECT_THAT(data->channels(0).values(), ElementsAre(1, 2, 3));
+}
+
+TEST(DataReader, RestartsTheClockAtANewRun) {
+  const auto data = ReadAll("t,run,x\n0,0,1\n1,0,2\n0.5,1,3\n0,2,4\n");
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_THAT(data->run(), ElementsAre(0, 0, 1, 2));
+  EXPECT_THAT(data->time(), ElementsAre(0, 1, 0.5, 0));
+}
+
+TEST(DataReader, CutsTheSameRowsIntoBatches) {
+  std::istringstream in("t,run,x\n0,0,\n1,0,2\n2,0,3\n3,0,\n4,0,5\n");
+  auto reader = DataReader::Open(in, "data.csv", kMeasuredOnly);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  std::vector<v1::Measurements> batches;
+  for (int i = 0; i < 4; ++i) {
+    auto batch = reader->Read(2);
+    ASSERT_TRUE(batch.ok()) << batch.status();
+    batches.push_back(*batch);
+  }
+  EXPECT_THAT(batches[0].time(), ElementsAre(0, 1));
+  EXPECT_THAT(batches[0].channels(0).missing(), ElementsAre(0));
+  EXPECT_THAT(batches[1].time(), ElementsAre(2, 3));
+  EXPECT_THAT(batches[1].run(), ElementsAre(0, 0));
+  EXPECT_THAT(batches[1].channels(0).missing(), ElementsAre(1));
+  EXPECT_THAT(batches[2].time(), ElementsAre(4));
+  EXPECT_THAT(batches[3].time(), IsEmpty());
+}
+
+TEST(DataReader, ChecksTimesFromOneBatchToTheNext) {
+  std::istringstream in("t,x\n0,1\n1,2\n1,3\n");
+  auto reader = DataReader::Open(in, "data.csv", kMeasuredOnly);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  ASSERT_TRUE(reader->Read(2).ok());
+  EXPECT_EQ(reader->Read(2).status().message(),
+            "data.csv:4: column t: 1 must be later than 1 of the row before");
+}
+
+TEST(DataReader, RefusesTextAndSaysWhere) {
+  EXPECT_EQ(ErrorOf("t,x\n0,1\n1,abc\n"), "data.csv:3: column x: \"abc\" must be a number");
+  EXPECT_EQ(ErrorOf("t,x\n0,1.5m\n"), "data.csv:2: column x: \"1.5m\" must be a number");
+  EXPECT_EQ(ErrorOf("t,x\n0,1 2\n"), "data.csv:2: column x: \"1 2\" must be a number");
+  EXPECT_EQ(ErrorOf("t,x\n0,+-1\n"), "data.csv:2: column x: \"+-1\" must be a number");
+  EXPECT_EQ(ErrorOf("t,x\nx,1\n"), "data.csv:2: column t: \"x\" must be a number");
+  EXPECT_THAT(ErrorOf("t,x\n0,1e999\n"), HasSubstr("\"1e999\" is out of the range of a double"));
+}
+
+TEST(DataReader, RefusesWhatIsNotFinite) {
+  for (const char* const cell : {"nan", "NaN", "inf", "-inf", "Infinity"}) {
+    EXPECT_THAT(ErrorOf(std::string("t,x\n0,") + cell + "\n"),
+                StartsWith(std::string("data.csv:2: column x: \"") + cell + "\" must be finite"));
+  }
+  EXPECT_THAT(ErrorOf("t,x\nnan,1\n"), StartsWith("data.csv:2: column t: \"nan\" must be finite"));
+}
+
+TEST(DataReader, RefusesTimesThatGoBackStandStillOrAreNegative) {
+  EXPECT_EQ(ErrorOf("t,x\n0,1\n2,2\n1.5,3\n"),
+            "data.csv:4: column t: 1.5 must be later than 2 of the row before");
+  EXPECT_EQ(ErrorOf("t,run,x\n0,0,1\n0,1,2\n0,1,3\n"),
+            "data.csv:4: column t: 0 must be later than 0 of the row before");
+  EXPECT_EQ(ErrorOf("t,x\n-1,1\n"), "data.csv:2: column t: -1 must be ≥ 0");
+  EXPECT_THAT(ErrorOf("t,x\n,1\n"), StartsWith("data.csv:2: column t: a value is missing"));
+}
+
+TEST(DataReader, RefusesRunsThatAreNoneStartLateOrDecrease) {
+  EXPECT_EQ(ErrorOf("t,run,x\n0,a,1\n"),
+            "data.csv:2: column run: \"a\" must be a whole number ≥ 0");
+  EXPECT_EQ(ErrorOf("t,run,x\n0,-1,1\n"),
+            "data.csv:2: column run: \"-1\" must be a whole number ≥ 0");
+  EXPECT_EQ(ErrorOf("t,run,x\n0,0.5,1\n"),
+            "data.csv:2: column run: \"0.5\" must be a whole number ≥ 0");
+  EXPECT_EQ(ErrorOf("t,run,x\n0,1,1\n"),
+            "data.csv:2: column run: the first row's run is 1, it must be 0");
+  EXPECT_EQ(ErrorOf("t,run,x\n0,0,1\n0,1,1\n1,0,1\n"),
+            "data.csv:4: column run: 0 after 1; it must not decrease");
+}
+
+TEST(DataReader, RefusesAHeaderThatIsMissing) {
+  EXPECT_THAT(ErrorOf("0,1\n1,2\n"), StartsWith("data.csv:1: the first column is \"0\""));
+  EXPECT_THAT(ErrorOf("x,t\n1,0\n"), StartsWith("data.csv:1: the first column is \"x\""));
+  EXPECT_THAT(ErrorOf("t;x\n0;1\n"), StartsWith("data.csv:1: the first column is \"t;x\""));
+}
+
+TEST(DataReader, RefusesUnknownAndRepeatedColumnsAndNamesTheKnown) {
+  EXPECT_EQ(ErrorOf("t,x,y,force\n0,1,2,3\n", kColumns),
+            "data.csv:1: unknown column \"y\"; the problem's columns are t, run, x, v, force");
+  EXPECT_EQ(ErrorOf("t,x,x\n0,1,2\n"), "data.csv:1: the column \"x\" is named twice");
+  EXPECT_EQ(ErrorOf("t,t\n0,1\n"), "data.csv:1: the column \"t\" is named twice");
+  EXPECT_THAT(ErrorOf("t,x,\n0,1,2\n"), StartsWith("data.csv:1: unknown column \"\""));
+}
+
+TEST(DataReader, RefusesAStreamedInputThatIsNotThereOrHasGaps) {
+  EXPECT_EQ(ErrorOf("t,x\n0,1\n", kColumns),
+            "data.csv:1: the column \"force\" of the streamed input of that name is missing");
+  EXPECT_EQ(ErrorOf("t,x,force\n0,1,\n", kColumns),
+            "data.csv:2: column force: a value is missing; a streamed input needs every row");
+}
+
+TEST(DataReader, RefusesRaggedRows) {
+  EXPECT_EQ(ErrorOf("t,x\n0,1\n1\n"), "data.csv:3: the row has 1 cells, the header has 2");
+  EXPECT_EQ(ErrorOf("t,x\n0,1,2\n"), "data.csv:2: the row has 3 cells, the header has 2");
+}
+
+TEST(DataReader, RefusesAFileWithoutAnything) {
+  EXPECT_THAT(ErrorOf(""), StartsWith("data.csv: is empty"));
+  EXPECT_THAT(ErrorOf("\n\r\n"), StartsWith("data.csv: is empty"));
+  EXPECT_EQ(ErrorOf("t,x\n"), "data.csv: has no rows below its header");
+}
+
+TEST(DataReader, RefusesALineThatNeverEnds) {
+  EXPECT_EQ(ErrorOf("t,x\n0," + std::string(100'000, '1') + "\n"),
+            "data.csv:2: the line is longer than 65535 bytes");
+}
+
+TEST(DataReader, ShowsOnlyTheStartOfALongCell) {
+  EXPECT_EQ(ErrorOf("t,x\n0," + std::string(100, 'z') + "\n"),
+            "data.csv:2: column x: \"" + std::string(40, 'z') + "…\" must be a number");
+}
+
+TEST(ReadDataFile, NamesAFileThatCannotBeOpened) {
+  const auto data = ReadDataFile("/nowhere/data.csv", kMeasuredOnly);
+  EXPECT_EQ(data.status().message(),
+            "/nowhere/data.csv: cannot be opened: No such file or directory");
+}
+
+TEST(ReadDataFile, RefusesAFolder) {
+  EXPECT_EQ(ReadDataFile("/", kMeasuredOnly).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ColumnsOf, AreMeasuredOutputsAndStreamedInputs) {
+  v1::Problem problem;
+  problem.add_measured()->set_output("x");
+  problem.add_inputs()->set_name("force");
+  problem.mutable_inputs(0)->mutable_constant()->set_amplitude(1);
+  problem.add_inputs()->set_name("road");
+  problem.mutable_inputs(1)->mutable_streamed();
+  const DataColumns columns = ColumnsOf(problem);
+  EXPECT_THAT(columns.measured, ElementsAre("x"));
+  EXPECT_THAT(columns.streamed, ElementsAre("road"));
+}
+
+}  // namespace
+}  // namespace polyest

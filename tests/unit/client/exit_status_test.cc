@@ -1,0 +1,50 @@
+#include "client/cli/exit_status.h"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+namespace polyest {
+namespace {
+
+constexpr char kServer[] = "rig:50051";
+
+TEST(ExitStatusOf, TellsBadInputFromARefusal) {
+  EXPECT_EQ(ExitStatusOf(absl::OkStatus(), ""), 0);
+  EXPECT_EQ(ExitStatusOf(absl::InvalidArgumentError(""), kServer), 2);
+  EXPECT_EQ(ExitStatusOf(absl::NotFoundError(""), kServer), 2);
+  EXPECT_EQ(ExitStatusOf(absl::AlreadyExistsError(""), kServer), 2);
+  EXPECT_EQ(ExitStatusOf(absl::UnavailableError(""), kServer), 3);
+  EXPECT_EQ(ExitStatusOf(absl::AbortedError(""), kServer), 3);
+  EXPECT_EQ(ExitStatusOf(absl::DeadlineExceededError(""), kServer), 3);
+  EXPECT_EQ(ExitStatusOf(absl::DeadlineExceededError(""), ""), 1);
+  EXPECT_EQ(ExitStatusOf(absl::InternalError(""), kServer), 1);
+}
+
+TEST(ExitStatusOf, TakesALimitPassedInThisProcessForBadInput) {
+  EXPECT_EQ(ExitStatusOf(absl::ResourceExhaustedError(""), ""), 2);
+  EXPECT_EQ(ExitStatusOf(absl::ResourceExhaustedError(""), kServer), 3);
+}
+
+TEST(Report, PrintsOneLine) {
+  std::ostringstream err;
+  EXPECT_EQ(Report(absl::InvalidArgumentError("first\nsecond"), "", err), 2);
+  EXPECT_EQ(err.str(), "polyest: first second\n");
+}
+
+TEST(Report, NamesTheServerThatRefused) {
+  std::ostringstream err;
+  EXPECT_EQ(Report(absl::UnavailableError("no route"), kServer, err), 3);
+  EXPECT_EQ(err.str(), "polyest: server rig:50051: no route\n");
+}
+
+TEST(InFile, PutsTheFileInFrontOfTheField) {
+  EXPECT_EQ(InFile(absl::InvalidArgumentError("fixed.q: unknown"), "p.json", "d.csv").message(),
+            "p.json: fixed.q: unknown");
+  EXPECT_EQ(InFile(absl::InvalidArgumentError("measurements.time[0]: x"), "p.json", "d.csv"),
+            absl::InvalidArgumentError("d.csv: measurements.time[0]: x"));
+  EXPECT_EQ(InFile(absl::UnavailableError("gone"), "p.json", "d.csv").message(), "gone");
+}
+
+}  // namespace
+}  // namespace polyest

@@ -1,0 +1,90 @@
+#include "client/cpp/problem_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string ErrorOf(const std::string& json) {
+  const auto problem = ParseProblem(json, "problem.json");
+  EXPECT_EQ(problem.status().code(), absl::StatusCode::kInvalidArgument) << json;
+  EXPECT_EQ(problem.status().message().find('\n'), absl::string_view::npos);
+  return std::string(problem.status().message());
+}
+
+TEST(ParseProblem, ReadsTheContractsExample) {
+  const auto problem = ParseProblem(R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "fixed": {"m": 1.0, "x0": 1.0},
+    "uncertain": [
+      {"name": "k",  "uniform": {"lower": 31.58, "upper": 47.37}},
+      {"name": "c",  "normal":  {"mean": 0.2, "stdDev": 0.03}},
+      {"name": "v0", "beta":    {"alpha": 2, "beta": 2, "lower": 0.5, "upper": 1.5}},
+      {"name": "g",  "gamma":   {"shape": 4, "scale": 0.1, "shift": 0}}
+    ],
+    "inputs":   [{"name": "force", "sinusoid": {"amplitude": 1.0, "frequencyHz": 0.5,
+                                                "phaseRad": 1.5707963}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01, "relative": 0.0,
+                                           "relativeToMax": 0.0}}],
+    "expansion": {"order": 3, "pointsPerTerm": 2, "points": "HALTON", "adaptive": true},
+    "regularization": 1.0
+  })",
+                                    "problem.json");
+  ASSERT_TRUE(problem.ok()) << problem.status();
+  EXPECT_EQ(problem->model().builtin(), "mass_spring_damper");
+  EXPECT_EQ(problem->fixed().at("x0"), 1.0);
+  ASSERT_EQ(problem->uncertain_size(), 4);
+  EXPECT_EQ(problem->uncertain(1).normal().std_dev(), 0.03);
+  EXPECT_EQ(problem->inputs(0).sinusoid().frequency_hz(), 0.5);
+  EXPECT_EQ(problem->expansion().points(), v1::ExpansionOptions::HALTON);
+}
+
+TEST(ParseProblem, NamesAFieldThatThereIsNot) {
+  EXPECT_EQ(ErrorOf(R"({"modle": {}})"), "problem.json: modle: there is no field of this name");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "unifrom": {"lower": 1}}]})"),
+            "problem.json: uncertain[0].unifrom: there is no field of this name");
+}
+
+TEST(ParseProblem, NamesAFieldOfTheWrongType) {
+  EXPECT_THAT(ErrorOf(R"({"uncertain": [{"uniform": {"lower": "low"}}]})"),
+              StartsWith("problem.json: uncertain[0].uniform.lower: invalid value \"low\""));
+  EXPECT_THAT(ErrorOf(R"({"expansion": {"order": 2.5}})"),
+              StartsWith("problem.json: expansion.order: invalid value 2.5"));
+  EXPECT_THAT(ErrorOf(R"({"expansion": {"points": "SOBOL"}})"),
+              StartsWith("problem.json: expansion.points: invalid value \"SOBOL\""));
+}
+
+TEST(ParseProblem, RefusesASecondPrior) {
+  EXPECT_THAT(ErrorOf(R"({"uncertain": [{"uniform": {}, "normal": {}}]})"),
+              HasSubstr("'prior' is already set"));
+}
+
+TEST(ParseProblem, FindsTheLineOfASyntaxError) {
+  EXPECT_EQ(ErrorOf("{\n  \"model\": {\"builtin\": \"duffing\"},\n  \"fixed\" {\"m\": 1}\n}\n"),
+            "problem.json:3: Expected : between key:value pair.");
+  EXPECT_THAT(ErrorOf("{\n\"fixed\": {\n"), StartsWith("problem.json:3: Unexpected end of string"));
+  EXPECT_THAT(ErrorOf("{\"fixed\": {\"m\": NaN}}"), StartsWith("problem.json:1: "));
+}
+
+TEST(ParseProblem, RefusesWhatIsNoObject) {
+  EXPECT_EQ(ErrorOf(" \n"), "problem.json: is empty; it must hold one JSON object, the problem");
+  EXPECT_EQ(ErrorOf("[]"), "problem.json: the file must hold one JSON object");
+  EXPECT_THAT(ErrorOf("t,x\n0,1\n"), StartsWith("problem.json"));
+}
+
+TEST(ParseProblem, RefusesDeepNestingWithoutFallingOver) {
+  EXPECT_THAT(ErrorOf(std::string(100'000, '[')), StartsWith("problem.json"));
+}
+
+TEST(ReadProblemFile, NamesAFileThatCannotBeOpened) {
+  EXPECT_EQ(ReadProblemFile("/nowhere/p.json").status().message(),
+            "/nowhere/p.json: cannot be opened: No such file or directory");
+  EXPECT_EQ(ReadProblemFile("/").status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace polyest
