@@ -1,0 +1,141 @@
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <signal.h>
+
+#include "tests/integration/daemon_fixture.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class LifecycleTest : public DaemonTest {
+ protected:
+  // A call of a service whose messages are not compiled in here, as bytes.
+  std::string CallRaw(const std::string& method, const std::string& request) {
+    grpc::GenericStub stub(channel_);
+    grpc::ClientContext context;
+    grpc::CompletionQueue queue;
+    const grpc::Slice slice(request);
+    const grpc::ByteBuffer bytes(&slice, 1);
+    auto call = stub.PrepareUnaryCall(&context, method, bytes, &queue);
+    call->StartCall();
+    grpc::ByteBuffer response;
+    grpc::Status status;
+    call->Finish(&response, &status, this);
+    void* tag = nullptr;
+    bool ok = false;
+    queue.Next(&tag, &ok);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    std::vector<grpc::Slice> slices;
+    response.Dump(&slices);
+    std::string answer;
+    for (const auto& part : slices) {
+      answer.append(reinterpret_cast<const char*>(part.begin()), part.size());
+    }
+    return answer;
+  }
+};
+
+TEST_F(LifecycleTest, AnswersTheHealthCheckForAllAndForTheService) {
+  // HealthCheckRequest{service = 1}; HealthCheckResponse{status = 1 (SERVING)}.
+  EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check", ""), "\x08\x01");
+  const std::string service = "polyest.v1.EstimationService";
+  EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check",
+                    "\x0a" + std::string(1, static_cast<char>(service.size())) + service),
+            "\x08\x01");
+}
+
+TEST_F(LifecycleTest, TellsOfItsServicesByReflection) {
+  // ServerReflectionRequest{list_services = 7: ""}.
+  const std::string answer = CallRaw(
+      "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", std::string("\x3a\x00", 2));
+  EXPECT_THAT(answer, HasSubstr("polyest.v1.EstimationService"));
+  EXPECT_THAT(answer, HasSubstr("grpc.health.v1.Health"));
+}
+
+TEST_F(LifecycleTest, GivesEveryStreamItsLastEstimateBeforeItEnds) {
+  ASSERT_TRUE(Create("rig").ok());
+  ASSERT_TRUE(Create("idle").ok());
+  ClientStream stream(*stub_);
+  ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 20),
+                          [](auto& request) { request.mutable_estimates()->set_only_last(true); }));
+  stream.ExpectAcknowledgement(1);
+  ClientStream idle(*stub_);
+  v1::StreamMeasurementsRequest hello;
+  hello.set_session("sessions/idle");
+  ASSERT_TRUE(idle.SendRequest(hello));
+  grpc::ClientContext context;
+  v1::WatchSessionRequest request;
+  request.set_session("sessions/rig");
+  auto watch = stub_->WatchSession(&context, request);
+  v1::EstimateResponse watched;
+  ASSERT_TRUE(watch->Read(&watched));
+  EXPECT_EQ(watched.estimate().sequence(), 1);
+  const v1::Estimate expected = EstimateAtOnce(20);
+
+  daemon_.Signal(SIGTERM);
+
+  v1::Estimate last;
+  stream.ExpectEstimate(last);
+  EXPECT_EQ(WithoutSequence(last), WithoutSequence(expected));
+  v1::StreamMeasurementsResponse nothing;
+  EXPECT_FALSE(stream.Read(nothing));
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(idle.Read(nothing));
+  EXPECT_EQ(idle.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(watch->Read(&watched));
+  EXPECT_EQ(watch->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(daemon_.Wait(), 0) << daemon_.Errors();
+}
+
+TEST_F(LifecycleTest, EndsOnAnInterruptToo) {
+  daemon_.Signal(SIGINT);
+  EXPECT_EQ(daemon_.Wait(), 0);
+}
+
+TEST_F(LifecycleTest, SaysInOneLineThatAPortIsInUse) {
+  DaemonProcess second({"--listen", address_});
+  EXPECT_EQ(second.ReadLine(), "");
+  EXPECT_EQ(second.Wait(), 1);
+  EXPECT_EQ(second.Errors(), "polyestd: cannot listen on " + address_ +
+                                 ": the port is in use or the address is not this machine's\n");
+}
+
+TEST(Daemon, ListensOnNamesAndIpv6) {
+  DaemonProcess by_name({"--listen", "localhost:0"});
+  EXPECT_THAT(by_name.ReadLine(), testing::MatchesRegex("listening on localhost:[1-9][0-9]*"));
+}
+
+TEST(Daemon, RefusesBadUsageInOneLine) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--listen", "50051"},
+                                                    {"--threads", "-1"},
+                                                    {"--max-message-mb", "x"},
+                                                    {"--log-level", "loud"},
+                                                    {"--nonsense"},
+                                                    {"--listen"},
+                                                    {"extra"}}) {
+    DaemonProcess daemon(arguments);
+    EXPECT_EQ(daemon.ReadLine(), "");
+    EXPECT_EQ(daemon.Wait(), 2) << arguments[0];
+    const std::string errors = daemon.Errors();
+    EXPECT_THAT(errors, StartsWith("polyestd: "));
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
+  }
+}
+
+TEST(Daemon, PrintsHelpAndVersion) {
+  DaemonProcess help({"--help"});
+  std::string text;
+  for (std::string line = help.ReadLine(); !line.empty() || text.empty(); line = help.ReadLine()) {
+    text += line + "\n";
+  }
+  EXPECT_EQ(help.Wait(), 0);
+  DaemonProcess version({"--version"});
+  EXPECT_THAT(version.ReadLine(), StartsWith("polyestd 0."));
+  EXPECT_EQ(version.Wait(), 0);
+}
+
+}  // namespace
+}  // namespace polyest

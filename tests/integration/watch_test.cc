@@ -1,0 +1,87 @@
+#include "tests/integration/daemon_fixture.h"
+
+namespace polyest {
+namespace {
+
+class Watch {
+ public:
+  Watch(v1::EstimationService::Stub& stub, const std::string& session) {
+    v1::WatchSessionRequest request;
+    request.set_session(session);
+    reader_ = stub.WatchSession(&context_, request);
+  }
+  // The sequence of the next estimate, or −1 at the end.
+  int64_t Next() {
+    v1::EstimateResponse response;
+    return reader_->Read(&response) ? response.estimate().sequence() : -1;
+  }
+  void Cancel() { context_.TryCancel(); }
+  grpc::Status Finish() { return reader_->Finish(); }
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::EstimateResponse>> reader_;
+};
+
+class WatchTest : public DaemonTest {
+ protected:
+  void SetUp() override {
+    DaemonTest::SetUp();
+    ASSERT_TRUE(Create("rig").ok());
+    ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 5)).ok());
+  }
+};
+
+TEST_F(WatchTest, ShowsThePresentEstimateAndNewOnesToEveryObserver) {
+  Watch first(*stub_, "sessions/rig"), second(*stub_, "sessions/rig");
+  EXPECT_EQ(first.Next(), 1);
+  EXPECT_EQ(second.Next(), 1);
+  ClientStream stream(*stub_);
+  ASSERT_TRUE(stream.Send("sessions/rig", 2, OscillatorRows(5, 10)));
+  EXPECT_EQ(first.Next(), 2);
+  EXPECT_EQ(second.Next(), 2);
+  first.Cancel();
+  EXPECT_EQ(first.Next(), -1);
+  EXPECT_EQ(first.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  ASSERT_TRUE(stream.Send("sessions/rig", 3, OscillatorRows(10, 15)));
+  EXPECT_EQ(second.Next(), 3);
+}
+
+TEST_F(WatchTest, ShowsEstimatesOfBatchesAddedByUnaryCalls) {
+  Watch watch(*stub_, "sessions/rig");
+  EXPECT_EQ(watch.Next(), 1);
+  ASSERT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 10)).ok());
+  EXPECT_EQ(watch.Next(), 2);
+}
+
+TEST_F(WatchTest, MissesNeverTheLastEstimateWhenItIsSlow) {
+  Watch watch(*stub_, "sessions/rig");
+  constexpr int64_t kLast = 40;
+  for (int64_t sequence = 2; sequence <= kLast; ++sequence) {
+    const int row = static_cast<int>(sequence) + 3;
+    ASSERT_TRUE(Add("sessions/rig", sequence, OscillatorRows(row, row + 1)).ok());
+  }
+  int64_t previous = 0;
+  while (previous != kLast) {
+    const int64_t next = watch.Next();
+    ASSERT_GT(next, previous);
+    previous = next;
+  }
+}
+
+TEST_F(WatchTest, EndsNotFoundWithItsSession) {
+  Watch watch(*stub_, "sessions/rig");
+  EXPECT_EQ(watch.Next(), 1);
+  ASSERT_TRUE(Delete("sessions/rig").ok());
+  EXPECT_EQ(watch.Next(), -1);
+  EXPECT_EQ(watch.Finish().error_code(), grpc::StatusCode::NOT_FOUND);
+  Watch none(*stub_, "sessions/rig");
+  EXPECT_EQ(none.Next(), -1);
+  EXPECT_EQ(none.Finish().error_code(), grpc::StatusCode::NOT_FOUND);
+  Watch bad(*stub_, "rig");
+  EXPECT_EQ(bad.Next(), -1);
+  EXPECT_EQ(bad.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace polyest

@@ -1,0 +1,109 @@
+#include "server/execution/executor.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <latch>
+#include <vector>
+
+namespace polyest {
+namespace {
+
+TEST(Executor, RunsEverythingAcceptedBeforeItEnds) {
+  std::atomic<int> ran{0};
+  {
+    Executor executor(2, 100);
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(executor.Submit([&] { ++ran; }).ok());
+  }
+  EXPECT_EQ(ran, 100);
+}
+
+TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
+  Executor executor(1, 2);
+  std::latch started(1), go_on(1);
+  ASSERT_TRUE(executor
+                  .Submit([&] {
+                    started.count_down();
+                    go_on.wait();
+                  })
+                  .ok());
+  started.wait();
+  std::latch second_ran(1);
+  ASSERT_TRUE(executor.Submit([&] { second_ran.count_down(); }).ok());
+  const absl::Status refused = executor.Submit([] { FAIL() << "was refused"; });
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused.message(), "the daemon is busy: its queue of 2 tasks is full; try later");
+  // A strand shares the capacity.
+  EXPECT_FALSE(std::make_shared<Strand>(executor)->Submit([] {}).ok());
+  go_on.count_down();
+  second_ran.wait();
+  // The second task has run but may not have left yet; one place is free in any case.
+  EXPECT_TRUE(executor.Submit([] {}).ok());
+}
+
+TEST(Executor, RunsTasksAtTheSameTimeOnItsThreads) {
+  Executor executor(2, 2);
+  std::latch both(2);  // opens only when two tasks run at once
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(executor.Submit([&] { both.arrive_and_wait(); }).ok());
+  both.wait();
+}
+
+TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
+  constexpr int kStrands = 5, kTasks = 200;
+  std::vector<std::vector<int>> order(kStrands);
+  std::atomic<int> overlaps{0};
+  {
+    Executor executor(4, kStrands * kTasks);
+    for (auto& seen : order) {
+      auto strand = std::make_shared<Strand>(executor);
+      auto inside = std::make_shared<std::atomic<int>>(0);
+      for (int task = 0; task < kTasks; ++task) {
+        ASSERT_TRUE(strand
+                        ->Submit([&seen, &overlaps, inside, task] {
+                          if (inside->fetch_add(1) != 0) ++overlaps;
+                          seen.push_back(task);
+                          inside->fetch_sub(1);
+                        })
+                        .ok());
+      }
+    }
+  }
+  EXPECT_EQ(overlaps, 0);
+  for (const auto& seen : order) {
+    ASSERT_EQ(seen.size(), static_cast<size_t>(kTasks));
+    for (int task = 0; task < kTasks; ++task) EXPECT_EQ(seen[static_cast<size_t>(task)], task);
+  }
+}
+
+TEST(Strand, LetsOthersHaveTheirTurnBetweenItsTasks) {
+  std::vector<char> order;
+  {
+    Executor executor(1, 10);
+    std::latch go_on(1);
+    ASSERT_TRUE(executor.Submit([&] { go_on.wait(); }).ok());
+    auto a = std::make_shared<Strand>(executor);
+    auto b = std::make_shared<Strand>(executor);
+    for (int i = 0; i < 2; ++i) ASSERT_TRUE(a->Submit([&] { order.push_back('a'); }).ok());
+    for (int i = 0; i < 2; ++i) ASSERT_TRUE(b->Submit([&] { order.push_back('b'); }).ok());
+    go_on.count_down();
+  }
+  EXPECT_EQ(order, (std::vector<char>{'a', 'b', 'a', 'b'}));
+}
+
+TEST(Strand, TakesTasksFromItsOwnTasks) {
+  int ran = 0;
+  {
+    Executor executor(1, 10);
+    auto strand = std::make_shared<Strand>(executor);
+    ASSERT_TRUE(strand
+                    ->Submit([&ran, strand] {
+                      ++ran;
+                      EXPECT_TRUE(strand->Submit([&ran] { ++ran; }).ok());
+                    })
+                    .ok());
+  }
+  EXPECT_EQ(ran, 2);
+}
+
+}  // namespace
+}  // namespace polyest

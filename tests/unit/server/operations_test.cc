@@ -1,0 +1,159 @@
+#include "server/operations/operations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/model/catalogue.h"
+#include "server/convert/studies.h"
+#include "server/operations/names.h"
+#include "server/operations/pages.h"
+#include "tests/unit/server/problem_json.h"
+
+namespace polyest {
+namespace {
+
+TEST(Models, ComeInPagesThatHoldEachOnceInOrder) {
+  std::vector<std::string> names;
+  v1::ListModelsRequest request;
+  request.set_page_size(2);
+  do {
+    const auto page = ListModels(request);
+    ASSERT_TRUE(page.ok()) << page.status();
+    ASSERT_GE(page->models_size(), 1);
+    ASSERT_LE(page->models_size(), 2);
+    for (const auto& model : page->models()) names.push_back(model.name());
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty());
+  std::vector<std::string> expected;
+  for (const auto& model : BuiltinModels()) {
+    expected.push_back("models/" + model->description().name);
+  }
+  EXPECT_EQ(names, expected);
+}
+
+TEST(Models, AreDescribedInFull) {
+  v1::GetModelRequest request;
+  request.set_name("models/mass_spring_damper");
+  const auto model = GetModel(request);
+  ASSERT_TRUE(model.ok()) << model.status();
+  EXPECT_EQ(model->name(), "models/mass_spring_damper");
+  EXPECT_FALSE(model->summary().empty());
+  EXPECT_FALSE(model->equations().empty());
+  EXPECT_FALSE(model->source().empty());
+  ASSERT_EQ(model->states_size(), 2);
+  ASSERT_EQ(model->parameters_size(), 5);
+  EXPECT_EQ(model->parameters(0).name(), "m");
+  EXPECT_EQ(model->parameters(0).unit(), "kg");
+  EXPECT_FALSE(model->parameters(0).meaning().empty());
+  EXPECT_EQ(model->parameters(0).default_value(), 0.1);
+  EXPECT_EQ(model->inputs(0).name(), "force");
+  EXPECT_EQ(model->outputs(0).name(), "x");
+}
+
+TEST(Models, ThatDoNotExistAreNotFound) {
+  v1::GetModelRequest request;
+  request.set_name("models/rocket");
+  EXPECT_EQ(GetModel(request).status().code(), absl::StatusCode::kNotFound);
+  request.set_name("rocket");
+  EXPECT_EQ(GetModel(request).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(Pages, RefuseNegativeSizesAndUnknownTokens) {
+  v1::ListModelsRequest request;
+  request.set_page_size(-1);
+  EXPECT_EQ(ListModels(request).status().message(), "pageSize: -1 must not be negative");
+  request.set_page_size(0);
+  request.set_page_token("nowhere");
+  EXPECT_EQ(ListModels(request).status().message(),
+            "pageToken: \"nowhere\" is not the nextPageToken of a page");
+}
+
+TEST(Pages, HaveADefaultSizeAndALargest) {
+  EXPECT_EQ(*PageSize(0), 50u);
+  EXPECT_EQ(*PageSize(7), 7u);
+  EXPECT_EQ(*PageSize(201), 200u);
+}
+
+TEST(ResourceId, TakesTheLastPartOfAName) {
+  EXPECT_EQ(*ResourceId("name", "sessions", "sessions/a-1"), "a-1");
+  for (const char* bad : {"", "sessions", "sessions/", "models/a", "sessions/a/b", "/sessions/a"}) {
+    EXPECT_EQ(ResourceId("name", "sessions", bad).status().message(),
+              "name: \"" + std::string(bad) + "\" must be of the form sessions/{id}");
+  }
+}
+
+TEST(RunEstimate, RefusesAProblemThatMeasuresNothing) {
+  v1::EstimateRequest request;
+  *request.mutable_problem() = SmallProblem();
+  request.mutable_problem()->clear_measured();
+  const auto response = RunEstimate(request, 1, {});
+  EXPECT_EQ(response.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(response.status().message()), testing::StartsWith("measured: "));
+}
+
+TEST(PropagationToProto, IsRowMajorAndTellsOfFailures) {
+  Propagation propagation;
+  propagation.time_s = {0, 1};
+  propagation.outputs = {
+      {.output = "x",
+       .unit = "m",
+       .mean = (Vector(2) << 1, 2).finished(),
+       .standard_deviation = (Vector(2) << 3, 4).finished(),
+       .quantiles = (Matrix(2, 2) << 5, 6, 7, 8).finished(),
+       .residual = (Vector(2) << 9, 10).finished(),
+       .densities = {{(Vector(1) << 11).finished(), (Vector(1) << 12).finished()}}}};
+  propagation.order = 3;
+  propagation.terms = 4;
+  propagation.points = 8;
+  propagation.failures.resize(2);
+  propagation.failures[0] = {.point = 1, .time_s = 0.5, .flag = -4, .reason = "it blew up"};
+  const v1::PropagateResponse response = ToProto(propagation, {0.1, 0.9});
+  EXPECT_EQ(response.time_size(), 2);
+  EXPECT_EQ(response.probabilities(1), 0.9);
+  EXPECT_EQ(response.order(), 3);
+  EXPECT_EQ(response.terms(), 4);
+  EXPECT_EQ(response.points(), 8);
+  const auto& x = response.outputs(0);
+  EXPECT_EQ(x.name(), "x");
+  EXPECT_EQ(x.unit(), "m");
+  EXPECT_EQ(x.mean(1), 2);
+  EXPECT_EQ(x.std_dev(1), 4);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(x.quantiles(i), 5 + i);
+  EXPECT_EQ(x.residual(0), 9);
+  EXPECT_EQ(x.densities(0).value(0), 11);
+  EXPECT_EQ(x.densities(0).density(0), 12);
+  ASSERT_EQ(response.diagnostics_size(), 1);
+  EXPECT_EQ(response.diagnostics(0).code(), v1::Diagnostic::POINTS_FAILED);
+  EXPECT_THAT(response.diagnostics(0).message(),
+              testing::AllOf(testing::HasSubstr("2 of 8"), testing::HasSubstr("it blew up")));
+}
+
+TEST(PropagationOptions, ComeFromTheRequest) {
+  v1::PropagateRequest request;
+  request.set_until(2);
+  request.set_step(0.5);
+  EXPECT_EQ(ToPropagationOptions(request).probabilities, (std::vector<double>{0.025, 0.5, 0.975}));
+  request.add_outputs("v");
+  request.add_probabilities(0.3);
+  request.set_density_bins(40);
+  const PropagationOptions options = ToPropagationOptions(request);
+  EXPECT_EQ(options.until_s, 2);
+  EXPECT_EQ(options.step_s, 0.5);
+  EXPECT_EQ(options.outputs, (std::vector<std::string>{"v"}));
+  EXPECT_EQ(options.probabilities, (std::vector<double>{0.3}));
+  EXPECT_EQ(options.density_bins, 40);
+}
+
+TEST(CostGridOptions, ComeFromTheRequest) {
+  v1::EvaluateCostRequest request;
+  request.add_parameters("k");
+  request.set_grid_points(11);
+  (*request.mutable_held())["c"] = 0.5;
+  const CostGridOptions options = ToCostGridOptions(request);
+  EXPECT_EQ(options.parameters, (std::vector<std::string>{"k"}));
+  EXPECT_EQ(options.points, 11);
+  EXPECT_EQ(options.held.at("c"), 0.5);
+}
+
+}  // namespace
+}  // namespace polyest
