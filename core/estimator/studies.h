@@ -4,6 +4,8 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,12 @@
 #include "core/estimator/samples.h"
 
 namespace polyest {
+
+// Limits past which a study is RESOURCE_EXHAUSTED (bins and samples: INVALID_ARGUMENT).
+inline constexpr int64_t kMostPropagatedValues = 5'000'000;  // numbers answered
+inline constexpr int64_t kMostGridPoints = 100'000;
+inline constexpr int kMostDensityBins = 1'000;
+inline constexpr int kMostDensitySamples = 200'000;
 
 struct PropagationOptions {
   double until_s = 0;                // > 0
@@ -47,7 +55,9 @@ struct Propagation {
   std::vector<PointFailure> failures;
 };
 
-// The outputs over time under the prior, on the fixed expansion of the problem (3)–(13).
+// The outputs over time under the prior, on the fixed expansion of the problem (3)–(13). Points
+// that cannot be integrated are left out while more than S remain, else FAILED_PRECONDITION.
+// INVALID_ARGUMENT names the field, the value and the rule.
 absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
                                            const PropagationOptions& options, const Stop& stop);
 
@@ -63,13 +73,14 @@ struct CostGridOptions {
 struct CostGrid {
   std::vector<std::string> parameters;
   std::vector<Vector> axes;  // values of each parameter; over Ω, or mean ± 4 σ where unbounded
-  Matrix mismatch;           // first axis × second axis (or × 1)
+  Matrix mismatch;           // first axis × second axis (or × 1); +∞ where the model fails
   Matrix prior;              // +∞ at a bound where the density is 0
   Matrix total;              // mismatch + α² prior
 };
 
 // J_mismatch, J_apriori and J_total (25), (56) on a grid, from runs of the model itself and not of
-// an expansion: what is drawn is the cost as it is.
+// an expansion: what is drawn is the cost as it is. α² is the problem's fixed one.
+// INVALID_ARGUMENT names the field (or row and column), the value and the rule.
 absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
                                           const CostGridOptions& options, const Stop& stop);
 

@@ -1,0 +1,242 @@
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/common/status.h"
+#include "core/estimator/sample_checks.h"
+#include "core/estimator/studies.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Grid points run together and sample times advanced at once: bound the memory.
+constexpr Eigen::Index kPointsAtATime = 1024;
+constexpr size_t kTimesAtATime = 64;
+// An axis without a bound goes this many standard deviations from the mean.
+constexpr double kDeviations = 4;
+
+std::vector<std::string> UncertainNames(const Prior& prior) {
+  std::vector<std::string> names;
+  for (const UncertainParameter& parameter : prior.parameters()) names.push_back(parameter.name);
+  return names;
+}
+
+absl::StatusOr<int> FindUncertain(const Prior& prior, const std::string& field,
+                                  const std::string& name) {
+  const std::vector<std::string> names = UncertainNames(prior);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  return absl::InvalidArgumentError(
+      absl::StrFormat("%s: \"%s\" is not among the uncertain parameters %s", field, name,
+                      absl::StrJoin(names, ", ")));
+}
+
+// The uncertain parameters on the axes, by column.
+absl::StatusOr<std::vector<int>> ChooseAxes(const Prior& prior, const CostGridOptions& options) {
+  if (options.parameters.empty()) {
+    return prior.dimension() == 1 ? std::vector<int>{0} : std::vector<int>{0, 1};
+  }
+  if (options.parameters.size() > 2) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "parameters: %d are given; a grid is over one or two", options.parameters.size()));
+  }
+  std::vector<int> axes;
+  for (size_t i = 0; i < options.parameters.size(); ++i) {
+    const std::string field = absl::StrFormat("parameters[%d]", i);
+    POLYEST_ASSIGN_OR_RETURN(const int axis, FindUncertain(prior, field, options.parameters[i]));
+    if (!axes.empty() && axes.front() == axis) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%s: %s is given twice", field, options.parameters[i]));
+    }
+    axes.push_back(axis);
+  }
+  return axes;
+}
+
+absl::StatusOr<Eigen::Index> ChoosePoints(const CostGridOptions& options, size_t axes) {
+  if (options.points == 0) return axes == 1 ? 201 : 41;
+  if (options.points < 2) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("gridPoints: %d must be at least 2, or 0 for the default", options.points));
+  }
+  const auto points = static_cast<int64_t>(options.points);
+  const int64_t all = axes == 1 ? points : points * points;
+  if (all > kMostGridPoints) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("gridPoints: %d an axis make %d runs of the model; the limit is %d", points,
+                        all, kMostGridPoints));
+  }
+  return static_cast<Eigen::Index>(points);
+}
+
+// The germ at which everything is held: the prior mean, but for the values given.
+absl::StatusOr<Vector> HeldGerm(const Prior& prior, const CostGridOptions& options,
+                                const std::vector<int>& axes) {
+  Vector theta = prior.Mean();
+  for (const auto& [name, value] : options.held) {
+    const std::string field = absl::StrFormat("held.%s", name);
+    POLYEST_ASSIGN_OR_RETURN(const int column, FindUncertain(prior, field, name));
+    if (std::find(axes.begin(), axes.end(), column) != axes.end()) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%s: %s is on an axis of the grid and cannot be held", field, name));
+    }
+    theta[column] = value;
+    const Germ& germ = prior.parameters()[static_cast<size_t>(column)].germ;
+    const double xi = prior.ToGerm(theta)[column];
+    if (!std::isfinite(value) || !(germ.Lower() <= xi && xi <= germ.Upper())) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%s: %g lies outside the prior of %s", field, value, name));
+    }
+  }
+  return prior.ToGerm(theta);
+}
+
+// Germ values along an axis: over Ω, or mean ± 4 standard deviations where it has no bound.
+Vector AxisGerm(const Germ& germ, Eigen::Index points) {
+  const double reach = kDeviations * germ.StandardDeviation();
+  const double lower = std::isfinite(germ.Lower()) ? germ.Lower() : germ.Mean() - reach;
+  const double upper = std::isfinite(germ.Upper()) ? germ.Upper() : germ.Mean() + reach;
+  Vector axis = Vector::LinSpaced(points, lower, upper);
+  axis[points - 1] = upper;  // exactly, so that it lies in Ω
+  return axis;
+}
+
+// J_mismatch of every row of `thetas`, from runs of the model over the whole record.
+class ModelMismatch {
+ public:
+  ModelMismatch(const ResolvedProblem& problem, const CheckedSamples& record, int threads)
+      : problem_(problem),
+        record_(record),
+        threads_(threads),
+        channels_(static_cast<size_t>(problem.channels())),
+        width_(channels_ + problem.streamed_inputs().size()) {}
+
+  absl::StatusOr<Vector> Evaluate(const Matrix& thetas, const Stop& stop) const {
+    Vector mismatch = Vector::Zero(thetas.rows());
+    for (size_t first = 0; first < record_.rows.size();) {
+      size_t end = first + 1;
+      while (end < record_.rows.size() && record_.rows[end].run == record_.rows[first].run) ++end;
+      POLYEST_RETURN_IF_ERROR(AddRun(thetas, first, end, mismatch, stop));
+      first = end;
+    }
+    return mismatch;
+  }
+
+ private:
+  // The rows [first, end) of one run: the model starts anew, with inputs of its own.
+  absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Vector& mismatch,
+                      const Stop& stop) const {
+    InputSignals inputs = problem_.MakeInputs();
+    std::vector<double> times;
+    for (size_t k = first; k < end; ++k) {
+      times.push_back(record_.rows[k].time_s);
+      for (size_t i = 0; i < problem_.streamed_inputs().size(); ++i) {
+        inputs[static_cast<size_t>(problem_.streamed_inputs()[i])].Append(
+            times.back(), record_.values[k * width_ + channels_ + i]);
+      }
+    }
+    EnsemblePropagator ensemble(problem_.MakeEnsemble(thetas, problem_.outputs(), threads_),
+                                &inputs);
+    Matrix outputs;
+    for (size_t k = 0; k < times.size(); k += kTimesAtATime) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      const size_t count = std::min(kTimesAtATime, times.size() - k);
+      outputs.resize(thetas.rows(), static_cast<Eigen::Index>(count * channels_));
+      POLYEST_RETURN_IF_ERROR(ensemble.Advance(std::span(times).subspan(k, count), outputs, stop));
+      for (size_t row = 0; row < count; ++row) {
+        AddRow(first + k + row, outputs, row * channels_, mismatch);
+      }
+    }
+    for (const PointFailure& failure : ensemble.failures()) mismatch[failure.point] = kInfinity;
+    return absl::OkStatus();
+  }
+
+  void AddRow(size_t row, const Matrix& outputs, size_t first_column, Vector& mismatch) const {
+    for (size_t channel = 0; channel < channels_; ++channel) {
+      const double sigma = record_.noise[row * channels_ + channel];
+      if (!(sigma > 0)) continue;  // missing
+      const double z = record_.values[row * width_ + channel];
+      // J_mismatch += ½ (z − y)²/R
+      const auto y = outputs.col(static_cast<Eigen::Index>(first_column + channel)).array();
+      mismatch.array() += 0.5 * ((z - y) / sigma).square();
+    }
+  }
+
+  const ResolvedProblem& problem_;
+  const CheckedSamples& record_;
+  int threads_;
+  size_t channels_;
+  size_t width_;  // of a row's values: channels, then streamed inputs
+};
+
+// Where the model could not be run J is +∞, never a value that is not a number.
+Matrix WithoutNotANumber(Matrix values) {
+  for (double& value : values.reshaped()) {
+    if (std::isnan(value)) value = kInfinity;
+  }
+  return values;
+}
+
+// J of the points of the grid, `xis` in germ coordinates with the first axis running fastest.
+absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model, const Matrix& xis,
+                      CostGrid& grid, const Stop& stop) {
+  const Prior& prior = problem.prior();
+  Matrix thetas(xis.rows(), xis.cols());
+  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
+    thetas.row(i) = prior.ToParameters(xis.row(i).transpose()).transpose();
+    grid.prior.reshaped()[i] = prior.NegativeLogDensity(xis.row(i).transpose());
+  }
+  for (Eigen::Index first = 0; first < xis.rows(); first += kPointsAtATime) {
+    const Eigen::Index count = std::min(kPointsAtATime, xis.rows() - first);
+    POLYEST_ASSIGN_OR_RETURN(const Vector mismatch,
+                             model.Evaluate(thetas.middleRows(first, count), stop));
+    grid.mismatch.reshaped().segment(first, count) = mismatch;
+  }
+  grid.mismatch = WithoutNotANumber(std::move(grid.mismatch));
+  grid.total = grid.mismatch;
+  const double regularization = problem.problem().regularization;  // α²
+  if (regularization > 0) grid.total += regularization * grid.prior;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
+                                          const CostGridOptions& options, const Stop& stop) {
+  const Prior& prior = problem.prior();
+  if (problem.channels() == 0) {
+    return absl::InvalidArgumentError("measured: at least one output must be measured");
+  }
+  if (options.threads < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("threads: %d must be at least 1", options.threads));
+  }
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<int> axes, ChooseAxes(prior, options));
+  POLYEST_ASSIGN_OR_RETURN(const Eigen::Index points, ChoosePoints(options, axes.size()));
+  POLYEST_ASSIGN_OR_RETURN(const Vector held, HeldGerm(prior, options, axes));
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
+
+  CostGrid grid;
+  const Eigen::Index second = axes.size() == 2 ? points : 1;
+  Matrix xis = held.transpose().replicate(points * second, 1);
+  for (size_t a = 0; a < axes.size(); ++a) {
+    const UncertainParameter& parameter = prior.parameters()[static_cast<size_t>(axes[a])];
+    const Vector axis = AxisGerm(parameter.germ, points);
+    grid.parameters.push_back(parameter.name);
+    grid.axes.push_back(parameter.location + parameter.scale * axis.array());
+    for (Eigen::Index i = 0; i < xis.rows(); ++i) {
+      xis(i, axes[a]) = axis[a == 0 ? i % points : i / points];
+    }
+  }
+  grid.mismatch.resize(points, second);
+  grid.prior.resize(points, second);
+  const ModelMismatch model(problem, record, options.threads);
+  POLYEST_RETURN_IF_ERROR(FillGrid(problem, model, xis, grid, stop));
+  return grid;
+}
+
+}  // namespace polyest
