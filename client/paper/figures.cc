@@ -10,8 +10,8 @@ namespace polyest {
 namespace {
 
 constexpr char kTotalColor[] = "#1f4e9c", kMismatchColor[] = "#d95f02", kPriorColor[] = "#1b9e77",
-               kResponseColor[] = "#1f4e9c", kReferenceColor[] = "#555555",
-               kEstimateColor[] = "#c2185b";
+               kResponseColor[] = "#6a4c93", kSampleColor[] = "#222222",
+               kReferenceColor[] = "#555555", kEstimateColor[] = "#c2185b";
 constexpr int kContourLevels = 14;
 
 std::vector<double> ToStdVector(const Vector& values) { return {values.begin(), values.end()}; }
@@ -40,7 +40,7 @@ LinePanel ResponsePanel(const ExperimentResult& result, int variant, int channel
   panel.y_label = absl::StrCat(name, " (", unit, ")");
   panel.series.push_back({"without noise", kResponseColor, LineStyle::kSolid,
                           result.response.time_s, ToStdVector(result.response.value.col(channel))});
-  panel.series.push_back({"measured", kEstimateColor, LineStyle::kMarkers, samples.time_s,
+  panel.series.push_back({"measured", kSampleColor, LineStyle::kMarkers, samples.time_s,
                           samples.columns[channel].value});
   return panel;
 }

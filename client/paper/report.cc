@@ -57,6 +57,7 @@ size_t Letters(std::string_view text) {
 std::string WithDeviation(double value, double deviation) {
   const int leading = deviation > 0 ? static_cast<int>(std::floor(std::log10(deviation))) : -6;
   const int decimals = std::clamp(1 - leading, 0, 9);
+  if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0;  // no "-0.00"
   return absl::StrFormat("%.*f ± %.*f", decimals, value, decimals, deviation);
 }
 

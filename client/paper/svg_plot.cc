@@ -144,9 +144,10 @@ class PanelFrame {
   double Y(double value) const {
     return std::clamp(vertical_.Pixel(value), top_ - 2000, top_ + height_ + 2000);
   }
+  double left() const { return left_; }
+  double right() const { return left_ + width_; }
   double top() const { return top_; }
   double bottom() const { return top_ + height_; }
-  const Axis& horizontal() const { return horizontal_; }
 
   void DrawGrid(SvgWriter& svg) const {
     for (const AxisTick& tick : horizontal_.ticks) {
@@ -205,7 +206,7 @@ void DrawPanel(const LinePanel& panel, double x, double y, SvgWriter& svg) {
     for (double value : series.x) xs.Include(value);
     for (double value : series.y) ys.Include(value);
   }
-  xs.Pad(0);
+  xs.Pad(0.02);
   ys.Pad(0.05);
   const PanelFrame frame(x, y, xs, ys);
   frame.DrawGrid(svg);
@@ -239,17 +240,57 @@ std::string LevelColor(double part) {
   return absl::StrFormat("#%02x%02x%02x", mix(0), mix(1), mix(2));
 }
 
-void DrawPanel(const ContourPanel& panel, double x, double y, SvgWriter& svg) {
-  Range xs{panel.x(0), panel.x(panel.x.size() - 1)};
-  Range ys{panel.y(0), panel.y(panel.y.size() - 1)};
-  const PanelFrame frame(x, y, xs, ys);
-  frame.DrawGrid(svg);
-  frame.BeginContent(svg);
-  struct LevelText {
-    std::array<double, 2> at;
+std::string LevelText(double level) {
+  if (std::abs(level) < 1000) return absl::StrFormat("%.3g", level);
+  return level < 1e6 ? absl::StrFormat("%.0f", level) : absl::StrFormat("%.2e", level);
+}
+
+// The levels' numbers upon their lines, each where it overlaps none before it.
+class LevelTexts {
+ public:
+  explicit LevelTexts(const PanelFrame& frame) : frame_(frame) {}
+
+  void Add(const ContourLine& line, double level, const std::string& color) {
+    const std::string text = LevelText(level);
+    const double width = 5.8 * static_cast<double>(text.size()) + 4;
+    const size_t count = line.points.size();
+    // From the middle outwards in steps of a sixteenth of the line.
+    for (const int sixteenth : {8, 5, 11, 3, 13, 2, 14}) {
+      const auto [x, y] = line.points[(count - 1) * sixteenth / 16];
+      const Box box{frame_.X(x) - width / 2, frame_.Y(y) - 6, width, 12, text, color};
+      if (!Fits(box)) continue;
+      boxes_.push_back(box);
+      return;
+    }
+  }
+
+  void Draw(SvgWriter& svg) const {
+    for (const Box& box : boxes_) {
+      svg.Rectangle(box.x, box.y, box.width, box.height, "#ffffff", 0.9);
+      svg.Text(box.x + box.width / 2, box.y + 9, box.text, {.size = 9, .color = box.color});
+    }
+  }
+
+ private:
+  struct Box {
+    double x, y, width, height;
     std::string text, color;
   };
-  std::vector<LevelText> texts;
+  bool Fits(const Box& box) const {
+    if (box.x < frame_.left() || box.x + box.width > frame_.right()) return false;
+    if (box.y < frame_.top() || box.y + box.height > frame_.bottom()) return false;
+    return std::none_of(boxes_.begin(), boxes_.end(), [&](const Box& other) {
+      return box.x < other.x + other.width && other.x < box.x + box.width &&
+             box.y < other.y + other.height && other.y < box.y + box.height;
+    });
+  }
+
+  const PanelFrame& frame_;
+  std::vector<Box> boxes_;
+};
+
+void DrawContours(const ContourPanel& panel, const PanelFrame& frame, SvgWriter& svg) {
+  LevelTexts texts(frame);
   const size_t count = panel.levels.size();
   for (size_t l = 0; l < count; ++l) {
     const std::string color =
@@ -262,15 +303,21 @@ void DrawPanel(const ContourPanel& panel, double x, double y, SvgWriter& svg) {
       for (const auto& [px, py] : line.points) pixels.push_back({frame.X(px), frame.Y(py)});
       svg.Polyline(pixels, line.closed, {color, 1.4, ""});
     }
-    if (longest == nullptr || l % 3 != 0) continue;
-    const auto [px, py] = longest->points[longest->points.size() / 3];
-    texts.push_back({{frame.X(px), frame.Y(py)}, absl::StrFormat("%.3g", panel.levels[l]), color});
+    if (longest != nullptr && l % 3 == 0) texts.Add(*longest, panel.levels[l], color);
   }
-  for (const LevelText& text : texts) {
-    svg.Text(text.at[0], text.at[1] + 3, text.text, {.size = 9, .color = text.color, .halo = true});
-  }
-  for (const PointMark& p : panel.points)
+  texts.Draw(svg);
+}
+
+void DrawPanel(const ContourPanel& panel, double x, double y, SvgWriter& svg) {
+  const Range xs{panel.x(0), panel.x(panel.x.size() - 1)};
+  const Range ys{panel.y(0), panel.y(panel.y.size() - 1)};
+  const PanelFrame frame(x, y, xs, ys);
+  frame.DrawGrid(svg);
+  frame.BeginContent(svg);
+  DrawContours(panel, frame, svg);
+  for (const PointMark& p : panel.points) {
     svg.Circle(frame.X(p.x), frame.Y(p.y), 5, p.color, "#ffffff");
+  }
   svg.EndClip();
   frame.DrawLabels(panel.title, panel.x_label, panel.y_label, svg);
 }

@@ -109,9 +109,6 @@ void SvgWriter::Text(double x, double y, std::string_view text, const SvgTextSty
     absl::StrAppend(&text_, " transform=\"rotate(", Number(style.rotation_deg), " ", Number(x), " ",
                     Number(y), ")\"");
   }
-  if (style.halo) {
-    absl::StrAppend(&text_, " stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\"");
-  }
   absl::StrAppend(&text_, ">", EscapeXml(text), "</text>\n");
 }
 

@@ -21,7 +21,6 @@ struct SvgTextStyle {
   std::string color = "#222222";
   bool bold = false;
   double rotation_deg = 0;  // about the text's own position
-  bool halo = false;        // white around the letters, for text upon lines
 };
 
 class SvgWriter {

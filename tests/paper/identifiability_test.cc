@@ -1,0 +1,150 @@
+// Figures 13 and 14 and sections 3.5 and 3.6: what cannot be identified, and what helps.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/paper/paper_experiments.h"
+
+namespace polyest {
+namespace {
+
+// Values computed from (55)–(56) with ω_obs = 6.098601, to four digits: half a unit of the last
+// one, and as much again for the polynomial, whose error is residualToNoise · ρ.
+constexpr double kFourDigits = 1e-4;
+
+void ExpectGerm(const VariantResult& variant, double xi1, double xi2) {
+  SCOPED_TRACE(variant.name);
+  EXPECT_NEAR(variant.map_germ(0), xi1, kFourDigits);
+  EXPECT_NEAR(variant.map_germ(1), xi2, kFourDigits);
+}
+
+const VariantResult& WithRegularization(double alpha_squared) {
+  const ExperimentResult& result = Rerun("14");
+  for (size_t v = 0; v < result.variants.size(); ++v) {
+    const Problem& problem = result.experiment.variants[v].problem;
+    if (problem.regularization == alpha_squared &&
+        problem.regularization_mode == RegularizationMode::kFixed) {
+      return result.variants[v];
+    }
+  }
+  throw std::runtime_error("no such variant");
+}
+
+TEST(Figure13, MeasuresTheFrequencyOfTheReference) {
+  EXPECT_NEAR(Rerun("13").variants[0].samples.columns[0].value[0], 6.098601, 1e-6);
+}
+
+TEST(Figure13, EstimateIsThePapers) {
+  ExpectGerm(Rerun("13").variants[0], 0.0951, -0.4032);
+  ExpectGerm(Rerun("13").variants[1], 0.0550, -0.2273);
+}
+
+TEST(Figure13, OneDirectionIsIdentifiedAndTheValleyIsNot) {
+  const VariantResult& variant = Rerun("13").variants[0];
+  const auto& directions = variant.estimate.directions;
+  ASSERT_EQ(directions.size(), 2u);
+  EXPECT_EQ(directions[0].verdict, Verdict::kIdentified);
+  EXPECT_EQ(directions[1].verdict, Verdict::kNotIdentified);
+  // λ = |∂ω/∂ξ|²/ρ² at the estimate, up to the curvature of ω times the misfit left, a per cent.
+  const double m = variant.estimate.parameters[0].map, k = variant.estimate.parameters[1].map;
+  const double omega = std::sqrt(k / m);
+  const double slope_m = -omega / (2 * m) * 6.667, slope_k = omega / (2 * k) * 1052.8;
+  const double information = (slope_m * slope_m + slope_k * slope_k) / (0.0628 * 0.0628);
+  EXPECT_NEAR(directions[0].information, information, 0.02 * information);
+  // The direction is ω's gradient.
+  EXPECT_NEAR(directions[0].coefficients(0) / directions[0].coefficients(1), slope_m / slope_k,
+              0.02);
+  EXPECT_EQ(variant.estimate.parameters[0].verdict, Verdict::kNotIdentified);
+}
+
+TEST(Figure13, MismatchIsAValleyOfConstantFrequency) {
+  const CostGrid& cost = Rerun("13").variants[0].cost;
+  ASSERT_EQ(cost.axes.size(), 2u);
+  for (Eigen::Index i = 0; i < cost.axes[0].size(); ++i) {
+    for (Eigen::Index j = 0; j < cost.axes[1].size(); ++j) {
+      const double e = (std::sqrt(cost.axes[1](j) / cost.axes[0](i)) -
+                        Rerun("13").variants[0].samples.columns[0].value[0]) /
+                       0.0628;
+      ASSERT_NEAR(cost.mismatch(i, j), e * e / 2, 1e-9 * (1 + e * e));
+    }
+  }
+}
+
+TEST(Figure14, SmallRegularizationFindsThePointOfTheValleyNearestToThePrior) {
+  ExpectGerm(WithRegularization(1e-4), 0.0969, -0.4114);
+}
+
+TEST(Figure14, WithoutExtraWeightTheEstimateIsThePapers) {
+  ExpectGerm(WithRegularization(1), 0.0951, -0.4032);
+}
+
+TEST(Figure14, MoreWeightMovesTheEstimateTowardsThePrior) {
+  double before = 1e9;
+  for (double alpha_squared : {1e-4, 1.0, 10.0, 100.0, 1000.0}) {
+    const double distance = WithRegularization(alpha_squared).map_germ.norm();
+    EXPECT_LT(distance, before) << alpha_squared;
+    before = distance;
+  }
+  // λ = 50 against α² = 1000: all but λ/(λ + α²) of the way.
+  EXPECT_LT(before, 0.05 * 0.4227);
+}
+
+TEST(Figure14, NamesTheWeightThatTheLCurveChooses) {
+  const ExperimentResult& result = Rerun("14");
+  const VariantResult& chosen = result.variants.back();
+  ASSERT_EQ(result.experiment.variants.back().problem.regularization_mode,
+            RegularizationMode::kLCurve);
+  // One noise-free value can be met exactly: the curve has no corner, and Bayes' own weight stays.
+  EXPECT_DOUBLE_EQ(chosen.estimate.regularization, 1);
+  ExpectGerm(chosen, 0.0951, -0.4032);
+}
+
+TEST(Section35, ThetaIsNotSeenInTheDifference) {
+  const VariantResult& variant = Rerun("3.5").variants[0];
+  const ParameterEstimate& theta = variant.estimate.parameters[0];
+  // x1 − x2 of two trajectories agrees to the integration's error, 10⁻⁹ of the noise's 10⁻³.
+  EXPECT_NEAR(theta.map, theta.prior_mean, 1e-4 * theta.prior_std_dev);
+  EXPECT_NEAR(theta.std_dev, theta.prior_std_dev, 1e-6 * theta.prior_std_dev);
+  EXPECT_EQ(theta.verdict, Verdict::kNotIdentified);
+  EXPECT_TRUE(HasDiagnostic(variant.estimate, DiagnosticCode::kNotIdentified));
+  EXPECT_LT(variant.cost.mismatch.maxCoeff() - variant.cost.mismatch.minCoeff(), 1e-3);
+}
+
+TEST(Section35, AnotherStateIdentifiesTheta) {
+  const VariantResult& variant = Rerun("3.5").variants[1];
+  const ParameterEstimate& theta = variant.estimate.parameters[0];
+  EXPECT_EQ(theta.verdict, Verdict::kIdentified);
+  EXPECT_LE(std::abs(theta.map - 1.3), 3 * theta.std_dev);
+  EXPECT_LT(theta.contraction, 0.05);
+}
+
+TEST(Section36, TheSameBumpOnBothSidesLeavesTheInertiaUnknown) {
+  const VariantResult& variant = Rerun("3.6").variants[0];
+  const ParameterEstimate &mass = variant.estimate.parameters[0],
+                          &inertia = variant.estimate.parameters[1];
+  EXPECT_EQ(mass.verdict, Verdict::kIdentified);
+  EXPECT_LE(std::abs(mass.map - 580), 3 * mass.std_dev);
+  EXPECT_EQ(inertia.verdict, Verdict::kNotIdentified);
+  // Beta(2, 2) on [55, 80]: mode 67.5, standard deviation 25 √(1/20).
+  EXPECT_NEAR(inertia.map, 67.5, 1e-3 * 25);
+  EXPECT_NEAR(inertia.std_dev, 25 * std::sqrt(0.05), 1e-6 * 25);
+  ASSERT_EQ(variant.estimate.directions.size(), 2u);
+  EXPECT_EQ(variant.estimate.directions[1].verdict, Verdict::kNotIdentified);
+  EXPECT_NEAR(std::abs(variant.estimate.directions[1].coefficients(1)), 1, 1e-6);
+  EXPECT_TRUE(HasDiagnostic(variant.estimate, DiagnosticCode::kNotIdentified));
+}
+
+TEST(Section36, ABumpOnOneSideIdentifiesBoth) {
+  const VariantResult& variant = Rerun("3.6").variants[1];
+  for (int i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = variant.estimate.parameters[i];
+    EXPECT_EQ(parameter.verdict, Verdict::kIdentified) << parameter.name;
+    EXPECT_LE(std::abs(parameter.map - Rerun("3.6").experiment.reference(i)),
+              3 * parameter.std_dev);
+  }
+  EXPECT_FALSE(HasDiagnostic(variant.estimate, DiagnosticCode::kExpansionInaccurate));
+}
+
+}  // namespace
+}  // namespace polyest

@@ -1,0 +1,184 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "client/paper/contours.h"
+#include "client/paper/figures.h"
+#include "client/paper/paper_command.h"
+#include "client/paper/svg_axis.h"
+#include "client/paper/svg_writer.h"
+#include "tests/paper/paper_experiments.h"
+
+namespace polyest {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+// Whether every tag is closed in order and every '<' and '&' in text and attributes is markup: what
+// XML calls well-formed, for the elements and attributes that our writer makes.
+testing::AssertionResult IsWellFormed(const std::string& text) {
+  std::vector<std::string> open;
+  size_t elements = 0;
+  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at)) {
+    const size_t end = text.find('>', at);
+    if (end == std::string::npos) return testing::AssertionFailure() << "tag not ended";
+    const std::string tag = text.substr(at + 1, end - at - 1);
+    at = end;
+    if (tag.front() == '?') continue;
+    if (tag.find('<') != std::string::npos) return testing::AssertionFailure() << "< in " << tag;
+    if (std::count(tag.begin(), tag.end(), '"') % 2 != 0) {
+      return testing::AssertionFailure() << "quotes in " << tag;
+    }
+    ++elements;
+    const std::string name = tag.substr(0, tag.find_first_of(" />", 1));
+    if (tag.front() == '/') {
+      if (open.empty() || "/" + open.back() != tag) {
+        return testing::AssertionFailure() << "closed out of order: " << tag;
+      }
+      open.pop_back();
+    } else if (tag.back() != '/') {
+      open.push_back(name);
+    }
+  }
+  for (size_t at = text.find('&'); at != std::string::npos; at = text.find('&', at + 1)) {
+    const std::string entity = text.substr(at, text.find(';', at) - at + 1);
+    if (entity != "&amp;" && entity != "&lt;" && entity != "&gt;" && entity != "&quot;" &&
+        entity != "&apos;") {
+      return testing::AssertionFailure() << "entity " << entity;
+    }
+  }
+  if (!open.empty()) return testing::AssertionFailure() << "not closed: " << open.back();
+  if (elements < 10) return testing::AssertionFailure() << "only " << elements << " tags";
+  return testing::AssertionSuccess();
+}
+
+TEST(WellFormedness, IsSeenAndMissed) {
+  SvgWriter svg(100, 100, "a < b & \"c\"", "");
+  for (int i = 0; i < 10; ++i) svg.Line(0, 0, i, i, {});
+  const std::string good = svg.Finish();
+  EXPECT_TRUE(IsWellFormed(good));
+  EXPECT_FALSE(IsWellFormed(good.substr(0, good.size() - 8)));
+  EXPECT_FALSE(IsWellFormed(good + "&x;"));
+}
+
+TEST(Contours, OfABowlAreClosedCircles) {
+  const Vector axis = Vector::LinSpaced(41, -2, 2);
+  const Matrix value = axis.array().square().matrix().replicate(1, 41) +
+                       axis.array().square().matrix().transpose().replicate(41, 1);
+  const auto lines = ContourLines(axis, axis, value, 1.05);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_TRUE(lines[0].closed);
+  // Linear interpolation of x² over h = 0.1 is wrong by h²/4 at most: 2r Δr ≤ h²/4.
+  for (const auto& [x, y] : lines[0].points) {
+    EXPECT_NEAR(x * x + y * y, 1.05, 0.01 / 4 + 1e-12);
+  }
+}
+
+TEST(Contours, ThatLeaveTheGridAreOpenAndHolesAreLeftOut) {
+  const Vector axis = Vector::LinSpaced(11, 0, 1);
+  Matrix value = axis.replicate(1, 11);  // value = x
+  auto lines = ContourLines(axis, axis, value, 0.55);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_FALSE(lines[0].closed);
+  EXPECT_EQ(lines[0].points.size(), 11u);
+  for (const auto& point : lines[0].points) EXPECT_NEAR(point[0], 0.55, 1e-12);
+  value(5, 5) = std::numeric_limits<double>::infinity();
+  lines = ContourLines(axis, axis, value, 0.55);
+  EXPECT_EQ(lines.size(), 2u);
+}
+
+TEST(Contours, OfASaddleDoNotCross) {
+  const Vector axis = Vector::LinSpaced(2, 0, 1);
+  Matrix value(2, 2);
+  value << 1, 0, 0, 1;
+  for (double level : {0.4, 0.6}) {
+    const auto lines = ContourLines(axis, axis, value, level);
+    ASSERT_EQ(lines.size(), 2u) << level;
+    // Below the centre's ½ the high corners are joined: each line cuts off a low corner.
+    const auto& [x, y] = lines[0].points[0];
+    const auto& [u, v] = lines[0].points[1];
+    const bool cuts_off_low = std::abs((x + u) / 2 + (y + v) / 2 - 1) < 0.2;
+    EXPECT_EQ(cuts_off_low, level < 0.5);
+  }
+}
+
+TEST(Axis, TicksAreRoundAndInside) {
+  const Axis axis = MakeAxis(-0.93, 1.07, 5, 0, 100);
+  ASSERT_EQ(axis.ticks.size(), 4u);
+  EXPECT_EQ(axis.ticks.front().text, "−0.5");
+  EXPECT_EQ(axis.ticks[1].text, "0.0");
+  EXPECT_NEAR(axis.Pixel(-0.93), 0, 1e-12);
+  EXPECT_NEAR(axis.Pixel(1.07), 100, 1e-12);
+  const Axis large = MakeAxis(0, 123456, 5, 0, 1);
+  EXPECT_EQ(large.exponent, 5);
+  EXPECT_EQ(large.ticks[1].text, "0.5");
+  EXPECT_EQ(PowerOfTenText(-12), "×10⁻¹²");
+}
+
+class EveryFigure : public testing::TestWithParam<std::string> {};
+
+TEST_P(EveryFigure, PlotsAsWellFormedSvgWithoutOutsideResources) {
+  const Plot plot = MakePlot(Rerun(GetParam()));
+  EXPECT_GE(plot.panels.size(), 2u);
+  const std::string svg = RenderSvg(plot);
+  EXPECT_TRUE(IsWellFormed(svg));
+  EXPECT_THAT(svg, HasSubstr("true value"));
+  EXPECT_THAT(svg, HasSubstr("estimate"));
+  EXPECT_THAT(svg, HasSubstr("<poly"));
+  EXPECT_THAT(svg, Not(HasSubstr("href")));
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  EXPECT_EQ(svg, RenderSvg(plot));
+}
+
+INSTANTIATE_TEST_SUITE_P(Paper, EveryFigure, testing::ValuesIn(PaperFigures()),
+                         [](const auto& figure) {
+                           std::string name = figure.param;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
+
+TEST(PaperCommand, AnswersAnUnknownFigureWithTheFiguresThereAre) {
+  std::ostringstream out, err;
+  EXPECT_EQ(RunPaper({.figure = "9", .plot_file = ""}, out, err), 2);
+  EXPECT_EQ(out.str(), "");
+  EXPECT_EQ(err.str(), "figure: \"9\" must be one of 4, 5, 6, 7, 8, 11, 12, 13, 14, 3.5, 3.6\n");
+}
+
+TEST(PaperCommand, RefusesAPlotOfNoFigure) {
+  std::ostringstream out, err;
+  EXPECT_EQ(RunPaper({.figure = "", .plot_file = "all.svg"}, out, err), 2);
+  EXPECT_EQ(out.str(), "");
+  EXPECT_THAT(err.str(), HasSubstr("--plot"));
+}
+
+TEST(PaperCommand, FailsWhenThePlotCannotBeWritten) {
+  std::ostringstream out, err;
+  EXPECT_EQ(RunPaper({.figure = "8", .plot_file = testing::TempDir() + "/no/such/x.svg"}, out, err),
+            1);
+  EXPECT_THAT(err.str(), HasSubstr("cannot write"));
+}
+
+TEST(PaperCommand, PrintsAFigureAndWritesItsPlot) {
+  const std::string file = testing::TempDir() + "/polyest_figure_4.svg";
+  std::ostringstream out, err;
+  EXPECT_EQ(RunPaper({.figure = "4", .plot_file = file}, out, err), 0);
+  EXPECT_EQ(err.str(), "");
+  EXPECT_THAT(out.str(), HasSubstr("Figure 4"));
+  EXPECT_THAT(out.str(), HasSubstr("NOT_IDENTIFIED"));
+  EXPECT_THAT(out.str(), HasSubstr("UNDERSAMPLED"));
+  EXPECT_THAT(out.str(), HasSubstr("The paper:"));
+  std::ostringstream written;
+  written << std::ifstream(file).rdbuf();
+  EXPECT_TRUE(IsWellFormed(written.str()));
+  std::filesystem::remove(file);
+}
+
+}  // namespace
+}  // namespace polyest
