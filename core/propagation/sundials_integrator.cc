@@ -40,7 +40,7 @@ int SundialsIntegrator::ErrorWeights(N_Vector states, N_Vector weights, void* se
 
 double SundialsIntegrator::FirstStep(double span_s) {
   system_->Derivatives(time_s_, EnsembleValues(vector()), first_rates_);
-  double step_s = span_s;
+  double step_s = span_s / 64;
   for (Eigen::Index s = 0; s < first_rates_.cols(); ++s) {
     const double rate = first_rates_.col(s).abs().maxCoeff();
     const double candidate_s = 0.01 * scale_.block_scale(s) / rate;

@@ -56,8 +56,9 @@ class SundialsIntegrator : public EnsembleIntegrator {
   void ChooseFirstStepAgain() { first_step_set_ = false; }
 
  private:
-  // A step to begin with, (1/100) min_s S_s ÷ max_p |ẋ_ps|, at most span_s. It is a guess: the
-  // error test shortens it, and it may grow fast.
+  // A step to begin with, (1/100) min_s S_s ÷ max_p |ẋ_ps|, at most a small part of span_s so that
+  // an input is seen that is 0 now. It is a guess: the error test shortens it, and it may grow
+  // fast.
   double FirstStep(double span_s);
   IntegratorOutcome Outcome(int flag, double advance_s, double span_s) const;
 

@@ -15,6 +15,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Steps between two looks at the stop request.
 constexpr int kStepsAtOnce = 500;
+// A multistep method sees an input only at the ends of its steps: one long step from rest over a
+// bump, 0 at both ends, would miss it. So after each break it stops once early on.
+constexpr double kLook = 1.0 / 64;
 
 Eigen::Index PaddedRows(int points) {
   return (points + kLanes - 1) / kLanes * static_cast<Eigen::Index>(kLanes);
@@ -90,9 +93,11 @@ TrajectoryBlock::Break TrajectoryBlock::NextBreak() const {
     const double break_s = input.NextBreak(time_s_);
     if (break_s > next.time_s || break_s == kInfinity) continue;
     const bool together = break_s == next.time_s;
-    next = {break_s, input.Jumps() || (together && next.jumps)};
+    next = {break_s, input.Jumps() || (together && next.jumps), true};
   }
-  return next;
+  if (!stiff_ || streamed_ || next.time_s == kInfinity) return next;
+  const double look_s = last_break_s_ + kLook * (next.time_s - last_break_s_);
+  return look_s > time_s_ ? Break{look_s, false, false} : next;
 }
 
 absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -117,6 +122,7 @@ absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
     }
     POLYEST_RETURN_IF_ERROR(Reach(next.time_s, next.time_s, stop));
     time_s_ = next.time_s;
+    if (next.is_input) last_break_s_ = time_s_;
     if (next.jumps && integrator_) integrator_->Restart();
   }
 }

@@ -47,6 +47,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   struct Break {
     double time_s = std::numeric_limits<double>::infinity();
     bool jumps = false;
+    bool is_input = false;  // rather than a time at which to look
   };
 
   void StartIntegrator(double time_s);
@@ -80,6 +81,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   int alive_points_;
   bool stiff_ = false;
   double time_s_ = 0;
+  double last_break_s_ = 0;
   std::unique_ptr<EnsembleIntegrator> integrator_;
   std::vector<PointFailure> failures_;
 };
