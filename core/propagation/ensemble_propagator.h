@@ -30,8 +30,9 @@ enum class IntegrationMethod {
 
 struct IntegrationOptions {
   IntegrationMethod method = IntegrationMethod::kAuto;
-  // Local error of each state of each point ≤ relative_tolerance × the largest magnitude that this
-  // state has had so far over the block.
+  // Estimated local error of each state of each point ≤ relative_tolerance × the largest magnitude
+  // that this state has had so far over the block, + 1e-14 in SI units; in fact × that of the point
+  // itself, unless that is below a thousandth of the block's (error_scale.h).
   double relative_tolerance = 1e-7;
   // Steps from one sample to the next, at most; past it a point has failed.
   int most_steps = 100'000;
@@ -72,8 +73,9 @@ class EnsemblePropagator {
 
   // Advances to each time in turn (non-decreasing, ≥ the time reached; the first may be 0).
   // outputs is Q × (m · times), the m outputs at the k-th time in columns k·m … k·m + m − 1; rows
-  // of failed points are 0 from their failure on. Only a stop request makes it not OK; a
-  // trajectory that fails is recorded in failures().
+  // of failed points are 0 from their failure on. Only a stop request makes it not OK: blocks are
+  // then left at different times and Advance must not be called again. A trajectory that fails is
+  // recorded in failures().
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
 
   // Ordered by point.

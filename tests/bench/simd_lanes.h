@@ -1,10 +1,13 @@
 #pragma once
 
 // The practical limit: Dormand–Prince written out by hand for this one model, eight trajectories in
-// the lanes of SIMD registers, fixed steps that end at every sample and kink. Nothing adaptive,
-// nothing general.
+// the lanes of SIMD registers, equal steps from sample to sample (and so from kink to kink), as
+// many as the error of the worst lane asks for. Nothing general: the scales of the states are
+// known.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/common/types.h"
 #include "tests/bench/half_car.h"
@@ -15,18 +18,12 @@ class SimdLanes {
  public:
   using State = std::array<Lane, HalfCar::kStates>;
 
-  // steps_per_sample steps from one 100 Hz sample to the next.
-  static void Propagate(int steps_per_sample, const Matrix& parameters, int samples,
-                        Matrix& outputs) {
+  static void Propagate(double tolerance, const Matrix& parameters, int samples, Matrix& outputs) {
     for (Eigen::Index first = 0; first < parameters.rows(); first += kLanes) {
       SimdLanes lanes(parameters.middleRows<kLanes>(first));
       lanes.Read(first, 0, outputs);
       for (int sample = 1; sample < samples; ++sample) {
-        const double begin_s = (sample - 1) * 0.01;
-        const double step_s = 0.01 / steps_per_sample;
-        for (int step = 0; step < steps_per_sample; ++step) {
-          lanes.Step(begin_s + step * step_s, step_s);
-        }
+        lanes.Advance((sample - 1) * 0.01, tolerance);
         lanes.Read(first, sample, outputs);
       }
     }
@@ -36,6 +33,22 @@ class SimdLanes {
   explicit SimdLanes(const Matrix& parameters)
       : parameters_{parameters.col(0).array(), parameters.col(1).array()} {
     for (Lane& state : x_) state.setZero();
+  }
+
+  void Advance(double begin_s, double tolerance) {
+    const State start = x_;
+    for (;;) {
+      const double step_s = 0.01 / steps_;
+      double error = 0;
+      for (int step = 0; step < steps_; ++step) {
+        error = std::max(error, Step(begin_s + step * step_s, step_s));
+      }
+      const double growth = std::pow(error / tolerance, 0.2) / 0.9;
+      const int used = steps_;
+      steps_ = std::clamp(static_cast<int>(std::ceil(steps_ * growth)), 1, 100);
+      if (error <= tolerance || used >= steps_) return;
+      x_ = start;
+    }
   }
 
   void Rates(double time_s, double middle_s, const State& x, State& rates) const {
@@ -56,7 +69,8 @@ class SimdLanes {
     return moved;
   }
 
-  void Step(double t, double h) {
+  // Returns the largest local error, relative to 0.05 m or 1 m/s.
+  double Step(double t, double h) {
     const double middle = t + h / 2;
     Rates(t, middle, x_, k_[0]);
     Rates(t + h / 5, middle, Moved<1>(h, {1.0 / 5}), k_[1]);
@@ -68,6 +82,15 @@ class SimdLanes {
           Moved<5>(h, {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656}),
           k_[5]);
     x_ = Moved<6>(h, {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84});
+    Rates(t + h, middle, x_, k_[6]);
+    Lane worst = Lane::Zero();
+    for (int s = 0; s < HalfCar::kStates; ++s) {
+      const Lane error = (71.0 / 57600) * k_[0][s] - (71.0 / 16695) * k_[2][s] +
+                         (71.0 / 1920) * k_[3][s] - (17253.0 / 339200) * k_[4][s] +
+                         (22.0 / 525) * k_[5][s] - (1.0 / 40) * k_[6][s];
+      worst = worst.max((s < 4 ? 20 * h : h) * error.abs());
+    }
+    return worst.maxCoeff();
   }
 
   void Read(Eigen::Index first, int sample, Matrix& outputs) const {
@@ -80,7 +103,8 @@ class SimdLanes {
 
   std::array<Lane, HalfCar::kParameters> parameters_;
   State x_;
-  std::array<State, 6> k_;
+  std::array<State, 7> k_;
+  int steps_ = 4;
 };
 
 }  // namespace polyest::bench
