@@ -66,11 +66,12 @@ absl::StatusOr<ReferenceResponse> Respond(const ResolvedProblem& problem, const 
 }
 
 absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const Vector& reference,
-                                         int threads, const Stop& stop) {
+                                         double until_s, int threads, const Stop& stop) {
   VariantResult result;
   result.name = variant.name;
   POLYEST_ASSIGN_OR_RETURN(result.samples, SyntheticSamples(variant, reference));
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ResolvedProblem::Make(variant.problem));
+  POLYEST_ASSIGN_OR_RETURN(result.response, Respond(problem, reference, until_s));
   POLYEST_ASSIGN_OR_RETURN(auto estimator,
                            Estimator::Make(problem, {.threads = threads, .store = nullptr}));
   POLYEST_RETURN_IF_ERROR(estimator->Append(result.samples));
@@ -152,20 +153,17 @@ absl::StatusOr<ExperimentResult> RunExperiment(const Experiment& experiment, int
                                                const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
                            ResolvedProblem::Make(experiment.variants.front().problem));
-  ExperimentResult result{.experiment = experiment,
-                          .reference_germ = {},
-                          .prior = problem.prior(),
-                          .response = {},
-                          .variants = {}};
+  ExperimentResult result{
+      .experiment = experiment, .reference_germ = {}, .prior = problem.prior(), .variants = {}};
   result.reference_germ = problem.prior().ToGerm(experiment.reference);
+  // All variants over the same time, so that their pictures can be compared.
   double until_s = 0;
   for (const ExperimentVariant& variant : experiment.variants) {
     until_s = std::max(until_s, variant.sample_times_s.back());
   }
-  POLYEST_ASSIGN_OR_RETURN(result.response, Respond(problem, experiment.reference, until_s));
   for (const ExperimentVariant& variant : experiment.variants) {
     POLYEST_ASSIGN_OR_RETURN(VariantResult one,
-                             RunVariant(variant, experiment.reference, threads, stop));
+                             RunVariant(variant, experiment.reference, until_s, threads, stop));
     result.variants.push_back(std::move(one));
   }
   return result;

@@ -56,6 +56,7 @@ struct ReferenceResponse {
 struct VariantResult {
   std::string name;
   Samples samples;
+  ReferenceResponse response;  // what was to be measured, without noise
   Estimate estimate;
   Vector map_germ;      // ξ̂
   Vector std_dev_germ;  // stdDev in units of ξ
@@ -65,8 +66,7 @@ struct VariantResult {
 struct ExperimentResult {
   Experiment experiment;
   Vector reference_germ;
-  Prior prior;                 // the same in all variants
-  ReferenceResponse response;  // of the first variant's problem
+  Prior prior;  // the same in all variants
   std::vector<VariantResult> variants;
 };
 

@@ -34,12 +34,13 @@ LinePanel ResponsePanel(const ExperimentResult& result, int variant, int channel
   std::string unit;
   if (auto column = description.FindOutput(name)) unit = description.outputs[*column].unit;
   const Samples& samples = result.variants[variant].samples;
+  const ReferenceResponse& response = result.variants[variant].response;
   LinePanel panel;
   panel.title = absl::StrCat(name, ", ", samples.rows(), samples.rows() == 1 ? " time" : " times");
   panel.x_label = "t (s)";
   panel.y_label = absl::StrCat(name, " (", unit, ")");
-  panel.series.push_back({"without noise", kResponseColor, LineStyle::kSolid,
-                          result.response.time_s, ToStdVector(result.response.value.col(channel))});
+  panel.series.push_back({"without noise", kResponseColor, LineStyle::kSolid, response.time_s,
+                          ToStdVector(response.value.col(channel))});
   panel.series.push_back({"measured", kSampleColor, LineStyle::kMarkers, samples.time_s,
                           samples.columns[channel].value});
   return panel;

@@ -264,8 +264,14 @@ class LevelTexts {
     }
   }
 
+  // Keeps the place of a point free.
+  void Avoid(double x, double y) {
+    boxes_.push_back({frame_.X(x) - 6, frame_.Y(y) - 6, 12, 12, "", ""});
+  }
+
   void Draw(SvgWriter& svg) const {
     for (const Box& box : boxes_) {
+      if (box.text.empty()) continue;
       svg.Rectangle(box.x, box.y, box.width, box.height, "#ffffff", 0.9);
       svg.Text(box.x + box.width / 2, box.y + 9, box.text, {.size = 9, .color = box.color});
     }
@@ -291,6 +297,7 @@ class LevelTexts {
 
 void DrawContours(const ContourPanel& panel, const PanelFrame& frame, SvgWriter& svg) {
   LevelTexts texts(frame);
+  for (const PointMark& point : panel.points) texts.Avoid(point.x, point.y);
   const size_t count = panel.levels.size();
   for (size_t l = 0; l < count; ++l) {
     const std::string color =
