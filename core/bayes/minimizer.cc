@@ -1,6 +1,5 @@
 #include "core/bayes/minimizer.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/bayes/unit_problem.h"
 #include "core/common/check.h"
 
 namespace polyest {
@@ -20,8 +20,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // What the solver sees instead of +∞: far above anything else once the function is scaled.
 constexpr double kHuge = 1e20;
-// A constraint is active, or held, to this much of the unit box.
-constexpr double kActive = 1e-10;
+constexpr double kActive = UnitProblem::kActive;
 // SLSQP is started again from its result, with fresh curvature, at most so often.
 constexpr int kMostRestarts = 8;
 constexpr int kMostNewtonSteps = 6;
@@ -54,108 +53,6 @@ std::string InWords(int code) {
       return "unknown return code of the solver";
   }
 }
-
-// The problem in u = (x − lower)/(upper − lower), where the box is the unit cube, every constraint
-// row has unit length and the function is divided by `function_scale`.
-class UnitProblem {
- public:
-  UnitProblem(const MinimizationProblem& problem, const Stop& stop)
-      : problem_(problem), stop_(stop), width_(problem.upper - problem.lower) {
-    POLYEST_CHECK(width_.allFinite() && width_.minCoeff() >= 0);
-    POLYEST_CHECK(problem.constraint.rows() == problem.bound.size());
-    // a (lower + W u) ≤ bound, over the length of a W
-    const Eigen::Index n = width_.size();
-    rows_.resize(problem.constraint.rows(), n);
-    bounds_.resize(problem.constraint.rows());
-    Eigen::Index kept = 0;
-    for (Eigen::Index i = 0; i < problem.constraint.rows(); ++i) {
-      const Vector row = problem.constraint.row(i).transpose().cwiseProduct(width_);
-      const double length = row.norm();
-      if (!(length > 0)) continue;
-      rows_.row(kept) = row.transpose() / length;
-      bounds_[kept++] = (problem.bound[i] - problem.constraint.row(i).dot(problem.lower)) / length;
-    }
-    rows_.conservativeResize(kept, n);
-    bounds_.conservativeResize(kept);
-  }
-
-  Eigen::Index dimension() const { return width_.size(); }
-  const Matrix& rows() const { return rows_; }
-  const Vector& bounds() const { return bounds_; }
-  double function_scale() const { return function_scale_; }
-  void set_function_scale(double scale) { function_scale_ = scale; }
-  int evaluations() const { return evaluations_; }
-  bool stopped() const { return stopped_; }
-  bool PollStop() { return stopped_ = stopped_ || !stop_.Check().ok(); }
-
-  Vector ToPoint(const Vector& u) const {
-    const Vector x = problem_.lower + width_.cwiseProduct(u);
-    return x.cwiseMax(problem_.lower).cwiseMin(problem_.upper);
-  }
-  Vector ToUnit(const Vector& x) const {
-    Vector u(x.size());
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
-      u[i] = width_[i] > 0 ? (x[i] - problem_.lower[i]) / width_[i] : 0;
-      if (!std::isfinite(u[i])) u[i] = 0.5;
-    }
-    return u;
-  }
-
-  // Scaled value; +∞ where it or its gradient is not finite (the gradient is then 0).
-  double Value(const Vector& u, Vector* gradient) {
-    ++evaluations_;
-    const Vector x = ToPoint(u);
-    Vector slope(x.size());
-    double value = problem_.function(x, gradient == nullptr ? nullptr : &slope) / function_scale_;
-    if (gradient != nullptr) {
-      *gradient = slope.cwiseProduct(width_) / function_scale_;
-      if (!gradient->allFinite() || !std::isfinite(value)) {
-        gradient->setZero();
-        value = kInfinity;
-      }
-    }
-    return std::isfinite(value) ? value : kInfinity;
-  }
-
-  // The nearest point of the box and the constraints, by Dykstra's alternating projections.
-  Vector Project(Vector u) const {
-    u = u.cwiseMax(0).cwiseMin(1);
-    if (MostViolated(u) <= 0) return u;
-    Matrix correction = Matrix::Zero(u.size(), rows_.rows() + 1);
-    for (int sweep = 0; sweep < 2000; ++sweep) {
-      const Vector before = u;
-      for (Eigen::Index i = 0; i < rows_.rows(); ++i) {
-        const Vector from = u + correction.col(i);
-        const double excess = rows_.row(i).dot(from) - bounds_[i];
-        u = from - std::max(0.0, excess) * rows_.row(i).transpose();
-        correction.col(i) = from - u;
-      }
-      const Vector from = u + correction.rightCols<1>();
-      u = from.cwiseMax(0).cwiseMin(1);
-      correction.rightCols<1>() = from - u;
-      if ((u - before).cwiseAbs().maxCoeff() < 1e-14 && MostViolated(u) < 1e-14) break;
-    }
-    return u;
-  }
-
-  double MostViolated(const Vector& u) const {
-    return rows_.rows() == 0 ? 0 : (rows_ * u - bounds_).maxCoeff();
-  }
-
-  bool Feasible(const Vector& u) const {
-    return u.minCoeff() >= 0 && u.maxCoeff() <= 1 && MostViolated(u) <= kActive;
-  }
-
- private:
-  const MinimizationProblem& problem_;
-  const Stop& stop_;
-  Vector width_;
-  Matrix rows_;
-  Vector bounds_;
-  double function_scale_ = 1;
-  int evaluations_ = 0;
-  bool stopped_ = false;
-};
 
 // NLopt's callback for the function.
 struct Callback {
@@ -336,6 +233,17 @@ Vector PrepareStart(UnitProblem& problem, const Vector& start) {
   return start;
 }
 
+// A point that missed a bound by rounding is put on it, unless f is infinite there.
+Vector OnBounds(UnitProblem& problem, const Vector& u) {
+  constexpr double kRounding = 1e-12;
+  Vector snapped = u;
+  for (double& value : snapped) {
+    if (value < kRounding) value = 0;
+    if (value > 1 - kRounding) value = 1;
+  }
+  return std::isfinite(problem.Value(snapped, nullptr)) ? snapped : u;
+}
+
 bool IsSuccess(int code) {
   return code == nlopt::SUCCESS || code == nlopt::FTOL_REACHED || code == nlopt::XTOL_REACHED;
 }
@@ -364,7 +272,7 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
     if (minimum.converged || problem.stopped() || !std::isfinite(next_value)) break;
     if (problem.evaluations() >= options.most_evaluations) break;
   }
-  minimum.point = problem.ToPoint(problem.Project(u));
+  minimum.point = problem.ToPoint(problem.Project(OnBounds(problem, u)));
   minimum.value = original.function(minimum.point, nullptr);
   minimum.evaluations = problem.evaluations() + 1;
   minimum.reason = std::isfinite(value) ? InWords(minimum.code) : "the function is not finite";
