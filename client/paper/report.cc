@@ -53,10 +53,11 @@ size_t Letters(std::string_view text) {
                        [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
 }
 
-// "value ± deviation" to the digits that the deviation leaves meaning to.
-std::string WithDeviation(double value, double deviation) {
+// "value ± deviation" to the digits that the deviation leaves meaning to, and no fewer decimals
+// than `least_decimals`.
+std::string WithDeviation(double value, double deviation, int least_decimals) {
   const int leading = deviation > 0 ? static_cast<int>(std::floor(std::log10(deviation))) : -6;
-  const int decimals = std::clamp(1 - leading, 0, 9);
+  const int decimals = std::clamp(1 - leading, least_decimals, 9);
   if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0;  // no "-0.00"
   return absl::StrFormat("%.*f ± %.*f", decimals, value, decimals, deviation);
 }
@@ -115,8 +116,8 @@ std::vector<Row> EstimateTable(const ExperimentResult& result) {
       const double truth = result.experiment.reference(static_cast<Eigen::Index>(i));
       const auto index = static_cast<Eigen::Index>(i);
       rows.push_back({i == 0 ? variant.name : "", p.name, absl::StrFormat("%.6g", truth),
-                      absl::StrCat(WithDeviation(p.map, p.std_dev), " ", p.unit),
-                      WithDeviation(variant.map_germ(index), variant.std_dev_germ(index)),
+                      absl::StrCat(WithDeviation(p.map, p.std_dev, 0), " ", p.unit),
+                      WithDeviation(variant.map_germ(index), variant.std_dev_germ(index), 4),
                       absl::StrFormat("%.2f stdDev", std::abs(p.map - truth) / p.std_dev),
                       NameOf(p.verdict)});
     }
