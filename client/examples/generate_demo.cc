@@ -86,7 +86,7 @@ void WriteRollPlane() {
 
   Mode heave{std::sqrt(2 * k_n_per_m / mass_kg)};
   Mode roll{std::sqrt(0.5 * k_n_per_m * length_m * length_m / inertia_kg_m2)};
-  std::mt19937_64 generator(20'061'110);
+  std::mt19937_64 generator(20'061'111);
   std::puts("t,u1,u2,x1,x2");
   double before1 = 0;
   double before2 = 0;
