@@ -42,11 +42,9 @@ absl::Status Executor::Reserve() {
 }
 
 void Executor::Release() {
-  {
-    std::lock_guard lock(mutex_);
-    --accepted_;
-  }
-  ready_.notify_all();
+  std::lock_guard lock(mutex_);
+  --accepted_;
+  if (ending_ && accepted_ == 0) ready_.notify_all();
 }
 
 void Executor::Enqueue(Task task) {

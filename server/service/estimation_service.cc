@@ -8,6 +8,7 @@
 #include "server/operations/names.h"
 #include "server/operations/operations.h"
 #include "server/operations/pages.h"
+#include "server/service/guarded.h"
 #include "server/service/measurement_stream.h"
 #include "server/service/session_watch.h"
 #include "server/service/unary_call.h"
@@ -199,10 +200,10 @@ EstimationService::Unary* EstimationService::AddMeasurements(
 void EstimationService::EstimateForObservers(const std::shared_ptr<Session>& session) {
   if (!session->observed()) return;
   // Refused, or failed, it is left to the next batch: the observers miss one between.
-  session->strand()
-      .Submit(
-          [session, stop = context_.stop] { session->CurrentEstimate(Stop(stop)).IgnoreError(); })
-      .IgnoreError();
+  const auto estimate = [session, stop = context_.stop] {
+    Guarded([&] { return session->CurrentEstimate(Stop(stop)).status(); }).IgnoreError();
+  };
+  session->strand().Submit(estimate).IgnoreError();
 }
 
 EstimationService::Unary* EstimationService::GetEstimate(Context* context,

@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "server/operations/names.h"
 #include "server/service/call_stop.h"
+#include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest {
@@ -147,7 +148,7 @@ void MeasurementFlow::Work() {
     }
     const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
     lock.unlock();
-    const absl::Status answered = last ? AnswerLast() : Answer(request);
+    const absl::Status answered = Guarded([&] { return last ? AnswerLast() : Answer(request); });
     lock.lock();
     if (!answered.ok()) End(answered);
     if (last) End(at_end);

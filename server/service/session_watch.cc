@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "server/operations/names.h"
 #include "server/service/call_stop.h"
+#include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest {
@@ -34,7 +35,8 @@ absl::Status WatchFlow::Attach(const std::string& session) {
 }
 
 void WatchFlow::Register() {
-  const absl::Status observing = session_->Observe(shared_from_this(), stop_);
+  const absl::Status observing =
+      Guarded([this] { return session_->Observe(shared_from_this(), stop_); });
   std::lock_guard lock(mutex_);
   registering_ = false;
   if (!observing.ok()) End(observing);

@@ -2,6 +2,7 @@
 
 #include "core/common/status.h"
 #include "server/service/call_stop.h"
+#include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest {
@@ -16,7 +17,7 @@ grpc::ServerUnaryReactor* UnaryCall::Start(OpenCalls& calls, grpc::CallbackServe
   auto run = [state = call->state_, stop = CallStop(*context, call->state_->stop.get_token()),
               work = std::move(work)] {
     absl::Status status = stop.Check();
-    if (status.ok()) status = work(stop);
+    if (status.ok()) status = Guarded([&] { return work(stop); });
     Finish(*state, status);
   };
   const absl::Status accepted = submit(std::move(run));

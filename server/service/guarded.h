@@ -1,0 +1,21 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <new>
+#include <utility>
+
+namespace polyest {
+
+// A request may be within every limit and still need more memory than there is: then it fails, and
+// not the daemon.
+template <typename Work>
+absl::Status Guarded(Work&& work) {
+  try {
+    return std::forward<Work>(work)();
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("the daemon has not enough memory for this request");
+  }
+}
+
+}  // namespace polyest
