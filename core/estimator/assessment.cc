@@ -169,11 +169,7 @@ class Assessment {
   void Summarize(const Cost& cost, const Vector& eta) {
     const RecordSummary& record = *request_.record;
     const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
-    // With one check point left there is no spread to see; then ‖residual‖/σ bounds the shift.
-    findings_.shift =
-        agreement.effective_checks >= kLeastChecks
-            ? agreement.shift
-            : agreement.residual_to_noise * std::sqrt(static_cast<double>(record.samples()));
+    findings_.shift = agreement.shift;
     estimate_.expansion = {design_.basis->order(),       design_.basis->size(),
                            request_.expansion->points(), agreement.residual_to_noise,
                            request_.reexpansions,        0};
@@ -243,8 +239,6 @@ class Assessment {
       estimate_.channels.push_back(std::move(channel));
     }
   }
-
-  static constexpr double kLeastChecks = 1.5;
 
   const ResolvedProblem& problem_;
   const Prior& prior_;

@@ -17,11 +17,9 @@ namespace {
 constexpr int64_t kBlockRows = 64;
 // A sample whose expansion residual passes this part of the noise ends the window before it.
 constexpr double kResidualToNoise = 0.1;
-// Where a window ends the expansion is compared with the model: it moves when the posterior's
-// means may be off by this many of its standard deviations, or when fewer check points than this
-// still speak for the posterior.
+// Where a window ends the expansion is compared with the model: it is settled anew when the
+// posterior's means may be off by this many of its standard deviations.
 constexpr double kMostShift = 0.1;
-constexpr double kLeastEffectiveChecks = 2;
 constexpr double kWindowGrowth = 1.3;
 // After a settlement that did not help, this part of the record so far is taken with its discount
 // before the next one is tried.
@@ -160,7 +158,7 @@ absl::StatusOr<bool> Estimator::Implementation::SettleAfterWindow(const Stop& st
   const Agreement agreement =
       AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
   bool moved = false;
-  if (agreement.shift > kMostShift || agreement.effective_checks < kLeastEffectiveChecks) {
+  if (agreement.shift > kMostShift) {
     POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop));
   }
   window_end_ =

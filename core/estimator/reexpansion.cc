@@ -12,7 +12,8 @@ namespace {
 constexpr int kMostAttempts = 15;
 constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
 constexpr int64_t kReplayRows = 256;
-constexpr double kNegligibleWeight = 1e-3;  // of a check point, relative to the heaviest
+constexpr double kLeastEffectiveChecks = 2;  // for a spread over them to be seen
+constexpr double kNegligibleWeight = 1e-3;   // of a check point, relative to the heaviest
 
 bool Stopped(const absl::Status& status) {
   return absl::IsCancelled(status) || absl::IsDeadlineExceeded(status);
@@ -135,24 +136,27 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   Agreement agreement;
   if (log_weight.empty()) return agreement;
   const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());
-  double sum = 0, sum_of_squares = 0, mean = 0;
+  double sum = 0, sum_of_squares = 0, mean = 0, worst = 0;
   for (size_t i = 0; i < log_weight.size(); ++i) {
     const double weight = std::exp(log_weight[i] - heaviest);
     sum += weight;
     sum_of_squares += weight * weight;
     mean += weight * difference[i];
+    worst = std::max(worst, residual[i]);
     if (weight > kNegligibleWeight) {
       agreement.residual_to_noise = std::max(agreement.residual_to_noise, residual[i]);
     }
   }
   mean /= sum;
-  agreement.effective_checks = sum * sum / sum_of_squares;
   double variance = 0;
   for (size_t i = 0; i < log_weight.size(); ++i) {
     const double weight = std::exp(log_weight[i] - heaviest) / sum;
     variance += weight * (difference[i] - mean) * (difference[i] - mean);
   }
-  agreement.shift = std::sqrt(variance);
+  agreement.shift = worst * std::sqrt(static_cast<double>(check.samples));
+  if (sum * sum / sum_of_squares >= kLeastEffectiveChecks) {
+    agreement.shift = std::min(agreement.shift, std::sqrt(variance));
+  }
   return agreement;
 }
 

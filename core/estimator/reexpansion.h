@@ -45,14 +45,15 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop);
 
-// How far the posterior on the expansion may be trusted, from the check points: with
-// ΔJ = J_mismatch of the model − that of the expansion, the standard deviation of ΔJ over the
-// posterior bounds the error of any posterior mean in units of its standard deviation
-// (Cauchy–Schwarz, to first order in ΔJ).
+// How far the posterior on the expansion may be trusted, from the check points. To first order a
+// posterior mean is off, in units of its standard deviation, by no more than either of
+//   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion,
+//   ‖(model − expansion)/σ‖ over the samples,
+// both by the Cauchy–Schwarz inequality, over particles and over samples. The first is the sharper
+// but needs check points where the posterior is; the second holds wherever they are.
 struct Agreement {
-  double shift = 0;              // that bound; ≥ 0
-  double effective_checks = 0;   // effective number of check points after reweighting
-  double residual_to_noise = 0;  // worst over the check points that still matter
+  double shift = 0;              // the smaller bound that may be used; ≥ 0
+  double residual_to_noise = 0;  // worst root mean square over the check points that still matter
 };
 
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost);

@@ -237,7 +237,8 @@ Cost RegionalExpansion::MakeCost(double regularization) const {
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {
   const double samples = std::max<double>(1, static_cast<double>(absorbed_samples_));
-  return {check_mismatch_, (check_residual_ / samples).cwiseSqrt(), check_valid_};
+  return {check_mismatch_, (check_residual_ / samples).cwiseSqrt(), check_valid_,
+          absorbed_samples_};
 }
 
 }  // namespace polyest

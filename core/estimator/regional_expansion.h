@@ -78,6 +78,7 @@ class RegionalExpansion {
     Vector model_mismatch;
     Vector residual_to_noise;
     std::vector<bool> valid;  // the trajectory could be integrated
+    int64_t samples = 0;
   };
   Check Checks() const;
 
