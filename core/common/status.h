@@ -7,8 +7,8 @@
 
 #include <utility>
 
-#define POLYEST_RETURN_IF_ERROR(expression)                        \
-  do {                                                             \
+#define POLYEST_RETURN_IF_ERROR(expression)                                 \
+  do {                                                                      \
     if (absl::Status status_ = (expression); !status_.ok()) return status_; \
   } while (false)
 
