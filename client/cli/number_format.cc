@@ -20,6 +20,11 @@ int LeadingExponent(double value) {
   return exponent;
 }
 
+// Whether it reads better without an exponent.
+bool IsPlain(double value, int decimals) {
+  return decimals >= -4 && decimals <= 8 && std::abs(value) < 1e7;
+}
+
 }  // namespace
 
 std::string FormatValue(double value, double standard_deviation) {
@@ -27,16 +32,18 @@ std::string FormatValue(double value, double standard_deviation) {
     return FormatNumber(value, 6);
   }
   const int decimals = 1 - LeadingExponent(standard_deviation);
-  if (decimals >= -4 && decimals <= 8 && std::abs(value) < 1e7) {
-    return absl::StrFormat("%.*f", std::max(decimals, 0), value);
-  }
+  if (IsPlain(value, decimals)) return absl::StrFormat("%.*f", std::max(decimals, 0), value);
   const int digits = value == 0 ? 1 : LeadingExponent(std::abs(value)) + decimals;
   return absl::StrFormat("%.*e", std::clamp(digits, 1, 15), value);
 }
 
 std::string FormatUncertain(double value, double standard_deviation) {
+  const bool known = std::isfinite(standard_deviation) && standard_deviation > 0;
+  const bool plain = known && IsPlain(value, 1 - LeadingExponent(standard_deviation));
+  // Both in the same notation.
   return absl::StrCat(FormatValue(value, standard_deviation), " ± ",
-                      FormatValue(standard_deviation, standard_deviation));
+                      known && !plain ? absl::StrFormat("%.1e", standard_deviation)
+                                      : FormatValue(standard_deviation, standard_deviation));
 }
 
 std::string FormatNumber(double value, int digits) {

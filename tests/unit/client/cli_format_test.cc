@@ -136,6 +136,14 @@ TEST(ToJson, HasTheContractsNames) {
   EXPECT_THAT(json, HasSubstr(R"("time":10,"samples":"200","sequence":"7")"));
 }
 
+TEST(ToJson, IsTheSameForTheSameMessage) {
+  v1::Direction first;
+  v1::Direction second;
+  for (int i = 0; i < 20; ++i) (*first.mutable_coefficients())[std::to_string(i)] = i;
+  for (int i = 19; i >= 0; --i) (*second.mutable_coefficients())[std::to_string(i)] = i;
+  EXPECT_EQ(ToJson(first, /*several_lines=*/true), ToJson(second, /*several_lines=*/true));
+}
+
 TEST(ToJson, PrintsWhatHasItsDefault) {
   const std::string json = ToJson(v1::Estimate(), /*several_lines=*/true);
   EXPECT_THAT(json, HasSubstr("\"covariance\": []"));

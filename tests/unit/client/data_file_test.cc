@@ -1,5 +1,6 @@
 #include "client/cpp/data_file.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -115,8 +116,8 @@ TEST(DataReader, RefusesTextAndSaysWhere) {
 
 TEST(DataReader, RefusesWhatIsNotFinite) {
   for (const char* const cell : {"nan", "NaN", "inf", "-inf", "Infinity"}) {
-    EXPECT_THAT(ErrorOf(std::string("t,x\n0,") + cell + "\n"),
-                StartsWith(std::string("data.csv:2: column x: \"") + cell + "\" must be finite"));
+    EXPECT_THAT(ErrorOf(absl::StrCat("t,x\n0,", cell, "\n")),
+                StartsWith(absl::StrCat("data.csv:2: column x: \"", cell, "\" must be finite")));
   }
   EXPECT_THAT(ErrorOf("t,x\nnan,1\n"), StartsWith("data.csv:2: column t: \"nan\" must be finite"));
 }
@@ -176,13 +177,13 @@ TEST(DataReader, RefusesAFileWithoutAnything) {
 }
 
 TEST(DataReader, RefusesALineThatNeverEnds) {
-  EXPECT_EQ(ErrorOf("t,x\n0," + std::string(100'000, '1') + "\n"),
+  EXPECT_EQ(ErrorOf(absl::StrCat("t,x\n0,", std::string(100'000, '1'), "\n")),
             "data.csv:2: the line is longer than 65535 bytes");
 }
 
 TEST(DataReader, ShowsOnlyTheStartOfALongCell) {
-  EXPECT_EQ(ErrorOf("t,x\n0," + std::string(100, 'z') + "\n"),
-            "data.csv:2: column x: \"" + std::string(40, 'z') + "…\" must be a number");
+  EXPECT_EQ(ErrorOf(absl::StrCat("t,x\n0,", std::string(100, 'z'), "\n")),
+            absl::StrCat("data.csv:2: column x: \"", std::string(40, 'z'), "…\" must be a number"));
 }
 
 TEST(ReadDataFile, NamesAFileThatCannotBeOpened) {
