@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // dx/dt = a + u, x(0) = x0, outputs x and 2x: everything about it is a closed form. Where a passes
-// `limit` the derivative is no number from t = 1 on.
+// `limit` the derivative gains 1000 x² at t = 1, so that x is infinite within a millisecond.
 class Ramp : public Model {
  public:
   Ramp() {
@@ -30,11 +30,12 @@ class Ramp : public Model {
   void InitialStates(const ConstBlock& parameters, Block states) const override {
     states.col(0) = parameters.col(1);
   }
-  void Derivatives(double time_s, const ConstBlock&, const ConstBlock& parameters,
+  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                    const ConstBlock& inputs, Block derivatives) const override {
     for (Eigen::Index i = 0; i < derivatives.rows(); ++i) {
       const bool fails = time_s > 1 && parameters(i, 0) > parameters(i, 2);
-      derivatives(i, 0) = fails ? std::nan("") : parameters(i, 0) + inputs(i, 0);
+      derivatives(i, 0) = parameters(i, 0) + inputs(i, 0);
+      if (fails) derivatives(i, 0) += 1000 * states(i, 0) * states(i, 0);
     }
   }
   void Outputs(double, const ConstBlock& states, const ConstBlock&, const ConstBlock&,
