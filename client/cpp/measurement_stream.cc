@@ -11,6 +11,14 @@
 #include "core/common/status.h"
 
 namespace polyest {
+namespace {
+
+// Whether a new connection may help: the daemon is away, or has cut its calls off on its way out.
+bool IsBreak(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsCancelled(status);
+}
+
+}  // namespace
 
 // One connection. The stream's mutex guards it; it never touches itself after OnDone has let go of
 // that, so the stream may then delete it. There is always a read under way until `ended`, which
@@ -173,7 +181,7 @@ absl::Status MeasurementStream::Recover(Lock& lock) {
   absl::Status status = connection_->status();
   if (status.ok()) return absl::InternalError("the daemon ended the stream before its end");
   // After a break the daemon may still hold the old connection as the session's writer.
-  while (absl::IsUnavailable(status) || (attempts_ > 0 && absl::IsAborted(status))) {
+  while (IsBreak(status) || (attempts_ > 0 && absl::IsAborted(status))) {
     if (attempts_ == options_.most_attempts) return status;
     const auto delay =
         std::min(options_.longest_delay, options_.first_delay * (1 << std::min(attempts_, 20)));

@@ -210,6 +210,7 @@ TEST_F(MeasurementStreamTest, GivesUpWhenTheDaemonStaysAway) {
   ASSERT_TRUE(stream.Open().ok());
   daemon_.Stop();
   absl::Status status = SendBatches(stream, 100);
+  // A call that is cut off ends CANCELLED, one that finds nobody UNAVAILABLE.
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(told_.size(), 3);
 }
