@@ -51,7 +51,7 @@ Vector UnitProblem::ToUnit(const Vector& x) const {
 
 double UnitProblem::Value(const Vector& u, Vector* gradient) {
   ++evaluations_;
-  Vector slope(u.size());
+  Vector slope = Vector::Zero(u.size());  // a function that is infinite may leave it alone
   double value = problem_.function(ToPoint(u), gradient == nullptr ? nullptr : &slope);
   value /= function_scale_;
   if (gradient != nullptr) {
