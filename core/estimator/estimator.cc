@@ -21,6 +21,11 @@ constexpr double kResidualToNoise = 0.1;
 // posterior's means may be off by this many of its standard deviations.
 constexpr double kMostShift = 0.1;
 constexpr double kWindowGrowth = 1.3;
+// The integration error must stay so far below the noise that it does not add up over a long
+// record to a share of the posterior's standard deviation: relative tolerance ≤ this × noise ÷
+// signal, looked at where windows end; never tighter than double precision bears.
+constexpr double kTolerancePerNoise = 1e-5;
+constexpr double kTightestTolerance = 1e-12;
 // After a settlement that did not help, this part of the record so far is taken with its discount
 // before the next one is tried.
 constexpr int64_t kPatience = 8;
@@ -59,6 +64,7 @@ class Estimator::Implementation {
   absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop);
+  absl::StatusOr<bool> TightenTolerance(const Stop& stop);
 
   ResolvedProblem problem_;
   int threads_;
@@ -155,16 +161,37 @@ absl::StatusOr<bool> Estimator::Implementation::SettleBefore(bool short_of_traje
 }
 
 absl::StatusOr<bool> Estimator::Implementation::SettleAfterWindow(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(bool moved, TightenTolerance(stop));
   const Agreement agreement =
       AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
-  bool moved = false;
   if (agreement.shift > kMostShift) {
-    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop));
+    moved = moved || settled;
   }
   window_end_ =
       std::max(processed_ + 2,
                static_cast<int64_t>(std::ceil(kWindowGrowth * static_cast<double>(processed_))));
   return moved;
+}
+
+// True when the noise asked for a tighter tolerance and the record was propagated again with it.
+absl::StatusOr<bool> Estimator::Implementation::TightenTolerance(const Stop& stop) {
+  if (!problem_.problem().tolerance_follows_noise) return false;
+  const double needed = std::max(kTightestTolerance, kTolerancePerNoise * summary_.NoiseToSignal());
+  const double present = problem_.problem().integration.relative_tolerance;
+  if (needed >= present) return false;
+  // Half of what is needed now, so that a slowly falling ratio does not ask again and again.
+  problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
+  auto replayed = Replay(problem_, expansion_->design(), *store_, processed_, threads_, stop);
+  if (!replayed.ok()) {
+    problem_.set_relative_tolerance(present);
+    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present one stays
+    return replayed.status();
+  }
+  abandoned_rows_ += expansion_->propagated_rows();
+  expansion_ = *std::move(replayed);
+  broken_ = false;
+  return true;
 }
 
 // True when the expansion moved.

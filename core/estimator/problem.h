@@ -52,6 +52,9 @@ struct Problem {
   double regularization = 1;  // α² ≥ 0 of (56)
   RegularizationMode regularization_mode = RegularizationMode::kFixed;
   IntegrationOptions integration;
+  // Tighten integration.relative_tolerance where the noise of the samples asks for it; false when
+  // the user has set a tolerance.
+  bool tolerance_follows_noise = true;
 };
 
 // Limits that keep one problem from taking a machine: past them RESOURCE_EXHAUSTED.
@@ -66,6 +69,10 @@ class ResolvedProblem {
   static absl::StatusOr<ResolvedProblem> Make(Problem problem);
 
   const Problem& problem() const { return problem_; }
+  // 0 < tolerance, within IntegrationOptions' limits; for ensembles made from then on.
+  void set_relative_tolerance(double tolerance) {
+    problem_.integration.relative_tolerance = tolerance;
+  }
   const Prior& prior() const { return prior_; }
   int dimension() const { return prior_.dimension(); }                         // n
   int channels() const { return static_cast<int>(problem_.measured.size()); }  // m

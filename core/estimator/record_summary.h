@@ -14,6 +14,7 @@ class RecordSummary {
   struct Channel {
     int64_t samples = 0;
     double noise_variance_sum = 0;
+    double largest = 0;  // |z|
 
     double RootMeanSquareNoise() const;
   };
@@ -23,6 +24,8 @@ class RecordSummary {
   int64_t rows() const { return rows_; }
   int64_t samples() const;  // over all channels
   double time_s() const { return time_s_; }
+  // The least over the channels of root mean square noise ÷ largest sample; 1 before any sample.
+  double NoiseToSignal() const;
   const std::vector<Channel>& channels() const { return channels_; }
   // The first rows of the first run, at most kBeginning: enough to see how the record is sampled.
   const RowBlock& beginning() const { return beginning_; }

@@ -223,6 +223,7 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given) {
   POLYEST_ASSIGN_OR_RETURN(problem.regularization_mode,
                            ToRegularizationMode(given.regularization_mode()));
   POLYEST_ASSIGN_OR_RETURN(problem.integration, ToIntegration(given.integration()));
+  problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
   return ResolvedProblem::Make(std::move(problem));
 }
 
