@@ -73,7 +73,7 @@ class EnsemblePropagator {
 
   // Advances to each time in turn (non-decreasing, ≥ the time reached; the first may be 0).
   // outputs is Q × (m · times), the m outputs at the k-th time in columns k·m … k·m + m − 1; rows
-  // of failed points are 0 from their failure on. Only a stop request makes it not OK: blocks are
+  // of failed points are NaN from their failure on. Only a stop request makes it not OK: blocks are
   // then left at different times and Advance must not be called again. A trajectory that fails is
   // recorded in failures().
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/common/check.h"
@@ -174,7 +175,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
     if (point_alive_[point]) {
       row = selected_outputs_.row(point).matrix();
     } else {
-      row.setZero();
+      row.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
   }
 }

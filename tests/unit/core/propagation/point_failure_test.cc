@@ -50,8 +50,9 @@ TEST_P(PointFailures, NameThePointThatBlowsUpAndTheTime) {
   EXPECT_EQ(failure.point, 13);
   EXPECT_NEAR(failure.time_s, BlowUpTime(2.0), 1e-4);
   EXPECT_FALSE(failure.reason.empty());
-  EXPECT_TRUE(y.allFinite());
-  EXPECT_EQ(y.row(13).tail(40), Matrix::Zero(1, 40));
+  EXPECT_TRUE(y.row(13).tail(40).array().isNaN().all());
+  EXPECT_TRUE(y.topRows(13).allFinite());
+  EXPECT_TRUE(y.bottomRows(6).allFinite());
   EXPECT_EQ(y(13, 0), 2.0);
 }
 
@@ -80,7 +81,7 @@ TEST_P(PointFailures, MayTakeAllPoints) {
   const Matrix y = ensemble.Propagate(kTimes);
   ASSERT_EQ(ensemble.failures.size(), 10u);
   for (int point = 0; point < 10; ++point) EXPECT_EQ(ensemble.failures[point].point, point);
-  EXPECT_TRUE(y.allFinite());
+  EXPECT_TRUE(y.rightCols(1).array().isNaN().all());
 }
 
 TEST_P(PointFailures, IncludeDerivativesThatAreNotFiniteFromTheStart) {
@@ -91,7 +92,9 @@ TEST_P(PointFailures, IncludeDerivativesThatAreNotFiniteFromTheStart) {
   ASSERT_EQ(ensemble.failures.size(), 1u);
   EXPECT_EQ(ensemble.failures[0].point, 4);
   EXPECT_LT(ensemble.failures[0].time_s, 1e-20);  // ERKStep names the end of its last attempt
-  EXPECT_TRUE(y.allFinite());
+  EXPECT_TRUE(y.row(4).rightCols(79).array().isNaN().all());
+  EXPECT_TRUE(y.topRows(4).allFinite());
+  EXPECT_TRUE(y.bottomRows(4).allFinite());
   EXPECT_NE(y(5, 79), 0);
 }
 
@@ -116,7 +119,7 @@ TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
   const Matrix omega = ensemble.Propagate({0, 1});
   ASSERT_EQ(ensemble.failures.size(), 1u);
   EXPECT_EQ(ensemble.failures[0].point, 2);
-  EXPECT_EQ(omega(2, 0), 0);
+  EXPECT_TRUE(std::isnan(omega(2, 0)));
   EXPECT_GT(omega(1, 1), 0);
 }
 
