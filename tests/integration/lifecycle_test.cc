@@ -2,6 +2,8 @@
 #include <grpcpp/support/byte_buffer.h>
 #include <signal.h>
 
+#include <algorithm>
+
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest {

@@ -1,3 +1,5 @@
+#include <thread>
+
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest {
