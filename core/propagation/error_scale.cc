@@ -61,12 +61,24 @@ double ErrorScale::Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& wei
   // Only a step that the known scales reject, while a state is beyond its largest so far, needs
   // the second look.
   if (norm <= 0.1 || watched_ == nullptr || !((watched_->abs() - largest_).maxCoeff() > 0)) {
-    return norm;
+    return LargestOf(norm);
   }
-  return GrowingNorm(error);
+  return LargestOf(GrowingNorm(error));
+}
+
+// Passes the norm on; remembers a point that was not finite.
+double ErrorScale::LargestOf(double norm) {
+  ++norms_since_not_finite_;
+  if (norm >= kHuge) {
+    point_norm_.maxCoeff(&not_finite_point_);
+    norms_since_not_finite_ = 0;
+  }
+  return norm;
 }
 
 Eigen::Index ErrorScale::worst_point() const {
+  constexpr int kFew = 32;
+  if (not_finite_point_ >= 0 && norms_since_not_finite_ <= kFew) return not_finite_point_;
   Eigen::Index worst = 0;
   if (point_norm_.size() > 0) point_norm_.maxCoeff(&worst);
   return worst;

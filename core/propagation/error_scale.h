@@ -42,12 +42,15 @@ class ErrorScale {
 
   // ‖error‖, with kHuge for a point that is not finite; remembers each point's norm.
   double Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights);
-  // The point with the largest norm at the last call of Norm.
+  // The point that was not finite at one of the last few calls of Norm: a solver that creeps up to
+  // where a point stops being defined alternates tiny steps accepted with longer ones rejected.
+  // Without such a point, the one with the largest norm at the last call.
   Eigen::Index worst_point() const;
 
  private:
   double WeightedNorm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights);
   double GrowingNorm(const Eigen::ArrayXXd& error);
+  double LargestOf(double norm);
 
   double relative_tolerance_;
   Eigen::ArrayXXd largest_;  // own magnitude so far
@@ -55,6 +58,8 @@ class ErrorScale {
   Eigen::ArrayXXd weights_;  // 1 / scale_
   Vector block_scale_;
   Eigen::ArrayXd point_norm_;
+  Eigen::Index not_finite_point_ = -1;
+  int norms_since_not_finite_ = 0;
   const Eigen::ArrayXXd* watched_ = nullptr;
 };
 

@@ -123,6 +123,56 @@ TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
   EXPECT_GT(omega(1, 1), 0);
 }
 
+// x″ = −x, but the derivative of a point is not a number once t passes its time of death.
+class Mortal final : public Model {
+ public:
+  const ModelDescription& description() const override { return description_; }
+  void InitialStates(const ConstBlock&, Block states) const override {
+    states.col(0).setOnes();
+    states.col(1).setZero();
+  }
+  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                   const ConstBlock&, Block derivatives) const override {
+    derivatives.col(0) = states.col(1);
+    derivatives.col(1) = (parameters.col(0) < time_s)
+                             .select(std::numeric_limits<double>::quiet_NaN(), -states.col(0));
+  }
+  void Outputs(double, const ConstBlock& states, const ConstBlock&, const ConstBlock&,
+               Block outputs) const override {
+    outputs.col(0) = states.col(0);
+  }
+
+ private:
+  const ModelDescription description_ = [] {
+    ModelDescription description;
+    description.name = "mortal";
+    description.states = {{"x", "m", "displacement"}, {"v", "m/s", "velocity"}};
+    description.parameters = {{"death", "s", "when it stops being defined"}};
+    description.outputs = {{"x", "m", "displacement"}};
+    return description;
+  }();
+};
+
+TEST_P(PointFailures, SpareTheHealthyWhenOthersStopBeingDefined) {
+  EnsembleSpecification specification;
+  specification.model = std::make_shared<Mortal>();
+  specification.parameters = Matrix::Constant(12, 1, std::numeric_limits<double>::max());
+  specification.parameters(3, 0) = 1;
+  specification.parameters(7, 0) = 1.5;
+  specification.amplitudes.resize(12, 0);
+  specification.outputs = {0};
+  specification.integration.method = GetParam();
+  const InputSignals inputs;
+  EnsemblePropagator propagator(specification, &inputs);
+  Matrix outputs(12, 2);
+  ASSERT_TRUE(propagator.Advance(std::vector<double>{0.5, 2}, outputs, Stop()).ok());
+  ASSERT_EQ(propagator.failures().size(), 2u);
+  EXPECT_EQ(propagator.failures()[0].point, 3);
+  EXPECT_EQ(propagator.failures()[1].point, 7);
+  // The healthy follow cos t to well within what 1e-7 a step adds up to.
+  EXPECT_NEAR(outputs(0, 1), std::cos(2.0), 1e-4);
+}
+
 TEST(PointFailures, NameTheStepsThatRanOut) {
   Ensemble ensemble("mass_spring_damper", 8, {"x"});
   ensemble.Set("v0", 1.0);
