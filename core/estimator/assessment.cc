@@ -191,6 +191,7 @@ class Assessment {
     const Vector deviation = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
     const Vector factor = deviation.cwiseQuotient(curvature.standard_deviation);
     estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
+    const Vector informed = ContractionByData(cost, eta);
     estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
@@ -205,10 +206,19 @@ class Assessment {
       parameter.prior_mean = prior_mean[i];
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation[i] / prior_deviation[i];
-      parameter.verdict = VerdictOfContraction(parameter.contraction);
+      parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
       DescribePosterior(xis.col(i), i, widening, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
+  }
+
+  // Posterior ÷ prior standard deviation with the prior at its own weight, whatever α² is: a heavy
+  // prior narrows the posterior, but that is not knowledge from the data.
+  Vector ContractionByData(const Cost& cost, const Vector& eta) const {
+    Matrix hessian = ToGermHessian(cost.MismatchHessian(eta));
+    hessian.diagonal() += prior_.Curvature(findings_.map_xi);
+    return CovarianceFromCurvature(hessian, prior_)
+        .standard_deviation.cwiseQuotient(prior_.StandardDeviation());
   }
 
   // Mean and quantiles of one parameter's particles, widened about the mean but not past Ω.
