@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -132,12 +133,8 @@ bool RegionalExpansion::FailsAt(int row) const {
 
 // Leaves out the trajectories without output at this row, and factors again what is left.
 absl::Status RegionalExpansion::DropFailed(int row) {
-  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
-    const auto values = outputs_.block(points() + i, row * channels_, 1, channels_);
-    if (!values.allFinite()) check_valid_[static_cast<size_t>(i)] = false;
-  }
   if (!FailsAt(row)) return absl::OkStatus();
-  NoteFailures();
+  NoteFailures(row);
   const auto values = outputs_.block(0, row * channels_, points(), channels_);
   std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
   const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
@@ -154,9 +151,12 @@ absl::Status RegionalExpansion::DropFailed(int row) {
   return absl::OkStatus();
 }
 
-void RegionalExpansion::NoteFailures() {
-  std::erase_if(failures_, [this](const FailedTrajectory& known) { return known.run == run_; });
+// The trajectories that fail at this row, once each; the propagator may be ahead of it and know of
+// later ones.
+void RegionalExpansion::NoteFailures(int row) {
   for (const PointFailure& failure : propagator_->failures()) {
+    const bool kept = std::binary_search(kept_.begin(), kept_.end(), failure.point);
+    if (!kept || outputs_.block(failure.point, row * channels_, 1, channels_).allFinite()) continue;
     failures_.push_back({thetas_.row(failure.point).transpose(), run_, failure.time_s, failure.flag,
                          failure.reason});
   }
@@ -211,6 +211,10 @@ void RegionalExpansion::Compare(int column, double z, double sigma) {
   for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
     if (!check_valid_[static_cast<size_t>(i)]) continue;
     const double y = outputs_(points() + i, column);
+    if (!std::isfinite(y)) {
+      check_valid_[static_cast<size_t>(i)] = false;
+      continue;
+    }
     const double error = (z - y) / sigma;
     const double difference = (y - check_phi_.row(i).dot(coefficients_.col(column))) / sigma;
     check_mismatch_[i] += 0.5 * error * error;

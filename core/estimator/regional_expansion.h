@@ -91,7 +91,7 @@ class RegionalExpansion {
   void FitRows(int first, int count);
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
-  void NoteFailures();
+  void NoteFailures(int row);
   void Compare(int column, double z, double sigma);
 
   const ResolvedProblem& problem_;
