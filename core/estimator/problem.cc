@@ -62,11 +62,14 @@ absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
     return absl::ResourceExhaustedError(absl::StrFormat(
         "expansion: %.0f collocation points are needed; the limit is %d", points, kMostPoints));
   }
-  if (options.adaptive && points <= static_cast<double>(terms)) {
+  // A tensor grid is of the prior alone; a moved expansion has points_per_term points a term.
+  const double moved = std::ceil(options.points_per_term * static_cast<double>(terms));
+  const double fewest = std::min(points, moved);
+  if (options.adaptive && fewest <= static_cast<double>(terms)) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "expansion.pointsPerTerm: %g gives %.0f points for %d terms; an adaptive expansion needs "
         "more points than terms to see its own error",
-        options.points_per_term, points, terms));
+        options.points_per_term, fewest, terms));
   }
   return absl::OkStatus();
 }

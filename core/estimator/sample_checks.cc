@@ -94,10 +94,14 @@ absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
     if (!seen.insert(column.name).second) {
       return absl::InvalidArgumentError(absl::StrFormat("column %s is given twice", column.name));
     }
-    if (column.value.size() != samples.rows() ||
-        (!column.missing.empty() && column.missing.size() != samples.rows())) {
+    if (column.value.size() != samples.rows()) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "column %s: %d values for %d rows", column.name, column.value.size(), samples.rows()));
+    }
+    if (!column.missing.empty() && column.missing.size() != samples.rows()) {
+      return absl::InvalidArgumentError(absl::StrFormat("column %s: %d missing flags for %d rows",
+                                                        column.name, column.missing.size(),
+                                                        samples.rows()));
     }
   }
   for (size_t i = static_cast<size_t>(problem_.channels()); i < names_.size(); ++i) {
