@@ -1,0 +1,217 @@
+// The estimator as a stream: what must not change its answers, and what it refuses.
+
+#include "core/estimator/estimator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <stop_token>
+
+#include "core/estimator/memory_store.h"
+#include "tests/testing/oscillator.h"
+#include "tests/testing/records.h"
+#include "tests/unit/core/estimator/estimation.h"
+
+namespace polyest {
+namespace {
+
+using testing::EstimateInBatches;
+using testing::Rows;
+
+Samples TenSeconds() {
+  testing::OscillatorTruth truth;
+  return testing::OscillatorRecord(10, 3, truth);
+}
+
+// The estimate of TenSeconds, order 3, in one piece.
+const Estimate& Undisturbed() {
+  static const Estimate estimate =
+      EstimateInBatches(testing::OscillatorProblem(3), TenSeconds(), 1000);
+  return estimate;
+}
+
+TEST(Estimator, NeedsAMeasuredOutput) {
+  Problem problem = testing::OscillatorProblem(3);
+  problem.measured.clear();
+  const auto estimator = Estimator::Make(ResolvedProblem::Make(problem).value());
+  EXPECT_EQ(estimator.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(estimator.status().message(), "measured: at least one output must be measured");
+}
+
+TEST(Estimator, IsTheSameBitsForAnyBatches) {
+  EXPECT_GT(Undisturbed().expansion.reexpansions, 0);
+  for (const size_t rows : {1, 7}) {
+    ExpectSame(EstimateInBatches(testing::OscillatorProblem(3), TenSeconds(), rows), Undisturbed());
+  }
+}
+
+// 80 points are two blocks of the ensemble, so that threads have something to share.
+TEST(Estimator, IsTheSameBitsForAnyThreads) {
+  Problem problem = testing::OscillatorProblem(3);
+  problem.expansion.points_per_term = 8;
+  ExpectSame(EstimateInBatches(problem, TenSeconds(), 50, /*threads=*/1),
+             EstimateInBatches(problem, TenSeconds(), 50, /*threads=*/2));
+}
+
+TEST(Estimator, IsNotChangedByBeingAsked) {
+  const Samples record = TenSeconds();
+  const auto estimator = MakeEstimator(testing::OscillatorProblem(3));
+  for (size_t first = 0; first < record.rows(); first += 40) {
+    ASSERT_TRUE(estimator->Append(Rows(record, first, 40)).ok());
+    EXPECT_TRUE(estimator->CurrentEstimate().ok());
+    ASSERT_TRUE(estimator->Process().ok());
+    ExpectSame(estimator->CurrentEstimate().value(), estimator->CurrentEstimate().value());
+  }
+  ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
+}
+
+TEST(Estimator, CountsTheRowsAppendedAndProcessed) {
+  const Samples record = TenSeconds();
+  const auto estimator = MakeEstimator(testing::OscillatorProblem(3));
+  ASSERT_TRUE(estimator->Append(Rows(record, 0, 5)).ok());
+  EXPECT_EQ(estimator->rows_appended(), 5);
+  EXPECT_EQ(estimator->rows_processed(), 0);
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_EQ(estimator->rows_processed(), 5);
+  const Estimate estimate = estimator->CurrentEstimate().value();
+  EXPECT_EQ(estimate.samples, 5);
+  EXPECT_EQ(estimate.time_s, record.time_s[4]);
+}
+
+TEST(Estimator, TakesNothingWhenAlreadyStoppedAndGoesOnLater) {
+  const auto estimator = MakeEstimator(testing::OscillatorProblem(3));
+  ASSERT_TRUE(estimator->Append(TenSeconds()).ok());
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_EQ(estimator->Process(Stop(source.get_token())).code(), absl::StatusCode::kCancelled);
+  const Stop past({}, Stop::Clock::now() - std::chrono::seconds(1));
+  EXPECT_EQ(estimator->Process(past).code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(estimator->CurrentEstimate(past).status().code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(estimator->rows_processed(), 0);
+  ASSERT_TRUE(estimator->Process().ok());
+  ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
+}
+
+// Requests a stop when it has been read a number of times: work stops wherever the estimator looks
+// next, in the middle of a block, a replay or a settlement.
+class StoppingStore final : public SampleStore {
+ public:
+  int64_t rows() const override { return samples_.rows(); }
+  absl::Status Append(const SampleRow& row, const std::vector<double>& values,
+                      const std::vector<double>& noise) override {
+    return samples_.Append(row, values, noise);
+  }
+  absl::Status Read(int64_t first, int64_t count, std::vector<SampleRow>& rows,
+                    std::vector<double>& values, std::vector<double>& noise) const override {
+    if (--reads_left_ == 0) source_.request_stop();
+    return samples_.Read(first, count, rows, values, noise);
+  }
+  Stop StopAfter(int reads) {
+    source_ = std::stop_source();
+    reads_left_ = reads;
+    return Stop(source_.get_token());
+  }
+
+ private:
+  MemoryStore samples_;
+  mutable std::stop_source source_;
+  mutable int reads_left_ = 0;
+};
+
+TEST(Estimator, ReachesTheSameBitsThroughAnyStops) {
+  const auto store = std::make_shared<StoppingStore>();
+  EstimatorOptions options;
+  options.store = store;
+  const auto estimator = MakeEstimator(testing::OscillatorProblem(3), options);
+  ASSERT_TRUE(estimator->Append(TenSeconds()).ok());
+  EXPECT_EQ(store->rows(), 200);
+  int stops = 0;
+  absl::Status status = absl::CancelledError("");
+  // One more read each time, so that every step is reached and every second one disturbed.
+  for (int reads = 1; absl::IsCancelled(status) && reads < 100; ++reads) {
+    status = estimator->Process(store->StopAfter(reads));
+    if (absl::IsCancelled(status)) ++stops;
+    EXPECT_TRUE(estimator->CurrentEstimate().ok());
+  }
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_GT(stops, 2);
+  ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
+}
+
+TEST(Estimator, IsNotChangedByABatchItRefused) {
+  const Samples record = TenSeconds();
+  const auto estimator = MakeEstimator(testing::OscillatorProblem(3));
+  ASSERT_TRUE(estimator->Append(Rows(record, 0, 100)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  Samples bad = Rows(record, 100, 100);
+  bad.columns[0].value[99] = std::nan("");
+  EXPECT_EQ(estimator->Append(bad).code(), absl::StatusCode::kInvalidArgument);
+  bad = Rows(record, 100, 100);
+  bad.time_s[50] = 0;
+  EXPECT_EQ(estimator->Append(bad).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(estimator->rows_appended(), 100);
+  ASSERT_TRUE(estimator->Append(Rows(record, 100, 100)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
+}
+
+// x of the forced oscillator, the force a triangle wave with its knots at the samples.
+Problem ForcedProblem(InputSpecification force) {
+  Problem problem = testing::OscillatorProblem(3);
+  problem.inputs = {{"force", std::move(force)}};
+  return problem;
+}
+
+double Triangle(int k) { return 10.0 * std::abs(k % 8 - 4) - 20; }
+
+Samples StreamedForceRecord() {
+  testing::OscillatorTruth truth;
+  Samples record = testing::OscillatorRecord(5, 3, truth);
+  record.columns.push_back({"force", {}, {}});
+  for (int k = 0; k < static_cast<int>(record.rows()); ++k) {
+    record.columns[1].value.push_back(Triangle(k));
+  }
+  // Of the forced oscillator with the same unknowns, from a fine run of the model itself.
+  TableInput table{.time_s = record.time_s, .value = record.columns[1].value};
+  Problem exact = ForcedProblem(table);
+  exact.integration.relative_tolerance = 1e-12;
+  const ResolvedProblem resolved = ResolvedProblem::Make(exact).value();
+  const InputSignals inputs = resolved.MakeInputs();
+  const Matrix theta = Eigen::RowVector2d(truth.k, truth.c);
+  EnsemblePropagator model(resolved.MakeEnsemble(theta, resolved.outputs(), 1), &inputs);
+  Matrix outputs(1, static_cast<Eigen::Index>(record.rows()));
+  EXPECT_TRUE(model.Advance(record.time_s, outputs, {}).ok());
+  for (size_t k = 0; k < record.rows(); ++k) {
+    record.columns[0].value[k] +=
+        outputs(0, static_cast<Eigen::Index>(k)) -
+        testing::OscillatorDisplacement(truth.k, truth.c, record.time_s[k]);
+  }
+  return record;
+}
+
+TEST(Estimator, TakesAStreamedInputAsATableOfTheSameKnots) {
+  const Samples streamed = StreamedForceRecord();
+  Samples measured = streamed;
+  measured.columns.pop_back();
+  const TableInput table{.time_s = streamed.time_s, .value = streamed.columns[1].value};
+  const Estimate a = EstimateInBatches(ForcedProblem(StreamedInput{}), streamed, 1000);
+  const Estimate b = EstimateInBatches(ForcedProblem(table), measured, 1000);
+  for (size_t i = 0; i < 2; ++i) {
+    const ParameterEstimate& p = a.parameters[i];
+    EXPECT_NEAR(p.map, b.parameters[i].map, 1e-3 * p.std_dev);
+    EXPECT_NEAR(p.std_dev, b.parameters[i].std_dev, 1e-3 * p.std_dev);
+  }
+  EXPECT_NEAR(a.channels[0].chi_squared, 100, 4 * std::sqrt(200));
+}
+
+TEST(Estimator, IsTheSameBitsForAnyBatchesOfAStreamedInput) {
+  const Samples record = StreamedForceRecord();
+  const Problem problem = ForcedProblem(StreamedInput{});
+  const Estimate whole = EstimateInBatches(problem, record, 1000);
+  ExpectSame(EstimateInBatches(problem, record, 1), whole);
+  ExpectSame(EstimateInBatches(problem, record, 7), whole);
+}
+
+}  // namespace
+}  // namespace polyest
