@@ -39,7 +39,7 @@ TEST(ToProblem, FillsInTheDefaultsOfTheContract) {
   EXPECT_EQ(problem.regularization, 1);
   EXPECT_EQ(problem.regularization_mode, RegularizationMode::kFixed);
   EXPECT_EQ(problem.integration.method, IntegrationMethod::kAuto);
-  EXPECT_EQ(problem.integration.relative_tolerance, IntegrationOptions().relative_tolerance);
+  EXPECT_TRUE(problem.tolerance_follows_noise);
   EXPECT_EQ(problem.integration.most_steps, 100'000);
 }
 
@@ -63,6 +63,7 @@ TEST(ToProblem, TakesEveryOptionThatIsGiven) {
   EXPECT_EQ(problem.regularization_mode, RegularizationMode::kLCurve);
   EXPECT_EQ(problem.integration.method, IntegrationMethod::kStiff);
   EXPECT_EQ(problem.integration.relative_tolerance, 1e-9);
+  EXPECT_FALSE(problem.tolerance_follows_noise);
   EXPECT_EQ(problem.integration.most_steps, 77);
 }
 
