@@ -3,8 +3,8 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
 #include "client/cpp/data_file.h"
-#include "client/cpp/problem_file.h"
 #include "core/common/status.h"
 
 namespace polyest {
@@ -12,7 +12,7 @@ namespace {
 
 absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const CostArguments& arguments) {
   v1::EvaluateCostRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadProblemFile(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
                            ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());

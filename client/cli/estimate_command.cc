@@ -3,8 +3,8 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
+#include "client/cli/problem_input.h"
 #include "client/cpp/data_file.h"
-#include "client/cpp/problem_file.h"
 #include "core/common/status.h"
 
 namespace polyest {
@@ -12,7 +12,7 @@ namespace {
 
 absl::StatusOr<v1::EstimateResponse> Estimate(const EstimateArguments& arguments) {
   v1::EstimateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadProblemFile(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
                            ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
   auto response = MakeBackend(arguments.place)->Estimate(request);

@@ -43,7 +43,9 @@ int Report(const absl::Status& status, absl::string_view server, std::ostream& e
 
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file) {
-  if (!absl::IsInvalidArgument(status)) return status;
+  if (!absl::IsInvalidArgument(status) || absl::StartsWith(status.message(), data_file)) {
+    return status;
+  }
   const bool of_data = absl::StartsWith(status.message(), "measurements");
   return absl::InvalidArgumentError(
       absl::StrCat(of_data ? data_file : problem_file, ": ", status.message()));

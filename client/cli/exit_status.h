@@ -24,7 +24,7 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 int Report(const absl::Status& status, absl::string_view server, std::ostream& err);
 
 // The estimator's messages start with a field of the problem or of the measurements: puts the name
-// of the file in front. Other errors are left alone.
+// of the file in front. Other errors, and those of reading the data file, are left alone.
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file);
 

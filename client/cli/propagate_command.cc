@@ -9,8 +9,8 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
-#include "client/cpp/problem_file.h"
 #include "core/common/status.h"
 
 namespace polyest {
@@ -18,7 +18,7 @@ namespace {
 
 absl::StatusOr<v1::PropagateResponse> Propagate(const PropagateArguments& arguments) {
   v1::PropagateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadProblemFile(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
   request.set_until(arguments.until_s);
   request.set_step(arguments.step_s);
   auto response = MakeBackend(arguments.place)->Propagate(request);

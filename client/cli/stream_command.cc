@@ -16,11 +16,11 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_format.h"
+#include "client/cli/problem_input.h"
 #include "client/cli/stream_session.h"
 #include "client/cpp/client.h"
 #include "client/cpp/data_file.h"
 #include "client/cpp/measurement_stream.h"
-#include "client/cpp/problem_file.h"
 #include "core/common/status.h"
 
 namespace polyest {
@@ -65,7 +65,7 @@ class StreamCommand {
 
   // The last estimate, none without samples.
   absl::StatusOr<std::optional<v1::Estimate>> Run() {
-    POLYEST_ASSIGN_OR_RETURN(problem_, ReadProblemFile(arguments_.problem_file));
+    POLYEST_ASSIGN_OR_RETURN(problem_, ReadCheckedProblem(arguments_.problem_file));
     if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
     const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {

@@ -34,7 +34,7 @@ absl::Status RunFigure(const std::string& figure, const PaperOptions& options, s
 }
 
 int Fail(const absl::Status& status, std::ostream& err) {
-  err << status.message() << "\n";
+  err << "polyest: " << status.message() << "\n";
   return absl::IsInvalidArgument(status) ? 2 : 1;
 }
 
