@@ -212,13 +212,20 @@ class Assessment {
     }
   }
 
-  // Posterior ÷ prior standard deviation with the prior at its own weight, whatever α² is: a heavy
-  // prior narrows the posterior, but that is not knowledge from the data.
+  // Posterior ÷ prior standard deviation as far as it is the data's doing: the larger of what the
+  // curvature gives with the prior at its own weight, whatever α² is (a heavy prior narrows the
+  // posterior, but that is not knowledge), and of
+  //   (H_mismatch + Σ_prior⁻¹)⁻¹,
+  // in which a skewed prior's sharp mode does not pass for information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
-    Matrix hessian = ToGermHessian(cost.MismatchHessian(eta));
-    hessian.diagonal() += prior_.Curvature(findings_.map_xi);
-    return CovarianceFromCurvature(hessian, prior_)
-        .standard_deviation.cwiseQuotient(prior_.StandardDeviation());
+    const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta));
+    Matrix curved = mismatch;
+    curved.diagonal() += prior_.Curvature(findings_.map_xi);
+    Matrix spread = mismatch;
+    spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
+    return CovarianceFromCurvature(curved, prior_)
+        .standard_deviation.cwiseMax(CovarianceFromCurvature(spread, prior_).standard_deviation)
+        .cwiseQuotient(prior_.StandardDeviation());
   }
 
   // Mean and quantiles of one parameter's particles, widened about the mean but not past Ω.

@@ -1,5 +1,7 @@
 #include "core/estimator/estimator.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -86,10 +88,7 @@ class Estimator::Implementation {
 
 absl::Status Estimator::Implementation::Append(const Samples& samples) {
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
-  for (size_t k = 0; k < checked.rows.size(); ++k) {
-    POLYEST_RETURN_IF_ERROR(
-        store_->Append(checked.rows[k], checked.RowValues(k), checked.RowNoise(k)));
-  }
+  POLYEST_RETURN_IF_ERROR(store_->Append(checked));
   checks_.Accept(checked);
   return absl::OkStatus();
 }
@@ -104,7 +103,7 @@ absl::Status Estimator::Implementation::Process(const Stop& stop) {
   while (processed_ < store_->rows()) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     const int64_t count = std::min(kBlockRows, store_->rows() - processed_);
-    POLYEST_RETURN_IF_ERROR(ReadBlock(*store_, processed_, count, block));
+    POLYEST_RETURN_IF_ERROR(store_->Read(processed_, count, block));
     broken_ = true;
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
@@ -233,6 +232,15 @@ absl::StatusOr<std::unique_ptr<Estimator>> Estimator::Make(ResolvedProblem probl
                                                            EstimatorOptions options) {
   if (problem.channels() == 0) {
     return absl::InvalidArgumentError("measured: at least one output must be measured");
+  }
+  if (options.threads < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("threads: %d must be at least 1", options.threads));
+  }
+  if (options.store && options.store->rows() > 0) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "the sample store holds %d rows already; an estimator begins with an empty one",
+        options.store->rows()));
   }
   auto implementation = std::make_unique<Implementation>(std::move(problem), std::move(options));
   POLYEST_RETURN_IF_ERROR(implementation->Begin());

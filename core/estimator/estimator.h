@@ -16,13 +16,14 @@ namespace polyest {
 
 struct EstimatorOptions {
   int threads = 1;  // for propagation; results do not depend on it
-  // Where samples are kept; in memory when null.
+  // Where samples are kept, empty at first; in memory when null.
   std::shared_ptr<SampleStore> store;
 };
 
 class Estimator {
  public:
-  // `problem` must measure at least one output.
+  // INVALID_ARGUMENT when `problem` measures nothing or an option is out of range;
+  // FAILED_PRECONDITION when its expansion cannot be factored or the store is not empty.
   static absl::StatusOr<std::unique_ptr<Estimator>> Make(ResolvedProblem problem,
                                                          EstimatorOptions options = {});
   ~Estimator();

@@ -18,6 +18,7 @@ constexpr double kBeyond = 1.12;         // where to look for Ω past an edge, o
 constexpr double kGoesOnFraction = 0.2;  // of the particles at an edge
 constexpr double kWiden = 1.5;
 constexpr int kChecksPastDimension = 3;
+constexpr double kJustInside = 1 - 1e-12;  // so that rounding does not put a point outside Ω
 
 int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
 
@@ -67,8 +68,7 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   design.check_points = sequence.bottomRows(CheckCount(n));
   design.check_costs.resize(design.check_points.rows());
   for (Eigen::Index i = 0; i < design.check_costs.size(); ++i) {
-    design.check_costs[i] = problem.problem().regularization *
-                            prior.NegativeLogDensity(design.check_points.row(i).transpose());
+    design.check_costs[i] = prior.NegativeLogDensity(design.check_points.row(i).transpose());
   }
   design.reference.resize(n);
   design.lower = prior.lower();
@@ -95,7 +95,8 @@ ExpansionDesign DesignForRegion(const ResolvedProblem& problem, Region region,
     const Vector xi = region.ToGerm(design.points.row(q).transpose());
     const double fraction = FractionInside(problem.prior(), xi, inside);
     if (fraction < 1) {
-      design.points.row(q) = region.ToLocal(inside + fraction * (xi - inside)).transpose();
+      design.points.row(q) =
+          region.ToLocal(inside + kJustInside * fraction * (xi - inside)).transpose();
     }
   }
   design.region = std::move(region);

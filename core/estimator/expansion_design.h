@@ -19,8 +19,9 @@ struct ExpansionDesign {
   Region region = Region::WholePrior(1);
   std::shared_ptr<const Basis> basis;  // in local coordinates η
   Matrix points;                       // Q × n, collocation points, local
-  // C × n, local: where the expansion is compared with the model itself, and J there when they
-  // were drawn, so that they can be reweighted as the posterior narrows.
+  // C × n, local: where the expansion is compared with the model itself, and −log of the density
+  // they were drawn from, up to a constant, so that they can be reweighted as the posterior
+  // narrows.
   Matrix check_points;
   Vector check_costs;
   Vector reference;     // η_0 of the mismatch sums

@@ -5,28 +5,34 @@
 namespace polyest {
 namespace {
 
-void CopyRows(const std::vector<double>& from, int64_t total_rows, int64_t first, int64_t count,
-              std::vector<double>& to) {
-  const int64_t width = total_rows == 0 ? 0 : static_cast<int64_t>(from.size()) / total_rows;
-  to.assign(from.begin() + first * width, from.begin() + (first + count) * width);
+template <class T>
+void AppendTo(std::vector<T>& all, const std::vector<T>& more) {
+  all.insert(all.end(), more.begin(), more.end());
+}
+
+// The part of `all` that belongs to rows [first, first + count) of `rows`.
+template <class T>
+void CopyRows(const std::vector<T>& all, int64_t rows, int64_t first, int64_t count,
+              std::vector<T>& part) {
+  const int64_t width = static_cast<int64_t>(all.size()) / rows;
+  part.assign(all.begin() + first * width, all.begin() + (first + count) * width);
 }
 
 }  // namespace
 
-absl::Status MemoryStore::Append(const SampleRow& row, const std::vector<double>& values,
-                                 const std::vector<double>& noise) {
-  rows_.push_back(row);
-  values_.insert(values_.end(), values.begin(), values.end());
-  noise_.insert(noise_.end(), noise.begin(), noise.end());
+absl::Status MemoryStore::Append(const RowBlock& block) {
+  AppendTo(record_.rows, block.rows);
+  AppendTo(record_.values, block.values);
+  AppendTo(record_.noise, block.noise);
   return absl::OkStatus();
 }
 
-absl::Status MemoryStore::Read(int64_t first, int64_t count, std::vector<SampleRow>& rows,
-                               std::vector<double>& values, std::vector<double>& noise) const {
-  POLYEST_CHECK(first >= 0 && count >= 0 && first + count <= MemoryStore::rows());
-  rows.assign(rows_.begin() + first, rows_.begin() + first + count);
-  CopyRows(values_, MemoryStore::rows(), first, count, values);
-  CopyRows(noise_, MemoryStore::rows(), first, count, noise);
+absl::Status MemoryStore::Read(int64_t first, int64_t count, RowBlock& block) const {
+  const int64_t all = rows();
+  POLYEST_CHECK(first >= 0 && count > 0 && first + count <= all);
+  CopyRows(record_.rows, all, first, count, block.rows);
+  CopyRows(record_.values, all, first, count, block.values);
+  CopyRows(record_.noise, all, first, count, block.noise);
   return absl::OkStatus();
 }
 

@@ -164,6 +164,7 @@ absl::Status ResolvedProblem::ResolveParameters() {
     if (!std::isfinite(value)) {
       return absl::InvalidArgumentError(absl::StrFormat("%s: %g must be finite", field, value));
     }
+    POLYEST_RETURN_IF_ERROR(CheckDriven(field, name, *target));
     (target->is_amplitude ? base_amplitudes_ : base_parameters_)[target->column] = value;
   }
   return absl::OkStatus();
@@ -194,7 +195,7 @@ absl::Status ResolvedProblem::ResolveUncertain() {
   return absl::OkStatus();
 }
 
-// An uncertain amplitude of an input that has no signal would do nothing.
+// The amplitude of an input that has no signal would do nothing.
 absl::Status ResolvedProblem::CheckDriven(const std::string& field, const std::string& name,
                                           Target target) const {
   if (!target.is_amplitude) return absl::OkStatus();

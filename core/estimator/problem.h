@@ -53,7 +53,7 @@ struct Problem {
   RegularizationMode regularization_mode = RegularizationMode::kFixed;
   IntegrationOptions integration;
   // Tighten integration.relative_tolerance where the noise of the samples asks for it; false when
-  // the user has set a tolerance.
+  // the user has set a tolerance, and without effect on a fixed expansion.
   bool tolerance_follows_noise = true;
 };
 

@@ -15,10 +15,6 @@ constexpr int64_t kReplayRows = 256;
 constexpr double kLeastEffectiveChecks = 2;  // for a spread over them to be seen
 constexpr double kNegligibleWeight = 1e-3;   // of a check point, relative to the heaviest
 
-bool Stopped(const absl::Status& status) {
-  return absl::IsCancelled(status) || absl::IsDeadlineExceeded(status);
-}
-
 // Loop of one settlement; holds what changes from attempt to attempt.
 class Settler {
  public:
@@ -65,8 +61,8 @@ class Settler {
     const Matrix guesses = expansion().design().region.ManyToLocal(result_.particles);
     absl::StatusOr<Particles> particles =
         SamplePosterior(cost, lower, upper, guesses, options, stop_);
-    if (Stopped(particles.status())) return particles.status();
-    if (!particles.ok()) return false;
+    if (absl::IsFailedPrecondition(particles.status())) return false;
+    if (!particles.ok()) return particles.status();
     particles_ = *std::move(particles);
     result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
     return true;
@@ -83,8 +79,8 @@ class Settler {
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
         Replay(*request_.problem, std::move(design), *request_.store, request_.rows,
                request_.threads, stop_);
-    if (Stopped(moved.status())) return moved.status();
-    if (!moved.ok()) return false;
+    if (absl::IsFailedPrecondition(moved.status())) return false;
+    if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
     result_.expansion = *std::move(moved);
     ++result_.reexpansions;
@@ -114,7 +110,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   RowBlock block;
   for (int64_t first = 0; first < rows; first += kReplayRows) {
     const int64_t count = std::min(kReplayRows, rows - first);
-    POLYEST_RETURN_IF_ERROR(ReadBlock(store, first, count, block));
+    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
     POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
     if (expansion->fitted_rows() < block.count()) return expansion->shortage();
     for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);

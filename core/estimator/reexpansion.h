@@ -33,8 +33,8 @@ struct Settlement {
   int64_t propagated_rows = 0;  // by all but the expansion returned
 };
 
-// Only a stop request makes it not OK; `present` is then untouched and the same call may be made
-// again.
+// Not OK on a stop request or when the store cannot be read; `present` is then untouched and the
+// same call may be made again.
 absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
                                   const Stop& stop);
 

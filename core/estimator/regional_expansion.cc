@@ -20,10 +20,6 @@ Matrix Stack(const Matrix& top, const Matrix& bottom) {
 
 }  // namespace
 
-absl::Status ReadBlock(const SampleStore& store, int64_t first, int64_t count, RowBlock& block) {
-  return store.Read(first, count, block.rows, block.values, block.noise);
-}
-
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, ExpansionDesign design, int threads) {
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,

@@ -20,15 +20,6 @@
 
 namespace polyest {
 
-// Consecutive rows of the record, as read from the store: values and noise row by row.
-struct RowBlock {
-  std::vector<SampleRow> rows;
-  std::vector<double> values;
-  std::vector<double> noise;
-
-  int count() const { return static_cast<int>(rows.size()); }
-};
-
 // A trajectory left out, with the parameters that made it fail.
 struct FailedTrajectory {
   Vector theta;
@@ -129,8 +120,5 @@ class RegionalExpansion {
 
 // One line that names parameters, time, run and the solver's flag.
 std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior);
-
-// Reads rows [first, first + count) of the store.
-absl::Status ReadBlock(const SampleStore& store, int64_t first, int64_t count, RowBlock& block);
 
 }  // namespace polyest

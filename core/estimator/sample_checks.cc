@@ -13,25 +13,15 @@
 namespace polyest {
 namespace {
 
-std::vector<double> RowOf(const std::vector<double>& all, size_t rows, size_t row) {
-  const size_t width = all.size() / rows;
-  const auto begin = all.begin() + static_cast<std::ptrdiff_t>(row * width);
-  return {begin, begin + static_cast<std::ptrdiff_t>(width)};
-}
+// A sample farther than this from zero, in standard deviations of its noise, is a wrong unit or a
+// wrong noise; its square would drown every other sample's in rounding.
+constexpr double kMostSignalToNoise = 1e9;
 
 bool Missing(const SampleColumn& column, size_t row) {
   return !column.missing.empty() && column.missing[row];
 }
 
 }  // namespace
-
-std::vector<double> CheckedSamples::RowValues(size_t row) const {
-  return RowOf(values, rows.size(), row);
-}
-
-std::vector<double> CheckedSamples::RowNoise(size_t row) const {
-  return RowOf(noise, rows.size(), row);
-}
 
 SampleChecks::SampleChecks(const ResolvedProblem& problem) : problem_(problem) {
   for (const MeasuredOutput& measured : problem.problem().measured) {
@@ -64,8 +54,14 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
       if (place >= channels) continue;
       double& largest = checked.after.largest[static_cast<Eigen::Index>(place)];
       largest = std::max(largest, std::abs(z));
-      checked.noise[k * channels + place] =
-          problem_.problem().measured[place].noise.StandardDeviation(z, largest);
+      const double sigma = problem_.problem().measured[place].noise.StandardDeviation(z, largest);
+      if (std::abs(z) > kMostSignalToNoise * sigma) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "row %d, column %s: %g is more than %g times its noise of %g; check its "
+            "unit or the noise",
+            k, column.name, z, kMostSignalToNoise, sigma));
+      }
+      checked.noise[k * channels + place] = sigma;
     }
   }
   for (size_t k = 0; k < samples.rows(); ++k) {

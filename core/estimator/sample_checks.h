@@ -20,16 +20,9 @@ struct RecordPosition {
   Vector largest;  // by channel: max |z| so far, for NoiseModel::relative_to_max
 };
 
-// Rows that have passed: values (the channels, then the streamed inputs; NaN where missing) and
-// noise (by channel; 0 where missing), row by row.
-struct CheckedSamples {
-  std::vector<SampleRow> rows;
-  std::vector<double> values;
-  std::vector<double> noise;
+// Rows that have passed, and where the record stands after them.
+struct CheckedSamples : RowBlock {
   RecordPosition after;
-
-  std::vector<double> RowValues(size_t row) const;
-  std::vector<double> RowNoise(size_t row) const;
 };
 
 class SampleChecks {

@@ -31,20 +31,27 @@ struct SampleRow {
   double time_s = 0;
 };
 
+// Consecutive rows of the record that have passed the checks, row by row: values (the channels,
+// then the streamed inputs; NaN where missing) and noise (standard deviation of each channel's
+// sample; 0 where missing).
+struct RowBlock {
+  std::vector<SampleRow> rows;
+  std::vector<double> values;
+  std::vector<double> noise;
+
+  int count() const { return static_cast<int>(rows.size()); }
+};
+
 // Where the samples of a session lie, so that a moved expansion can be propagated over them again:
 // in memory now, on disk behind the same interface later. Rows are appended and never changed.
 class SampleStore {
  public:
   virtual ~SampleStore() = default;
   virtual int64_t rows() const = 0;
-  // values: the channels then the streamed inputs, NaN where missing. noise: the standard
-  // deviation of each channel, 0 where missing.
-  virtual absl::Status Append(const SampleRow& row, const std::vector<double>& values,
-                              const std::vector<double>& noise) = 0;
-  // Reads rows [first, first + count) column-wise into the vectors given (resized to count,
-  // count × values, count × noise).
-  virtual absl::Status Read(int64_t first, int64_t count, std::vector<SampleRow>& rows,
-                            std::vector<double>& values, std::vector<double>& noise) const = 0;
+  // All of the block, or nothing and why.
+  virtual absl::Status Append(const RowBlock& block) = 0;
+  // Rows [first, first + count), which must be there, into the block.
+  virtual absl::Status Read(int64_t first, int64_t count, RowBlock& block) const = 0;
 };
 
 }  // namespace polyest

@@ -38,20 +38,18 @@ Problem DrivenOscillator() {
 class CountedStore final : public SampleStore {
  public:
   int64_t rows() const override { return static_cast<int64_t>(time_s_.size()); }
-  absl::Status Append(const SampleRow& row, const std::vector<double>& values,
-                      const std::vector<double>& noise) override {
-    POLYEST_CHECK(values.size() == 1 && noise.size() == 1);
-    time_s_.push_back(row.time_s);
-    value_.push_back(values[0]);
+  absl::Status Append(const RowBlock& block) override {
+    for (const SampleRow& row : block.rows) time_s_.push_back(row.time_s);
+    value_.insert(value_.end(), block.values.begin(), block.values.end());
     return absl::OkStatus();
   }
-  absl::Status Read(int64_t first, int64_t count, std::vector<SampleRow>& rows,
-                    std::vector<double>& values, std::vector<double>& noise) const override {
-    rows.clear();
-    for (int64_t i = first; i < first + count; ++i)
-      rows.push_back({0, time_s_[static_cast<size_t>(i)]});
-    values.assign(value_.begin() + first, value_.begin() + first + count);
-    noise.assign(static_cast<size_t>(count), kNoise);
+  absl::Status Read(int64_t first, int64_t count, RowBlock& block) const override {
+    block.rows.clear();
+    for (int64_t i = first; i < first + count; ++i) {
+      block.rows.push_back({0, time_s_[static_cast<size_t>(i)]});
+    }
+    block.values.assign(value_.begin() + first, value_.begin() + first + count);
+    block.noise.assign(static_cast<size_t>(count), kNoise);
     return absl::OkStatus();
   }
   size_t bytes() const { return (time_s_.capacity() + value_.capacity()) * sizeof(double); }

@@ -18,7 +18,7 @@ Estimate TwoParameters() {
                           .prior_std_dev = 7,
                           .contraction = 0.5,
                           .verdict = Verdict::kIdentified},
-                         {.name = "c", .verdict = Verdict::kWeak}};
+                         {.name = "c", .unit = "N s/m", .verdict = Verdict::kWeak}};
   estimate.covariance = (Matrix(2, 2) << 1, 2, 3, 4).finished();
   estimate.cost = {.mismatch = 10, .prior = 20, .total = 30};
   estimate.regularization = 0.25;

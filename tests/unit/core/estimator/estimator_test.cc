@@ -98,14 +98,10 @@ TEST(Estimator, TakesNothingWhenAlreadyStoppedAndGoesOnLater) {
 class StoppingStore final : public SampleStore {
  public:
   int64_t rows() const override { return samples_.rows(); }
-  absl::Status Append(const SampleRow& row, const std::vector<double>& values,
-                      const std::vector<double>& noise) override {
-    return samples_.Append(row, values, noise);
-  }
-  absl::Status Read(int64_t first, int64_t count, std::vector<SampleRow>& rows,
-                    std::vector<double>& values, std::vector<double>& noise) const override {
+  absl::Status Append(const RowBlock& block) override { return samples_.Append(block); }
+  absl::Status Read(int64_t first, int64_t count, RowBlock& block) const override {
     if (--reads_left_ == 0) source_.request_stop();
-    return samples_.Read(first, count, rows, values, noise);
+    return samples_.Read(first, count, block);
   }
   Stop StopAfter(int reads) {
     source_ = std::stop_source();

@@ -11,6 +11,20 @@
 namespace polyest {
 namespace {
 
+std::vector<double> Row(const CheckedSamples& checked, const std::vector<double>& all, size_t row) {
+  const auto width = static_cast<std::ptrdiff_t>(all.size() / checked.rows.size());
+  const auto begin = all.begin() + static_cast<std::ptrdiff_t>(row) * width;
+  return {begin, begin + width};
+}
+
+std::vector<double> RowValues(const CheckedSamples& checked, size_t row) {
+  return Row(checked, checked.values, row);
+}
+
+std::vector<double> RowNoise(const CheckedSamples& checked, size_t row) {
+  return Row(checked, checked.noise, row);
+}
+
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -52,16 +66,16 @@ TEST_F(SampleChecksTest, PlaceValuesByTheProblemsOrderWithNanWhereMissing) {
   ASSERT_EQ(checked.rows.size(), 3u);
   EXPECT_EQ(checked.rows[2].time_s, 2);
   EXPECT_EQ(checked.rows[2].run, 0);
-  EXPECT_THAT(checked.RowValues(1), ElementsAre(-3, ::testing::IsNan(), 6));
-  EXPECT_EQ(checked.RowNoise(1)[1], 0);
+  EXPECT_THAT(RowValues(checked, 1), ElementsAre(-3, ::testing::IsNan(), 6));
+  EXPECT_EQ(RowNoise(checked, 1)[1], 0);
 }
 
 // σ = absolute + relative |z| + relative_to_max max |z| up to the sample itself.
 TEST_F(SampleChecksTest, GiveNoiseWithTheMaximumSoFar) {
   const CheckedSamples checked = checks_.Check(ThreeRows()).value();
-  EXPECT_DOUBLE_EQ(checked.RowNoise(0)[0], 0.1 + 0.01 * 1 + 0.001 * 1);
-  EXPECT_DOUBLE_EQ(checked.RowNoise(1)[0], 0.1 + 0.01 * 3 + 0.001 * 3);
-  EXPECT_DOUBLE_EQ(checked.RowNoise(2)[0], 0.1 + 0.01 * 2 + 0.001 * 3);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 0)[0], 0.1 + 0.01 * 1 + 0.001 * 1);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 1)[0], 0.1 + 0.01 * 3 + 0.001 * 3);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 3);
 }
 
 TEST_F(SampleChecksTest, GiveTheSameNoiseHoweverTheRecordIsCut) {
@@ -72,7 +86,7 @@ TEST_F(SampleChecksTest, GiveTheSameNoiseHoweverTheRecordIsCut) {
     row.columns = {{"x", {ThreeRows().columns[0].value[k]}, {}},
                    {"force", {ThreeRows().columns[1].value[k]}, {}}};
     const CheckedSamples checked = checks_.Check(row).value();
-    EXPECT_EQ(checked.RowNoise(0), whole.RowNoise(k));
+    EXPECT_EQ(RowNoise(checked, 0), RowNoise(whole, k));
     checks_.Accept(checked);
   }
 }
@@ -82,17 +96,17 @@ TEST_F(SampleChecksTest, IgnoreTheValueOfAMissingSample) {
   samples.columns[0].value[1] = kNan;
   samples.columns[0].missing = {false, true, false};
   const CheckedSamples checked = checks_.Check(samples).value();
-  EXPECT_TRUE(std::isnan(checked.RowValues(1)[0]));
-  EXPECT_EQ(checked.RowNoise(1)[0], 0);
-  EXPECT_DOUBLE_EQ(checked.RowNoise(2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);  // 3 was not measured
+  EXPECT_TRUE(std::isnan(RowValues(checked, 1)[0]));
+  EXPECT_EQ(RowNoise(checked, 1)[0], 0);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);  // 3 was not measured
 }
 
 TEST_F(SampleChecksTest, KeepTheNoiseAboveZero) {
   Samples samples = ThreeRows();
   samples.columns.push_back({"v", {0, 0, 4}, {}});
   const CheckedSamples checked = checks_.Check(samples).value();
-  EXPECT_EQ(checked.RowNoise(0)[1], NoiseModel::kLeastStandardDeviation);
-  EXPECT_DOUBLE_EQ(checked.RowNoise(2)[1], 2);
+  EXPECT_EQ(RowNoise(checked, 0)[1], NoiseModel::kLeastStandardDeviation);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2);
 }
 
 TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {
@@ -101,7 +115,7 @@ TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {
   earlier.time_s = {0, 0.5, 0.75};
   earlier.columns[0].value = {1, 1, 1};
   const CheckedSamples checked = checks_.Check(earlier).value();
-  EXPECT_DOUBLE_EQ(checked.RowNoise(2)[0], 0.1 + 0.01 + 0.001);  // not the 3 of the batch before
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 + 0.001);  // not the 3 of the batch before
 }
 
 TEST_F(SampleChecksTest, TakeRunsThatBeginAgainAtZero) {
