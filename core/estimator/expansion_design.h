@@ -44,7 +44,7 @@ ExpansionDesign DesignForRegion(const ResolvedProblem& problem, Region region,
                                 const Vector& inside);
 
 // The box that holds the particles (germ coordinates, W × n) along their principal axes, widened
-// by a margin of a third.
+// by a margin of about a third.
 Region RegionOfParticles(const Matrix& xis);
 
 // The design's trusted box in germ space as a region, with η ∈ [−1, 1]^n.

@@ -105,7 +105,7 @@ TEST(DesignForRegion, DrawsPointsIntoThePrior) {
   const Vector inside = Eigen::Vector2d(0.8, -0.8);
   const ExpansionDesign design = DesignForRegion(problem, region, inside);
   const Matrix xis = region.ManyToGerm(design.points);
-  EXPECT_LE(xis.cwiseAbs().maxCoeff(), 1 + 1e-14);
+  EXPECT_LE(xis.cwiseAbs().maxCoeff(), 1.0);
   const Matrix plain = region.ManyToGerm(2 * UnitCubePoints(PointSet::kHalton, 2, 20).array() - 1);
   int drawn = 0;
   for (Eigen::Index q = 0; q < xis.rows(); ++q) {
@@ -115,8 +115,8 @@ TEST(DesignForRegion, DrawsPointsIntoThePrior) {
       continue;
     }
     ++drawn;
-    // On the bound, and on the line from the point to `inside`.
-    EXPECT_NEAR(xis.row(q).cwiseAbs().maxCoeff(), 1, 1e-14);
+    // On the bound but for 1e-12 of the way, and on the line from the point to `inside`.
+    EXPECT_NEAR(xis.row(q).cwiseAbs().maxCoeff(), 1, 1e-12);
     const Eigen::Vector2d step = xis.row(q).transpose() - inside;
     const Eigen::Vector2d whole = plain.row(q).transpose() - inside;
     EXPECT_NEAR(step[0] * whole[1] - step[1] * whole[0], 0, 1e-14);
