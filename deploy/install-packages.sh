@@ -12,7 +12,7 @@ packages=(
   libspdlog-dev libcli11-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev clang-format python3 python3-grpcio python3-protobuf
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format
 )
 
 say() { echo "install-packages: $*" >&2; }

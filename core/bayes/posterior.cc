@@ -40,11 +40,14 @@ class Sampler {
   absl::StatusOr<Particles> Run(const Matrix& guesses, const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(Start(guesses));
     double beta = 0;
+    int done = 0;
     while (beta < 1) {
       const double step = TemperingStep(1 - beta);
       Resample(step);
       beta = step >= 1 - beta ? 1 : beta + step;
-      const int sweeps = beta < 1 ? options_.sweeps : options_.final_sweeps;
+      const int sweeps = beta < 1 ? options_.sweeps
+                                  : std::max(options_.final_sweeps, options_.total_sweeps - done);
+      done += sweeps;
       for (int i = 0; i < sweeps; ++i) {
         POLYEST_RETURN_IF_ERROR(stop.Check());
         Sweep(beta);

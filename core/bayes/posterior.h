@@ -21,8 +21,11 @@ namespace polyest {
 struct SamplerOptions {
   int particles = 1000;
   int sweeps = 10;        // of moves after each tempering step
-  int final_sweeps = 40;  // at β = 1
-  uint64_t seed = 1;      // the particles are a function of the arguments alone
+  int final_sweeps = 40;  // at β = 1, at least
+  // In all, made up at β = 1: the same work however many steps the tempering takes, up to where
+  // sweeps × steps + final_sweeps passes it.
+  int total_sweeps = 0;
+  uint64_t seed = 1;  // the particles are a function of the arguments alone
 };
 
 struct Particles {

@@ -16,6 +16,8 @@ namespace polyest {
 namespace {
 
 constexpr int kParticles = 2000;
+constexpr int kSweeps = 6;         // after each tempering step
+constexpr int kTotalSweeps = 120;  // so that an estimate takes the same time after any record
 constexpr uint64_t kSeed = 20'071'121;
 constexpr int kStarts = 6;
 // Other minima count when their density is not below this part of the best one's: e^−7 ≈ 10⁻³.
@@ -139,6 +141,8 @@ class Assessment {
     SamplerOptions options;
     options.particles = kParticles;
     options.seed = kSeed;
+    options.sweeps = kSweeps;
+    options.total_sweeps = kTotalSweeps;
     POLYEST_ASSIGN_OR_RETURN(
         particles_, SamplePosterior(cost, lower, upper,
                                     design_.region.ManyToLocal(*request_.guesses), options, stop));

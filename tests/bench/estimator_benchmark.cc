@@ -62,12 +62,13 @@ class CountedStore final : public SampleStore {
 // An estimator and the record that feeds it: the model itself at k = 40, c = 1, with noise.
 class Rig {
  public:
-  Rig() : resolved_(*ResolvedProblem::Make(DrivenOscillator())), inputs_(resolved_.MakeInputs()) {
-    const size_t before = mallinfo2().uordblks;
+  Rig()
+      : heap_before_(HeapBytes()),
+        resolved_(*ResolvedProblem::Make(DrivenOscillator())),
+        inputs_(resolved_.MakeInputs()) {
     EstimatorOptions options;
     options.store = store_;
     estimator_ = *Estimator::Make(resolved_, options);
-    heap_before_ = before;
     Matrix truth(1, 2);
     truth << 40, 1;
     truth_ = std::make_unique<EnsemblePropagator>(
@@ -98,16 +99,22 @@ class Rig {
 
   Estimate Now() const { return *estimator_->CurrentEstimate(); }
   double HeapBesideSamples() const {
-    return static_cast<double>(mallinfo2().uordblks - heap_before_ - store_->bytes());
+    return HeapBytes() - heap_before_ - static_cast<double>(store_->bytes());
   }
 
  private:
+  // In use, of the heap and of what was mapped for large blocks.
+  static double HeapBytes() {
+    const struct mallinfo2 info = mallinfo2();
+    return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
+  }
+
+  double heap_before_;
   ResolvedProblem resolved_;
   InputSignals inputs_;
   std::shared_ptr<CountedStore> store_ = std::make_shared<CountedStore>();
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<EnsemblePropagator> truth_;
-  size_t heap_before_ = 0;
   int64_t row_ = 0;
   std::mt19937_64 generator_{1};
   std::normal_distribution<double> noise_{0, kNoise};
