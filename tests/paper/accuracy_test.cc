@@ -122,6 +122,7 @@ TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
     ExpectNear(estimate.parameters[i], exact[i], 0.05, 0.1, 0.02);
   }
   EXPECT_LT(estimate.expansion.trajectories, order == 2 ? 111 : 385);
+  RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   EXPECT_LT(estimate.expansion.residual_to_noise, 0.1);
 }
 
@@ -142,6 +143,7 @@ TEST(TwoGlidersRecord, AgreesWithLeastSquaresOnTheExactModel) {
     ExpectNear(estimate.parameters[i], exact[i], 0.1, 0.17, 0.03);
   }
   EXPECT_LT(estimate.expansion.trajectories, 1'350);
+  RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   for (const ChannelEstimate& channel : estimate.channels) {
     EXPECT_NEAR(std::sqrt(channel.chi_squared / static_cast<double>(channel.samples)), 1, 0.06);
   }
@@ -167,6 +169,7 @@ TEST(PendulumRecord, AgreesWithTheirsWhoRecordedIt) {
   const Estimate estimate = EstimateInBatches(problem, *record, 1000);
   EXPECT_NEAR(estimate.parameters[0].map, 1.3556, 0.0007);
   EXPECT_LT(estimate.expansion.trajectories, 340);
+  RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   EXPECT_LT(estimate.expansion.residual_to_noise, 0.1);
 }
 
