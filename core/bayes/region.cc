@@ -31,6 +31,7 @@ Matrix Region::ManyToGerm(const ConstMatrixRef& etas) const {
 }
 
 Matrix Region::ManyToLocal(const ConstMatrixRef& xis) const {
+  if (xis.rows() == 0) return Matrix(0, dimension());  // Eigen's solver reads the first column
   return factors_.solve((xis.rowwise() - centre_.transpose()).transpose()).transpose();
 }
 
