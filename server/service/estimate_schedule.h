@@ -23,12 +23,14 @@ class EstimateSchedule {
       return absl::InvalidArgumentError(absl::StrFormat(
           "estimates.everyBatches: %d must not be negative", policy.every_batches()));
     }
-    const auto interval = std::chrono::seconds(policy.min_interval().seconds()) +
-                          std::chrono::nanoseconds(policy.min_interval().nanos());
-    if (interval.count() < 0 || policy.min_interval().seconds() > kLongestIntervalSeconds) {
+    // Before the conversion to nanoseconds, which would overflow.
+    const int64_t seconds = policy.min_interval().seconds();
+    const int32_t nanos = policy.min_interval().nanos();
+    if (seconds < 0 || seconds > kLongestIntervalSeconds || nanos < 0 || nanos >= 1'000'000'000) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "estimates.minInterval: must lie between 0 and %d s", kLongestIntervalSeconds));
     }
+    const auto interval = std::chrono::seconds(seconds) + std::chrono::nanoseconds(nanos);
     every_batches_ = std::max(1, policy.every_batches());
     min_interval_ = interval;
     only_last_ = policy.only_last();
