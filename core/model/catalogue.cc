@@ -17,25 +17,26 @@ namespace polyest {
 namespace {
 
 template <class... Equations>
-std::vector<std::shared_ptr<const Model>> MakeAll() {
+std::vector<std::shared_ptr<const StateSpaceModel>> MakeAll() {
   return {std::make_shared<const LaneModel<Equations>>()...};
 }
 
 }  // namespace
 
-const std::vector<std::shared_ptr<const Model>>& BuiltinModels() {
+const std::vector<std::shared_ptr<const StateSpaceModel>>& BuiltinModels() {
   // Never destroyed, so that it may be used at any time of the program's end.
-  static const auto& models = *new std::vector<std::shared_ptr<const Model>>(
+  static const auto& models = *new std::vector<std::shared_ptr<const StateSpaceModel>>(
       MakeAll<builtin::MassSpringDamper, builtin::MassSpringFrequency, builtin::LinearTwoState,
               builtin::RollPlane2Dof, builtin::Duffing, builtin::Pendulum>());
   return models;
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> FindBuiltinModel(std::string_view name) {
-  for (const std::shared_ptr<const Model>& model : BuiltinModels()) {
+absl::StatusOr<std::shared_ptr<const StateSpaceModel>> FindBuiltinModel(std::string_view name) {
+  for (const std::shared_ptr<const StateSpaceModel>& model : BuiltinModels()) {
     if (model->description().name == name) return model;
   }
-  const auto append_name = [](std::string* text, const std::shared_ptr<const Model>& model) {
+  const auto append_name = [](std::string* text,
+                              const std::shared_ptr<const StateSpaceModel>& model) {
     text->append(model->description().name);
   };
   return absl::NotFoundError(absl::StrCat("no built-in model is named \"", std::string(name),

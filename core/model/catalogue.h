@@ -11,9 +11,9 @@
 namespace polyest {
 
 // The built-in models, in the order of the documentation.
-const std::vector<std::shared_ptr<const Model>>& BuiltinModels();
+const std::vector<std::shared_ptr<const StateSpaceModel>>& BuiltinModels();
 
 // NOT_FOUND, listing the names there are, for a name that is not in the catalogue.
-absl::StatusOr<std::shared_ptr<const Model>> FindBuiltinModel(std::string_view name);
+absl::StatusOr<std::shared_ptr<const StateSpaceModel>> FindBuiltinModel(std::string_view name);
 
 }  // namespace polyest

@@ -6,6 +6,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -75,6 +76,10 @@ class InputSignal {
 
   double default_amplitude() const;
   bool streamed() const;
+  // What it was made of, but for a table's knots: those are below, with a streamed signal's.
+  const InputSpecification& specification() const { return specification_; }
+  std::span<const double> knot_times_s() const { return knot_time_s_; }
+  std::span<const double> knot_values() const { return knot_value_; }
   // A streamed signal's next knot: finite, times strictly increasing within a run; amortized O(1).
   void Append(double time_s, double value);
   // Forgets the knots of a streamed signal: a new run begins.

@@ -30,7 +30,7 @@
 namespace polyest {
 
 template <class Equations>
-class LaneModel final : public Model {
+class LaneModel final : public StateSpaceModel {
  public:
   LaneModel() : description_(Equations::Describe()) {
     POLYEST_CHECK(description_.states.size() == Equations::kStates);

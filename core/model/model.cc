@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_join.h>
 
+#include "core/common/check.h"
+
 namespace polyest {
 namespace {
 
@@ -31,6 +33,11 @@ std::string ListNames(const std::vector<Quantity>& quantities) {
   return absl::StrJoin(quantities, ", ", [](std::string* text, const Quantity& quantity) {
     text->append(quantity.name);
   });
+}
+
+void StateSpaceModel::StateJacobian(double, const ConstBlock&, const ConstBlock&, const ConstBlock&,
+                                    Block) const {
+  POLYEST_CHECK(has_state_jacobian());
 }
 
 }  // namespace polyest

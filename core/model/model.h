@@ -21,6 +21,7 @@ struct Quantity {
   std::string unit;          // SI, as in "N/m"; "1" for a plain number
   std::string meaning;       // one line
   double default_value = 0;  // of a parameter; unused for states, inputs, outputs
+  bool has_default = true;   // of a parameter; without one it must be given a value
 };
 
 struct ModelDescription {
@@ -42,18 +43,30 @@ struct ModelDescription {
 // "none".
 std::string ListNames(const std::vector<Quantity>& quantities);
 
-// Blocks have one row a point and one column a quantity, in the description's order; the number of
-// rows is a multiple of kLanes. A model keeps no state between calls and may be used by several
-// threads at once.
+// What can be simulated. How, its kind says: by its equations (StateSpaceModel), or by itself
+// (SelfPropagatingModel, core/propagation).
 class Model {
  public:
   virtual ~Model() = default;
   virtual const ModelDescription& description() const = 0;
+};
+
+// Blocks have one row a point and one column a quantity, in the description's order; the number of
+// rows is a multiple of kLanes. A model keeps no state between calls and may be used by several
+// threads at once.
+class StateSpaceModel : public Model {
+ public:
   virtual void InitialStates(const ConstBlock& parameters, Block states) const = 0;
   virtual void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                            const ConstBlock& inputs, Block derivatives) const = 0;
   virtual void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                        const ConstBlock& inputs, Block outputs) const = 0;
+
+  // Whether StateJacobian is there; differences of Derivatives serve otherwise.
+  virtual bool has_state_jacobian() const { return false; }
+  // ∂f_i/∂x_s in column s·states + i; rows × states².
+  virtual void StateJacobian(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                             const ConstBlock& inputs, Block jacobian) const;
 };
 
 }  // namespace polyest

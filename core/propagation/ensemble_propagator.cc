@@ -7,6 +7,7 @@
 
 #include "core/common/check.h"
 #include "core/common/parallel.h"
+#include "core/common/status.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest {
@@ -23,12 +24,16 @@ absl::Status IntegrationOptions::Validate() const {
   return absl::OkStatus();
 }
 
-class EnsemblePropagator::Implementation {
+namespace {
+
+// An ensemble of a state-space model in blocks of trajectories.
+class IntegratedEnsemble final : public TrajectoryEnsemble {
  public:
-  Implementation(EnsembleSpecification specification, const InputSignals* inputs);
-  absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
-  int points() const { return static_cast<int>(specification_.parameters.rows()); }
-  const std::vector<PointFailure>& failures() const { return failures_; }
+  IntegratedEnsemble(EnsembleSpecification specification, const InputSignals* inputs);
+  absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
+                       const Stop& stop) override;
+  int points() const override { return static_cast<int>(specification_.parameters.rows()); }
+  const std::vector<PointFailure>& failures() const override { return failures_; }
 
  private:
   void CollectFailures();
@@ -39,18 +44,9 @@ class EnsemblePropagator::Implementation {
   std::vector<PointFailure> failures_;
 };
 
-EnsemblePropagator::Implementation::Implementation(EnsembleSpecification specification,
-                                                   const InputSignals* inputs)
+IntegratedEnsemble::IntegratedEnsemble(EnsembleSpecification specification,
+                                       const InputSignals* inputs)
     : specification_(std::move(specification)) {
-  const ModelDescription& description = specification_.model->description();
-  POLYEST_CHECK(specification_.parameters.cols() == std::ssize(description.parameters));
-  POLYEST_CHECK(specification_.amplitudes.cols() == std::ssize(description.inputs));
-  POLYEST_CHECK(specification_.amplitudes.rows() == specification_.parameters.rows());
-  POLYEST_CHECK(inputs->size() == description.inputs.size());
-  POLYEST_CHECK(specification_.integration.Validate().ok());
-  for (const int output : specification_.outputs) {
-    POLYEST_CHECK(output >= 0 && output < std::ssize(description.outputs));
-  }
   for (int first = 0; first < points(); first += TrajectoryBlock::kPoints) {
     const int count = std::min(TrajectoryBlock::kPoints, points() - first);
     blocks_.push_back(std::make_unique<TrajectoryBlock>(&specification_, inputs, first, count));
@@ -59,8 +55,8 @@ EnsemblePropagator::Implementation::Implementation(EnsembleSpecification specifi
   CollectFailures();
 }
 
-absl::Status EnsemblePropagator::Implementation::Advance(std::span<const double> times_s,
-                                                         MatrixRef outputs, const Stop& stop) {
+absl::Status IntegratedEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
+                                         const Stop& stop) {
   POLYEST_CHECK(outputs.rows() == points());
   POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * std::ssize(specification_.outputs));
   ParallelFor(static_cast<int>(blocks_.size()), specification_.threads, [&](int block) {
@@ -73,7 +69,7 @@ absl::Status EnsemblePropagator::Implementation::Advance(std::span<const double>
   return absl::OkStatus();
 }
 
-void EnsemblePropagator::Implementation::CollectFailures() {
+void IntegratedEnsemble::CollectFailures() {
   size_t count = 0;
   for (const auto& block : blocks_) count += block->failures().size();
   if (count == failures_.size()) return;
@@ -85,22 +81,56 @@ void EnsemblePropagator::Implementation::CollectFailures() {
             [](const PointFailure& a, const PointFailure& b) { return a.point < b.point; });
 }
 
+void CheckSpecification(const EnsembleSpecification& specification, const InputSignals& inputs) {
+  const ModelDescription& description = specification.model->description();
+  const Eigen::Index points = specification.parameters.rows();
+  const auto fits = [points](const Matrix& matrix, size_t columns) {
+    return matrix.rows() == points && matrix.cols() == static_cast<Eigen::Index>(columns);
+  };
+  const auto fits_or_empty = [&fits](const Matrix& matrix, size_t columns) {
+    return matrix.size() == 0 || fits(matrix, columns);
+  };
+  POLYEST_CHECK(fits(specification.parameters, description.parameters.size()));
+  POLYEST_CHECK(fits(specification.amplitudes, description.inputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.input_delays_s, description.inputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.input_offsets, description.inputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.output_gains, specification.outputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.output_offsets, specification.outputs.size()));
+  POLYEST_CHECK(inputs.size() == description.inputs.size());
+  POLYEST_CHECK(specification.integration.Validate().ok());
+  for (const int output : specification.outputs) {
+    POLYEST_CHECK(output >= 0 && output < std::ssize(description.outputs));
+  }
+}
+
+std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
+                                                  const InputSignals* inputs) {
+  CheckSpecification(specification, *inputs);
+  if (const auto* model = dynamic_cast<const SelfPropagatingModel*>(specification.model.get())) {
+    return model->StartEnsemble(std::move(specification), inputs);
+  }
+  return std::make_unique<IntegratedEnsemble>(std::move(specification), inputs);
+}
+
+}  // namespace
+
 EnsemblePropagator::EnsemblePropagator(EnsembleSpecification specification,
                                        const InputSignals* inputs)
-    : implementation_(std::make_unique<Implementation>(std::move(specification), inputs)) {}
-EnsemblePropagator::~EnsemblePropagator() = default;
-EnsemblePropagator::EnsemblePropagator(EnsemblePropagator&&) noexcept = default;
-EnsemblePropagator& EnsemblePropagator::operator=(EnsemblePropagator&&) noexcept = default;
-
-int EnsemblePropagator::points() const { return implementation_->points(); }
+    : output_gains_(specification.output_gains),
+      output_offsets_(specification.output_offsets),
+      ensemble_(StartEnsemble(std::move(specification), inputs)) {}
 
 absl::Status EnsemblePropagator::Advance(std::span<const double> times_s, MatrixRef outputs,
                                          const Stop& stop) {
-  return implementation_->Advance(times_s, outputs, stop);
-}
-
-const std::vector<PointFailure>& EnsemblePropagator::failures() const {
-  return implementation_->failures();
+  POLYEST_RETURN_IF_ERROR(ensemble_->Advance(times_s, outputs, stop));
+  // y = gain · h + offset
+  const Eigen::Index m = times_s.empty() ? 0 : outputs.cols() / std::ssize(times_s);
+  for (Eigen::Index column = 0; column < outputs.cols(); ++column) {
+    auto y = outputs.col(column).array();
+    if (output_gains_.size() > 0) y *= output_gains_.col(column % m).array();
+    if (output_offsets_.size() > 0) y += output_offsets_.col(column % m).array();
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace polyest

@@ -38,6 +38,7 @@ Eigen::ArrayXXd PaddedCopy(const Matrix& matrix, int first, int points) {
 TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
                                  const InputSignals* inputs, int first_point, int points)
     : specification_(specification),
+      model_(dynamic_cast<const StateSpaceModel*>(specification->model.get())),
       inputs_(inputs),
       first_point_(first_point),
       parameters_(PaddedCopy(specification->parameters, first_point, points)),
@@ -46,7 +47,8 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
       point_alive_(points, true),
       alive_points_(points),
       stiff_(specification->integration.method == IntegrationMethod::kStiff) {
-  const ModelDescription& description = specification->model->description();
+  POLYEST_CHECK(model_ != nullptr);
+  const ModelDescription& description = model_->description();
   const Eigen::Index rows = parameters_.rows();
   for (const InputSignal& input : *inputs) streamed_ = streamed_ || input.streamed();
   states_.setZero(rows, static_cast<Eigen::Index>(description.states.size()));
@@ -57,7 +59,7 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
     source_.push_back(std::min(static_cast<int>(row), points - 1));
   }
   if (states_.cols() == 0) return;
-  specification->model->InitialStates(parameters_, states_);
+  model_->InitialStates(parameters_, states_);
   FailRowsNotFinite(states_, 0, "an initial state is not finite");
   StartIntegrator(0);
 }
@@ -85,7 +87,7 @@ void TrajectoryBlock::EvaluateInputs(double time_s) {
 
 void TrajectoryBlock::Derivatives(double time_s, const ConstBlock& states, Block derivatives) {
   EvaluateInputs(std::min(time_s, input_limit_s_));
-  specification_->model->Derivatives(time_s, states, parameters_, input_values_, derivatives);
+  model_->Derivatives(time_s, states, parameters_, input_values_, derivatives);
 }
 
 TrajectoryBlock::Break TrajectoryBlock::NextBreak() const {
@@ -162,7 +164,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
   const Eigen::Index columns = selected_outputs_.cols();
   if (alive()) {
     EvaluateInputs(time_s);
-    specification_->model->Outputs(time_s, states_, parameters_, input_values_, model_outputs_);
+    model_->Outputs(time_s, states_, parameters_, input_values_, model_outputs_);
     for (Eigen::Index j = 0; j < columns; ++j) {
       selected_outputs_.col(j) = model_outputs_.col(selected[j]);
     }

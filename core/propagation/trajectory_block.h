@@ -21,7 +21,7 @@
 #include "core/common/stop.h"
 #include "core/common/types.h"
 #include "core/propagation/ensemble_integrator.h"
-#include "core/propagation/ensemble_propagator.h"
+#include "core/propagation/trajectory_ensemble.h"
 
 namespace polyest {
 
@@ -63,6 +63,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   bool alive() const { return alive_points_ > 0; }
 
   const EnsembleSpecification* specification_;
+  const StateSpaceModel* model_;
   const InputSignals* inputs_;
   const int first_point_;
   bool streamed_ = false;  // a knot yet to come must not change a step already taken

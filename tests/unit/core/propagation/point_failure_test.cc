@@ -124,7 +124,7 @@ TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
 }
 
 // x″ = −x, but the derivative of a point is not a number once t passes its time of death.
-class Mortal final : public Model {
+class Mortal final : public StateSpaceModel {
  public:
   const ModelDescription& description() const override { return description_; }
   void InitialStates(const ConstBlock&, Block states) const override {
