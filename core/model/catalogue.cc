@@ -5,12 +5,15 @@
 
 #include <string>
 
+#include "core/model/builtin/bicycle.h"
 #include "core/model/builtin/duffing.h"
 #include "core/model/builtin/linear_two_state.h"
 #include "core/model/builtin/mass_spring_damper.h"
 #include "core/model/builtin/mass_spring_frequency.h"
 #include "core/model/builtin/pendulum.h"
+#include "core/model/builtin/quarter_car.h"
 #include "core/model/builtin/roll_plane_2dof.h"
+#include "core/model/builtin/roll_plane_4dof.h"
 #include "core/model/lane_model.h"
 
 namespace polyest {
@@ -27,7 +30,8 @@ const std::vector<std::shared_ptr<const StateSpaceModel>>& BuiltinModels() {
   // Never destroyed, so that it may be used at any time of the program's end.
   static const auto& models = *new std::vector<std::shared_ptr<const StateSpaceModel>>(
       MakeAll<builtin::MassSpringDamper, builtin::MassSpringFrequency, builtin::LinearTwoState,
-              builtin::RollPlane2Dof, builtin::Duffing, builtin::Pendulum>());
+              builtin::RollPlane2Dof, builtin::RollPlane4Dof, builtin::QuarterCar, builtin::Bicycle,
+              builtin::Duffing, builtin::Pendulum>());
   return models;
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <string>
@@ -43,7 +44,8 @@ TEST(Catalogue, ListsTheModelsInTheOrderOfTheDocumentation) {
   std::vector<std::string> names;
   for (const auto& model : BuiltinModels()) names.push_back(model->description().name);
   EXPECT_THAT(names, ElementsAre("mass_spring_damper", "mass_spring_frequency", "linear_two_state",
-                                 "roll_plane_2dof", "duffing", "pendulum"));
+                                 "roll_plane_2dof", "roll_plane_4dof", "quarter_car", "bicycle",
+                                 "duffing", "pendulum"));
 }
 
 TEST(Catalogue, FindsEveryModelByItsName) {
@@ -72,7 +74,7 @@ TEST(Catalogue, EveryModelSaysWhatItIs) {
   }
 }
 
-TEST(Catalogue, EveryQuantityHasAUnitAMeaningAndAFiniteDefault) {
+TEST(Catalogue, EveryQuantityHasAUnitAMeaningAndADefault) {
   for (const auto& model : BuiltinModels()) {
     const ModelDescription& description = model->description();
     for (const auto* quantities : {&description.states, &description.parameters,
@@ -84,7 +86,10 @@ TEST(Catalogue, EveryQuantityHasAUnitAMeaningAndAFiniteDefault) {
         EXPECT_FALSE(quantity.unit.empty());
         EXPECT_FALSE(quantity.meaning.empty());
         EXPECT_EQ(quantity.meaning.find('\n'), std::string::npos);
-        EXPECT_TRUE(std::isfinite(quantity.default_value));
+        // Infinite friction is a linear tyre; nothing else is infinite.
+        const bool unbounded = description.name == "bicycle" && quantity.name == "mu";
+        EXPECT_EQ(std::isfinite(quantity.default_value), !unbounded);
+        EXPECT_FALSE(std::isnan(quantity.default_value));
       }
     }
   }
@@ -128,6 +133,44 @@ TEST(Catalogue, RollPlane2DofIsAsDocumented) {
                           Pair("x2_0", 0.0), Pair("v1_0", 0.0), Pair("v2_0", 0.0)));
   EXPECT_THAT(Names(model.inputs), ElementsAre("u1", "u2"));
   EXPECT_THAT(Names(model.outputs), ElementsAre("x1", "x2", "v1", "v2"));
+}
+
+TEST(Catalogue, RollPlane4DofIsAsDocumented) {
+  const ModelDescription& model = Describe("roll_plane_4dof");
+  EXPECT_THAT(Names(model.states), ElementsAre("x1", "x2", "xt1", "xt2", "v1", "v2", "vt1", "vt2"));
+  EXPECT_THAT(
+      Defaults(model),
+      ElementsAre(Pair("M", 580.0), Pair("I", 63.3316), Pair("L", 1.524), Pair("m_t", 36.26),
+                  Pair("k", 19357.2), Pair("k3", 100000.0), Pair("c_f", 142.14),
+                  Pair("k_t", 96319.76), Pair("m_a", 0.0), Pair("d", 0.762), Pair("x1_0", 0.0),
+                  Pair("x2_0", 0.0), Pair("xt1_0", 0.0), Pair("xt2_0", 0.0), Pair("v1_0", 0.0),
+                  Pair("v2_0", 0.0), Pair("vt1_0", 0.0), Pair("vt2_0", 0.0)));
+  EXPECT_THAT(Names(model.inputs), ElementsAre("y1", "y2"));
+  EXPECT_THAT(Names(model.outputs),
+              ElementsAre("d1", "d2", "d1_rate", "d2_rate", "x1", "x2", "xt1", "xt2", "a1", "a2"));
+}
+
+TEST(Catalogue, QuarterCarIsAsDocumented) {
+  const ModelDescription& model = Describe("quarter_car");
+  EXPECT_THAT(Names(model.states), ElementsAre("zs", "zu", "vs", "vu"));
+  EXPECT_THAT(Defaults(model), ElementsAre(Pair("ms", 290.0), Pair("mu", 59.0), Pair("ks", 16800.0),
+                                           Pair("cs", 1000.0), Pair("kt", 190000.0),
+                                           Pair("ks3", 0.0), Pair("zs_0", 0.0), Pair("zu_0", 0.0),
+                                           Pair("vs_0", 0.0), Pair("vu_0", 0.0)));
+  EXPECT_THAT(Names(model.inputs), ElementsAre("road"));
+  EXPECT_THAT(Names(model.outputs), ElementsAre("zs", "zu", "travel", "travel_rate", "zs_accel"));
+}
+
+TEST(Catalogue, BicycleIsAsDocumented) {
+  const ModelDescription& model = Describe("bicycle");
+  EXPECT_THAT(Names(model.states), ElementsAre("vy", "r"));
+  EXPECT_THAT(Defaults(model),
+              ElementsAre(Pair("m", 1500.0), Pair("Iz", 2500.0), Pair("lf", 1.2), Pair("lr", 1.4),
+                          Pair("Cf", 80000.0), Pair("Cr", 90000.0),
+                          Pair("mu", std::numeric_limits<double>::infinity()), Pair("vy_0", 0.0),
+                          Pair("r_0", 0.0)));
+  EXPECT_THAT(Names(model.inputs), ElementsAre("vx", "delta"));
+  EXPECT_THAT(Names(model.outputs), ElementsAre("vy", "r", "ay", "beta"));
 }
 
 TEST(Catalogue, DuffingIsAsDocumented) {

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <string>
 
+#include "core/model/builtin/bicycle.h"
 #include "core/model/builtin/duffing.h"
 #include "core/model/builtin/linear_two_state.h"
 #include "core/model/builtin/mass_spring_damper.h"
 #include "core/model/builtin/mass_spring_frequency.h"
 #include "core/model/builtin/pendulum.h"
+#include "core/model/builtin/quarter_car.h"
 #include "core/model/builtin/roll_plane_2dof.h"
+#include "core/model/builtin/roll_plane_4dof.h"
 
 namespace polyest {
 namespace {
@@ -50,12 +53,14 @@ class LaneModelOf : public ::testing::Test {
   LaneModel<Equations> model_;
   Eigen::ArrayXXd parameters_ = Varied(kRows, Equations::kParameters, 0);
   Eigen::ArrayXXd states_ = Varied(kRows, Equations::kStates, 1) - 1.5;
-  Eigen::ArrayXXd inputs_ = Varied(kRows, Equations::kInputs, 2) - 1.5;
+  // Positive: a bicycle rolls forwards.
+  Eigen::ArrayXXd inputs_ = Varied(kRows, Equations::kInputs, 2);
 };
 
-using AllEquations = ::testing::Types<builtin::MassSpringDamper, builtin::MassSpringFrequency,
-                                      builtin::LinearTwoState, builtin::RollPlane2Dof,
-                                      builtin::Duffing, builtin::Pendulum>;
+using AllEquations =
+    ::testing::Types<builtin::MassSpringDamper, builtin::MassSpringFrequency,
+                     builtin::LinearTwoState, builtin::RollPlane2Dof, builtin::RollPlane4Dof,
+                     builtin::QuarterCar, builtin::Bicycle, builtin::Duffing, builtin::Pendulum>;
 
 struct EquationsName {
   template <class Equations>

@@ -1,0 +1,411 @@
+// The vehicle models at a single point (Real = double): balances that hold exactly, linear systems
+// read off by differences, and closed forms of vehicle dynamics.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "core/model/builtin/bicycle.h"
+#include "core/model/builtin/quarter_car.h"
+#include "core/model/builtin/roll_plane_4dof.h"
+#include "core/model/lane_model.h"
+
+namespace polyest::builtin {
+namespace {
+
+template <class Equations>
+class ModelAtAPoint {
+ public:
+  using States = std::array<double, Equations::kStates>;
+  using Inputs = std::array<double, Equations::kInputs>;
+  using Outputs = std::array<double, Equations::kOutputs>;
+
+  ModelAtAPoint() {
+    for (size_t i = 0; i < parameters_.size(); ++i) {
+      parameters_[i] = description_.parameters[i].default_value;
+    }
+  }
+
+  double& operator[](const std::string& parameter) {
+    return parameters_.at(static_cast<size_t>(description_.FindParameter(parameter).value()));
+  }
+
+  States InitialStates() const {
+    States states;
+    Equations::Initial(parameters_, states);
+    return states;
+  }
+
+  States Derivatives(const States& states, const Inputs& inputs) const {
+    States derivatives;
+    Equations::Derivatives(0, states, parameters_, inputs, derivatives);
+    return derivatives;
+  }
+
+  double Output(const std::string& output, const States& states, const Inputs& inputs) const {
+    Outputs outputs;
+    Equations::Outputs(0, states, parameters_, inputs, outputs);
+    return outputs.at(static_cast<size_t>(description_.FindOutput(output).value()));
+  }
+
+  // ∂ẋ/∂x by central differences; the step is in the states' own units.
+  Matrix Jacobian(const States& at, const Inputs& inputs, double step) const {
+    Matrix jacobian(Equations::kStates, Equations::kStates);
+    for (size_t j = 0; j < at.size(); ++j) {
+      States above = at, below = at;
+      above[j] += step;
+      below[j] -= step;
+      jacobian.col(static_cast<Eigen::Index>(j)) =
+          (Eigen::Map<const Vector>(Derivatives(above, inputs).data(), Equations::kStates) -
+           Eigen::Map<const Vector>(Derivatives(below, inputs).data(), Equations::kStates)) /
+          (2 * step);
+    }
+    return jacobian;
+  }
+
+ private:
+  ModelDescription description_ = Equations::Describe();
+  std::array<double, Equations::kParameters> parameters_;
+};
+
+using RollPlane = ModelAtAPoint<RollPlane4Dof>;
+using Quarter = ModelAtAPoint<QuarterCar>;
+using SingleTrack = ModelAtAPoint<Bicycle>;
+
+// Of a few dozen operations on terms of the size `scale`.
+double Rounding(double scale) { return 1e-13 * scale; }
+
+constexpr double kGravity = 9.81;
+
+// Far from rest in every state.
+constexpr RollPlane::States kMoving = {0.03, -0.02, 0.01, 0.015, 0.4, -0.7, 0.2, 0.5};
+
+TEST(RollPlane4Dof, StartsAtItsInitialStates) {
+  RollPlane car;
+  const char* names[] = {"x1_0", "x2_0", "xt1_0", "xt2_0", "v1_0", "v2_0", "vt1_0", "vt2_0"};
+  for (int i = 0; i < 8; ++i) car[names[i]] = i + 1;
+  EXPECT_THAT(car.InitialStates(), testing::ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
+}
+
+// Oracle: the documentation's 1.18, 2.71, 9.01 and 9.08 Hz, to the digits that it gives.
+TEST(RollPlane4Dof, HasTheModesOfTheDocumentation) {
+  RollPlane car;
+  car["c_f"] = 0;
+  // k3 d³ is below 10⁻⁷ of k d at a step of 10⁻⁴ m.
+  const Eigen::VectorXcd eigenvalues = car.Jacobian({}, {0, 0}, 1e-4).eigenvalues();
+  std::vector<double> frequencies_hz;
+  for (const std::complex<double>& eigenvalue : eigenvalues) {
+    EXPECT_NEAR(eigenvalue.real(), 0, 1e-6);  // undamped
+    if (eigenvalue.imag() > 0) frequencies_hz.push_back(eigenvalue.imag() / (2 * std::numbers::pi));
+  }
+  EXPECT_THAT(frequencies_hz, testing::UnorderedElementsAre(testing::DoubleNear(1.18, 0.005),
+                                                            testing::DoubleNear(2.71, 0.005),
+                                                            testing::DoubleNear(9.01, 0.005),
+                                                            testing::DoubleNear(9.08, 0.005)));
+}
+
+// T and V are the header's, written down again.
+TEST(RollPlane4Dof, LosesToFrictionWhatTheRoadDoesNotGive) {
+  RollPlane car;
+  car["m_a"] = 220;
+  car["d"] = 0.4;
+  const RollPlane::Inputs road = {0.02, -0.01};
+  const auto [x1, x2, xt1, xt2, v1, v2, vt1, vt2] = kMoving;
+  const auto [dx1, dx2, dxt1, dxt2, a1, a2, at1, at2] = car.Derivatives(kMoving, road);
+  EXPECT_EQ((std::array{dx1, dx2, dxt1, dxt2}), (std::array{v1, v2, vt1, vt2}));
+  const double delta = 0.4 / 1.524;
+  const double v_a = (1 - delta) * v1 + delta * v2, a_a = (1 - delta) * a1 + delta * a2;
+  // dT/dt
+  double power = 580 * (v1 + v2) / 2 * (a1 + a2) / 2 +
+                 63.3316 * (v2 - v1) * (a2 - a1) / (1.524 * 1.524) + 220 * v_a * a_a +
+                 36.26 * (vt1 * at1 + vt2 * at2);
+  // dV/dt at a standing road, and the friction's loss
+  double friction = 0;
+  const double travel[] = {x1 - xt1, x2 - xt2}, rate[] = {v1 - vt1, v2 - vt2};
+  const double tyre[] = {road[0] - xt1, road[1] - xt2}, wheel[] = {vt1, vt2};
+  for (int i = 0; i < 2; ++i) {
+    power += (19357.2 * travel[i] + 1e5 * std::pow(travel[i], 3)) * rate[i] -
+             96319.76 * tyre[i] * wheel[i];
+    friction += 142.14 * std::tanh(10 * rate[i]) * rate[i];
+  }
+  EXPECT_GT(friction, 100);
+  EXPECT_NEAR(power, -friction, Rounding(1e4));
+}
+
+TEST(RollPlane4Dof, AnswersASymmetricRoadSymmetrically) {
+  RollPlane car;
+  car["m_a"] = 150;  // at the centre, the default
+  const auto derivatives =
+      car.Derivatives({0.03, 0.03, 0.01, 0.01, 0.4, 0.4, -0.2, -0.2}, {0.05, 0.05});
+  for (size_t i = 0; i < 8; i += 2) {
+    EXPECT_NEAR(derivatives[i], derivatives[i + 1], Rounding(1000)) << i;
+  }
+}
+
+TEST(RollPlane4Dof, MirroredMovesAsItsMirrorImage) {
+  RollPlane car, mirrored;
+  car["m_a"] = mirrored["m_a"] = 150;
+  car["d"] = 0.3;
+  mirrored["d"] = 1.524 - 0.3;
+  const auto [x1, x2, xt1, xt2, v1, v2, vt1, vt2] = kMoving;
+  const auto here = car.Derivatives(kMoving, {0.05, 0.02});
+  const auto there = mirrored.Derivatives({x2, x1, xt2, xt1, v2, v1, vt2, vt1}, {0.02, 0.05});
+  for (size_t i = 0; i < 8; i += 2) {
+    EXPECT_NEAR(here[i], there[i + 1], Rounding(1000)) << i;
+    EXPECT_NEAR(here[i + 1], there[i], Rounding(1000)) << i;
+  }
+}
+
+TEST(RollPlane4Dof, HeavesWithAMassAtItsCentreLikeAHeavierBar) {
+  RollPlane loaded, heavier;
+  loaded["m_a"] = 200;
+  heavier["M"] = 780;
+  const RollPlane::Inputs road = {0.02, -0.01};
+  const auto a = loaded.Derivatives(kMoving, road), b = heavier.Derivatives(kMoving, road);
+  EXPECT_NEAR(a[4] + a[5], b[4] + b[5], Rounding(1000));
+  EXPECT_NEAR(a[5] - a[4], b[5] - b[4], Rounding(1000));  // and rolls like it
+}
+
+// Steiner: at the end of the bar the point mass is as if fixed to that corner.
+TEST(RollPlane4Dof, CarriesAMassAtItsEndThereAlone) {
+  RollPlane car;
+  car["m_a"] = 200;
+  car["d"] = 0;
+  // Newton's law for the whole bar and its moments about the centre.
+  const auto d = car.Derivatives(kMoving, {0, 0});
+  const double travel1 = 0.02, travel2 = -0.035, rate1 = 0.2, rate2 = -1.2;
+  const double F1 = 19357.2 * travel1 + 1e5 * std::pow(travel1, 3) + 142.14 * std::tanh(10 * rate1);
+  const double F2 = 19357.2 * travel2 + 1e5 * std::pow(travel2, 3) + 142.14 * std::tanh(10 * rate2);
+  EXPECT_NEAR(580 * (d[4] + d[5]) / 2 + 200 * d[4], -F1 - F2, Rounding(1e4));
+  EXPECT_NEAR(63.3316 * (d[5] - d[4]) / 1.524, 1.524 / 2 * (F1 + 200 * d[4] - F2), Rounding(1e4));
+}
+
+TEST(RollPlane4Dof, ReadsTravelAndAccelerations) {
+  RollPlane car;
+  car["m_a"] = 200;
+  car["d"] = 0.5;
+  const RollPlane::Inputs road = {0.02, -0.01};
+  const auto derivatives = car.Derivatives(kMoving, road);
+  EXPECT_EQ(car.Output("d1", kMoving, road), 0.03 - 0.01);
+  EXPECT_EQ(car.Output("d2", kMoving, road), -0.02 - 0.015);
+  EXPECT_EQ(car.Output("d1_rate", kMoving, road), 0.4 - 0.2);
+  EXPECT_EQ(car.Output("d2_rate", kMoving, road), -0.7 - 0.5);
+  EXPECT_EQ(car.Output("x1", kMoving, road), 0.03);
+  EXPECT_EQ(car.Output("x2", kMoving, road), -0.02);
+  EXPECT_EQ(car.Output("xt1", kMoving, road), 0.01);
+  EXPECT_EQ(car.Output("xt2", kMoving, road), 0.015);
+  EXPECT_EQ(car.Output("a1", kMoving, road), derivatives[4]);
+  EXPECT_EQ(car.Output("a2", kMoving, road), derivatives[5]);
+}
+
+TEST(QuarterCar, StartsAtItsInitialStates) {
+  Quarter car;
+  const char* names[] = {"zs_0", "zu_0", "vs_0", "vu_0"};
+  for (int i = 0; i < 4; ++i) car[names[i]] = i + 1;
+  EXPECT_THAT(car.InitialStates(), testing::ElementsAre(1, 2, 3, 4));
+}
+
+// A constant force f on the body presses suspension and tyre together by f/ks + f/kt.
+TEST(QuarterCar, RestsWhereSpringsInSeriesCarryALoad) {
+  Quarter car;
+  const double load = 500, zu = -load / 190000, zs = zu - load / 16800;
+  const auto [dzs, dzu, as, au] = car.Derivatives({zs, zu, 0, 0}, {0});
+  EXPECT_EQ(dzs, 0);
+  EXPECT_EQ(dzu, 0);
+  EXPECT_NEAR(290 * as, load, Rounding(load));
+  EXPECT_NEAR(59 * au, 0, Rounding(load));
+}
+
+TEST(QuarterCar, StandsOnARaisedRoadAsOnALevelOne) {
+  Quarter car;
+  car["ks3"] = 1e6;
+  EXPECT_THAT(car.Derivatives({0.07, 0.07, 0, 0}, {0.07}), testing::Each(0.0));
+}
+
+TEST(QuarterCar, LosesToTheDamperWhatTheRoadDoesNotGive) {
+  Quarter car;
+  car["ks3"] = 1e6;
+  const double zs = 0.04, zu = -0.01, vs = -0.3, vu = 0.8, road = 0.02;
+  const auto [dzs, dzu, as, au] = car.Derivatives({zs, zu, vs, vu}, {road});
+  const double travel = zs - zu, rate = vs - vu;
+  const double power = 290 * vs * as + 59 * vu * au +
+                       (16800 * travel + 1e6 * std::pow(travel, 3)) * rate -
+                       190000 * (road - zu) * vu;
+  EXPECT_NEAR(power, -1000 * rate * rate, Rounding(1e4));
+  EXPECT_EQ(car.Output("zs_accel", {zs, zu, vs, vu}, {road}), as);
+  EXPECT_EQ(car.Output("travel", {zs, zu, vs, vu}, {road}), travel);
+  EXPECT_EQ(car.Output("travel_rate", {zs, zu, vs, vu}, {road}), rate);
+}
+
+// Oracle: zs/road = kt c/D, zu/road = kt (ms s² + c)/D, D = (ms s² + c)(mu s² + c + kt) − c²,
+// c = cs s + ks, from below the body's mode (1.2 Hz) to above the wheel's (9.5 Hz).
+TEST(QuarterCar, HasTheTransferFunctionsOfItsEquations) {
+  Quarter car;
+  // Linear: differences over a step of 1 are exact but for rounding.
+  const Matrix A = car.Jacobian({}, {0}, 1);
+  const auto unit = car.Derivatives({}, {1});
+  const Eigen::VectorXcd b = Eigen::Map<const Vector>(unit.data(), 4).cast<std::complex<double>>();
+  for (const double hz : {0.1, 1.2, 3.0, 9.5, 40.0}) {
+    const std::complex<double> s(0, 2 * std::numbers::pi * hz);
+    const Eigen::MatrixXcd resolvent = s * Eigen::MatrixXcd::Identity(4, 4) - A;
+    const Eigen::VectorXcd response = resolvent.partialPivLu().solve(b);
+    const std::complex<double> c = 1000.0 * s + 16800.0;
+    const std::complex<double> D = (290.0 * s * s + c) * (59.0 * s * s + c + 190000.0) - c * c;
+    const std::complex<double> body = 190000.0 * c / D;
+    const std::complex<double> wheel = 190000.0 * (290.0 * s * s + c) / D;
+    // The condition number of the resolvent, about 10⁶, times a rounding.
+    EXPECT_LT(std::abs(response(0) - body), 1e-9 * std::abs(body)) << hz;
+    EXPECT_LT(std::abs(response(1) - wheel), 1e-9 * std::abs(wheel)) << hz;
+  }
+}
+
+TEST(Bicycle, StartsAtItsInitialStates) {
+  SingleTrack car;
+  car["vy_0"] = 2;
+  car["r_0"] = 3;
+  EXPECT_THAT(car.InitialStates(), testing::ElementsAre(2, 3));
+}
+
+// The equilibrium of a steady turn, by Newton's method from straight ahead.
+SingleTrack::States SteadyTurn(const SingleTrack& car, double vx, double delta) {
+  SingleTrack::States states = {0, 0};
+  for (int i = 0; i < 20; ++i) {
+    const auto rates = car.Derivatives(states, {vx, delta});
+    const Vector step = car.Jacobian(states, {vx, delta}, 1e-6)
+                            .partialPivLu()
+                            .solve(Eigen::Map<const Vector>(rates.data(), 2));
+    for (size_t j = 0; j < 2; ++j) states[j] -= step(static_cast<Eigen::Index>(j));
+  }
+  return states;
+}
+
+// Oracle: r/δ = vx/(L + K vx²), K = m/L (lr/Cf − lf/Cr); what small angles leave out is of the
+// order δ².
+TEST(Bicycle, TurnsWithTheClassicalYawGain) {
+  SingleTrack car;
+  const double K = 1500 / 2.6 * (1.4 / 80000 - 1.2 / 90000), delta = 1e-4;
+  EXPECT_GT(K, 0);  // understeering
+  for (const double vx : {1.0, 10.0, 30.0, 60.0}) {
+    const auto [vy, r] = SteadyTurn(car, vx, delta);
+    EXPECT_NEAR(r / delta, vx / (2.6 + K * vx * vx), 1e-6 * vx) << vx;
+    // No v̇y in a steady turn: ay = vx r.
+    EXPECT_NEAR(car.Output("ay", {vy, r}, {vx, delta}), vx * r, 1e-9 * vx);
+    EXPECT_EQ(car.Output("beta", {vy, r}, {vx, delta}), std::atan2(vy, vx));
+  }
+  // The gain is largest at the characteristic speed √(L/K), and half the neutral car's.
+  const double characteristic = std::sqrt(2.6 / K);
+  const auto gain = [&](double vx) { return SteadyTurn(car, vx, delta)[1] / delta; };
+  EXPECT_NEAR(gain(characteristic), characteristic / 2.6 / 2, 1e-5);
+  EXPECT_LT(gain(0.95 * characteristic), gain(characteristic));
+  EXPECT_LT(gain(1.05 * characteristic), gain(characteristic));
+}
+
+TEST(Bicycle, TurnsAsItsWheelsPointWhenNeutral) {
+  SingleTrack car;
+  car["Cr"] = 80000 * 1.2 / 1.4;  // lf Cf = lr Cr, so K = 0
+  for (const double vx : {5.0, 50.0}) {
+    EXPECT_NEAR(SteadyTurn(car, vx, 1e-4)[1] / 1e-4, vx / 2.6, 1e-6 * vx) << vx;
+  }
+}
+
+TEST(Bicycle, LosesItsStabilityAtTheCriticalSpeedWhenOversteering) {
+  SingleTrack car;
+  car["Cr"] = 60000;
+  const double K = 1500 / 2.6 * (1.4 / 80000 - 1.2 / 60000);
+  ASSERT_LT(K, 0);
+  const double critical = std::sqrt(-2.6 / K);
+  const auto growth = [&](double vx) {
+    return car.Jacobian({0, 0}, {vx, 0}, 1e-5).eigenvalues().real().maxCoeff();
+  };
+  EXPECT_LT(growth(0.99 * critical), 0);
+  EXPECT_GT(growth(1.01 * critical), 0);
+}
+
+TEST(Bicycle, GoesStraightAheadUnsteered) {
+  EXPECT_THAT(SingleTrack().Derivatives({0, 0}, {20, 0}), testing::Each(0.0));
+}
+
+// Newton and Euler at angles that are not small.
+TEST(Bicycle, ResolvesTheFrontForceAlongTheSteeredWheel) {
+  SingleTrack car;
+  const double vx = 5, delta = 0.6, vy = 1.5, r = 0.8;
+  const double front = 80000 * (delta - std::atan((vy + 1.2 * r) / vx));
+  const double rear = -90000 * std::atan((vy - 1.4 * r) / vx);
+  const auto [dvy, dr] = car.Derivatives({vy, r}, {vx, delta});
+  EXPECT_NEAR(1500 * (dvy + vx * r), front * std::cos(delta) + rear, Rounding(1e5));
+  EXPECT_NEAR(2500 * dr, 1.2 * front * std::cos(delta) - 1.4 * rear, Rounding(1e5));
+}
+
+TEST(Bicycle, IsExactlyLinearWithoutAFrictionLimit) {
+  SingleTrack unlimited, limited;
+  limited["mu"] = 1e9;
+  const SingleTrack::States states = {1.5, 0.8};
+  const auto a = unlimited.Derivatives(states, {5, 0.6}), b = limited.Derivatives(states, {5, 0.6});
+  EXPECT_EQ(a, b);  // (C α/(10⁹ Fz))² is below a rounding of 1
+  EXPECT_TRUE(std::isfinite(a[0]) && std::isfinite(a[1]));
+}
+
+TEST(Bicycle, NeverPassesItsFrictionLimit) {
+  SingleTrack car;
+  car["mu"] = 0.8;
+  for (const double vy : {-50.0, -3.0, -0.1, 0.0, 0.1, 3.0, 50.0}) {
+    EXPECT_LT(std::abs(car.Output("ay", {vy, 0}, {1, 0})), 0.8 * kGravity) << vy;
+  }
+  // Sliding sideways all but at the limit: C α/(mu Fz) is about 19 at α = π/2, and
+  // 1 − 1/√(1 + 19⁻²) = 0.0014.
+  EXPECT_NEAR(car.Output("ay", {-1e6, 0}, {1, 0}), 0.8 * kGravity, 0.002 * 0.8 * kGravity);
+}
+
+TEST(Bicycle, StartsToSlideWithTheTyresStiffness) {
+  SingleTrack grippy, linear;
+  grippy["mu"] = 0.8;
+  const SingleTrack::States states = {1e-4, 0};
+  const double a = grippy.Derivatives(states, {20, 0})[0],
+               b = linear.Derivatives(states, {20, 0})[0];
+  // ½ (C α/(mu Fz))² = ½ (0.4/6337)² = 2·10⁻⁹
+  EXPECT_NEAR(a / b, 1, 1e-8);
+  EXPECT_LT(std::abs(a), std::abs(b));
+}
+
+TEST(Bicycle, SaysNothingWhenItDoesNotRollForwards) {
+  SingleTrack car;
+  for (const double vx : {0.0, -0.0, -10.0, std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double vy : {0.0, 1.0}) {
+      EXPECT_THAT(car.Derivatives({vy, 0.1}, {vx, 0.1}), testing::Each(testing::IsNan())) << vx;
+      EXPECT_TRUE(std::isnan(car.Output("ay", {vy, 0.1}, {vx, 0.1}))) << vx;
+      EXPECT_TRUE(std::isnan(car.Output("beta", {vy, 0.1}, {vx, 0.1}))) << vx;
+    }
+  }
+}
+
+TEST(Lanes, AreNanAloneWhereTheSpeedIsNotPositive) {
+  const LaneModel<Bicycle> model;
+  Eigen::ArrayXXd parameters(kLanes, 9), inputs(kLanes, 2), rates(kLanes, 2);
+  for (int i = 0; i < 9; ++i) {
+    parameters.col(i).setConstant(model.description().parameters[i].default_value);
+  }
+  inputs.col(0).setConstant(20);
+  inputs.col(1).setConstant(0.01);
+  inputs(3, 0) = 0;
+  model.Derivatives(0, Eigen::ArrayXXd::Zero(kLanes, 2), parameters, inputs, rates);
+  for (int i = 0; i < kLanes; ++i) EXPECT_EQ(rates.row(i).isFinite().all(), i != 3) << i;
+}
+
+// 1 − 2/(e^{2x} + 1) to a few roundings of 1.
+TEST(Lanes, HaveAHyperbolicTangent) {
+  const Lane x = {-1e300, -19.0, -0.5, 0.0, 1e-9, 0.3, 21.0, 1e300};
+  const Lane tangent = Tanh(x);
+  for (int i = 0; i < kLanes; ++i) EXPECT_NEAR(tangent[i], std::tanh(x[i]), 5e-16) << x[i];
+  EXPECT_EQ(tangent[3], 0);  // at rest there is no friction at all
+}
+
+}  // namespace
+}  // namespace polyest::builtin
