@@ -1,0 +1,220 @@
+#include "core/model/equations/equation_model.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <array>
+#include <optional>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/model/equations/differentiate.h"
+#include "core/model/equations/equation_reader.h"
+#include "core/model/equations/limits.h"
+#include "core/model/equations/program.h"
+
+namespace polyest {
+namespace equations {
+namespace {
+
+enum BlockNumber { kStatesBlock, kParametersBlock, kInputsBlock };
+
+struct Programs {
+  Program initial, derivatives, outputs;
+  std::optional<Program> jacobian;
+};
+
+class EquationModel final : public StateSpaceModel {
+ public:
+  EquationModel(ModelDescription description, std::vector<Lookup> tables)
+      : description_(std::move(description)), tables_(std::move(tables)) {}
+
+  const std::vector<Lookup>& tables() const { return tables_; }
+  void set_programs(Programs programs) { programs_ = std::move(programs); }
+
+  const ModelDescription& description() const override { return description_; }
+
+  void InitialStates(const ConstBlock& parameters, Block states) const override {
+    Run(programs_.initial, 0, parameters, parameters, parameters, states);
+  }
+
+  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                   const ConstBlock& inputs, Block derivatives) const override {
+    CheckShapes(states, parameters, inputs);
+    Run(programs_.derivatives, time_s, states, parameters, inputs, derivatives);
+  }
+
+  void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+               const ConstBlock& inputs, Block outputs) const override {
+    CheckShapes(states, parameters, inputs);
+    POLYEST_CHECK(outputs.rows() == parameters.rows());
+    Run(programs_.outputs, time_s, states, parameters, inputs, outputs);
+  }
+
+  bool has_state_jacobian() const override { return programs_.jacobian.has_value(); }
+
+  void StateJacobian(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                     const ConstBlock& inputs, Block jacobian) const override {
+    POLYEST_CHECK(has_state_jacobian());
+    CheckShapes(states, parameters, inputs);
+    Run(*programs_.jacobian, time_s, states, parameters, inputs, jacobian);
+  }
+
+ private:
+  // A block without columns may have any number of rows: nothing of it is read.
+  void CheckShapes(const ConstBlock& states, const ConstBlock& parameters,
+                   const ConstBlock& inputs) const {
+    const auto fits = [&parameters](const ConstBlock& block, size_t columns) {
+      return block.cols() == static_cast<Eigen::Index>(columns) &&
+             (columns == 0 || block.rows() == parameters.rows());
+    };
+    POLYEST_CHECK(fits(states, description_.states.size()));
+    POLYEST_CHECK(fits(parameters, description_.parameters.size()));
+    POLYEST_CHECK(fits(inputs, description_.inputs.size()));
+  }
+
+  static void Run(const Program& program, double time_s, const ConstBlock& states,
+                  const ConstBlock& parameters, const ConstBlock& inputs, Block& results) {
+    POLYEST_CHECK(results.cols() == program.results());
+    POLYEST_CHECK(results.cols() == 0 || results.rows() == parameters.rows());
+    const std::array<const ConstBlock*, 3> blocks = {&states, &parameters, &inputs};
+    program.Run(time_s, blocks, results);
+  }
+
+  const ModelDescription description_;
+  const std::vector<Lookup> tables_;
+  Programs programs_;
+};
+
+// The graph of all expressions.
+class Assembly {
+ public:
+  explicit Assembly(const ReadEquations& read) : read_(read) {}
+
+  absl::Status Assemble();
+  Programs Compile(const std::vector<Lookup>& tables);
+
+ private:
+  NodeId Variable(const std::string& name, VariablePlace place);
+  absl::StatusOr<std::vector<NodeId>> LowerAll(const std::vector<Definition>& definitions);
+
+  const ReadEquations& read_;
+  Graph graph_{kMostNodes};
+  std::map<std::string, NodeId> names_;
+  std::vector<VariablePlace> places_;
+  std::vector<NodeId> states_, initial_, derivatives_, outputs_;
+};
+
+NodeId Assembly::Variable(const std::string& name, VariablePlace place) {
+  places_.push_back(place);
+  return names_[name] = graph_.Variable(static_cast<int>(places_.size()) - 1);
+}
+
+absl::StatusOr<std::vector<NodeId>> Assembly::LowerAll(const std::vector<Definition>& definitions) {
+  std::vector<NodeId> nodes;
+  for (const Definition& definition : definitions) {
+    POLYEST_ASSIGN_OR_RETURN(const NodeId node,
+                             Lower(definition.syntax, names_, read_.table_index, graph_));
+    nodes.push_back(node);
+  }
+  return nodes;
+}
+
+absl::Status Assembly::Assemble() {
+  Variable("t", {VariablePlace::kTime, 0});
+  Eigen::Index column = 0;
+  for (const Definition& state : read_.states) {
+    states_.push_back(Variable(state.name, {kStatesBlock, column++}));
+  }
+  column = 0;
+  for (const std::string& input : read_.inputs) Variable(input, {kInputsBlock, column++});
+  column = 0;
+  for (const Quantity& parameter : read_.parameters) {
+    Variable(parameter.name, {kParametersBlock, column++});
+  }
+  for (const Definition& state : read_.states) {
+    initial_.push_back(names_.at(InitialName(state.name)));
+  }
+  for (const Definition& intermediate : read_.intermediates) {
+    POLYEST_ASSIGN_OR_RETURN(names_[intermediate.name],
+                             Lower(intermediate.syntax, names_, read_.table_index, graph_));
+  }
+  POLYEST_ASSIGN_OR_RETURN(derivatives_, LowerAll(read_.states));
+  POLYEST_ASSIGN_OR_RETURN(outputs_, LowerAll(read_.outputs));
+  return absl::OkStatus();
+}
+
+Programs Assembly::Compile(const std::vector<Lookup>& tables) {
+  Programs programs{Program(graph_, initial_, places_, tables),
+                    Program(graph_, derivatives_, places_, tables),
+                    Program(graph_, outputs_, places_, tables), std::nullopt};
+  if (states_.empty()) return programs;
+  graph_.set_most_nodes(kMostJacobianNodes);
+  const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
+  if (!graph_.exhausted()) programs.jacobian = Program(graph_, jacobian, places_, tables);
+  return programs;
+}
+
+ModelDescription Describe(const EquationSpecification& specification, const ReadEquations& read) {
+  const auto unit = [&specification](const std::string& name) {
+    const auto found = specification.units.find(name);
+    return found == specification.units.end() ? std::string() : found->second;
+  };
+  ModelDescription description;
+  description.name = "equations";
+  description.summary = "Equations given as text";
+  const auto append = [&description](const std::string& left, const std::string& right) {
+    absl::StrAppend(&description.equations, description.equations.empty() ? "" : "; ", left, " = ",
+                    right);
+  };
+  for (const Definition& state : read.states) {
+    description.states.push_back({state.name, unit(state.name), ""});
+    append("d" + state.name + "/dt", state.syntax.text);
+  }
+  for (const Definition& intermediate : read.intermediates) {
+    append(intermediate.name, intermediate.syntax.text);
+  }
+  for (const Definition& output : read.outputs) {
+    description.outputs.push_back({output.name, unit(output.name), ""});
+    append(output.name, output.syntax.text);
+  }
+  for (const std::string& input : read.inputs) {
+    description.inputs.push_back({input, unit(input), ""});
+  }
+  description.parameters = read.parameters;
+  return description;
+}
+
+std::shared_ptr<const StateSpaceModel> Make(const EquationSpecification& specification,
+                                            std::vector<absl::Status>& problems) {
+  const ReadEquations read = Read(specification, problems);
+  if (!problems.empty()) return nullptr;
+  Assembly assembly(read);
+  if (absl::Status status = assembly.Assemble(); !status.ok()) {
+    problems.push_back(std::move(status));
+    return nullptr;
+  }
+  auto model = std::make_shared<EquationModel>(Describe(specification, read), read.tables);
+  model->set_programs(assembly.Compile(model->tables()));
+  return model;
+}
+
+}  // namespace
+}  // namespace equations
+
+std::vector<std::string> CheckEquations(const EquationSpecification& specification) {
+  std::vector<absl::Status> problems;
+  equations::Make(specification, problems);
+  std::vector<std::string> messages;
+  for (const absl::Status& problem : problems) messages.emplace_back(problem.message());
+  return messages;
+}
+
+absl::StatusOr<std::shared_ptr<const StateSpaceModel>> MakeEquationModel(
+    const EquationSpecification& specification) {
+  std::vector<absl::Status> problems;
+  std::shared_ptr<const StateSpaceModel> model = equations::Make(specification, problems);
+  if (!problems.empty()) return problems.front();
+  return model;
+}
+
+}  // namespace polyest

@@ -1,0 +1,249 @@
+#include "core/model/equations/equation_reader.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/model/equations/functions.h"
+#include "core/model/equations/limits.h"
+#include "core/model/equations/text_error.h"
+
+namespace polyest::equations {
+namespace {
+
+std::string Path(const char* member) { return absl::StrCat("model.equations.", member); }
+
+std::string Path(const char* member, const std::string& name) {
+  return absl::StrCat("model.equations.", member, ".", name);
+}
+
+class Reader {
+ public:
+  Reader(const EquationSpecification& specification, std::vector<absl::Status>& problems)
+      : specification_(specification), problems_(problems) {}
+
+  ReadEquations Run() {
+    CheckSizes();
+    if (!problems_.empty()) return {};
+    ReadTables();
+    Declare();
+    if (specification_.outputs.empty()) Wrong(Path("outputs"), "there must be at least one");
+    ReadAll("states", specification_.states, read_.states);
+    ReadAll("intermediates", specification_.intermediates, read_.intermediates);
+    ReadAll("outputs", specification_.outputs, read_.outputs);
+    if (absl::Status status = SortByDependency(read_.intermediates); !status.ok()) {
+      problems_.push_back(std::move(status));
+    }
+    ReadParameters();
+    CheckUnitNames();
+    return std::move(read_);
+  }
+
+ private:
+  void CheckSizes();
+  void CheckSize(const std::string& path, size_t size, size_t most);
+  void ReadTables();
+  void Declare();
+  void Declare(const std::string& path, const char* member, const std::string& name,
+               const std::string& what);
+  void DeclareOutput(const std::string& name);
+  void ReadAll(const char* member, const std::map<std::string, std::string>& texts,
+               std::vector<Definition>& definitions);
+  void ReadNames(const Syntax& syntax);
+  void ReadParameters();
+  void CheckUnitNames();
+
+  void Wrong(const std::string& path, const std::string& rule) {
+    problems_.push_back(absl::InvalidArgumentError(absl::StrCat(path, ": ", rule)));
+  }
+
+  const EquationSpecification& specification_;
+  std::vector<absl::Status>& problems_;
+  ReadEquations read_;
+  std::map<std::string, std::string> declared_;  // name -> what it is, "a state"
+  std::map<std::string, int> table_arguments_;
+  std::set<std::string> free_;  // names that nothing declares
+};
+
+void Reader::CheckSize(const std::string& path, size_t size, size_t most) {
+  if (size <= most) return;
+  problems_.push_back(absl::ResourceExhaustedError(
+      absl::StrFormat("%s: there are %d; at most %d are allowed", path, size, most)));
+}
+
+void Reader::CheckSizes() {
+  const auto& [states, outputs, intermediates, parameters, inputs, units, tables] = specification_;
+  CheckSize(Path("states"), states.size(), kMostStates);
+  CheckSize("model.equations", states.size() + outputs.size() + intermediates.size(),
+            kMostExpressions);
+  CheckSize(Path("parameters"), parameters.size(), kMostNames);
+  CheckSize(Path("inputs"), inputs.size(), kMostNames);
+  CheckSize(Path("units"), units.size(), kMostNames);
+  CheckSize(Path("tables"), tables.size(), kMostTables);
+  size_t text = 0, values = 0;
+  for (const auto* texts : {&states, &outputs, &intermediates}) {
+    for (const auto& [name, expression] : *texts) text += expression.size();
+  }
+  if (text > kMostTextInAll) {
+    problems_.push_back(absl::ResourceExhaustedError(
+        absl::StrFormat("model.equations: the expressions have %d bytes in all; at most %d", text,
+                        kMostTextInAll)));
+  }
+  for (const auto& [name, table] : tables) {
+    const size_t size = std::max({table.value.size(), table.x.size(), table.y.size()});
+    CheckSize(absl::StrCat(Path("tables"), " of ", Quoted(name), ", values"), size,
+              kMostTableValues);
+    values += size;
+  }
+  CheckSize(absl::StrCat(Path("tables"), ", values in all"), values, kMostTableValuesInAll);
+}
+
+void Reader::ReadTables() {
+  for (const auto& [name, table] : specification_.tables) {
+    table_arguments_[name] = table.y.empty() ? 1 : 2;
+    if (const auto problem = CheckTable(table)) {
+      problems_.push_back(
+          absl::InvalidArgumentError(absl::StrCat(Path("tables", name), ".", *problem)));
+      continue;
+    }
+    read_.table_index[name] = static_cast<int>(read_.tables.size());
+    read_.tables.emplace_back(table);
+  }
+}
+
+void Reader::Declare(const std::string& path, const char* member, const std::string& name,
+                     const std::string& what) {
+  if (!IsName(name)) {
+    return Wrong(Path(member),
+                 absl::StrFormat("%s is not a name: a letter, then letters, digits and _, at most "
+                                 "%d of them",
+                                 Quoted(name), kMostNameLength));
+  }
+  if (IsReserved(name)) {
+    return Wrong(path, absl::StrFormat("%s means something else in an expression: t, pi and the "
+                                       "names of functions are reserved",
+                                       name));
+  }
+  const auto [other, is_new] = declared_.emplace(name, what);
+  if (!is_new) Wrong(path, absl::StrFormat("%s is %s already", name, other->second));
+}
+
+void Reader::Declare() {
+  const EquationSpecification& s = specification_;
+  for (const auto& [name, text] : s.states)
+    Declare(Path("states", name), "states", name, "a state");
+  for (size_t i = 0; i < s.inputs.size(); ++i) {
+    Declare(absl::StrCat(Path("inputs"), "[", i, "]"), "inputs", s.inputs[i], "an input");
+  }
+  for (const auto& [name, text] : s.intermediates) {
+    Declare(Path("intermediates", name), "intermediates", name, "an intermediate");
+  }
+  for (const auto& [name, table] : s.tables)
+    Declare(Path("tables", name), "tables", name, "a table");
+  for (const auto& [name, value] : s.parameters) {
+    Declare(Path("parameters", name), "parameters", name, "a parameter");
+  }
+  for (const auto& [name, text] : s.states) {
+    const std::string initial = InitialName(name);
+    const auto found = declared_.find(initial);
+    if (found == declared_.end()) {
+      declared_[initial] = "the initial value of the state " + name;
+    } else if (found->second != "a parameter") {
+      Wrong(Path("states", name),
+            absl::StrFormat("its initial value is named %s, which is %s", initial, found->second));
+    }
+  }
+  for (const auto& [name, text] : s.outputs) DeclareOutput(name);
+}
+
+// An output may be named as the state or the intermediate that it is mostly; it means that in
+// expressions.
+void Reader::DeclareOutput(const std::string& name) {
+  const auto found = declared_.find(name);
+  const bool shared = found != declared_.end() &&
+                      (found->second == "a state" || found->second == "an intermediate");
+  if (!shared) Declare(Path("outputs", name), "outputs", name, "an output");
+}
+
+void Reader::ReadAll(const char* member, const std::map<std::string, std::string>& texts,
+                     std::vector<Definition>& definitions) {
+  for (const auto& [name, text] : texts) {
+    const std::string path = IsName(name) ? Path(member, name) : Path(member);
+    absl::StatusOr<Syntax> syntax = Parse(path, text, table_arguments_);
+    if (!syntax.ok()) {
+      problems_.push_back(std::move(syntax).status());
+      continue;
+    }
+    ReadNames(*syntax);
+    definitions.push_back({name, *std::move(syntax)});
+  }
+}
+
+void Reader::ReadNames(const Syntax& syntax) {
+  for (const SyntaxNode& node : syntax.nodes) {
+    if (node.operation != Operation::kVariable || node.name == "t") continue;
+    const auto found = declared_.find(node.name);
+    if (found == declared_.end()) {
+      free_.insert(node.name);
+    } else if (found->second == "an output") {
+      problems_.push_back(ErrorAt(
+          syntax.field, syntax.text, node.offset,
+          absl::StrFormat("%s is an output; what others use is an intermediate", node.name)));
+      return;
+    }
+  }
+}
+
+void Reader::ReadParameters() {
+  const auto& defaults = specification_.parameters;
+  const auto unit = [this](const std::string& name) {
+    const auto found = specification_.units.find(name);
+    return found == specification_.units.end() ? std::string() : found->second;
+  };
+  std::set<std::string> names = free_;
+  for (const auto& [name, value] : defaults) {
+    names.insert(name);
+    if (!std::isfinite(value)) {
+      Wrong(Path("parameters", name), absl::StrFormat("is %g; it must be finite", value));
+    }
+  }
+  for (const auto& [state, text] : specification_.states) names.erase(InitialName(state));
+  CheckSize(Path("parameters"), names.size(), kMostNames);
+  for (const std::string& name : names) {
+    const auto found = defaults.find(name);
+    const bool has_default = found != defaults.end();
+    read_.parameters.push_back(
+        {name, unit(name), "", has_default ? found->second : 0.0, has_default});
+  }
+  for (const auto& [state, text] : specification_.states) {
+    const std::string name = InitialName(state);
+    const auto found = defaults.find(name);
+    read_.parameters.push_back({name, unit(specification_.units.contains(state) ? state : name),
+                                "initial value of " + state,
+                                found == defaults.end() ? 0.0 : found->second});
+  }
+  read_.inputs = specification_.inputs;
+}
+
+void Reader::CheckUnitNames() {
+  for (const auto& [name, unit] : specification_.units) {
+    const auto found = declared_.find(name);
+    const bool known = found == declared_.end() ? free_.contains(name) : found->second != "a table";
+    if (known) continue;
+    Wrong(Path("units"), absl::StrFormat("%s is not a name in these equations", Quoted(name)));
+  }
+}
+
+}  // namespace
+
+std::string InitialName(const std::string& state) { return state + "_0"; }
+
+ReadEquations Read(const EquationSpecification& specification,
+                   std::vector<absl::Status>& problems) {
+  return Reader(specification, problems).Run();
+}
+
+}  // namespace polyest::equations

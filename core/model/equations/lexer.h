@@ -1,0 +1,38 @@
+#pragma once
+
+// The words of an expression.
+
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <string_view>
+
+namespace polyest::equations {
+
+struct Token {
+  enum class Kind { kNumber, kName, kSymbol, kEnd };
+  Kind kind = Kind::kEnd;
+  size_t offset = 0;           // bytes from the beginning of the text
+  std::string_view text = {};  // of it: the name, the symbol ("<=", "(" …) or the number
+  double value = 0;            // of a number, finite
+};
+
+class Lexer {
+ public:
+  // Both must outlive the lexer and its tokens.
+  Lexer(std::string_view field, std::string_view text) : field_(field), text_(text) {}
+
+  absl::StatusOr<Token> Next();
+
+ private:
+  absl::StatusOr<Token> Number();
+  absl::StatusOr<Token> Symbol();
+  size_t Skip(size_t from, bool (*belongs)(char)) const;
+  absl::Status Error(size_t offset, std::string_view message) const;
+
+  std::string_view field_;
+  std::string_view text_;
+  size_t offset_ = 0;
+};
+
+}  // namespace polyest::equations

@@ -1,0 +1,59 @@
+#include "core/model/equations/program.h"
+
+#include <algorithm>
+
+#include "core/common/check.h"
+
+namespace polyest::equations {
+namespace {
+
+// What the thread's programs work in.
+struct Scratch {
+  Eigen::ArrayXd registers;
+  std::vector<double*> slots;
+};
+
+Scratch& ThreadScratch(size_t slots, Eigen::Index registers) {
+  thread_local Scratch scratch;
+  if (scratch.slots.size() < slots) scratch.slots.resize(slots);
+  if (scratch.registers.size() < registers) scratch.registers.resize(registers);
+  return scratch;
+}
+
+}  // namespace
+
+void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Block results) const {
+  const Eigen::Index rows = results.rows();
+  POLYEST_CHECK(rows % kLanes == 0);
+  Scratch& scratch =
+      ThreadScratch(first_register_ + static_cast<size_t>(registers_), registers_ * kRows);
+  double** const slots = scratch.slots.data();
+  alignas(64) double time[kLanes];
+  std::fill_n(time, kLanes, time_s);
+  slots[0] = time;
+  // The slots of operands are only read: see Kernel.
+  double* const constants = const_cast<double*>(constants_.data());
+  for (Eigen::Index i = 0; i * kLanes < constants_.size(); ++i) {
+    slots[1 + i] = constants + i * kLanes;
+  }
+  for (int i = 0; i < registers_; ++i) {
+    slots[first_register_ + static_cast<size_t>(i)] = scratch.registers.data() + i * kRows;
+  }
+  for (const Eigen::Index column : zero_) results.col(column).setZero();
+  for (Eigen::Index row = 0; row < rows; row += kRows) {
+    for (const Load& load : loads_) {
+      const ConstBlock& block = *blocks[static_cast<size_t>(load.place.block)];
+      slots[load.slot] =
+          const_cast<double*>(block.data()) + load.place.column * block.outerStride() + row;
+    }
+    for (Eigen::Index column = 0; column < results.cols(); ++column) {
+      slots[first_result_ + column] = results.data() + column * results.outerStride() + row;
+    }
+    const Eigen::Index chunk = std::min(kRows, rows - row);
+    for (const Instruction& instruction : instructions_) {
+      instruction.kernel(instruction, slots, chunk);
+    }
+  }
+}
+
+}  // namespace polyest::equations

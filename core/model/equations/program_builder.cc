@@ -1,0 +1,244 @@
+// Makes programs of graphs.
+
+#include <algorithm>
+#include <limits>
+
+#include "core/common/check.h"
+#include "core/model/equations/program.h"
+
+namespace polyest::equations {
+namespace {
+
+constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+
+// A node as it is computed: with a product drawn into a sum where that saves an instruction.
+struct Step {
+  Operation operation;
+  NodeId operands[3];
+  int uses = 0;       // by steps and roots
+  int last_use = -1;  // position of the last instruction that reads it
+  bool needed = false;
+  std::uint32_t slot = kNowhere;
+};
+
+}  // namespace
+
+class ProgramBuilder {
+ public:
+  ProgramBuilder(const Graph& graph, const std::vector<NodeId>& roots,
+                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables)
+      : graph_(graph), roots_(roots), places_(places), tables_(tables) {}
+
+  Program Build() {
+    CountUses();
+    Fuse();
+    for (const NodeId root : roots_) Order(root);
+    PlaceOperands();
+    PlaceResults();
+    Emit();
+    return std::move(program_);
+  }
+
+ private:
+  Step& step(NodeId id) { return steps_[static_cast<size_t>(id)]; }
+  bool IsLeaf(NodeId id) const { return Operands(graph_.node(id).operation) == 0; }
+
+  void CountUses();
+  void Fuse();
+  bool Draw(NodeId sum, Operation operation, NodeId product, NodeId other);
+  void Order(NodeId root);
+  void PlaceOperands();
+  void PlaceLeaf(NodeId id);
+  void PlaceResults();
+  void Emit();
+  void EmitStep(NodeId id, int position);
+  bool IsUniform(std::uint32_t slot) const {
+    return slot < 1 + static_cast<size_t>(program_.constants_.size() / kLanes);
+  }
+
+  const Graph& graph_;
+  const std::vector<NodeId>& roots_;
+  const std::vector<VariablePlace>& places_;
+  const std::vector<Lookup>& tables_;
+  std::vector<Step> steps_;
+  std::vector<NodeId> order_;  // of what is computed, operands first
+  std::vector<std::uint32_t> free_registers_;
+  Program program_;
+};
+
+void ProgramBuilder::CountUses() {
+  for (NodeId id = 0; id < graph_.size(); ++id) {
+    const Node& node = graph_.node(id);
+    steps_.push_back({node.operation, {node.operands[0], node.operands[1], node.operands[2]}});
+  }
+  for (const NodeId root : roots_) {
+    step(root).needed = true;
+    ++step(root).uses;
+  }
+  for (NodeId id = graph_.size(); id-- > 0;) {
+    if (!step(id).needed) continue;
+    for (const NodeId operand : step(id).operands) {
+      if (operand < 0) continue;
+      step(operand).needed = true;
+      ++step(operand).uses;
+    }
+  }
+}
+
+void ProgramBuilder::Fuse() {
+  for (NodeId id = 0; id < graph_.size(); ++id) {
+    if (!step(id).needed) continue;
+    const auto [a, b, c] = step(id).operands;
+    if (step(id).operation == Operation::kAdd) {
+      Draw(id, Operation::kMultiplyAdd, a, b) || Draw(id, Operation::kMultiplyAdd, b, a);
+    } else if (step(id).operation == Operation::kSubtract) {
+      Draw(id, Operation::kSubtractMultiplied, b, a) ||
+          Draw(id, Operation::kMultiplySubtract, a, b);
+    }
+  }
+}
+
+// Makes `sum` the operation on the factors of `product` and the other term, if nobody else needs
+// the product.
+bool ProgramBuilder::Draw(NodeId sum, Operation operation, NodeId product, NodeId other) {
+  if (step(product).operation != Operation::kMultiply || step(product).uses != 1) return false;
+  const auto [a, b, none] = step(product).operands;
+  step(sum).operation = operation;
+  step(sum).operands[0] = a;
+  step(sum).operands[1] = b;
+  step(sum).operands[2] = other;
+  return true;
+}
+
+// Appends what `root` needs and is not there yet, operands first, without recursion.
+void ProgramBuilder::Order(NodeId root) {
+  std::vector<std::pair<NodeId, int>> path = {{root, 0}};
+  while (!path.empty()) {
+    auto& [id, next] = path.back();
+    if (IsLeaf(id) || step(id).last_use >= 0) {
+      path.pop_back();
+      continue;
+    }
+    while (next < 3 && step(id).operands[next] < 0) ++next;
+    if (next < 3) {
+      path.emplace_back(step(id).operands[next++], 0);
+      continue;
+    }
+    // A value that nothing reads, a root's, lives to its own computation.
+    step(id).last_use = static_cast<int>(order_.size());
+    order_.push_back(id);
+    path.pop_back();
+  }
+}
+
+void ProgramBuilder::PlaceLeaf(NodeId id) {
+  const Node& node = graph_.node(id);
+  if (step(id).slot != kNowhere) return;
+  if (node.operation == Operation::kConstant) {
+    const Eigen::Index end = program_.constants_.size();
+    program_.constants_.conservativeResize(end + kLanes);
+    program_.constants_.tail(kLanes).setConstant(node.value);
+    step(id).slot = 1 + static_cast<std::uint32_t>(end / kLanes);
+    return;
+  }
+  const VariablePlace& place = places_[static_cast<size_t>(node.index)];
+  if (place.block == VariablePlace::kTime) {
+    step(id).slot = 0;
+    return;
+  }
+  program_.loads_.push_back({kNowhere, place});
+  step(id).slot = static_cast<std::uint32_t>(program_.loads_.size() - 1);
+}
+
+// Constants first, since where they end the slots of the loads begin.
+void ProgramBuilder::PlaceOperands() {
+  std::vector<NodeId> leaves;
+  for (const NodeId id : order_) {
+    for (const NodeId operand : step(id).operands) {
+      if (operand >= 0 && IsLeaf(operand)) leaves.push_back(operand);
+    }
+  }
+  for (const NodeId root : roots_) {
+    if (IsLeaf(root) && root != Graph::kZero) leaves.push_back(root);
+  }
+  for (const NodeId id : leaves) {
+    if (graph_.IsConstant(id)) PlaceLeaf(id);
+  }
+  const auto first_load = 1 + static_cast<std::uint32_t>(program_.constants_.size() / kLanes);
+  for (const NodeId id : leaves) {
+    if (graph_.IsConstant(id) || step(id).slot != kNowhere) continue;
+    const size_t loads = program_.loads_.size();
+    PlaceLeaf(id);
+    if (program_.loads_.size() == loads) continue;  // the time
+    step(id).slot += first_load;
+    program_.loads_.back().slot = step(id).slot;
+  }
+  program_.first_result_ = first_load + static_cast<std::uint32_t>(program_.loads_.size());
+  program_.first_register_ = program_.first_result_ + static_cast<std::uint32_t>(roots_.size());
+}
+
+// A root is computed into its column at once.
+void ProgramBuilder::PlaceResults() {
+  for (size_t i = 0; i < roots_.size(); ++i) {
+    Step& root = step(roots_[i]);
+    if (IsLeaf(roots_[i]) || root.slot != kNowhere) continue;
+    root.slot = program_.first_result_ + static_cast<std::uint32_t>(i);
+  }
+  for (size_t position = 0; position < order_.size(); ++position) {
+    for (const NodeId operand : step(order_[position]).operands) {
+      if (operand >= 0) step(operand).last_use = static_cast<int>(position);
+    }
+  }
+}
+
+void ProgramBuilder::EmitStep(NodeId id, int position) {
+  Step& current = step(id);
+  Instruction instruction{};
+  bool uniform[3] = {true, true, true};
+  for (int i = 0; i < 3; ++i) {
+    // An operand that is not there is the first one once more.
+    const NodeId operand = current.operands[current.operands[i] < 0 ? 0 : i];
+    Step& source = step(operand);
+    instruction.operands[i] = source.slot;
+    uniform[i] = IsUniform(source.slot);
+    if (source.last_use == position && source.slot >= program_.first_register_) {
+      free_registers_.push_back(source.slot);
+      source.last_use = -1;  // once
+    }
+  }
+  if (current.slot == kNowhere) {
+    if (free_registers_.empty()) {
+      free_registers_.push_back(program_.first_register_ +
+                                static_cast<std::uint32_t>(program_.registers_++));
+    }
+    current.slot = free_registers_.back();
+    free_registers_.pop_back();
+  }
+  instruction.result = current.slot;
+  instruction.kernel = SelectKernel(current.operation, uniform[0], uniform[1], uniform[2]);
+  if (IsLookup(current.operation)) {
+    instruction.lookup = &tables_[static_cast<size_t>(graph_.node(id).index)];
+  }
+  program_.instructions_.push_back(instruction);
+}
+
+void ProgramBuilder::Emit() {
+  for (size_t position = 0; position < order_.size(); ++position) {
+    EmitStep(order_[position], static_cast<int>(position));
+  }
+  for (size_t i = 0; i < roots_.size(); ++i) {
+    const std::uint32_t column = program_.first_result_ + static_cast<std::uint32_t>(i);
+    if (roots_[i] == Graph::kZero) {
+      program_.zero_.push_back(static_cast<Eigen::Index>(i));
+    } else if (const std::uint32_t slot = step(roots_[i]).slot; slot != column) {
+      program_.instructions_.push_back(
+          {CopyKernel(IsUniform(slot)), column, {slot, slot, slot}, nullptr});
+    }
+  }
+}
+
+Program::Program(const Graph& graph, const std::vector<NodeId>& roots,
+                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables)
+    : Program(ProgramBuilder(graph, roots, places, tables).Build()) {}
+
+}  // namespace polyest::equations

@@ -1,0 +1,31 @@
+#pragma once
+
+// What the tests of equation models share.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "core/model/equations/equation_model.h"
+
+namespace polyest {
+
+inline std::shared_ptr<const StateSpaceModel> MakeOrFail(const EquationSpecification& equations) {
+  auto model = MakeEquationModel(equations);
+  if (!model.ok()) {
+    ADD_FAILURE() << model.status();
+    return nullptr;
+  }
+  return *std::move(model);
+}
+
+// Numbers that differ in every row and column, in (−1, 1).
+inline Eigen::ArrayXXd Varied(Eigen::Index rows, Eigen::Index columns, double phase) {
+  return Eigen::ArrayXXd::NullaryExpr(rows, columns, [phase](Eigen::Index i, Eigen::Index j) {
+    return std::sin(0.7 * static_cast<double>(i) + 2.3 * static_cast<double>(j) + phase);
+  });
+}
+
+}  // namespace polyest
