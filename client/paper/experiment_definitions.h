@@ -24,6 +24,8 @@ absl::StatusOr<Experiment> Figure14();
 absl::StatusOr<Experiment> Section35();
 // Section 3.6: an excitation that is not rich enough.
 absl::StatusOr<Experiment> Section36();
+// The project's own: mass and place of a load on a half car.
+absl::StatusOr<Experiment> ReferenceScenario();
 
 // The noise of (30), as a standard deviation: `percent` of the value and a thousandth of the
 // largest value so far. (The paper calls it a variance; its R_k is the square of this.)

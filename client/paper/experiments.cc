@@ -24,6 +24,7 @@ using paper_experiments::Figure5;
 using paper_experiments::Figure6;
 using paper_experiments::Figure7;
 using paper_experiments::Figure8;
+using paper_experiments::ReferenceScenario;
 using paper_experiments::Section35;
 using paper_experiments::Section36;
 
@@ -35,23 +36,24 @@ struct Entry {
 constexpr Entry kEntries[] = {
     {"4", Figure4},   {"5", Figure5},     {"6", Figure6},     {"7", Figure7},
     {"8", Figure8},   {"11", Figure11},   {"12", Figure12},   {"13", Figure13},
-    {"14", Figure14}, {"3.5", Section35}, {"3.6", Section36},
+    {"14", Figure14}, {"3.5", Section35}, {"3.6", Section36}, {"reference", ReferenceScenario},
 };
 
-constexpr uint64_t kSeed = 2007;
 constexpr int kResponsePoints = 401;
 
 // Standard normal draws that are the same with every standard library: the quantile of the middle
 // of one of 2⁵³ equal intervals.
 class NormalDraws {
  public:
+  explicit NormalDraws(uint64_t seed) : engine_(seed) {}
+
   double Next() {
     const double u = (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53;
     return normal_.Quantile(u);
   }
 
  private:
-  std::mt19937_64 engine_{kSeed};
+  std::mt19937_64 engine_;
   Germ normal_ = Germ::Normal();
 };
 
@@ -94,6 +96,12 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
 
 }  // namespace
 
+std::string Heading(const Experiment& experiment) {
+  if (!experiment.from_paper) return absl::StrCat("Reference scenario: ", experiment.title);
+  const bool section = experiment.figure.find('.') != std::string::npos;
+  return absl::StrCat(section ? "Section " : "Figure ", experiment.figure, ": ", experiment.title);
+}
+
 std::vector<std::string> PaperFigures() {
   std::vector<std::string> figures;
   for (const Entry& entry : kEntries) figures.emplace_back(entry.figure);
@@ -124,15 +132,15 @@ absl::StatusOr<Matrix> SimulateOutputs(const ResolvedProblem& problem, const Vec
   return row.reshaped(channels, time_s.size()).transpose();
 }
 
-absl::StatusOr<Samples> SyntheticSamples(const ExperimentVariant& variant,
-                                         const Vector& reference) {
+absl::StatusOr<Samples> SyntheticSamples(const ExperimentVariant& variant, const Vector& reference,
+                                         uint64_t seed) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ResolvedProblem::Make(variant.problem));
   POLYEST_ASSIGN_OR_RETURN(Matrix value,
                            SimulateOutputs(problem, reference, variant.sample_times_s));
   Samples samples;
   samples.time_s = variant.sample_times_s;
   Vector largest = Vector::Zero(problem.channels());
-  NormalDraws draws;
+  NormalDraws draws(seed);
   for (Eigen::Index k = 0; k < value.rows(); ++k) {
     for (Eigen::Index j = 0; j < value.cols() && !variant.noise_free; ++j) {
       largest(j) = std::max(largest(j), std::abs(value(k, j)));

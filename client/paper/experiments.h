@@ -1,7 +1,8 @@
 #pragma once
 
-// The experiments of section 3 of the paper (TR-07-38), as data: for each figure the problem, the
-// synthetic measurements and what the paper says of it, and after a run what the estimator answers.
+// The experiments of section 3 of the paper (TR-07-38) and the project's reference scenario, as
+// data: for each figure the problem, the synthetic measurements and what the paper says of it, and
+// after a run what the estimator answers.
 //
 // Measurements are z_k = h(y_ref(t_k)) + ε_k, ε_k ~ N(0, R_k) (30), from the model at the reference
 // values and a fixed seed. R_k is the channel's own noise model at the true value; the estimator,
@@ -10,6 +11,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,16 +34,18 @@ struct ExperimentVariant {
 
 // What is drawn of the cost.
 enum class CostPicture {
-  kCurves,        // mismatch, prior and total over one unknown, for each variant
-  kContours,      // contours of the total over two unknowns, for each variant
-  kContourParts,  // contours of mismatch, prior and total, for the first variant
+  kCurves,                // mismatch, prior and total over one unknown, for each variant
+  kContours,              // contours of the total over two unknowns, for each variant
+  kContourParts,          // contours of mismatch, prior and total, for the first variant
+  kResponsesAndContours,  // what is measured, and contours of mismatch and total, for the first
 };
 
 struct Experiment {
-  std::string figure;  // "5", or the section where the paper has no figure
+  std::string figure;  // "5"; the section where the paper has no figure; or "reference"
   std::string title;
   std::string question;    // what is asked, in a sentence or two
-  std::string paper_says;  // what the paper reports
+  std::string says;        // what the paper reports, or what is to be expected
+  bool from_paper = true;  // false: the project's own
   Vector reference;        // the true values, in the order of `uncertain`
   std::vector<ExperimentVariant> variants;
   CostPicture cost_picture = CostPicture::kCurves;
@@ -70,7 +74,10 @@ struct ExperimentResult {
   std::vector<VariantResult> variants;
 };
 
-// The figures there are, in the paper's order: "4" … "14", "3.5", "3.6".
+// "Figure 5: …", "Section 3.5: …" or "Reference scenario: …".
+std::string Heading(const Experiment& experiment);
+
+// The figures there are, in the paper's order: "4" … "14", "3.5", "3.6"; then "reference".
 std::vector<std::string> PaperFigures();
 
 // INVALID_ARGUMENT, listing the figures there are, for one that is not among them.
@@ -85,7 +92,11 @@ absl::StatusOr<ExperimentResult> RunExperiment(const Experiment& experiment, int
 absl::StatusOr<Matrix> SimulateOutputs(const ResolvedProblem& problem, const Vector& theta,
                                        const std::vector<double>& time_s);
 
-// The measurements of a variant, from the model at `reference` and the fixed seed.
-absl::StatusOr<Samples> SyntheticSamples(const ExperimentVariant& variant, const Vector& reference);
+// The seed of every experiment's noise.
+inline constexpr uint64_t kNoiseSeed = 2007;
+
+// The measurements of a variant, from the model at `reference`.
+absl::StatusOr<Samples> SyntheticSamples(const ExperimentVariant& variant, const Vector& reference,
+                                         uint64_t seed = kNoiseSeed);
 
 }  // namespace polyest

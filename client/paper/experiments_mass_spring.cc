@@ -88,7 +88,7 @@ absl::StatusOr<Experiment> Figure4() {
   experiment.figure = "4";
   experiment.title = "Estimation with 10 time points, all at zero crossings";
   experiment.question = kVelocityQuestion;
-  experiment.paper_says =
+  experiment.says =
       "The mismatch is constant: sampled at 0.5, 1.0 … 5.0 s the displacement is zero whatever v0 "
       "is. The estimate is the best initial guess, ξ = 0: the worst case of undersampling.";
   return experiment;
@@ -100,7 +100,7 @@ absl::StatusOr<Experiment> Figure5() {
   experiment.figure = "5";
   experiment.title = "Estimation with 3 time points";
   experiment.question = kVelocityQuestion;
-  experiment.paper_says =
+  experiment.says =
       "A sharp minimum and an accurate estimate for little noise, though sampled below the Nyquist "
       "rate; at 10 % the prior weighs more and the minimum is wide.";
   return experiment;
@@ -112,7 +112,7 @@ absl::StatusOr<Experiment> Figure6() {
   experiment.figure = "6";
   experiment.title = "Estimation with 30 time points";
   experiment.question = kVelocityQuestion;
-  experiment.paper_says =
+  experiment.says =
       "More samples average the noise out: the mismatch weighs more and the estimate at 10 % is "
       "better than with 3.";
   return experiment;
@@ -133,7 +133,7 @@ absl::StatusOr<Experiment> Figure7() {
   experiment.figure = "7";
   experiment.title = "Adding samples that contain no information";
   experiment.question = kVelocityQuestion;
-  experiment.paper_says =
+  experiment.says =
       "The extra samples add a constant to the mismatch, the effect of their noise; the minimum "
       "is not more pronounced and the estimate no better.";
   return experiment;
@@ -147,7 +147,7 @@ absl::StatusOr<Experiment> Figure8() {
   experiment.question =
       "What was the initial velocity v0 of the mass, given x and v at a single time? "
       "A priori v0 is beta(2, 2) on [0.5, 1.5] m/s.";
-  experiment.paper_says = "One time is sufficient for low noise: x and v are never both zero.";
+  experiment.says = "One time is sufficient for low noise: x and v are never both zero.";
   return experiment;
 }
 
@@ -157,7 +157,7 @@ absl::StatusOr<Experiment> Figure11() {
   experiment.figure = "11";
   experiment.title = "Forced mass, 5 time points without information";
   experiment.question = kForceQuestion;
-  experiment.paper_says =
+  experiment.says =
       "At 1, 2 … 5 s displacement and velocity are both zero whatever F0 is: the estimate is the "
       "prior's most likely value, 1000 N, at any noise.";
   return experiment;
@@ -169,7 +169,7 @@ absl::StatusOr<Experiment> Figure12() {
   experiment.figure = "12";
   experiment.title = "Forced mass, 3 time points";
   experiment.question = kForceQuestion;
-  experiment.paper_says =
+  experiment.says =
       "Three times yield an accurate estimate at low noise, well below the Nyquist rate; the shape "
       "of the cost tells that it is accurate.";
   return experiment;

@@ -66,7 +66,7 @@ absl::StatusOr<Experiment> Figure13() {
   experiment.figure = "13";
   experiment.title = "Contours of the cost: mismatch, prior, total";
   experiment.question = kValleyQuestion;
-  experiment.paper_says =
+  experiment.says =
       "The mismatch has a line of minima, all pairs (k, m) of the same ratio: m and k are not "
       "identifiable. With the prior, ξ = (0.09, −0.40). (0.01 √(K0/M0) is 0.0628 rad/s; the paper "
       "prints 0.3938, from which (0.055, −0.227) would follow.)";
@@ -83,7 +83,7 @@ absl::StatusOr<Experiment> Figure14() {
   experiment.figure = "14";
   experiment.title = "Contours of the cost after regularization";
   experiment.question = kValleyQuestion;
-  experiment.paper_says =
+  experiment.says =
       "With a low α² the cost looks like its mismatch, with a high one like the prior; between, "
       "the "
       "valley becomes an ellipse that moves to (0, 0). The paper settles on ξ = (0.09, −0.40). "
@@ -113,7 +113,7 @@ absl::StatusOr<Experiment> Section35() {
   experiment.title = "Non-observability";
   experiment.question =
       "What is θ of (57), given x1 − x2, and given x1 as well? A priori θ is normal(1, 0.5).";
-  experiment.paper_says =
+  experiment.says =
       "x1 − x2 does not depend on θ: the mismatch is constant and the estimate the prior's most "
       "likely value. Measuring another state puts it right.";
   experiment.reference = Vector::Constant(1, 1.3);
@@ -141,7 +141,7 @@ absl::StatusOr<Experiment> Section36() {
   experiment.question =
       "What are mass M and roll inertia I of the bar (58), given x1 and x2? A priori M is "
       "beta(2, 2) on [500, 700] kg and I beta(2, 2) on [55, 80] kg m².";
-  experiment.paper_says =
+  experiment.says =
       "With the same excitation left and right x1 = x2 for ever and the output does not depend on "
       "I; a different one on each side identifies it.";
   experiment.reference = Vector(2);

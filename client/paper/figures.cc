@@ -104,9 +104,7 @@ void AddCurves(const ExperimentResult& result, Plot& plot) {
 Plot MakePlot(const ExperimentResult& result) {
   const Experiment& experiment = result.experiment;
   Plot plot;
-  plot.title =
-      absl::StrCat(experiment.figure.find('.') == std::string::npos ? "Figure " : "Section ",
-                   experiment.figure, ": ", experiment.title);
+  plot.title = Heading(experiment);
   plot.description = experiment.question;
   switch (experiment.cost_picture) {
     case CostPicture::kCurves:
@@ -121,6 +119,14 @@ Plot MakePlot(const ExperimentResult& result) {
       const VariantResult& first = result.variants.front();
       plot.panels.push_back(ContoursOf(result, first, "mismatch", first.cost.mismatch));
       plot.panels.push_back(ContoursOf(result, first, "prior", first.cost.prior));
+      plot.panels.push_back(ContoursOf(result, first, "total", first.cost.total));
+      break;
+    }
+    case CostPicture::kResponsesAndContours: {
+      const VariantResult& first = result.variants.front();
+      const int channels = static_cast<int>(experiment.variants.front().problem.measured.size());
+      for (int c = 0; c < channels; ++c) plot.panels.push_back(ResponsePanel(result, 0, c));
+      plot.panels.push_back(ContoursOf(result, first, "mismatch", first.cost.mismatch));
       plot.panels.push_back(ContoursOf(result, first, "total", first.cost.total));
       break;
     }

@@ -5,7 +5,7 @@
 
 namespace polyest {
 
-// The paper's figure of an experiment: what was measured at the reference values with the sample
+// The figure of an experiment: what was measured at the reference values with the sample
 // times marked, and the cost over the germ ξ with the true value and the estimate.
 Plot MakePlot(const ExperimentResult& result);
 

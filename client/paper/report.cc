@@ -162,11 +162,9 @@ void PrintRemarks(const VariantResult& variant, const std::vector<double>& times
 
 void PrintExperiment(const ExperimentResult& result, std::ostream& out) {
   const Experiment& experiment = result.experiment;
-  const bool section = experiment.figure.find('.') != std::string::npos;
-  out << (section ? "Section " : "Figure ") << experiment.figure << ": " << experiment.title
-      << "\n";
+  out << Heading(experiment) << "\n";
   PrintWrapped("  Asked:     ", experiment.question, out);
-  PrintWrapped("  The paper: ", experiment.paper_says, out);
+  PrintWrapped(experiment.from_paper ? "  The paper: " : "  Expected:  ", experiment.says, out);
   out << "\n";
   PrintTable(EstimateTable(result), out);
   out << "\n";

@@ -182,6 +182,14 @@ class PanelFrame {
   Axis horizontal_, vertical_;
 };
 
+// A ring of white keeps a few markers apart; of many it would leave nothing else to see.
+void DrawMarker(const LineSeries& series, size_t i, const PanelFrame& frame, SvgWriter& svg) {
+  constexpr size_t kMany = 100;
+  const bool many = series.x.size() > kMany;
+  svg.Circle(frame.X(series.x[i]), frame.Y(series.y[i]), many ? 0.7 : 4.5, series.color,
+             many ? std::string_view(series.color) : "#ffffff");
+}
+
 void DrawSeries(const LineSeries& series, const PanelFrame& frame, SvgWriter& svg) {
   std::vector<std::array<double, 2>> run;
   const auto flush = [&] {
@@ -192,7 +200,7 @@ void DrawSeries(const LineSeries& series, const PanelFrame& frame, SvgWriter& sv
     if (!std::isfinite(series.y[i])) {
       flush();
     } else if (series.style == LineStyle::kMarkers) {
-      svg.Circle(frame.X(series.x[i]), frame.Y(series.y[i]), 4.5, series.color, "#ffffff");
+      DrawMarker(series, i, frame, svg);
     } else {
       run.push_back({frame.X(series.x[i]), frame.Y(series.y[i])});
     }
