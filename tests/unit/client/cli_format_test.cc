@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -8,6 +9,7 @@
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
+#include "polyest/v1/estimation_service.pb.h"
 
 namespace polyest {
 namespace {
@@ -67,6 +69,10 @@ TEST(FormatValue, ManagesWithoutAnUncertainty) {
   EXPECT_EQ(FormatValue(1.23456789, 0), "1.23457");
   EXPECT_EQ(FormatValue(0, 1e-12), "0.0e+00");
   EXPECT_EQ(FormatValue(2, std::numeric_limits<double>::infinity()), "2");
+}
+
+TEST(FormatNumber, NamesWhatIsInfinite) {
+  EXPECT_EQ(FormatNumber(std::numeric_limits<double>::infinity(), 6), "inf");
 }
 
 TEST(FormatExact, IsReadBackAsTheSameNumber) {
@@ -142,6 +148,16 @@ TEST(ToJson, IsTheSameForTheSameMessage) {
   for (int i = 0; i < 20; ++i) (*first.mutable_coefficients())[std::to_string(i)] = i;
   for (int i = 19; i >= 0; --i) (*second.mutable_coefficients())[std::to_string(i)] = i;
   EXPECT_EQ(ToJson(first, /*several_lines=*/true), ToJson(second, /*several_lines=*/true));
+}
+
+TEST(ToJson, WritesAnInfiniteDefaultAsJsonSays) {
+  v1::Model model;
+  model.add_parameters()->set_default_value(std::numeric_limits<double>::infinity());
+  const std::string json = ToJson(model, /*several_lines=*/false);
+  EXPECT_THAT(json, HasSubstr(R"("defaultValue":"Infinity")"));
+  v1::Model again;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(json, &again).ok());
+  EXPECT_EQ(again.parameters(0).default_value(), std::numeric_limits<double>::infinity());
 }
 
 TEST(ToJson, PrintsWhatHasItsDefault) {
