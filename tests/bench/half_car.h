@@ -11,12 +11,6 @@
 
 namespace polyest::bench {
 
-inline double Tanh(double x) { return std::tanh(x); }
-
-// Exact to rounding of 1, which is all that a force needs; the sign by subtraction, so that all
-// lanes do the same: tanh x = 1 − 2/(e^{2x} + 1).
-inline Lane Tanh(const Lane& x) { return 1 - 2 / ((2 * x.max(-20).min(20)).exp() + 1); }
-
 struct HalfCar {
   static constexpr int kStates = 8;
   static constexpr int kParameters = 2;  // m_a, d
