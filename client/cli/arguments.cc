@@ -128,7 +128,10 @@ class Parser {
         .add_option("--rate", stream_.rate,
                     "Send this many times as fast as the data's time; 0: at once")
         ->check(CLI::Range(0.0, 1e9));
-    command.add_option("--session", stream_.session, "The session to create, or to resume");
+    command.add_option(
+        "--session", stream_.session,
+        "The session to create, or to resume: then with rows after its last, in the same run "
+        "too, so that the last few rows of a smooth streamed input wait for them");
     AddFormat(command, stream_.format, {"table", "jsonl"});
   }
 

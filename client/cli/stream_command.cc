@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -105,22 +106,38 @@ class StreamCommand {
     if (isatty(STDERR_FILENO) != 0) err_ << "streaming to " << session.name << std::endl;
     Pace pace(arguments_.rate, interrupt_);
     int64_t skipped = 0;
+    bool any_sent = false;
     while (batch.time_size() > 0) {
-      if (session.resumed_after_s) skipped += RemoveRowsUpTo(*session.resumed_after_s, batch);
+      if (session.resumed_after) skipped += RemoveRowsUpTo(*session.resumed_after, batch);
       if (batch.time_size() > 0) {
         pace.Wait(batch);
         POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
+        any_sent = true;
       }
       if (interrupted()) break;
       auto next = reader.Read(arguments_.batch_rows);
       if (interrupted()) break;  // what was read may end in the midst of a row
       POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
     }
-    if (session.resumed_after_s) {
-      err_ << absl::StrFormat("polyest: resumed %s after t = %g s, %d rows were there already\n",
-                              session.name, *session.resumed_after_s, skipped);
+    if (session.resumed_after) {
+      err_ << absl::StrFormat(
+          "polyest: resumed %s after t = %g s of run %d, %d rows were there already\n",
+          session.name, session.resumed_after->time_s, session.resumed_after->run, skipped);
+    }
+    if (EndsRun() && any_sent && !interrupted()) {
+      v1::Measurements end;
+      end.set_end_of_run(true);
+      POLYEST_RETURN_IF_ERROR(stream.Send(std::move(end)));
     }
     return stream.Finish();
+  }
+
+  // Whether the last rows would wait for rows that will not come. A session with a name of its own
+  // may be resumed, by data that go on.
+  bool EndsRun() const {
+    if (!arguments_.session.empty()) return false;
+    return std::any_of(problem_.inputs().begin(), problem_.inputs().end(),
+                       [](const v1::Input& input) { return input.has_streamed(); });
   }
 
   MeasurementStreamCallbacks Callbacks() {

@@ -26,20 +26,18 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
   }
   StreamSession resumed{session.name(), std::nullopt};
   if (session.samples() > 0) {
-    v1::GetEstimateRequest request;
-    request.set_session(session.name());
-    POLYEST_ASSIGN_OR_RETURN(const v1::EstimateResponse response, client.GetEstimate(request));
-    resumed.resumed_after_s = response.estimate().time();
+    resumed.resumed_after = RowPlace{session.last_run(), session.last_time()};
   }
   return resumed;
 }
 
-int RemoveRowsUpTo(double time_s, v1::Measurements& batch) {
+int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch) {
+  const auto is_there = [&](int row) {
+    const int run = batch.run().empty() ? 0 : batch.run(row);
+    return run < place.run || (run == place.run && batch.time(row) <= place.time_s);
+  };
   int rows = 0;
-  while (rows < batch.time_size() && batch.time(rows) <= time_s &&
-         (batch.run().empty() || batch.run(rows) == 0)) {
-    ++rows;
-  }
+  while (rows < batch.time_size() && is_there(rows)) ++rows;
   batch.mutable_time()->erase(batch.time().begin(), batch.time().begin() + rows);
   if (!batch.run().empty()) {
     batch.mutable_run()->erase(batch.run().begin(), batch.run().begin() + rows);

@@ -11,11 +11,15 @@
 
 namespace polyest {
 
+struct RowPlace {
+  int run = 0;
+  double time_s = 0;
+};
+
 struct StreamSession {
   std::string name;  // `sessions/{id}`
-  // The time of the last sample that it has; none if it is new. Rows of run 0 up to there are in
-  // it already.
-  std::optional<double> resumed_after_s;
+  // The last row that it has; none if it is new.
+  std::optional<RowPlace> resumed_after;
 };
 
 // Creates the session, or resumes the one of that name if its problem is the same. `id` empty: the
@@ -23,7 +27,7 @@ struct StreamSession {
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id);
 
-// Takes leading rows of run 0 with times up to `time_s` away; returns how many.
-int RemoveRowsUpTo(double time_s, v1::Measurements& batch);
+// Takes the leading rows up to and including `place` away; returns how many.
+int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
 
 }  // namespace polyest

@@ -139,6 +139,7 @@ class ModelMismatch {
             times.back(), record_.values[k * width_ + channels_ + i]);
       }
     }
+    for (const int input : problem_.streamed_inputs()) inputs[static_cast<size_t>(input)].Finish();
     EnsemblePropagator ensemble(problem_.MakeEnsemble(thetas, problem_.outputs(), threads_),
                                 &inputs);
     Matrix outputs;

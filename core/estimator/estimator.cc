@@ -61,6 +61,7 @@ class Estimator::Implementation {
 
  private:
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
+  int64_t SettledRows() const;
   absl::Status Recover(const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
@@ -100,16 +101,25 @@ absl::Status Estimator::Implementation::Process(const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
   }
   RowBlock block;
-  while (processed_ < store_->rows()) {
+  const int64_t settled = SettledRows();
+  while (processed_ < settled) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    const int64_t count = std::min(kBlockRows, store_->rows() - processed_);
-    POLYEST_RETURN_IF_ERROR(store_->Read(processed_, count, block));
+    const int64_t count = std::min(kBlockRows, settled - processed_);
+    POLYEST_RETURN_IF_ERROR(
+        ReadWithRowsAhead(*store_, processed_, count, problem_.knots_ahead(), block));
     broken_ = true;
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
     if (through) broken_ = false;
   }
   return absl::OkStatus();
+}
+
+// Rows up to which the streamed inputs are settled, whatever rows may follow.
+int64_t Estimator::Implementation::SettledRows() const {
+  const RecordPosition& last = checks_.position();
+  if (last.run_ended) return last.rows;
+  return last.rows - std::min<int64_t>(problem_.knots_ahead(), last.rows_in_run);
 }
 
 // After a stop in the middle of a block: the same expansion, propagated again up to the last row

@@ -34,7 +34,9 @@ class Estimator {
   // INVALID_ARGUMENT names row, column, value and rule. Cheap: no numerics.
   absl::Status Append(const Samples& samples);
 
-  // Takes every stored sample not yet taken into the sums, re-expanding where needed. On a stop
+  // Takes every stored sample not yet taken into the sums, re-expanding where needed; the last few
+  // rows of a run with a smooth streamed input wait for the rows after them or for the run's end
+  // (Samples::end_of_run), since its curve up to them depends on what follows. On a stop
   // request returns its status; what was taken stays, the next call goes on from there.
   absl::Status Process(const Stop& stop = {});
 

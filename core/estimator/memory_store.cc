@@ -24,6 +24,7 @@ absl::Status MemoryStore::Append(const RowBlock& block) {
   AppendTo(record_.rows, block.rows);
   AppendTo(record_.values, block.values);
   AppendTo(record_.noise, block.noise);
+  record_.run_ended = block.run_ended;
   return absl::OkStatus();
 }
 
@@ -33,6 +34,8 @@ absl::Status MemoryStore::Read(int64_t first, int64_t count, RowBlock& block) co
   CopyRows(record_.rows, all, first, count, block.rows);
   CopyRows(record_.values, all, first, count, block.values);
   CopyRows(record_.noise, all, first, count, block.noise);
+  block.ahead = 0;
+  block.run_ended = record_.run_ended && first + count == all;
   return absl::OkStatus();
 }
 

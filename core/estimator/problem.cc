@@ -16,28 +16,11 @@
 namespace polyest {
 namespace {
 
-constexpr char kAmplitudeSuffix[] = ".amplitude";
-
-std::vector<std::string> Names(const std::vector<Quantity>& quantities) {
-  std::vector<std::string> names;
-  for (const Quantity& quantity : quantities) names.push_back(quantity.name);
-  return names;
-}
-
-// Every name that `fixed` and `uncertain` may use.
-std::vector<std::string> SettableNames(const ModelDescription& model) {
-  std::vector<std::string> names = Names(model.parameters);
-  for (const Quantity& input : model.inputs) {
-    names.push_back(absl::StrCat(input.name, kAmplitudeSuffix));
-  }
-  return names;
-}
-
 absl::Status UnknownName(std::string_view field, std::string_view name, std::string_view kind,
-                         const ModelDescription& model, const std::vector<std::string>& known) {
-  return absl::InvalidArgumentError(
-      absl::StrFormat("%s: model %s has no %s \"%s\"; it has %s", field, model.name, kind, name,
-                      known.empty() ? "none" : absl::StrJoin(known, ", ")));
+                         const ModelDescription& model, std::string_view known) {
+  return absl::InvalidArgumentError(absl::StrFormat("%s: model %s has no %s \"%s\"; it has %s",
+                                                    field, model.name, kind, name,
+                                                    known.empty() ? "none" : known));
 }
 
 absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
@@ -93,137 +76,214 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
   return absl::OkStatus();
 }
 
-}  // namespace
-
-std::optional<ResolvedProblem::Target> ResolvedProblem::FindTarget(const ModelDescription& model,
-                                                                   std::string_view name) {
-  if (auto column = model.FindParameter(name)) return Target{false, *column};
-  if (name.ends_with(kAmplitudeSuffix)) {
-    name.remove_suffix(std::string_view(kAmplitudeSuffix).size());
-    if (auto column = model.FindInput(name)) return Target{true, *column};
-  }
-  return std::nullopt;
-}
-
-absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
-  if (problem.model == nullptr) return absl::InvalidArgumentError("model: a model must be given");
+// What can be said without looking into the model.
+std::vector<absl::Status> CheckOptions(const Problem& problem) {
+  std::vector<absl::Status> refusals;
+  const auto add = [&refusals](absl::Status status) {
+    if (!status.ok()) refusals.push_back(std::move(status));
+  };
+  if (problem.model == nullptr) add(absl::InvalidArgumentError("model: a model must be given"));
   if (problem.uncertain.empty()) {
-    return absl::InvalidArgumentError("uncertain: at least one parameter must be uncertain");
+    add(absl::InvalidArgumentError("uncertain: at least one parameter must be uncertain"));
   }
   if (!std::isfinite(problem.regularization) || problem.regularization < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("regularization: %g must be a finite number ≥ 0", problem.regularization));
+    add(absl::InvalidArgumentError(
+        absl::StrFormat("regularization: %g must be a finite number ≥ 0", problem.regularization)));
   }
-  POLYEST_RETURN_IF_ERROR(
-      ValidateExpansion(problem.expansion, static_cast<int>(problem.uncertain.size())));
-  POLYEST_RETURN_IF_ERROR(problem.integration.Validate());
-  Prior prior(problem.uncertain);
-  ResolvedProblem resolved(std::move(problem), std::move(prior));
-  POLYEST_RETURN_IF_ERROR(resolved.ResolveInputs());
-  POLYEST_RETURN_IF_ERROR(resolved.ResolveParameters());
-  POLYEST_RETURN_IF_ERROR(resolved.ResolveUncertain());
-  POLYEST_RETURN_IF_ERROR(resolved.ResolveMeasured());
-  return resolved;
+  if (!problem.uncertain.empty()) {
+    add(ValidateExpansion(problem.expansion, static_cast<int>(problem.uncertain.size())));
+  }
+  add(problem.integration.Validate());
+  return refusals;
 }
 
-absl::Status ResolvedProblem::ResolveInputs() {
-  const ModelDescription& model = problem_.model->description();
-  base_amplitudes_ = Vector::Zero(static_cast<Eigen::Index>(model.inputs.size()));
-  std::set<int> seen;
+}  // namespace
+
+// Finds every name of a problem in its model, and collects what is wrong.
+class ResolvedProblem::Resolver {
+ public:
+  explicit Resolver(ResolvedProblem& resolved)
+      : resolved_(resolved),
+        problem_(resolved.problem_),
+        model_(problem_.model->description()),
+        settable_(resolved.settable_) {}
+
+  std::vector<absl::Status> Run() {
+    ResolveInputs();
+    ResolveMeasured();
+    ResolveFixed();
+    ResolveUncertain();
+    CheckAllHaveValues();
+    return std::move(refusals_);
+  }
+
+ private:
+  void Refuse(absl::Status refusal) { refusals_.push_back(std::move(refusal)); }
+  template <class... Arguments>
+  void Refuse(const absl::FormatSpec<Arguments...>& format, const Arguments&... arguments) {
+    Refuse(absl::InvalidArgumentError(absl::StrFormat(format, arguments...)));
+  }
+
+  void ResolveInputs();
+  void ResolveMeasured();
+  void ResolveFixed();
+  void ResolveUncertain();
+  void CheckAllHaveValues();
+  std::optional<int> Find(const std::string& field, const std::string& name);
+  bool Driven(int input) const { return signals_.contains(input); }
+  bool Measured(int output) const;
+  void CheckDelay(const std::string& field, const SettableQuantities::Settable& delay,
+                  double smallest_s);
+
+  ResolvedProblem& resolved_;
+  const Problem& problem_;
+  const ModelDescription& model_;
+  const SettableQuantities& settable_;
+  std::set<int> signals_;  // inputs that have one
+  std::vector<bool> has_value_ = std::vector<bool>(static_cast<size_t>(settable_.size()));
+  std::vector<absl::Status> refusals_;
+};
+
+void ResolvedProblem::Resolver::ResolveInputs() {
   for (size_t i = 0; i < problem_.inputs.size(); ++i) {
     const NamedInput& input = problem_.inputs[i];
     const std::string field = absl::StrFormat("inputs[%d]", i);
-    const auto column = model.FindInput(input.name);
-    if (!column) return UnknownName(field, input.name, "input", model, Names(model.inputs));
-    if (!seen.insert(*column).second) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%s: input %s is given twice", field, input.name));
+    const auto column = model_.FindInput(input.name);
+    if (!column) {
+      Refuse(UnknownName(field, input.name, "input", model_, ListNames(model_.inputs)));
+      continue;
     }
-    absl::StatusOr<InputSignal> signal = InputSignal::Make(input.signal);
+    if (!signals_.insert(*column).second) {
+      Refuse("%s: input %s is given twice", field, input.name);
+      continue;
+    }
+    const absl::StatusOr<InputSignal> signal = InputSignal::Make(input.signal);
     if (!signal.ok()) {
-      return absl::Status(signal.status().code(),
-                          absl::StrCat(field, " (", input.name, "): ", signal.status().message()));
+      Refuse(absl::Status(signal.status().code(),
+                          absl::StrCat(field, " (", input.name, "): ", signal.status().message())));
+      continue;
     }
-    base_amplitudes_[*column] = signal->default_amplitude();
-    if (signal->streamed()) streamed_inputs_.push_back(*column);
+    resolved_.base_[settable_.Amplitude(*column)] = signal->default_amplitude();
+    if (!signal->streamed()) continue;
+    resolved_.streamed_inputs_.push_back(*column);
+    resolved_.knots_ahead_ = std::max(resolved_.knots_ahead_, signal->knots_ahead());
   }
-  std::sort(streamed_inputs_.begin(), streamed_inputs_.end());
-  return absl::OkStatus();
+  std::sort(resolved_.streamed_inputs_.begin(), resolved_.streamed_inputs_.end());
 }
 
-absl::Status ResolvedProblem::ResolveParameters() {
-  const ModelDescription& model = problem_.model->description();
-  base_parameters_.resize(static_cast<Eigen::Index>(model.parameters.size()));
-  for (size_t i = 0; i < model.parameters.size(); ++i) {
-    base_parameters_[static_cast<Eigen::Index>(i)] = model.parameters[i].default_value;
-  }
-  for (const auto& [name, value] : problem_.fixed) {
-    const std::string field = absl::StrCat("fixed.", name);
-    const auto target = FindTarget(model, name);
-    if (!target) return UnknownName(field, name, "parameter", model, SettableNames(model));
-    if (!std::isfinite(value)) {
-      return absl::InvalidArgumentError(absl::StrFormat("%s: %g must be finite", field, value));
-    }
-    POLYEST_RETURN_IF_ERROR(CheckDriven(field, name, *target));
-    (target->is_amplitude ? base_amplitudes_ : base_parameters_)[target->column] = value;
-  }
-  return absl::OkStatus();
-}
-
-absl::Status ResolvedProblem::ResolveUncertain() {
-  const ModelDescription& model = problem_.model->description();
-  std::set<std::string> seen;
-  for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
-    const std::string& name = problem_.uncertain[i].name;
-    const std::string field = absl::StrFormat("uncertain[%d]", i);
-    const auto target = FindTarget(model, name);
-    if (!target) return UnknownName(field, name, "parameter", model, SettableNames(model));
-    if (!seen.insert(name).second) {
-      return absl::InvalidArgumentError(absl::StrFormat("%s: %s is given twice", field, name));
-    }
-    if (problem_.fixed.contains(name)) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%s: %s is both fixed and uncertain", field, name));
-    }
-    POLYEST_RETURN_IF_ERROR(CheckDriven(field, name, *target));
-    targets_.push_back(*target);
-    const Quantity& quantity =
-        (target->is_amplitude ? model.inputs
-                              : model.parameters)[static_cast<size_t>(target->column)];
-    units_.push_back(quantity.unit);
-  }
-  return absl::OkStatus();
-}
-
-// The amplitude of an input that has no signal would do nothing.
-absl::Status ResolvedProblem::CheckDriven(const std::string& field, const std::string& name,
-                                          Target target) const {
-  if (!target.is_amplitude) return absl::OkStatus();
-  const std::string& input =
-      problem_.model->description().inputs[static_cast<size_t>(target.column)].name;
-  for (const NamedInput& given : problem_.inputs) {
-    if (given.name == input) return absl::OkStatus();
-  }
-  return absl::InvalidArgumentError(
-      absl::StrFormat("%s: %s needs a signal for input %s in inputs", field, name, input));
-}
-
-absl::Status ResolvedProblem::ResolveMeasured() {
-  const ModelDescription& model = problem_.model->description();
-  std::set<int> seen;
+void ResolvedProblem::Resolver::ResolveMeasured() {
   for (size_t i = 0; i < problem_.measured.size(); ++i) {
     const MeasuredOutput& measured = problem_.measured[i];
     const std::string field = absl::StrFormat("measured[%d]", i);
-    const auto column = model.FindOutput(measured.output);
-    if (!column) return UnknownName(field, measured.output, "output", model, Names(model.outputs));
-    if (!seen.insert(*column).second) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("%s: output %s is given twice", field, measured.output));
+    const auto column = model_.FindOutput(measured.output);
+    if (!column) {
+      Refuse(UnknownName(field, measured.output, "output", model_, ListNames(model_.outputs)));
+      continue;
     }
-    POLYEST_RETURN_IF_ERROR(ValidateNoise(static_cast<int>(i), measured));
-    outputs_.push_back(*column);
+    if (Measured(*column)) Refuse("%s: output %s is given twice", field, measured.output);
+    const absl::Status noise = ValidateNoise(static_cast<int>(i), measured);
+    if (!noise.ok()) Refuse(noise);
+    resolved_.outputs_.push_back(*column);
   }
-  return absl::OkStatus();
+}
+
+bool ResolvedProblem::Resolver::Measured(int output) const {
+  return std::count(resolved_.outputs_.begin(), resolved_.outputs_.end(), output) > 0;
+}
+
+// The settable quantity of that name, if setting it makes a difference.
+std::optional<int> ResolvedProblem::Resolver::Find(const std::string& field,
+                                                   const std::string& name) {
+  const auto index = settable_.Find(name);
+  if (!index) {
+    Refuse(UnknownName(field, name, "parameter", model_, settable_.Describe()));
+    return std::nullopt;
+  }
+  const SettableQuantities::Settable& settable = settable_[*index];
+  const auto column = static_cast<size_t>(settable.column);
+  if (settable.of_input() && settable.kind != SettableQuantities::Kind::kInputOffset &&
+      !Driven(settable.column)) {
+    Refuse("%s: %s needs a signal for input %s in inputs", field, name, model_.inputs[column].name);
+    return std::nullopt;
+  }
+  if (settable.of_output() && !problem_.measured.empty() && !Measured(settable.column)) {
+    Refuse("%s: %s needs output %s in measured", field, name, model_.outputs[column].name);
+    return std::nullopt;
+  }
+  has_value_[static_cast<size_t>(*index)] = true;
+  return index;
+}
+
+void ResolvedProblem::Resolver::CheckDelay(const std::string& field,
+                                           const SettableQuantities::Settable& delay,
+                                           double smallest_s) {
+  const auto& streamed = resolved_.streamed_inputs_;
+  if (delay.kind != SettableQuantities::Kind::kDelay || smallest_s >= 0) return;
+  if (std::find(streamed.begin(), streamed.end(), delay.column) == streamed.end()) return;
+  Refuse(
+      "%s: %s may be as small as %g s; the delay of a streamed input must not be negative, since "
+      "values to come would be needed",
+      field, delay.name, smallest_s);
+}
+
+void ResolvedProblem::Resolver::ResolveFixed() {
+  for (const auto& [name, value] : problem_.fixed) {
+    const std::string field = absl::StrCat("fixed.", name);
+    const auto index = Find(field, name);
+    if (!index) continue;
+    if (!std::isfinite(value)) Refuse("%s: %g must be finite", field, value);
+    CheckDelay(field, settable_[*index], value);
+    resolved_.base_[*index] = value;
+  }
+}
+
+void ResolvedProblem::Resolver::ResolveUncertain() {
+  std::set<std::string> seen;
+  for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
+    const UncertainParameter& parameter = problem_.uncertain[i];
+    const std::string field = absl::StrFormat("uncertain[%d]", i);
+    const auto index = Find(field, parameter.name);
+    if (!index) continue;
+    if (!seen.insert(parameter.name).second) {
+      Refuse("%s: %s is given twice", field, parameter.name);
+    }
+    if (problem_.fixed.contains(parameter.name)) {
+      Refuse("%s: %s is both fixed and uncertain", field, parameter.name);
+    }
+    CheckDelay(field, settable_[*index],
+               parameter.location + parameter.scale * parameter.germ.Lower());
+    resolved_.targets_.push_back(*index);
+    resolved_.units_.push_back(settable_[*index].unit);
+  }
+}
+
+void ResolvedProblem::Resolver::CheckAllHaveValues() {
+  for (int i = 0; i < settable_.size(); ++i) {
+    if (settable_[i].has_default || has_value_[static_cast<size_t>(i)]) continue;
+    Refuse(
+        "model: parameter %s of model %s has no default; give it a value in fixed or a prior in "
+        "uncertain",
+        settable_[i].name, model_.name);
+  }
+}
+
+absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
+  std::vector<absl::Status> refusals = CheckOptions(problem);
+  if (!refusals.empty()) return refusals.front();
+  Prior prior(problem.uncertain);
+  ResolvedProblem resolved(std::move(problem), std::move(prior));
+  refusals = Resolver(resolved).Run();
+  if (!refusals.empty()) return refusals.front();
+  return resolved;
+}
+
+std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
+  std::vector<absl::Status> refusals = CheckOptions(problem);
+  if (problem.model == nullptr || problem.uncertain.empty()) return refusals;
+  Prior prior(problem.uncertain);
+  ResolvedProblem resolved(std::move(problem), std::move(prior));
+  for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
+  return refusals;
 }
 
 InputSignals ResolvedProblem::MakeInputs() const {
@@ -244,15 +304,14 @@ InputSignals ResolvedProblem::MakeInputs() const {
 EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas,
                                                     std::vector<int> outputs, int threads) const {
   POLYEST_CHECK(thetas.cols() == dimension());
+  Matrix values = base_.transpose().replicate(thetas.rows(), 1);
+  for (size_t i = 0; i < targets_.size(); ++i) {
+    values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
+  }
   EnsembleSpecification specification;
   specification.model = problem_.model;
-  specification.parameters = base_parameters_.transpose().replicate(thetas.rows(), 1);
-  specification.amplitudes = base_amplitudes_.transpose().replicate(thetas.rows(), 1);
-  for (size_t i = 0; i < targets_.size(); ++i) {
-    (targets_[i].is_amplitude ? specification.amplitudes : specification.parameters)
-        .col(targets_[i].column) = thetas.col(static_cast<Eigen::Index>(i));
-  }
   specification.outputs = std::move(outputs);
+  settable_.Fill(values, specification);
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;

@@ -15,6 +15,7 @@
 #include "core/bayes/noise.h"
 #include "core/bayes/prior.h"
 #include "core/chaos/collocation_points.h"
+#include "core/estimator/settable_quantities.h"
 #include "core/model/input_signal.h"
 #include "core/model/model.h"
 #include "core/propagation/ensemble_propagator.h"
@@ -42,8 +43,8 @@ enum class RegularizationMode { kFixed, kLCurve };
 
 struct Problem {
   std::shared_ptr<const Model> model;
-  // Model parameters, initial states and input amplitudes ("force.amplitude") that are known.
-  // What is named neither here nor among the uncertain has the model's default.
+  // What is known of the settable quantities (settable_quantities.h). What is named neither here
+  // nor among the uncertain and the derived has the model's default.
   std::map<std::string, double> fixed;
   std::vector<UncertainParameter> uncertain;
   std::vector<NamedInput> inputs;  // an input not listed is 0
@@ -67,6 +68,8 @@ class ResolvedProblem {
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED name the field, the value and the rule; an unknown name
   // is answered with the names there are. `measured` may be empty (a propagation needs none).
   static absl::StatusOr<ResolvedProblem> Make(Problem problem);
+  // All that Make has to say against it, not only the first.
+  static std::vector<absl::Status> Check(Problem problem);
 
   const Problem& problem() const { return problem_; }
   // 0 < tolerance, within IntegrationOptions' limits; for ensembles made from then on.
@@ -84,36 +87,32 @@ class ResolvedProblem {
   // The streamed inputs: their columns among the model's inputs.
   const std::vector<int>& streamed_inputs() const { return streamed_inputs_; }
 
+  // Rows that must follow a row of the data before the streamed inputs are settled up to it.
+  int knots_ahead() const { return knots_ahead_; }
+
   // An ensemble with one trajectory for each row of thetas (Q × n, the uncertain parameters'
   // values), reading `outputs` of the model.
   EnsembleSpecification MakeEnsemble(const ConstMatrixRef& thetas, std::vector<int> outputs,
                                      int threads) const;
 
  private:
+  class Resolver;
+
   ResolvedProblem(Problem problem, Prior prior)
-      : problem_(std::move(problem)), prior_(std::move(prior)) {}
-
-  // Where a settable name goes: a column of the parameters, or of the amplitudes.
-  struct Target {
-    bool is_amplitude = false;
-    int column = 0;
-  };
-
-  static std::optional<Target> FindTarget(const ModelDescription& model, std::string_view name);
-  absl::Status ResolveInputs();
-  absl::Status ResolveParameters();
-  absl::Status ResolveUncertain();
-  absl::Status ResolveMeasured();
-  absl::Status CheckDriven(const std::string& field, const std::string& name, Target target) const;
+      : problem_(std::move(problem)),
+        prior_(std::move(prior)),
+        settable_(problem_.model->description()),
+        base_(settable_.Defaults()) {}
 
   Problem problem_;
   Prior prior_;
-  Vector base_parameters_;
-  Vector base_amplitudes_;
-  std::vector<Target> targets_;  // where each uncertain parameter goes
+  SettableQuantities settable_;
+  Vector base_;               // values of the settable quantities that are not uncertain
+  std::vector<int> targets_;  // the settable quantity of each uncertain parameter
   std::vector<int> outputs_;
   std::vector<std::string> units_;
   std::vector<int> streamed_inputs_;
+  int knots_ahead_ = 0;
 };
 
 }  // namespace polyest

@@ -110,7 +110,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   RowBlock block;
   for (int64_t first = 0; first < rows; first += kReplayRows) {
     const int64_t count = std::min(kReplayRows, rows - first);
-    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
+    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store, first, count, problem.knots_ahead(), block));
     POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
     if (expansion->fitted_rows() < block.count()) return expansion->shortage();
     for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/common/check.h"
@@ -53,6 +54,8 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
 // A run begins at t = 0 from the initial states, with inputs of its own.
 void RegionalExpansion::StartRun(int run) {
   run_ = run;
+  knot_time_s_ = -std::numeric_limits<double>::infinity();
+  inputs_finished_ = false;
   propagator_.reset();
   inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
   propagator_ = std::make_unique<EnsemblePropagator>(
@@ -80,21 +83,37 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
 }
 
 absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
-  const size_t width = block_.values.size() / block_.rows.size();
+  AppendKnots(first);
   std::vector<double> times;
   for (int k = first; k < first + count; ++k) {
-    const double time_s = block_.rows[static_cast<size_t>(k)].time_s;
-    times.push_back(time_s);
-    for (size_t i = 0; i < problem_.streamed_inputs().size(); ++i) {
-      const auto column = static_cast<size_t>(problem_.streamed_inputs()[i]);
-      const size_t value = static_cast<size_t>(k) * width + static_cast<size_t>(channels_) + i;
-      (*inputs_)[column].Append(time_s, block_.values[value]);
-    }
+    times.push_back(block_.rows[static_cast<size_t>(k)].time_s);
   }
   POLYEST_RETURN_IF_ERROR(
       propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
   FitRows(first, count);
   return absl::OkStatus();
+}
+
+// The streamed inputs of the present run as far as the block tells, from this row on. Rows ahead
+// come again with the next block.
+void RegionalExpansion::AppendKnots(int row) {
+  const std::vector<int>& streamed = problem_.streamed_inputs();
+  if (streamed.empty()) return;
+  const size_t width = block_.values.size() / block_.rows.size();
+  auto k = static_cast<size_t>(row);
+  for (; k < block_.rows.size() && block_.rows[k].run == run_; ++k) {
+    const double time_s = block_.rows[k].time_s;
+    if (time_s <= knot_time_s_) continue;
+    for (size_t i = 0; i < streamed.size(); ++i) {
+      const double value = block_.values[k * width + static_cast<size_t>(channels_) + i];
+      (*inputs_)[static_cast<size_t>(streamed[i])].Append(time_s, value);
+    }
+    knot_time_s_ = time_s;
+  }
+  const bool complete = k < block_.rows.size() || block_.run_ended;
+  if (!complete || inputs_finished_) return;
+  for (const int input : streamed) (*inputs_)[static_cast<size_t>(input)].Finish();
+  inputs_finished_ = true;
 }
 
 // Fits each stretch of rows over which the same trajectories are good.

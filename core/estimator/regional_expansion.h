@@ -79,6 +79,7 @@ class RegionalExpansion {
 
   void StartRun(int run);
   absl::Status PropagateRun(int first, int count, const Stop& stop);
+  void AppendKnots(int row);
   void FitRows(int first, int count);
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
@@ -98,6 +99,8 @@ class RegionalExpansion {
   std::vector<bool> check_valid_;
   int run_ = -1;
   std::unique_ptr<InputSignals> inputs_;
+  double knot_time_s_ = 0;        // of the last knot of the streamed inputs
+  bool inputs_finished_ = false;  // no more knots in this run
   std::unique_ptr<EnsemblePropagator> propagator_;
   std::vector<FailedTrajectory> failures_;
 

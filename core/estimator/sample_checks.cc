@@ -67,14 +67,23 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   for (size_t k = 0; k < samples.rows(); ++k) {
     checked.rows.push_back({samples.run.empty() ? 0 : samples.run[k], samples.time_s[k]});
   }
-  checked.after.rows += static_cast<int64_t>(samples.rows());
-  checked.after.run = checked.rows.back().run;
-  checked.after.time_s = checked.rows.back().time_s;
+  for (const SampleRow& row : checked.rows) {
+    const bool same_run = checked.after.rows > 0 && row.run == checked.after.run;
+    checked.after.rows_in_run = same_run ? checked.after.rows_in_run + 1 : 1;
+    checked.after.run = row.run;
+    checked.after.time_s = row.time_s;
+    ++checked.after.rows;
+  }
+  checked.run_ended = samples.end_of_run;
+  checked.after.run_ended = samples.end_of_run;
   return checked;
 }
 
 absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
-  if (samples.rows() == 0) return absl::InvalidArgumentError("the measurements have no rows");
+  if (samples.rows() == 0) {
+    if (samples.end_of_run && position_.rows > 0) return absl::OkStatus();
+    return absl::InvalidArgumentError("the measurements have no rows");
+  }
   if (!samples.run.empty() && samples.run.size() != samples.rows()) {
     return absl::InvalidArgumentError(
         absl::StrFormat("run: %d values for %d rows", samples.run.size(), samples.rows()));
@@ -123,12 +132,17 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
           absl::StrFormat("row %d, column run: %d after %d; runs start at 0 and never decrease", k,
                           run, before.run));
     }
+    if (before.run_ended && run == before.run) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("row %d: run %d has ended; further rows belong to a new run", k, run));
+    }
     if (before.rows > 0 && run == before.run && time_s <= before.time_s) {
       return absl::InvalidArgumentError(
           absl::StrFormat("row %d, column t: %.17g after %.17g; times must increase within a run",
                           k, time_s, before.time_s));
     }
     before.run = run;
+    before.run_ended = false;
     before.time_s = time_s;
     ++before.rows;
   }

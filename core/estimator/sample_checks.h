@@ -17,7 +17,9 @@ struct RecordPosition {
   int64_t rows = 0;
   int run = 0;
   double time_s = 0;
-  Vector largest;  // by channel: max |z| so far, for NoiseModel::relative_to_max
+  int64_t rows_in_run = 0;
+  bool run_ended = false;  // no more rows of `run`
+  Vector largest;          // by channel: max |z| so far, for NoiseModel::relative_to_max
 };
 
 // Rows that have passed, and where the record stands after them.
@@ -35,6 +37,7 @@ class SampleChecks {
   absl::StatusOr<CheckedSamples> Check(const Samples& samples) const;
   // The rows checked have been stored; the next samples must follow them.
   void Accept(const CheckedSamples& samples) { position_ = samples.after; }
+  const RecordPosition& position() const { return position_; }
 
  private:
   absl::Status CheckColumns(const Samples& samples) const;

@@ -160,6 +160,8 @@ InputSignal::InputSignal(InputSpecification specification)
   if (auto* table = std::get_if<TableInput>(&specification_)) {
     knot_time_s_ = std::move(table->time_s);
     knot_value_ = std::move(table->value);
+    finished_ = true;
+    SettleSlopes();
   }
 }
 
@@ -167,27 +169,63 @@ double InputSignal::default_amplitude() const {
   return std::visit([](const auto& input) { return input.amplitude; }, specification_);
 }
 
+std::optional<Interpolation> InputSignal::interpolation() const {
+  return std::visit(
+      []<class Input>(const Input& input) -> std::optional<Interpolation> {
+        if constexpr (kHasKnots<Input>) {
+          return input.interpolation;
+        } else {
+          return std::nullopt;
+        }
+      },
+      specification_);
+}
+
+int InputSignal::knots_ahead() const { return streamed() ? KnotsAhead(*interpolation()) : 0; }
+
 bool InputSignal::streamed() const { return std::holds_alternative<StreamedInput>(specification_); }
 
 void InputSignal::Append(double time_s, double value) {
-  POLYEST_CHECK(streamed());
+  POLYEST_CHECK(streamed() && !finished_);
   POLYEST_CHECK(std::isfinite(time_s) && std::isfinite(value));
   POLYEST_CHECK(knot_time_s_.empty() || time_s > knot_time_s_.back());
   knot_time_s_.push_back(time_s);
   knot_value_.push_back(value);
+  SettleSlopes();
+}
+
+void InputSignal::Finish() {
+  POLYEST_CHECK(streamed());
+  finished_ = true;
+  SettleSlopes();
+}
+
+void InputSignal::SettleSlopes() {
+  const Interpolation curve = *interpolation();
+  const auto ahead = static_cast<size_t>(KnotsAhead(curve));
+  if (ahead == 0) return;
+  const size_t settled =
+      finished_ ? knot_time_s_.size() : knot_time_s_.size() - std::min(ahead, knot_time_s_.size());
+  for (size_t k = knot_slope_.size(); k < settled; ++k) {
+    knot_slope_.push_back(curve == Interpolation::kCubic
+                              ? SplineSlope(knot_time_s_, knot_value_, k)
+                              : MonotoneSlope(knot_time_s_, knot_value_, k));
+  }
 }
 
 void InputSignal::Clear() {
   POLYEST_CHECK(streamed());
   knot_time_s_.clear();
   knot_value_.clear();
+  knot_slope_.clear();
+  finished_ = false;
 }
 
 double InputSignal::Shape(double time_s) const {
   return std::visit(
       [&]<class Input>(const Input& input) {
         if constexpr (kHasKnots<Input>) {
-          return BetweenKnots(time_s, input.hold);
+          return BetweenKnots(time_s, input.interpolation);
         } else {
           return ClosedForm(input, time_s);
         }
@@ -199,6 +237,7 @@ double InputSignal::NextBreak(double time_s) const {
   return std::visit(
       [&]<class Input>(const Input& input) {
         if constexpr (kHasKnots<Input>) {
+          if (KnotsAhead(input.interpolation) > 0) return EndAfter(time_s);
           const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
           return next == knot_time_s_.end() ? kInfinity : *next;
         } else {
@@ -208,11 +247,18 @@ double InputSignal::NextBreak(double time_s) const {
       specification_);
 }
 
+// A smooth curve has corners where it begins and ends.
+double InputSignal::EndAfter(double time_s) const {
+  if (knot_time_s_.empty()) return kInfinity;
+  if (time_s < knot_time_s_.front()) return knot_time_s_.front();
+  return finished_ && time_s < knot_time_s_.back() ? knot_time_s_.back() : kInfinity;
+}
+
 bool InputSignal::Jumps() const {
   return std::visit(
       []<class Input>(const Input& input) {
         if constexpr (kHasKnots<Input>) {
-          return input.hold;
+          return input.interpolation == Interpolation::kHold;
         } else {
           // A chirp ends, and with a phase also begins, in the middle of a swing.
           return std::is_same_v<Input, StepInput> || std::is_same_v<Input, ChirpInput>;
@@ -221,17 +267,22 @@ bool InputSignal::Jumps() const {
       specification_);
 }
 
-double InputSignal::BetweenKnots(double time_s, bool hold) const {
+double InputSignal::BetweenKnots(double time_s, Interpolation interpolation) const {
   if (knot_time_s_.empty()) return 0;
   const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
   if (next == knot_time_s_.begin()) return knot_value_.front();
   const size_t right = static_cast<size_t>(next - knot_time_s_.begin());
   const size_t left = right - 1;
-  if (hold || right == knot_time_s_.size()) return knot_value_[left];
-  // u_l + (u_r − u_l) (t − t_l)/(t_r − t_l)
-  const double fraction =
-      (time_s - knot_time_s_[left]) / (knot_time_s_[right] - knot_time_s_[left]);
-  return std::lerp(knot_value_[left], knot_value_[right], fraction);
+  if (time_s == knot_time_s_[left] || right == knot_time_s_.size()) return knot_value_[left];
+  if (interpolation == Interpolation::kHold) return knot_value_[left];
+  if (interpolation == Interpolation::kLinear) {
+    // u_l + (u_r − u_l) (t − t_l)/(t_r − t_l)
+    const double fraction =
+        (time_s - knot_time_s_[left]) / (knot_time_s_[right] - knot_time_s_[left]);
+    return std::lerp(knot_value_[left], knot_value_[right], fraction);
+  }
+  POLYEST_CHECK(right < knot_slope_.size());
+  return Hermite(knot_time_s_, knot_value_, left, knot_slope_[left], knot_slope_[right], time_s);
 }
 
 }  // namespace polyest

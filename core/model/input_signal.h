@@ -6,9 +6,12 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
+
+#include "core/model/interpolation.h"
 
 namespace polyest {
 
@@ -50,18 +53,17 @@ struct HalfSineBumpInput {
   double duration_s = 1;
 };
 
-// One knot or more in strictly increasing time; linear between them (or held), the end values
-// outside.
+// One knot or more in strictly increasing time; the end values outside.
 struct TableInput {
   std::vector<double> time_s;
   std::vector<double> value;
-  bool hold = false;
+  Interpolation interpolation = Interpolation::kLinear;
   double amplitude = 1;
 };
 
 // Values that come with the data; see Append.
 struct StreamedInput {
-  bool hold = false;
+  Interpolation interpolation = Interpolation::kCubic;
   double amplitude = 1;
 };
 
@@ -82,14 +84,21 @@ class InputSignal {
   std::span<const double> knot_values() const { return knot_value_; }
   // A streamed signal's next knot: finite, times strictly increasing within a run; amortized O(1).
   void Append(double time_s, double value);
+  // No more knots of a streamed signal will come.
+  void Finish();
   // Forgets the knots of a streamed signal: a new run begins.
   void Clear();
 
-  // shape(t). A streamed signal is its first value before its first knot and its last value after
-  // its last, and 0 while it has none. At a jump (step, held knot, end of a chirp) it is the value
-  // from the right; the one from the left is Shape(std::nextafter(break, −∞)).
+  // Knots that must follow a knot before the signal up to it is settled, unless it is finished.
+  int knots_ahead() const;
+
+  // shape(t), for a streamed signal no later than it is settled. It is its first value before its
+  // first knot and its last value after its last, and 0 while it has none. At a jump (step, held
+  // knot, end of a chirp) it is the value from the right; the one from the left is
+  // Shape(std::nextafter(break, −∞)).
   double Shape(double time_s) const;
-  // The first time strictly after time_s at which shape or its derivative jumps; +∞ if none.
+  // The first time strictly after time_s at which shape or its derivative jumps; +∞ if none. A
+  // smooth curve has none but its ends.
   double NextBreak(double time_s) const;
   // Whether shape itself jumps at its breaks (step, chirp, hold), so that an
   // integrator must also forget the derivative it kept from before.
@@ -97,11 +106,16 @@ class InputSignal {
 
  private:
   explicit InputSignal(InputSpecification specification);
-  double BetweenKnots(double time_s, bool hold) const;
+  std::optional<Interpolation> interpolation() const;  // of a signal with knots
+  void SettleSlopes();
+  double EndAfter(double time_s) const;
+  double BetweenKnots(double time_s, Interpolation interpolation) const;
 
   InputSpecification specification_;  // a table's knots are moved out of it
   std::vector<double> knot_time_s_;
   std::vector<double> knot_value_;
+  std::vector<double> knot_slope_;  // of a smooth curve, as far as it is settled
+  bool finished_ = false;
 };
 
 }  // namespace polyest

@@ -20,17 +20,18 @@ constexpr int kStepsAtOnce = 500;
 // bump, 0 at both ends, would miss it. So after each break it stops once early on.
 constexpr double kLook = 1.0 / 64;
 
-Eigen::Index PaddedRows(int points) {
-  return (points + kLanes - 1) / kLanes * static_cast<Eigen::Index>(kLanes);
+// Rows 0 … points − 1, then copies of the last up to a multiple of kLanes.
+std::vector<int> PaddedRows(int points) {
+  std::vector<int> rows;
+  for (int row = 0; row < points || row % kLanes != 0; ++row) {
+    rows.push_back(std::min(row, points - 1));
+  }
+  return rows;
 }
 
-// Rows first … first + points − 1, then copies of the last of them.
-Eigen::ArrayXXd PaddedCopy(const Matrix& matrix, int first, int points) {
-  Eigen::ArrayXXd copy(PaddedRows(points), matrix.cols());
-  for (Eigen::Index row = 0; row < copy.rows(); ++row) {
-    copy.row(row) = matrix.row(first + std::min<Eigen::Index>(row, points - 1)).array();
-  }
-  return copy;
+std::vector<int> Shifted(std::vector<int> rows, int first) {
+  for (int& row : rows) row += first;
+  return rows;
 }
 
 }  // namespace
@@ -39,11 +40,10 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
                                  const InputSignals* inputs, int first_point, int points)
     : specification_(specification),
       model_(dynamic_cast<const StateSpaceModel*>(specification->model.get())),
-      inputs_(inputs),
       first_point_(first_point),
-      parameters_(PaddedCopy(specification->parameters, first_point, points)),
-      amplitudes_(PaddedCopy(specification->amplitudes, first_point, points)),
-      input_time_s_(std::numeric_limits<double>::quiet_NaN()),
+      source_(PaddedRows(points)),
+      parameters_(specification->parameters(Shifted(source_, first_point), Eigen::all).array()),
+      inputs_(*specification, inputs, Shifted(source_, first_point)),
       point_alive_(points, true),
       alive_points_(points),
       stiff_(specification->integration.method == IntegrationMethod::kStiff) {
@@ -52,12 +52,8 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
   const Eigen::Index rows = parameters_.rows();
   for (const InputSignal& input : *inputs) streamed_ = streamed_ || input.streamed();
   states_.setZero(rows, static_cast<Eigen::Index>(description.states.size()));
-  input_values_.setZero(rows, amplitudes_.cols());
   model_outputs_.setZero(rows, static_cast<Eigen::Index>(description.outputs.size()));
   selected_outputs_.setZero(rows, static_cast<Eigen::Index>(specification->outputs.size()));
-  for (Eigen::Index row = 0; row < rows; ++row) {
-    source_.push_back(std::min(static_cast<int>(row), points - 1));
-  }
   if (states_.cols() == 0) return;
   model_->InitialStates(parameters_, states_);
   FailRowsNotFinite(states_, 0, "an initial state is not finite");
@@ -76,31 +72,16 @@ bool TrajectoryBlock::MayChangeMethod() const {
   return specification_->integration.method == IntegrationMethod::kAuto && !stiff_;
 }
 
-void TrajectoryBlock::EvaluateInputs(double time_s) {
-  if (time_s == input_time_s_) return;
-  for (Eigen::Index i = 0; i < amplitudes_.cols(); ++i) {
-    // u_pi(t) = amplitude_pi · shape_i(t)
-    input_values_.col(i) = amplitudes_.col(i) * (*inputs_)[i].Shape(time_s);
-  }
-  input_time_s_ = time_s;
-}
-
 void TrajectoryBlock::Derivatives(double time_s, const ConstBlock& states, Block derivatives) {
-  EvaluateInputs(std::min(time_s, input_limit_s_));
-  model_->Derivatives(time_s, states, parameters_, input_values_, derivatives);
+  model_->Derivatives(time_s, states, parameters_, inputs_.At(time_s), derivatives);
 }
 
-TrajectoryBlock::Break TrajectoryBlock::NextBreak() const {
-  Break next;
-  for (const InputSignal& input : *inputs_) {
-    const double break_s = input.NextBreak(time_s_);
-    if (break_s > next.time_s || break_s == kInfinity) continue;
-    const bool together = break_s == next.time_s;
-    next = {break_s, input.Jumps() || (together && next.jumps), true};
-  }
-  if (!stiff_ || streamed_ || next.time_s == kInfinity) return next;
+TrajectoryBlock::StopTime TrajectoryBlock::NextStop() {
+  const BlockInputs::Break next = inputs_.NextBreak();
+  const StopTime stop = {next.time_s, next.jumps, true};
+  if (!stiff_ || streamed_ || next.time_s == kInfinity) return stop;
   const double look_s = last_break_s_ + kLook * (next.time_s - last_break_s_);
-  return look_s > time_s_ ? Break{look_s, false, false} : next;
+  return look_s > time_s_ ? StopTime{look_s, false, false} : stop;
 }
 
 absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -118,14 +99,16 @@ absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef
 
 absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
   for (;;) {
-    const Break next = NextBreak();
-    input_limit_s_ = std::nextafter(next.time_s, -kInfinity);
+    const StopTime next = NextStop();
     if (next.time_s > time_s) {
       return Reach(time_s, streamed_ ? time_s : next.time_s, stop);
     }
     POLYEST_RETURN_IF_ERROR(Reach(next.time_s, next.time_s, stop));
     time_s_ = next.time_s;
-    if (next.is_input) last_break_s_ = time_s_;
+    if (next.is_break) {
+      last_break_s_ = time_s_;
+      inputs_.Pass(time_s_);
+    }
     if (next.jumps && integrator_) integrator_->Restart();
   }
 }
@@ -163,8 +146,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
   const std::vector<int>& selected = specification_->outputs;
   const Eigen::Index columns = selected_outputs_.cols();
   if (alive()) {
-    EvaluateInputs(time_s);
-    model_->Outputs(time_s, states_, parameters_, input_values_, model_outputs_);
+    model_->Outputs(time_s, states_, parameters_, inputs_.At(time_s), model_outputs_);
     for (Eigen::Index j = 0; j < columns; ++j) {
       selected_outputs_.col(j) = model_outputs_.col(selected[j]);
     }
@@ -207,10 +189,9 @@ void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::strin
     if (source_[copy] != point) continue;
     source_[copy] = static_cast<int>(healthy);
     parameters_.row(copy) = parameters_.row(healthy);
-    amplitudes_.row(copy) = amplitudes_.row(healthy);
+    inputs_.CopyRow(healthy, copy);
     states_.row(copy) = states_.row(healthy);
   }
-  input_time_s_ = std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace polyest

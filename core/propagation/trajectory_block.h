@@ -4,10 +4,6 @@
 //
 // Rows beyond the block's own points, up to a multiple of kLanes, carry copies of its last point; a
 // point that fails is replaced by a copy of one that has not, so that the shape stays.
-//
-// An input that jumps at t* is integrated with its left limit up to t* and with its value from the
-// right from there on: while the block is on its way to t*, inputs are evaluated no later than just
-// before it.
 
 #include <absl/status/status.h>
 
@@ -20,6 +16,7 @@
 
 #include "core/common/stop.h"
 #include "core/common/types.h"
+#include "core/propagation/block_inputs.h"
 #include "core/propagation/ensemble_integrator.h"
 #include "core/propagation/trajectory_ensemble.h"
 
@@ -44,16 +41,16 @@ class TrajectoryBlock final : public EnsembleSystem {
   const std::vector<PointFailure>& failures() const { return failures_; }
 
  private:
-  struct Break {
+  // A time at which the integrator stops on its way.
+  struct StopTime {
     double time_s = std::numeric_limits<double>::infinity();
     bool jumps = false;
-    bool is_input = false;  // rather than a time at which to look
+    bool is_break = false;  // of an input, rather than a time at which to look
   };
 
   void StartIntegrator(double time_s);
   bool MayChangeMethod() const;
-  void EvaluateInputs(double time_s);
-  Break NextBreak() const;
+  StopTime NextStop();
   absl::Status AdvanceStates(double time_s, const Stop& stop);
   absl::Status Reach(double time_s, double stop_time_s, const Stop& stop);
   void ReadOutputs(double time_s, int sample, MatrixRef outputs);
@@ -64,20 +61,16 @@ class TrajectoryBlock final : public EnsembleSystem {
 
   const EnsembleSpecification* specification_;
   const StateSpaceModel* model_;
-  const InputSignals* inputs_;
   const int first_point_;
   bool streamed_ = false;  // a knot yet to come must not change a step already taken
 
+  std::vector<int> source_;  // the block's own point that each row carries
   Eigen::ArrayXXd parameters_;
-  Eigen::ArrayXXd amplitudes_;
+  BlockInputs inputs_;
   Eigen::ArrayXXd states_;
-  Eigen::ArrayXXd input_values_;
   Eigen::ArrayXXd model_outputs_;
   Eigen::ArrayXXd selected_outputs_;
-  double input_time_s_;  // input_values_ are of this time
-  double input_limit_s_ = std::numeric_limits<double>::infinity();
 
-  std::vector<int> source_;  // the block's own point that each row carries
   std::vector<bool> point_alive_;
   int alive_points_;
   bool stiff_ = false;

@@ -75,6 +75,7 @@ absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements) {
   Samples samples;
   samples.time_s.assign(measurements.time().begin(), measurements.time().end());
   samples.run.assign(measurements.run().begin(), measurements.run().end());
+  samples.end_of_run = measurements.end_of_run();
   samples.columns.reserve(static_cast<size_t>(measurements.channels_size()));
   for (int i = 0; i < measurements.channels_size(); ++i) {
     POLYEST_ASSIGN_OR_RETURN(SampleColumn column,

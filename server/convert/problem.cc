@@ -24,6 +24,8 @@ absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem)
       if (!model.ok()) return InvalidField("model.builtin", model.status().message());
       return model;
     }
+    case v1::Problem::Model::kEquations:
+    case v1::Problem::Model::kFmu:
     case v1::Problem::Model::SOURCE_NOT_SET:
       break;
   }
@@ -55,6 +57,8 @@ std::pair<absl::StatusOr<UncertainParameter>, const char*> ToPrior(
       return {UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift()),
               "gamma"};
     }
+    case v1::UncertainParameter::kLognormal:
+    case v1::UncertainParameter::kTruncatedNormal:
     case v1::UncertainParameter::PRIOR_NOT_SET:
       break;
   }
@@ -87,11 +91,41 @@ absl::StatusOr<std::vector<UncertainParameter>> ToUncertain(const v1::Problem& p
   return uncertain;
 }
 
-TableInput ToTable(const v1::Input::Table& table) {
-  return {.time_s = {table.time_s().begin(), table.time_s().end()},
-          .value = {table.value().begin(), table.value().end()},
-          .hold = table.hold(),
-          .amplitude = table.has_amplitude() ? table.amplitude() : 1};
+// `path` is that of a table or a streamed signal.
+absl::StatusOr<Interpolation> ToInterpolation(bool hold, v1::Input::Interpolation given,
+                                              Interpolation preset, absl::string_view path) {
+  if (hold && given != v1::Input::INTERPOLATION_UNSPECIFIED) {
+    return InvalidField(path, "hold and interpolation exclude each other");
+  }
+  switch (given) {
+    case v1::Input::INTERPOLATION_UNSPECIFIED:
+      return hold ? Interpolation::kHold : preset;
+    case v1::Input::LINEAR:
+      return Interpolation::kLinear;
+    case v1::Input::CUBIC:
+      return Interpolation::kCubic;
+    case v1::Input::SHAPE_PRESERVING:
+      return Interpolation::kShapePreserving;
+    default:
+      return UnknownEnumerator(absl::StrCat(path, ".interpolation"), given);
+  }
+}
+
+absl::StatusOr<InputSpecification> ToTable(const v1::Input::Table& table) {
+  POLYEST_ASSIGN_OR_RETURN(
+      const Interpolation interpolation,
+      ToInterpolation(table.hold(), table.interpolation(), Interpolation::kLinear, "table"));
+  return TableInput{.time_s = {table.time_s().begin(), table.time_s().end()},
+                    .value = {table.value().begin(), table.value().end()},
+                    .interpolation = interpolation,
+                    .amplitude = table.has_amplitude() ? table.amplitude() : 1};
+}
+
+absl::StatusOr<InputSpecification> ToStreamed(const v1::Input::Streamed& streamed) {
+  POLYEST_ASSIGN_OR_RETURN(const Interpolation interpolation,
+                           ToInterpolation(streamed.hold(), streamed.interpolation(),
+                                           Interpolation::kCubic, "streamed"));
+  return StreamedInput{interpolation, streamed.has_amplitude() ? streamed.amplitude() : 1};
 }
 
 ChirpInput ToChirp(const v1::Input::Chirp& chirp) {
@@ -121,10 +155,8 @@ absl::StatusOr<InputSpecification> ToSignal(const v1::Input& input) {
     }
     case v1::Input::kTable:
       return ToTable(input.table());
-    case v1::Input::kStreamed: {
-      const auto& streamed = input.streamed();
-      return StreamedInput{streamed.hold(), streamed.has_amplitude() ? streamed.amplitude() : 1};
-    }
+    case v1::Input::kStreamed:
+      return ToStreamed(input.streamed());
     case v1::Input::SIGNAL_NOT_SET:
       break;
   }

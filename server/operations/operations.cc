@@ -26,6 +26,7 @@ absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& requ
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   POLYEST_ASSIGN_OR_RETURN(auto estimator,
                            Estimator::Make(std::move(problem), {.threads = threads, .store = {}}));
+  samples.end_of_run = true;
   POLYEST_RETURN_IF_ERROR(estimator->Append(samples));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));

@@ -39,6 +39,8 @@ v1::Session Session::Describe() const {
   std::lock_guard lock(mutex_);
   session.set_last_sequence(sequence_.last());
   session.set_samples(samples_);
+  session.set_last_time(last_row_.time_s);
+  session.set_last_run(last_row_.run);
   return session;
 }
 
@@ -89,6 +91,9 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     std::lock_guard lock(mutex_);
     sequence_.Accept(batch);
     samples_ += CountValues(samples);
+    if (samples.rows() > 0) {
+      last_row_ = {samples.run.empty() ? 0 : samples.run.back(), samples.time_s.back()};
+    }
   }
   return Acknowledge();
 }

@@ -86,6 +86,7 @@ class Session {
   // Changed on the strand only, under the mutex; read anywhere.
   BatchSequence sequence_;
   int64_t samples_ = 0;
+  SampleRow last_row_;
   bool closed_ = false;
   std::shared_ptr<SessionObserver> writer_;
   std::vector<std::shared_ptr<SessionObserver>> observers_;

@@ -44,6 +44,7 @@ Samples Rows(const Samples& record, size_t first, size_t count) {
   Samples part;
   part.time_s = Slice(record.time_s, first, end);
   part.run = Slice(record.run, first, end);
+  part.end_of_run = record.end_of_run && end == record.rows();
   for (const SampleColumn& column : record.columns) {
     part.columns.push_back(
         {column.name, Slice(column.value, first, end), Slice(column.missing, first, end)});

@@ -87,7 +87,7 @@ TEST_F(StreamTest, ResumesASessionWhereItEnded) {
   const Finished second =
       Run(Command(File("d.csv", DemoRows(100)), {"--format", "jsonl", "--session", "rig-1"}));
   ASSERT_EQ(second.exit_status, 0) << second.err;
-  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s, 45 rows"));
+  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s of run 0, 45 rows"));
   ExpectSame(LastEstimate(second.out), EstimateOf(100));
 }
 

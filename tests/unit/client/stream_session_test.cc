@@ -22,7 +22,7 @@ v1::Measurements Rows() {
 
 TEST(RemoveRowsUpTo, KeepsWhatIsLater) {
   v1::Measurements batch = Rows();
-  EXPECT_EQ(RemoveRowsUpTo(2, batch), 2);
+  EXPECT_EQ(RemoveRowsUpTo({0, 2}, batch), 2);
   EXPECT_THAT(batch.time(), ElementsAre(3, 4));
   EXPECT_THAT(batch.channels(0).values(), ElementsAre(0, 40));
   EXPECT_THAT(batch.channels(0).missing(), ElementsAre(0));
@@ -30,17 +30,24 @@ TEST(RemoveRowsUpTo, KeepsWhatIsLater) {
 
 TEST(RemoveRowsUpTo, MayTakeAllOrNone) {
   v1::Measurements batch = Rows();
-  EXPECT_EQ(RemoveRowsUpTo(0.5, batch), 0);
+  EXPECT_EQ(RemoveRowsUpTo({0, 0.5}, batch), 0);
   EXPECT_EQ(batch.time_size(), 4);
-  EXPECT_EQ(RemoveRowsUpTo(10, batch), 4);
+  EXPECT_EQ(RemoveRowsUpTo({0, 10}, batch), 4);
   EXPECT_THAT(batch.time(), IsEmpty());
 }
 
 TEST(RemoveRowsUpTo, LeavesLaterRunsAlone) {
   v1::Measurements batch = Rows();
   for (const int run : {0, 0, 1, 1}) batch.add_run(run);
-  EXPECT_EQ(RemoveRowsUpTo(10, batch), 2);
+  EXPECT_EQ(RemoveRowsUpTo({0, 10}, batch), 2);
   EXPECT_THAT(batch.run(), ElementsAre(1, 1));
+}
+
+TEST(RemoveRowsUpTo, TakesEarlierRunsWhole) {
+  v1::Measurements batch = Rows();
+  for (const int run : {0, 0, 1, 1}) batch.add_run(run);
+  EXPECT_EQ(RemoveRowsUpTo({1, 3}, batch), 3);
+  EXPECT_THAT(batch.time(), ElementsAre(4));
 }
 
 }  // namespace

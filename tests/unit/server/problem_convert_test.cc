@@ -138,16 +138,18 @@ TEST(ToProblem, KnowsChirpsTablesAndStreams) {
   const TableInput& table = OnlySignal<TableInput>(with_table);
   EXPECT_EQ(table.time_s, (std::vector<double>{0, 1}));
   EXPECT_EQ(table.value, (std::vector<double>{5, 6}));
-  EXPECT_TRUE(table.hold);
+  EXPECT_EQ(table.interpolation, Interpolation::kHold);
   EXPECT_EQ(table.amplitude, 1);
   const auto scaled = WithForce(R"("table": {"timeS": [0], "value": [5], "amplitude": 2})");
   EXPECT_EQ(OnlySignal<TableInput>(scaled).amplitude, 2);
   const auto streamed = WithForce(R"("streamed": {})");
-  EXPECT_FALSE(OnlySignal<StreamedInput>(streamed).hold);
+  EXPECT_EQ(OnlySignal<StreamedInput>(streamed).interpolation, Interpolation::kCubic);
   EXPECT_EQ(OnlySignal<StreamedInput>(streamed).amplitude, 1);
   const auto held = WithForce(R"("streamed": {"hold": true, "amplitude": 0})");
-  EXPECT_TRUE(OnlySignal<StreamedInput>(held).hold);
+  EXPECT_EQ(OnlySignal<StreamedInput>(held).interpolation, Interpolation::kHold);
   EXPECT_EQ(OnlySignal<StreamedInput>(held).amplitude, 0);
+  const auto shaped = WithForce(R"("streamed": {"interpolation": "SHAPE_PRESERVING"})");
+  EXPECT_EQ(OnlySignal<StreamedInput>(shaped).interpolation, Interpolation::kShapePreserving);
 }
 
 TEST(ToProblem, TakesTheNoiseOfEachOutput) {

@@ -191,7 +191,8 @@ TEST(Estimator, TakesAStreamedInputAsATableOfTheSameKnots) {
   Samples measured = streamed;
   measured.columns.pop_back();
   const TableInput table{.time_s = streamed.time_s, .value = streamed.columns[1].value};
-  const Estimate a = EstimateInBatches(ForcedProblem(StreamedInput{}), streamed, 1000);
+  const Estimate a =
+      EstimateInBatches(ForcedProblem(StreamedInput{Interpolation::kLinear}), streamed, 1000);
   const Estimate b = EstimateInBatches(ForcedProblem(table), measured, 1000);
   for (size_t i = 0; i < 2; ++i) {
     const ParameterEstimate& p = a.parameters[i];
@@ -201,12 +202,66 @@ TEST(Estimator, TakesAStreamedInputAsATableOfTheSameKnots) {
   EXPECT_NEAR(a.channels[0].chi_squared, 100, 4 * std::sqrt(200));
 }
 
-TEST(Estimator, IsTheSameBitsForAnyBatchesOfAStreamedInput) {
-  const Samples record = StreamedForceRecord();
-  const Problem problem = ForcedProblem(StreamedInput{});
+class StreamedCurve : public ::testing::TestWithParam<Interpolation> {};
+
+INSTANTIATE_TEST_SUITE_P(AnyInterpolation, StreamedCurve,
+                         ::testing::Values(Interpolation::kHold, Interpolation::kLinear,
+                                           Interpolation::kCubic, Interpolation::kShapePreserving));
+
+TEST_P(StreamedCurve, GivesTheSameBitsForAnyBatches) {
+  Samples record = StreamedForceRecord();
+  record.end_of_run = true;
+  const Problem problem = ForcedProblem(StreamedInput{GetParam()});
   const Estimate whole = EstimateInBatches(problem, record, 1000);
+  EXPECT_EQ(whole.samples, 100);
   ExpectSame(EstimateInBatches(problem, record, 1), whole);
   ExpectSame(EstimateInBatches(problem, record, 7), whole);
+}
+
+TEST_P(StreamedCurve, IsTheSameAsATableOfItsKnots) {
+  Samples streamed = StreamedForceRecord();
+  streamed.end_of_run = true;
+  Samples measured = streamed;
+  measured.columns.pop_back();
+  const TableInput table{streamed.time_s, streamed.columns[1].value, GetParam()};
+  const Estimate a = EstimateInBatches(ForcedProblem(StreamedInput{GetParam()}), streamed, 1000);
+  const Estimate b = EstimateInBatches(ForcedProblem(table), measured, 1000);
+  // A table lets the integrator step over the samples, a stream does not: within its tolerance.
+  for (size_t i = 0; i < 2; ++i) {
+    const ParameterEstimate& p = a.parameters[i];
+    EXPECT_NEAR(p.map, b.parameters[i].map, 1e-3 * p.std_dev);
+    EXPECT_NEAR(p.std_dev, b.parameters[i].std_dev, 1e-3 * p.std_dev);
+  }
+}
+
+TEST(Estimator, LetsTheLastRowsOfASmoothInputWaitForWhatFollows) {
+  Samples record = StreamedForceRecord();
+  const auto estimator = MakeEstimator(ForcedProblem(StreamedInput{}));
+  ASSERT_TRUE(estimator->Append(Rows(record, 0, 50)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_EQ(estimator->rows_processed(), 50 - kSplineReach);
+  Samples rest = Rows(record, 50, 50);
+  ASSERT_TRUE(estimator->Append(rest).ok());
+  Samples end;
+  end.end_of_run = true;
+  ASSERT_TRUE(estimator->Append(end).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_EQ(estimator->rows_processed(), 100);
+}
+
+TEST(Estimator, TakesRowsOfANewRunOnlyAfterTheEndOfARun) {
+  Samples record = StreamedForceRecord();
+  const auto estimator = MakeEstimator(ForcedProblem(StreamedInput{}));
+  Samples first = Rows(record, 0, 10);
+  first.end_of_run = true;
+  ASSERT_TRUE(estimator->Append(first).ok());
+  Samples more = Rows(record, 10, 10);
+  EXPECT_EQ(estimator->Append(more).message(),
+            "row 0: run 0 has ended; further rows belong to a new run");
+  more.run.assign(10, 1);
+  EXPECT_TRUE(estimator->Append(more).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_EQ(estimator->rows_processed(), 20 - kSplineReach);
 }
 
 }  // namespace

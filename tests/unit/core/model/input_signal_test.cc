@@ -133,7 +133,7 @@ TEST(TableInput, IsLinearBetweenItsKnotsAndConstantOutside) {
 
 TEST(TableInput, HoldsEachValueUntilTheNextKnot) {
   const InputSignal signal =
-      Make(TableInput{.time_s = {1, 2, 4}, .value = {10, 20, -20}, .hold = true});
+      Make(TableInput{.time_s = {1, 2, 4}, .value = {10, 20, -20}, .interpolation = Interpolation::kHold});
   EXPECT_EQ(signal.default_amplitude(), 1);
   EXPECT_EQ(signal.Shape(0), 10);
   EXPECT_EQ(FromTheLeft(signal, 2), 10);
@@ -153,7 +153,7 @@ TEST(TableInput, OfOneKnotIsConstant) {
 }
 
 TEST(StreamedInput, FollowsTheKnotsAppended) {
-  InputSignal signal = Make(StreamedInput{});
+  InputSignal signal = Make(StreamedInput{.interpolation = Interpolation::kLinear});
   EXPECT_TRUE(signal.streamed());
   EXPECT_EQ(signal.default_amplitude(), 1);
   EXPECT_EQ(signal.Shape(0), 0);
@@ -171,7 +171,7 @@ TEST(StreamedInput, FollowsTheKnotsAppended) {
 }
 
 TEST(StreamedInput, HoldsWhenAsked) {
-  InputSignal signal = Make(StreamedInput{.hold = true, .amplitude = 2});
+  InputSignal signal = Make(StreamedInput{.interpolation = Interpolation::kHold, .amplitude = 2});
   signal.Append(0, 5);
   signal.Append(2, 9);
   EXPECT_EQ(signal.default_amplitude(), 2);
@@ -181,7 +181,7 @@ TEST(StreamedInput, HoldsWhenAsked) {
 }
 
 TEST(StreamedInput, BeginsANewRunWhenCleared) {
-  InputSignal signal = Make(StreamedInput{});
+  InputSignal signal = Make(StreamedInput{.interpolation = Interpolation::kLinear});
   signal.Append(0, 5);
   signal.Append(2, 9);
   signal.Clear();
@@ -192,7 +192,7 @@ TEST(StreamedInput, BeginsANewRunWhenCleared) {
 }
 
 TEST(StreamedInputDeathTest, TakesOnlyFiniteKnotsInIncreasingTime) {
-  InputSignal signal = Make(StreamedInput{});
+  InputSignal signal = Make(StreamedInput{.interpolation = Interpolation::kLinear});
   signal.Append(1, 0);
   EXPECT_DEATH(signal.Append(1, 0), "time_s");
   EXPECT_DEATH(signal.Append(2, kNan), "isfinite");
