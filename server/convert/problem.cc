@@ -11,10 +11,28 @@
 
 #include "core/common/status.h"
 #include "core/model/catalogue.h"
+#include "core/model/equations/equation_model.h"
 #include "server/convert/annotate.h"
 
 namespace polyest {
 namespace {
+
+EquationSpecification ToEquations(const v1::Equations& given) {
+  EquationSpecification equations;
+  equations.states = {given.states().begin(), given.states().end()};
+  equations.outputs = {given.outputs().begin(), given.outputs().end()};
+  equations.intermediates = {given.intermediates().begin(), given.intermediates().end()};
+  equations.parameters = {given.parameters().begin(), given.parameters().end()};
+  equations.inputs = {given.inputs().begin(), given.inputs().end()};
+  equations.units = {given.units().begin(), given.units().end()};
+  for (const auto& [name, table] : given.tables()) {
+    equations.tables[name] = {.x = {table.x().begin(), table.x().end()},
+                              .y = {table.y().begin(), table.y().end()},
+                              .value = {table.value().begin(), table.value().end()},
+                              .spline = table.spline()};
+  }
+  return equations;
+}
 
 absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem) {
   switch (problem.model().source_case()) {
@@ -25,6 +43,7 @@ absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem)
       return model;
     }
     case v1::Problem::Model::kEquations:
+      return MakeEquationModel(ToEquations(problem.model().equations()));
     case v1::Problem::Model::kFmu:
     case v1::Problem::Model::SOURCE_NOT_SET:
       break;

@@ -226,11 +226,12 @@ TEST_P(StreamedCurve, IsTheSameAsATableOfItsKnots) {
   const TableInput table{streamed.time_s, streamed.columns[1].value, GetParam()};
   const Estimate a = EstimateInBatches(ForcedProblem(StreamedInput{GetParam()}), streamed, 1000);
   const Estimate b = EstimateInBatches(ForcedProblem(table), measured, 1000);
-  // A table lets the integrator step over the samples, a stream does not: within its tolerance.
+  // A table lets the integrator step over the samples, a stream does not. The error allowed to a
+  // step is 1e-5 of the noise, and steps are a few hundred: to a percent of a standard deviation.
   for (size_t i = 0; i < 2; ++i) {
     const ParameterEstimate& p = a.parameters[i];
-    EXPECT_NEAR(p.map, b.parameters[i].map, 1e-3 * p.std_dev);
-    EXPECT_NEAR(p.std_dev, b.parameters[i].std_dev, 1e-3 * p.std_dev);
+    EXPECT_NEAR(p.map, b.parameters[i].map, 1e-2 * p.std_dev);
+    EXPECT_NEAR(p.std_dev, b.parameters[i].std_dev, 1e-2 * p.std_dev);
   }
 }
 
