@@ -52,23 +52,34 @@ absl::StatusOr<Problem> ForcedMass() {
   return problem;
 }
 
-Problem Measuring(Problem problem, const std::vector<std::string>& outputs, double percent) {
-  problem.measured.clear();
-  for (const std::string& output : outputs)
-    problem.measured.push_back({output, PaperNoise(percent)});
-  return problem;
-}
+// What one figure measures of a problem, and what the paper says of it.
+struct Definition {
+  const char* figure;
+  const char* title;
+  const char* question;
+  const char* says;
+  std::vector<std::string> outputs;
+  std::vector<double> times_s;
+  std::vector<double> noise_percents;  // a variant for each
+};
 
-// One variant for each noise level.
-Experiment ByNoise(const Problem& problem, const std::vector<std::string>& outputs,
-                   const std::vector<double>& times_s, const std::vector<double>& percents) {
+absl::StatusOr<Experiment> Define(absl::StatusOr<Problem> problem, const Definition& definition) {
+  POLYEST_RETURN_IF_ERROR(problem.status());
   Experiment experiment;
-  const UncertainParameter& unknown = problem.uncertain.front();
+  experiment.figure = definition.figure;
+  experiment.title = definition.title;
+  experiment.question = definition.question;
+  experiment.says = definition.says;
+  const UncertainParameter& unknown = problem->uncertain.front();
   experiment.reference = Vector::Constant(1, unknown.location + unknown.scale * kReferenceGerm);
-  for (double percent : percents) {
+  for (double percent : definition.noise_percents) {
+    problem->measured.clear();
+    for (const std::string& output : definition.outputs) {
+      problem->measured.push_back({output, PaperNoise(percent)});
+    }
     experiment.variants.push_back({.name = absl::StrCat("noise ", percent, " %"),
-                                   .problem = Measuring(problem, outputs, percent),
-                                   .sample_times_s = times_s});
+                                   .problem = *problem,
+                                   .sample_times_s = definition.times_s});
   }
   return experiment;
 }
@@ -83,96 +94,102 @@ std::vector<double> EvenTimes(int count) {
 }  // namespace
 
 absl::StatusOr<Experiment> Figure4() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, StruckMass());
-  Experiment experiment = ByNoise(problem, {"x"}, EvenTimes(10), {1});
-  experiment.figure = "4";
-  experiment.title = "Estimation with 10 time points, all at zero crossings";
-  experiment.question = kVelocityQuestion;
-  experiment.says =
-      "The mismatch is constant: sampled at 0.5, 1.0 … 5.0 s the displacement is zero whatever v0 "
-      "is. The estimate is the best initial guess, ξ = 0: the worst case of undersampling.";
-  return experiment;
+  return Define(
+      StruckMass(),
+      {.figure = "4",
+       .title = "Estimation with 10 time points, all at zero crossings",
+       .question = kVelocityQuestion,
+       .says = "The mismatch is constant: sampled at 0.5, 1.0 … 5.0 s the displacement is zero "
+               "whatever v0 is. The estimate is the best initial guess, ξ = 0: the worst case of "
+               "undersampling.",
+       .outputs = {"x"},
+       .times_s = EvenTimes(10),
+       .noise_percents = {1}});
 }
 
 absl::StatusOr<Experiment> Figure5() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, StruckMass());
-  Experiment experiment = ByNoise(problem, {"x"}, {1.1, 2.7, 4.3}, {0.01, 1, 10});
-  experiment.figure = "5";
-  experiment.title = "Estimation with 3 time points";
-  experiment.question = kVelocityQuestion;
-  experiment.says =
-      "A sharp minimum and an accurate estimate for little noise, though sampled below the Nyquist "
-      "rate; at 10 % the prior weighs more and the minimum is wide.";
-  return experiment;
+  return Define(
+      StruckMass(),
+      {.figure = "5",
+       .title = "Estimation with 3 time points",
+       .question = kVelocityQuestion,
+       .says = "A sharp minimum and an accurate estimate for little noise, though sampled below "
+               "the Nyquist rate; at 10 % the prior weighs more and the minimum is wide.",
+       .outputs = {"x"},
+       .times_s = {1.1, 2.7, 4.3},
+       .noise_percents = {0.01, 1, 10}});
 }
 
 absl::StatusOr<Experiment> Figure6() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, StruckMass());
-  Experiment experiment = ByNoise(problem, {"x"}, EvenTimes(30), {0.01, 1, 10});
-  experiment.figure = "6";
-  experiment.title = "Estimation with 30 time points";
-  experiment.question = kVelocityQuestion;
-  experiment.says =
-      "More samples average the noise out: the mismatch weighs more and the estimate at 10 % is "
-      "better than with 3.";
-  return experiment;
+  return Define(StruckMass(),
+                {.figure = "6",
+                 .title = "Estimation with 30 time points",
+                 .question = kVelocityQuestion,
+                 .says = "More samples average the noise out: the mismatch weighs more and the "
+                         "estimate at 10 % is better than with 3.",
+                 .outputs = {"x"},
+                 .times_s = EvenTimes(30),
+                 .noise_percents = {0.01, 1, 10}});
 }
 
 absl::StatusOr<Experiment> Figure7() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, StruckMass());
+  POLYEST_ASSIGN_OR_RETURN(
+      Experiment experiment,
+      Define(StruckMass(),
+             {.figure = "7",
+              .title = "Adding samples that contain no information",
+              .question = kVelocityQuestion,
+              .says = "The extra samples add a constant to the mismatch, the effect of their "
+                      "noise; the minimum is not more pronounced and the estimate no better.",
+              .outputs = {"x"},
+              .times_s = {0.3, 0.8, 1.2, 1.7, 2.3},
+              .noise_percents = {0.01}}));
   // The zero crossings come after the informative times: these then have the same noise draws, and
   // the same largest value so far, in both variants.
-  const std::vector<double> informative = {0.3, 0.8, 1.2, 1.7, 2.3};
-  std::vector<double> with_crossings = informative;
-  for (double time_s : {3.0, 3.5, 4.0, 4.5, 5.0}) with_crossings.push_back(time_s);
-  Experiment experiment = ByNoise(problem, {"x"}, informative, {0.01});
   experiment.variants.push_back(experiment.variants.front());
   experiment.variants[0].name = "5 times, noise 0.01 %";
   experiment.variants[1].name = "and 5 zero crossings";
-  experiment.variants[1].sample_times_s = with_crossings;
-  experiment.figure = "7";
-  experiment.title = "Adding samples that contain no information";
-  experiment.question = kVelocityQuestion;
-  experiment.says =
-      "The extra samples add a constant to the mismatch, the effect of their noise; the minimum "
-      "is not more pronounced and the estimate no better.";
+  for (double time_s : {3.0, 3.5, 4.0, 4.5, 5.0}) {
+    experiment.variants[1].sample_times_s.push_back(time_s);
+  }
   return experiment;
 }
 
 absl::StatusOr<Experiment> Figure8() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, StruckMass());
-  Experiment experiment = ByNoise(problem, {"x", "v"}, {3.3}, {0.01, 1});
-  experiment.figure = "8";
-  experiment.title = "Estimation with 1 time point, displacement and velocity measured";
-  experiment.question =
-      "What was the initial velocity v0 of the mass, given x and v at a single time? "
-      "A priori v0 is beta(2, 2) on [0.5, 1.5] m/s.";
-  experiment.says = "One time is sufficient for low noise: x and v are never both zero.";
-  return experiment;
+  return Define(
+      StruckMass(),
+      {.figure = "8",
+       .title = "Estimation with 1 time point, displacement and velocity measured",
+       .question = "What was the initial velocity v0 of the mass, given x and v at a single time? "
+                   "A priori v0 is beta(2, 2) on [0.5, 1.5] m/s.",
+       .says = "One time is sufficient for low noise: x and v are never both zero.",
+       .outputs = {"x", "v"},
+       .times_s = {3.3},
+       .noise_percents = {0.01, 1}});
 }
 
 absl::StatusOr<Experiment> Figure11() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, ForcedMass());
-  Experiment experiment = ByNoise(problem, {"x", "v"}, EvenTimes(5), {0.01, 10});
-  experiment.figure = "11";
-  experiment.title = "Forced mass, 5 time points without information";
-  experiment.question = kForceQuestion;
-  experiment.says =
-      "At 1, 2 … 5 s displacement and velocity are both zero whatever F0 is: the estimate is the "
-      "prior's most likely value, 1000 N, at any noise.";
-  return experiment;
+  return Define(ForcedMass(),
+                {.figure = "11",
+                 .title = "Forced mass, 5 time points without information",
+                 .question = kForceQuestion,
+                 .says = "At 1, 2 … 5 s displacement and velocity are both zero whatever F0 is: "
+                         "the estimate is the prior's most likely value, 1000 N, at any noise.",
+                 .outputs = {"x", "v"},
+                 .times_s = EvenTimes(5),
+                 .noise_percents = {0.01, 10}});
 }
 
 absl::StatusOr<Experiment> Figure12() {
-  POLYEST_ASSIGN_OR_RETURN(Problem problem, ForcedMass());
-  Experiment experiment = ByNoise(problem, {"x", "v"}, {0.75, 2.3, 4.2}, {0.01, 10});
-  experiment.figure = "12";
-  experiment.title = "Forced mass, 3 time points";
-  experiment.question = kForceQuestion;
-  experiment.says =
-      "Three times yield an accurate estimate at low noise, well below the Nyquist rate; the shape "
-      "of the cost tells that it is accurate.";
-  return experiment;
+  return Define(ForcedMass(),
+                {.figure = "12",
+                 .title = "Forced mass, 3 time points",
+                 .question = kForceQuestion,
+                 .says = "Three times yield an accurate estimate at low noise, well below the "
+                         "Nyquist rate; the shape of the cost tells that it is accurate.",
+                 .outputs = {"x", "v"},
+                 .times_s = {0.75, 2.3, 4.2},
+                 .noise_percents = {0.01, 10}});
 }
 
 }  // namespace polyest::paper_experiments
