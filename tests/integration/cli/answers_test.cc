@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "polyest/v1/estimation_service.pb.h"
 #include "tests/integration/cli/command_test.h"
@@ -60,6 +62,7 @@ TEST_F(AnswersTest, ModelsAgree) {
   ExpectSameAnswer({"models", "--format", "json"});
   ExpectSameAnswer({"models", "duffing"});
   ExpectSameAnswer({"models", "duffing", "--format", "json"});
+  ExpectSameAnswer({"models", "bicycle", "--format", "json"});  // its mu is infinite
 }
 
 TEST_F(CommandTest, FindsTheTruthOfTheDemonstrationRecord) {
@@ -78,6 +81,38 @@ TEST_F(CommandTest, FindsTheTruthOfTheDemonstrationRecord) {
   EXPECT_EQ(k.verdict(), v1::Identifiability::IDENTIFIED);
   EXPECT_EQ(estimate.samples(), 1000);
 }
+
+struct VehicleRecord {
+  const char* name;
+  std::map<std::string, double> truth;  // the constants of generate_demo.cc
+};
+
+class VehicleRecords : public CommandTest, public testing::WithParamInterface<VehicleRecord> {};
+
+// Four standard deviations hold for each parameter but for one record in 10⁴.
+TEST_P(VehicleRecords, TellTheirTruth) {
+  const auto& [name, truth] = GetParam();
+  const Finished run = Run({"estimate", Example(std::string(name) + ".json"),
+                            Example(std::string(name) + ".csv"), "--format", "json"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  ASSERT_EQ(estimate.parameters_size(), truth.size());
+  for (const auto& parameter : estimate.parameters()) {
+    EXPECT_NEAR(parameter.map(), truth.at(parameter.name()), 4 * parameter.std_dev())
+        << parameter.name();
+    EXPECT_LT(parameter.contraction(), 0.05) << parameter.name();
+    EXPECT_EQ(parameter.verdict(), v1::Identifiability::IDENTIFIED) << parameter.name();
+  }
+  EXPECT_EQ(estimate.diagnostics_size(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Examples, VehicleRecords,
+    testing::Values(VehicleRecord{"roll_plane_4dof", {{"m_a", 185}, {"d", 0.48}}},
+                    VehicleRecord{"quarter_car", {{"ks", 15800}, {"cs", 1180}, {"kt", 204000}}},
+                    VehicleRecord{"bicycle",
+                                  {{"Iz", 2410}, {"Cf", 76500}, {"Cr", 93800}, {"mu", 0.87}}}),
+    [](const auto& record) { return std::string(record.param.name); });
 
 TEST_F(CommandTest, PrintsATableThatAPersonCanRead) {
   const std::string data = File("data.csv", DemoRows(100));

@@ -185,6 +185,18 @@ TEST_F(ErrorsTest, AnUnknownModelOrFigure) {
   EXPECT_THAT(figure.err, HasSubstr("99"));
 }
 
+TEST_F(ErrorsTest, AVehicleThatComesToAStop) {
+  const std::string problem = File("p.json", R"({
+    "model": {"builtin": "bicycle"},
+    "uncertain": [{"name": "Cf", "uniform": {"lower": 6e4, "upper": 1e5}}],
+    "inputs": [{"name": "vx", "streamed": {}}, {"name": "delta", "constant": {"amplitude": 0.01}}],
+    "measured": [{"output": "r", "noise": {"absolute": 0.005}}]
+  })");
+  const std::string data = File("d.csv", "t,vx,r\n0,10,0\n1,5,0.02\n2,0,0\n3,0,0\n");
+  EXPECT_THAT(OneLine(Run({"estimate", problem, data}), 2),
+              AllOf(HasSubstr("only 0 of"), HasSubstr("could be integrated")));
+}
+
 TEST_F(ErrorsTest, BadUsage) {
   const std::string problem = File("p.json", kProblem);
   const std::string data = File("d.csv", kData);
