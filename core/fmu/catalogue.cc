@@ -1,0 +1,102 @@
+#include "core/fmu/catalogue.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <system_error>
+#include <utility>
+
+#include "core/fmu/clean_text.h"
+
+namespace polyest {
+namespace {
+
+constexpr char kSuffix[] = ".fmu";
+
+bool IsName(std::string_view name) {
+  constexpr size_t kLongest = 250;
+  return !name.empty() && name.size() <= kLongest && name.front() != '.' &&
+         name.find_first_of("/\\") == std::string_view::npos &&
+         CleanText(std::string(name)) == name;
+}
+
+}  // namespace
+
+absl::StatusOr<FmuCatalogue> FmuCatalogue::Open(const std::filesystem::path& folder,
+                                                const WorkerLimits& limits) {
+  std::error_code error;
+  const std::filesystem::path absolute = std::filesystem::canonical(folder, error);
+  if (error || !std::filesystem::is_directory(absolute, error)) {
+    return absl::NotFoundError(
+        absl::StrFormat("\"%s\" is not a folder that can be read", folder.string()));
+  }
+  auto state = std::make_shared<State>();
+  state->folder = absolute;
+  state->limits = limits;
+  return FmuCatalogue(std::move(state));
+}
+
+void FmuCatalogue::Refresh() const {
+  std::map<std::string, Entry> entries;
+  std::error_code error;
+  for (std::filesystem::directory_iterator file(state_->folder, error), end; !error && file != end;
+       file.increment(error)) {
+    const std::filesystem::path path = file->path();
+    const std::string name = path.stem().string();
+    std::error_code unreadable;
+    if (path.extension() != kSuffix || !IsName(name) || !file->is_regular_file(unreadable)) {
+      continue;
+    }
+    const auto written = file->last_write_time(unreadable);
+    const uintmax_t size = file->file_size(unreadable);
+    if (unreadable) continue;
+    const auto known = state_->entries.find(name);
+    if (known != state_->entries.end() && known->second.written == written &&
+        known->second.size == size) {
+      entries.emplace(name, known->second);
+    } else {
+      entries.emplace(name, Entry{written, size, FmuModel::Read(path, name, state_->limits)});
+    }
+  }
+  state_->entries = std::move(entries);
+}
+
+std::vector<std::shared_ptr<const Model>> FmuCatalogue::Models() const {
+  const std::lock_guard lock(state_->mutex);
+  Refresh();
+  std::vector<std::shared_ptr<const Model>> models;
+  for (const auto& [name, entry] : state_->entries) {
+    if (entry.model.ok()) models.push_back(*entry.model);
+  }
+  return models;
+}
+
+std::vector<BrokenFmu> FmuCatalogue::Broken() const {
+  const std::lock_guard lock(state_->mutex);
+  Refresh();
+  std::vector<BrokenFmu> broken;
+  for (const auto& [name, entry] : state_->entries) {
+    if (!entry.model.ok()) broken.push_back({name, entry.model.status()});
+  }
+  return broken;
+}
+
+absl::StatusOr<std::shared_ptr<const Model>> FmuCatalogue::Find(std::string_view name) const {
+  if (!IsName(name)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "\"%s\" must be the name of a file of the FMU folder without .fmu", name.substr(0, 250)));
+  }
+  const std::lock_guard lock(state_->mutex);
+  Refresh();
+  const auto found = state_->entries.find(std::string(name));
+  if (found != state_->entries.end()) {
+    if (!found->second.model.ok()) return found->second.model.status();
+    return *found->second.model;
+  }
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : state_->entries) names.push_back(known);
+  return absl::NotFoundError(absl::StrFormat("there is no FMU \"%s\"; there are %s", name,
+                                             names.empty() ? "none" : absl::StrJoin(names, ", ")));
+}
+
+}  // namespace polyest

@@ -1,0 +1,17 @@
+#include "core/fmu/clean_text.h"
+
+#include <pugixml.hpp>
+
+namespace polyest {
+
+std::string CleanText(const std::string& text, size_t most_bytes) {
+  // The way to wide characters drops what is not UTF-8, and so a character that was cut in two.
+  std::string clean = pugi::as_utf8(pugi::as_wide(text.substr(0, most_bytes)));
+  for (char& c : clean) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  }
+  while (!clean.empty() && clean.back() == ' ') clean.pop_back();
+  return clean;
+}
+
+}  // namespace polyest

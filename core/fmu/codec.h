@@ -1,0 +1,149 @@
+#pragma once
+
+// Values as bytes between a daemon and its workers: one machine, one build, so that numbers go as
+// they lie in memory. The decoder reads what a worker wrote, whose FMU may have written anything:
+// it never reads past the end nor makes room for more than is there.
+//
+// A type takes part by a function Fields(archive, value) that names its members once, for both
+// directions.
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/common/types.h"
+
+namespace polyest {
+
+template <class T>
+concept PlainValue = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+
+class Encoder {
+ public:
+  template <class... Values>
+  void operator()(const Values&... values) {
+    (Put(values), ...);
+  }
+  std::string TakeBytes() { return std::move(bytes_); }
+
+ private:
+  template <PlainValue T>
+  void Put(const T& value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T));
+  }
+  void Put(const std::string& text) {
+    Put(static_cast<uint64_t>(text.size()));
+    bytes_.append(text);
+  }
+  void Put(const Matrix& matrix) {
+    Put(static_cast<uint64_t>(matrix.rows()));
+    Put(static_cast<uint64_t>(matrix.cols()));
+    bytes_.append(reinterpret_cast<const char*>(matrix.data()),
+                  static_cast<size_t>(matrix.size()) * sizeof(double));
+  }
+  template <class T>
+  void Put(const std::vector<T>& values) {
+    Put(static_cast<uint64_t>(values.size()));
+    for (const T& value : values) Put(value);
+  }
+  template <class... Alternatives>
+  void Put(const std::variant<Alternatives...>& variant) {
+    Put(static_cast<uint64_t>(variant.index()));
+    std::visit([this](const auto& value) { Put(value); }, variant);
+  }
+  template <class T>
+  requires std::is_class_v<T>
+  void Put(const T& value) {
+    // Fields serves both directions and so takes what it may change; this one does not.
+    Fields(*this, const_cast<T&>(value));
+  }
+
+  std::string bytes_;
+};
+
+class Decoder {
+ public:
+  explicit Decoder(std::string bytes) : bytes_(std::move(bytes)) {}
+
+  template <class... Values>
+  void operator()(Values&... values) {
+    (Get(values), ...);
+  }
+  // Whether all was there that was asked for; what was not is left as it was.
+  bool ok() const { return ok_; }
+  bool complete() const { return ok_ && position_ == bytes_.size(); }
+
+ private:
+  size_t left() const { return bytes_.size() - position_; }
+
+  // The next bytes, or null.
+  const char* Next(size_t size) {
+    ok_ = ok_ && size <= left();
+    if (!ok_) return nullptr;
+    position_ += size;
+    return bytes_.data() + position_ - size;
+  }
+  // How many there are of something that has at least this many bytes each.
+  size_t Count(size_t bytes_each) {
+    uint64_t count = 0;
+    Get(count);
+    ok_ = ok_ && count <= left() / bytes_each;
+    return ok_ ? static_cast<size_t>(count) : 0;
+  }
+
+  template <PlainValue T>
+  void Get(T& value) {
+    if (const char* bytes = Next(sizeof(T))) std::memcpy(&value, bytes, sizeof(T));
+  }
+  void Get(bool& value) {
+    uint8_t byte = 0;
+    Get(byte);
+    value = byte != 0;
+  }
+  void Get(std::string& text) {
+    const size_t size = Count(1);
+    if (const char* bytes = Next(size)) text.assign(bytes, size);
+  }
+  void Get(Matrix& matrix) {
+    const uint64_t rows = Count(1);
+    uint64_t columns = 0;
+    Get(columns);
+    ok_ = ok_ && (rows == 0 || columns <= left() / sizeof(double) / rows);
+    if (!ok_ || rows == 0) return matrix.resize(0, 0);
+    const size_t size = static_cast<size_t>(rows * columns) * sizeof(double);
+    if (const char* bytes = Next(size)) {
+      matrix.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+      if (size > 0) std::memcpy(matrix.data(), bytes, size);
+    }
+  }
+  template <class T>
+  void Get(std::vector<T>& values) {
+    values.clear();
+    const size_t count = Count(1);
+    for (size_t i = 0; i < count && ok_; ++i) Get(values.emplace_back());
+  }
+  template <class... Alternatives>
+  void Get(std::variant<Alternatives...>& variant) {
+    uint64_t index = 0;
+    Get(index);
+    ok_ = ok_ && index < sizeof...(Alternatives);
+    if (ok_) GetAlternative(variant, index, std::index_sequence_for<Alternatives...>());
+  }
+  template <class Variant, size_t... kIndex>
+  void GetAlternative(Variant& variant, uint64_t index, std::index_sequence<kIndex...>) {
+    ((index == kIndex ? Get(variant.template emplace<kIndex>()) : void()), ...);
+  }
+  template <class T>
+  requires std::is_class_v<T>
+  void Get(T& value) { Fields(*this, value); }
+
+  std::string bytes_;
+  size_t position_ = 0;
+  bool ok_ = true;
+};
+
+}  // namespace polyest

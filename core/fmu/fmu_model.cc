@@ -1,0 +1,73 @@
+#include "core/fmu/fmu_model.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "core/common/status.h"
+#include "core/fmu/archive.h"
+#include "core/fmu/worker_ensemble.h"
+
+namespace polyest {
+namespace {
+
+constexpr char kDescriptionEntry[] = "modelDescription.xml";
+constexpr int64_t kLongestDescription = int64_t{64} << 20;
+
+absl::StatusOr<FmuDescription> ReadDescription(const Archive& archive, const std::string& name) {
+  POLYEST_ASSIGN_OR_RETURN(const std::string xml,
+                           archive.Read(kDescriptionEntry, kLongestDescription));
+  POLYEST_ASSIGN_OR_RETURN(FmuDescription description, ParseFmuDescription(name, xml));
+  const std::string library = LibraryPath(description.interface);
+  if (!archive.Contains(library)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the archive has no ", library, ": export it for 64-bit Linux"));
+  }
+  return description;
+}
+
+absl::Status Annotate(const std::string& name, const absl::Status& status) {
+  return absl::Status(status.code(), absl::StrCat("fmu ", name, ": ", status.message()));
+}
+
+absl::Status UnpackInto(const std::filesystem::path& file, UnpackedFmu& fmu) {
+  POLYEST_ASSIGN_OR_RETURN(const Archive archive, Archive::Open(file));
+  // The file may have been replaced since it was read.
+  const std::string& name = fmu.description.interface.name;
+  POLYEST_ASSIGN_OR_RETURN(const FmuDescription now, ReadDescription(archive, name));
+  if (now.interface.token != fmu.description.interface.token) {
+    return absl::FailedPreconditionError("the file was replaced in the meantime; try again");
+  }
+  POLYEST_ASSIGN_OR_RETURN(fmu.folder, TemporaryFolder::Make());
+  return archive.Unpack(fmu.folder->path());
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const FmuModel>> FmuModel::Read(const std::filesystem::path& file,
+                                                               const std::string& name,
+                                                               const WorkerLimits& limits) {
+  const absl::StatusOr<Archive> archive = Archive::Open(file);
+  if (!archive.ok()) return Annotate(name, archive.status());
+  absl::StatusOr<FmuDescription> description = ReadDescription(*archive, name);
+  if (!description.ok()) return Annotate(name, description.status());
+  return std::shared_ptr<const FmuModel>(new FmuModel(file, *std::move(description), limits));
+}
+
+std::shared_ptr<const UnpackedFmu> FmuModel::Unpack() const {
+  const std::lock_guard lock(mutex_);
+  if (unpacked_ != nullptr) return unpacked_;
+  auto fmu = std::make_shared<UnpackedFmu>();
+  fmu->description = description_;
+  fmu->status = Annotate(description_.interface.name, UnpackInto(file_, *fmu));
+  // A failure (no room left, say) is not kept.
+  if (fmu->status.ok()) unpacked_ = fmu;
+  return fmu;
+}
+
+std::unique_ptr<TrajectoryEnsemble> FmuModel::StartEnsemble(EnsembleSpecification specification,
+                                                            const InputSignals* inputs) const {
+  return std::make_unique<WorkerEnsemble>(Unpack(), std::move(specification), inputs, limits_);
+}
+
+}  // namespace polyest

@@ -1,0 +1,132 @@
+#pragma once
+
+// What a daemon and its workers tell each other over a socket: a length of 8 bytes, then a Start
+// once, then Advances, each answered by a Result.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/common/types.h"
+#include "core/fmu/codec.h"
+#include "core/fmu/fmu_description.h"
+#include "core/propagation/trajectory_ensemble.h"
+
+namespace polyest {
+
+// Beyond it a message is refused by both sides.
+inline constexpr uint64_t kLongestMessage = uint64_t{1} << 30;
+
+// One or more blocks of points, and the FMU that simulates them.
+struct StartMessage {
+  std::string library;    // path
+  std::string resources;  // path
+  FmuInterface interface;
+  std::vector<FmuVariable> parameters;
+  std::vector<FmuVariable> inputs;
+  std::vector<FmuVariable> outputs;  // those to read
+  std::vector<int> block_points;     // the sizes of the blocks
+  // As in EnsembleSpecification, the blocks' rows one below the other.
+  Matrix parameter_values;
+  Matrix amplitudes, input_delays_s, input_offsets;
+  std::vector<InputSpecification> signals;
+  IntegrationOptions integration;
+};
+
+// The new knots of one streamed input.
+struct KnotsMessage {
+  int input = 0;
+  std::vector<double> time_s;
+  std::vector<double> value;
+};
+
+struct AdvanceMessage {
+  std::vector<KnotsMessage> knots;
+  std::vector<double> times_s;
+};
+
+struct ResultMessage {
+  std::string error;  // what ended the simulation as a whole; empty: nothing did
+  Matrix outputs;     // rows as in Start, columns as TrajectoryEnsemble::Advance has them
+  std::vector<PointFailure> failures;  // all up to now; points are rows of Start
+};
+
+template <class Archive>
+void Fields(Archive& archive, ConstantInput& input) {
+  archive(input.amplitude);
+}
+template <class Archive>
+void Fields(Archive& archive, StepInput& input) {
+  archive(input.amplitude, input.time_s);
+}
+template <class Archive>
+void Fields(Archive& archive, SinusoidInput& input) {
+  archive(input.amplitude, input.frequency_hz, input.phase_rad);
+}
+template <class Archive>
+void Fields(Archive& archive, ChirpInput& input) {
+  archive(input.amplitude, input.start_frequency_hz, input.end_frequency_hz, input.start_s,
+          input.duration_s, input.phase_rad);
+}
+template <class Archive>
+void Fields(Archive& archive, HalfSineBumpInput& input) {
+  archive(input.amplitude, input.start_s, input.duration_s);
+}
+// How a signal goes between its knots.
+template <class Archive, class Input>
+void InterpolationField(Archive& archive, Input& input) {
+  if constexpr (requires { input.hold; }) {
+    archive(input.hold);
+  } else {
+    archive(input.interpolation);
+  }
+}
+template <class Archive>
+void Fields(Archive& archive, TableInput& input) {
+  archive(input.time_s, input.value, input.amplitude);
+  InterpolationField(archive, input);
+}
+template <class Archive>
+void Fields(Archive& archive, StreamedInput& input) {
+  archive(input.amplitude);
+  InterpolationField(archive, input);
+}
+template <class Archive>
+void Fields(Archive& archive, IntegrationOptions& options) {
+  archive(options.method, options.relative_tolerance, options.most_steps);
+}
+template <class Archive>
+void Fields(Archive& archive, PointFailure& failure) {
+  archive(failure.point, failure.time_s, failure.flag, failure.reason);
+}
+template <class Archive>
+void Fields(Archive& archive, FmuVariable& variable) {
+  archive(variable.reference, variable.is_float32);
+}
+template <class Archive>
+void Fields(Archive& archive, FmuInterface& interface) {
+  archive(interface.version, interface.kind, interface.name, interface.identifier, interface.token,
+          interface.states, interface.event_indicators, interface.needs_completed_step,
+          interface.once_per_process, interface.can_save_state, interface.can_interpolate_inputs,
+          interface.can_vary_step, interface.communication_step_s);
+}
+template <class Archive>
+void Fields(Archive& archive, StartMessage& start) {
+  archive(start.library, start.resources, start.interface, start.parameters, start.inputs,
+          start.outputs, start.block_points, start.parameter_values, start.amplitudes,
+          start.input_delays_s, start.input_offsets, start.signals, start.integration);
+}
+template <class Archive>
+void Fields(Archive& archive, KnotsMessage& knots) {
+  archive(knots.input, knots.time_s, knots.value);
+}
+template <class Archive>
+void Fields(Archive& archive, AdvanceMessage& advance) {
+  archive(advance.knots, advance.times_s);
+}
+template <class Archive>
+void Fields(Archive& archive, ResultMessage& result) {
+  archive(result.error, result.outputs, result.failures);
+}
+
+}  // namespace polyest

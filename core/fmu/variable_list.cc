@@ -1,0 +1,202 @@
+#include "core/fmu/variable_list.h"
+
+#include <absl/container/flat_hash_set.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/common/status.h"
+#include "core/fmu/clean_text.h"
+
+namespace polyest {
+namespace {
+
+constexpr size_t kMostVariables = 200'000;
+constexpr size_t kLongestName = 1'000;
+
+absl::Status Wrong(const std::string& what) {
+  return absl::FailedPreconditionError(absl::StrCat("modelDescription.xml: ", what));
+}
+
+// The units that named types declare.
+absl::flat_hash_map<std::string, std::string> TypeUnits(const pugi::xml_node& root, int version) {
+  absl::flat_hash_map<std::string, std::string> units;
+  for (const pugi::xml_node type : root.child("TypeDefinitions").children()) {
+    const pugi::xml_node real = version == 2 ? type.child("Real") : type;
+    units[type.attribute("name").value()] = real.attribute("unit").value();
+  }
+  return units;
+}
+
+}  // namespace
+
+absl::StatusOr<VariableList> VariableList::Read(const pugi::xml_node& root, int version) {
+  VariableList list;
+  const Units units = TypeUnits(root, version);
+  for (const pugi::xml_node node : root.child("ModelVariables").children()) {
+    if (node.type() != pugi::node_element) continue;
+    if (list.variables_.size() == kMostVariables) {
+      return Wrong(absl::StrFormat("there are more than %d variables", kMostVariables));
+    }
+    POLYEST_RETURN_IF_ERROR(version == 2 ? list.Add2(node, units) : list.Add3(node, units));
+  }
+  const pugi::xml_node structure = root.child("ModelStructure");
+  POLYEST_RETURN_IF_ERROR(version == 2 ? list.FindStates2(structure) : list.FindStates3(structure));
+  if (version == 2) list.event_indicators_ = root.attribute("numberOfEventIndicators").as_int();
+  if (list.event_indicators_ < 0 || list.event_indicators_ > static_cast<int>(kMostVariables)) {
+    return Wrong(absl::StrFormat("%d event indicators are not supported", list.event_indicators_));
+  }
+  return list;
+}
+
+absl::Status VariableList::Add2(const pugi::xml_node& node, const Units& units) {
+  Variable variable;
+  const pugi::xml_node real = node.child("Real");
+  variable.is_real = static_cast<bool>(real);
+  if (const pugi::xml_attribute derivative = real.attribute("derivative")) {
+    variable.is_derivative = true;
+    variable.derivative_of = derivative.as_int();
+  }
+  return AddCommon(node, real, units, std::move(variable));
+}
+
+absl::Status VariableList::Add3(const pugi::xml_node& node, const Units& units) {
+  Variable variable;
+  const std::string type = node.name();
+  variable.variable.is_float32 = type == "Float32";
+  variable.is_real = (type == "Float64" || type == "Float32") && !node.child("Dimension");
+  if (const pugi::xml_attribute derivative = node.attribute("derivative")) {
+    variable.is_derivative = true;
+    variable.derivative_of = static_cast<int>(derivative.as_uint());
+  }
+  return AddCommon(node, node, units, std::move(variable));
+}
+
+absl::Status VariableList::AddCommon(const pugi::xml_node& node, const pugi::xml_node& type,
+                                     const Units& units, Variable variable) {
+  Quantity& quantity = variable.quantity;
+  quantity.name = CleanText(node.attribute("name").value(), kLongestName + 1);
+  if (quantity.name.empty() || quantity.name.size() > kLongestName) {
+    return Wrong(absl::StrFormat("variable %d must have a name of 1 to %d characters",
+                                 variables_.size() + 1, kLongestName));
+  }
+  quantity.meaning = CleanText(node.attribute("description").value());
+  quantity.unit = type.attribute("unit").value();
+  if (quantity.unit.empty()) {
+    const auto declared = units.find(type.attribute("declaredType").value());
+    if (declared != units.end()) quantity.unit = declared->second;
+  }
+  quantity.unit = CleanText(quantity.unit, 100);
+  if (quantity.unit.empty()) quantity.unit = "1";
+  variable.variable.reference = node.attribute("valueReference").as_uint();
+  variable.causality = node.attribute("causality").as_string("local");
+  variable.variability = node.attribute("variability").as_string("continuous");
+  variable.initial = node.attribute("initial").value();
+  if (const pugi::xml_attribute start = type.attribute("start"); start && variable.is_real) {
+    variable.has_start = true;
+    if (!absl::SimpleAtod(start.value(), &quantity.default_value) ||
+        !std::isfinite(quantity.default_value)) {
+      return Wrong(absl::StrFormat("the start value \"%s\" of %s must be a finite number",
+                                   std::string(start.value()).substr(0, 64), quantity.name));
+    }
+  }
+  variables_.push_back(std::move(variable));
+  return absl::OkStatus();
+}
+
+absl::Status VariableList::AddState(const Variable& derivative, size_t state) {
+  if (!derivative.is_derivative || state >= variables_.size() || !variables_[state].is_real) {
+    return Wrong(absl::StrFormat(
+        "%s must be the derivative of a single real variable; arrays are not supported",
+        derivative.quantity.name));
+  }
+  variables_[state].is_state = true;
+  states_.push_back(state);
+  return absl::OkStatus();
+}
+
+absl::Status VariableList::FindStates2(const pugi::xml_node& structure) {
+  for (const pugi::xml_node unknown : structure.child("Derivatives").children("Unknown")) {
+    const size_t index = unknown.attribute("index").as_uint();
+    if (index < 1 || index > variables_.size()) {
+      return Wrong(absl::StrFormat("ModelStructure.Derivatives: there is no variable %d", index));
+    }
+    const Variable derivative = variables_[index - 1];
+    POLYEST_RETURN_IF_ERROR(
+        AddState(derivative, static_cast<size_t>(derivative.derivative_of) - 1));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status VariableList::FindStates3(const pugi::xml_node& structure) {
+  absl::flat_hash_map<uint32_t, size_t> by_reference;
+  for (size_t i = 0; i < variables_.size(); ++i) {
+    by_reference.emplace(variables_[i].variable.reference, i);
+  }
+  const auto find = [&](uint32_t reference) {
+    const auto found = by_reference.find(reference);
+    return found == by_reference.end() ? variables_.size() : found->second;
+  };
+  for (const pugi::xml_node node : structure.children("ContinuousStateDerivative")) {
+    const uint32_t reference = node.attribute("valueReference").as_uint();
+    const size_t index = find(reference);
+    if (index == variables_.size()) {
+      return Wrong(absl::StrFormat(
+          "ModelStructure.ContinuousStateDerivative: there is no variable with valueReference %d",
+          reference));
+    }
+    const Variable derivative = variables_[index];
+    POLYEST_RETURN_IF_ERROR(
+        AddState(derivative, find(static_cast<uint32_t>(derivative.derivative_of))));
+  }
+  for ([[maybe_unused]] const pugi::xml_node node : structure.children("EventIndicator")) {
+    ++event_indicators_;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
+                                                            FmuDescription& description) const {
+  std::vector<std::string> kept;
+  absl::flat_hash_set<std::string> names;
+  ModelDescription& model = description.model;
+  for (const Variable& variable : variables_) {
+    const Quantity& quantity = variable.quantity;
+    if (!names.insert(quantity.name).second) {
+      return Wrong(absl::StrFormat("the variable %s is there twice", quantity.name));
+    }
+    const bool is_parameter = variable.causality == "parameter";
+    const bool is_input = variable.causality == "input";
+    // Model Exchange takes discrete inputs only at events, of which a signal has none.
+    const bool is_discrete = kind == FmuKind::kModelExchange && variable.variability == "discrete";
+    if ((is_parameter || is_input) && (!variable.is_real || (is_input && is_discrete))) {
+      kept.push_back(quantity.name);
+      continue;
+    }
+    if (!variable.is_real || variable.causality == "independent") continue;
+    // The start values of others than parameters: with initial="exact" they are set, not found.
+    const bool is_initial_value = variable.initial == "exact" && variable.has_start &&
+                                  variable.variability != "constant" && !is_input;
+    if ((is_parameter && variable.has_start) || is_initial_value) {
+      model.parameters.push_back(quantity);
+      description.parameters.push_back(variable.variable);
+    }
+    if (is_input) {
+      model.inputs.push_back(quantity);
+      description.inputs.push_back(variable.variable);
+    }
+    if (variable.causality == "output" || variable.is_state) {
+      model.outputs.push_back(quantity);
+      description.outputs.push_back(variable.variable);
+    }
+  }
+  for (const size_t state : states_) model.states.push_back(variables_[state].quantity);
+  description.interface.states = static_cast<int>(states_.size());
+  description.interface.event_indicators = event_indicators_;
+  return kept;
+}
+
+}  // namespace polyest

@@ -1,0 +1,53 @@
+#pragma once
+
+// The variables of a modelDescription.xml, and which of them are states, parameters, inputs and
+// outputs of the model.
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/status/statusor.h>
+
+#include <pugixml.hpp>
+#include <string>
+#include <vector>
+
+#include "core/fmu/fmu_description.h"
+
+namespace polyest {
+
+class VariableList {
+ public:
+  // `root` is fmiModelDescription.
+  static absl::StatusOr<VariableList> Read(const pugi::xml_node& root, int version);
+
+  // Fills the quantities of `description` and answers the names of the parameters and inputs that
+  // keep their start values, because they are no real numbers or no single ones.
+  absl::StatusOr<std::vector<std::string>> Sort(FmuKind kind, FmuDescription& description) const;
+
+ private:
+  struct Variable {
+    Quantity quantity;
+    FmuVariable variable;
+    bool is_real = false;  // and single
+    std::string causality, variability, initial;
+    bool has_start = false;
+    int derivative_of = 0;  // FMI 2: 1-based index; FMI 3: value reference; see is_derivative
+    bool is_derivative = false;
+    bool is_state = false;
+  };
+
+  using Units = absl::flat_hash_map<std::string, std::string>;  // by declared type
+
+  absl::Status Add2(const pugi::xml_node& node, const Units& units);
+  absl::Status Add3(const pugi::xml_node& node, const Units& units);
+  absl::Status AddCommon(const pugi::xml_node& node, const pugi::xml_node& type, const Units& units,
+                         Variable variable);
+  absl::Status FindStates2(const pugi::xml_node& structure);
+  absl::Status FindStates3(const pugi::xml_node& structure);
+  absl::Status AddState(const Variable& derivative, size_t state);
+
+  std::vector<Variable> variables_;
+  std::vector<size_t> states_;  // in the order of the FMU's vector of states
+  int event_indicators_ = 0;
+};
+
+}  // namespace polyest

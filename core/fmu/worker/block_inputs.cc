@@ -1,0 +1,104 @@
+#include "core/fmu/worker/block_inputs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Eigen::ArrayXXd RowsOf(const Matrix& matrix, const std::vector<int>& points) {
+  if (matrix.size() == 0) return {};
+  return matrix(points, Eigen::all).array();
+}
+
+}  // namespace
+
+BlockInputs::BlockInputs(const EnsembleSpecification& specification, const InputSignals* signals,
+                         const std::vector<int>& points)
+    : signals_(signals),
+      amplitudes_(specification.amplitudes(points, Eigen::all).array()),
+      offsets_(RowsOf(specification.input_offsets, points)) {
+  const Eigen::ArrayXXd delays_s = RowsOf(specification.input_delays_s, points);
+  values_.setZero(amplitudes_.rows(), amplitudes_.cols());
+  for (Eigen::Index i = 0; i < amplitudes_.cols(); ++i) {
+    std::vector<Cursor> cursors;
+    const bool differ = delays_s.size() > 0 && (delays_s.col(i) != delays_s(0, i)).any();
+    for (Eigen::Index row = 0; row < (differ ? amplitudes_.rows() : 1); ++row) {
+      const double delay_s = delays_s.size() > 0 ? delays_s(row, i) : 0;
+      cursors.push_back({.delay_s = delay_s, .last_s = -delay_s});
+    }
+    cursors_.push_back(std::move(cursors));
+  }
+}
+
+bool BlockInputs::Stops(size_t input) const {
+  return cursors_[input].size() == 1 || (*signals_)[input].Jumps();
+}
+
+BlockInputs::Break BlockInputs::NextBreak() {
+  Break next;
+  for (size_t i = 0; i < cursors_.size(); ++i) {
+    if (!Stops(i)) continue;
+    const InputSignal& signal = (*signals_)[i];
+    for (Cursor& cursor : cursors_[i]) {
+      // Anew each time: knots may have been appended.
+      cursor.next_s = signal.NextBreak(cursor.last_s);
+      const double break_s = cursor.next_s + cursor.delay_s;
+      if (break_s > next.time_s || break_s == kInfinity) continue;
+      next = {break_s, signal.Jumps() || (break_s == next.time_s && next.jumps)};
+    }
+  }
+  return next;
+}
+
+void BlockInputs::Pass(double time_s) {
+  for (size_t i = 0; i < cursors_.size(); ++i) {
+    if (!Stops(i)) continue;
+    for (Cursor& cursor : cursors_[i]) {
+      while (cursor.next_s + cursor.delay_s <= time_s) {
+        cursor.last_s = cursor.next_s;
+        cursor.next_s = (*signals_)[i].NextBreak(cursor.last_s);
+      }
+    }
+  }
+  time_s_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+double BlockInputs::Shape(size_t input, const Cursor& cursor, double time_s) const {
+  const InputSignal& signal = (*signals_)[input];
+  const double at_s = time_s - cursor.delay_s;
+  if (!Stops(input)) return signal.Shape(at_s);
+  const double before_next_s = std::nextafter(cursor.next_s, -kInfinity);
+  return signal.Shape(std::max(cursor.last_s, std::min(at_s, before_next_s)));
+}
+
+const Eigen::ArrayXXd& BlockInputs::At(double time_s) {
+  if (time_s == time_s_) return values_;
+  for (size_t i = 0; i < cursors_.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    auto u = values_.col(column);
+    if (cursors_[i].size() == 1) {
+      u = amplitudes_.col(column) * Shape(i, cursors_[i].front(), time_s);
+    } else {
+      for (Eigen::Index row = 0; row < u.rows(); ++row) {
+        u(row) = amplitudes_(row, column) * Shape(i, cursors_[i][static_cast<size_t>(row)], time_s);
+      }
+    }
+    if (offsets_.size() > 0) u += offsets_.col(column);
+  }
+  time_s_ = time_s;
+  return values_;
+}
+
+void BlockInputs::CopyRow(Eigen::Index from, Eigen::Index to) {
+  amplitudes_.row(to) = amplitudes_.row(from);
+  if (offsets_.size() > 0) offsets_.row(to) = offsets_.row(from);
+  for (std::vector<Cursor>& cursors : cursors_) {
+    if (cursors.size() > 1) cursors[static_cast<size_t>(to)] = cursors[static_cast<size_t>(from)];
+  }
+  time_s_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace polyest

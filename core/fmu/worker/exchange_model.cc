@@ -1,0 +1,98 @@
+#include "core/fmu/worker/exchange_model.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace polyest {
+namespace {
+
+std::vector<Quantity> Numbered(size_t count) {
+  std::vector<Quantity> quantities(count);
+  for (size_t i = 0; i < count; ++i) quantities[i].name = absl::StrCat(i);
+  return quantities;
+}
+
+}  // namespace
+
+ExchangeModel::ExchangeModel(const InstanceFactory& factory,
+                             std::vector<std::unique_ptr<Instance>> instances)
+    : instances_(std::move(instances)) {
+  description_.states = Numbered(static_cast<size_t>(factory.interface.states));
+  description_.parameters = Numbered(1);
+  description_.inputs = Numbered(factory.inputs.size());
+  description_.outputs = Numbered(factory.outputs.size());
+}
+
+// Calls read(instance, result) with each row's instance at its point; a row whose instance fails is
+// NaN.
+template <class Read>
+void ExchangeModel::ForEachRow(double time_s, const ConstBlock& states,
+                               const ConstBlock& parameters, const ConstBlock& inputs,
+                               Block results, Read read) const {
+  Vector x(states.cols()), u(inputs.cols()), result(results.cols());
+  const std::span<double> point(x.data(), static_cast<size_t>(x.size()));
+  for (Eigen::Index row = 0; row < parameters.rows(); ++row) {
+    Instance& instance = *instances_[static_cast<size_t>(parameters(row, 0))];
+    if (states.cols() > 0) x = states.row(row).matrix();
+    if (inputs.cols() > 0) u = inputs.row(row).matrix();
+    const bool good =
+        instance.SetPoint(time_s, point) && instance.SetInputs(u.data()) && read(instance, result);
+    if (!good) result.setConstant(std::numeric_limits<double>::quiet_NaN());
+    results.row(row) = result.array();
+  }
+}
+
+void ExchangeModel::InitialStates(const ConstBlock& parameters, Block states) const {
+  Vector x(states.cols());
+  const std::span<double> values(x.data(), static_cast<size_t>(x.size()));
+  for (Eigen::Index row = 0; row < parameters.rows(); ++row) {
+    Instance& instance = *instances_[static_cast<size_t>(parameters(row, 0))];
+    if (!instance.GetStates(values)) x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    states.row(row) = x.array();
+  }
+}
+
+void ExchangeModel::Derivatives(double time_s, const ConstBlock& states,
+                                const ConstBlock& parameters, const ConstBlock& inputs,
+                                Block derivatives) const {
+  ForEachRow(time_s, states, parameters, inputs, derivatives,
+             [](Instance& instance, Vector& result) {
+               return instance.GetDerivatives({result.data(), static_cast<size_t>(result.size())});
+             });
+}
+
+void ExchangeModel::Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                            const ConstBlock& inputs, Block outputs) const {
+  ForEachRow(time_s, states, parameters, inputs, outputs,
+             [](Instance& instance, Vector& result) { return instance.GetOutputs(result.data()); });
+}
+
+ExchangeEnsemble::ExchangeEnsemble(std::shared_ptr<const ExchangeModel> model,
+                                   EnsembleSpecification channels, const InputSignals* signals)
+    : model_(std::move(model)) {
+  const Eigen::Index points = channels.amplitudes.rows();
+  channels.model = model_;
+  channels.parameters = Vector::LinSpaced(points, 0, static_cast<double>(points - 1));
+  channels.outputs.resize(model_->description().outputs.size());
+  std::iota(channels.outputs.begin(), channels.outputs.end(), 0);
+  channels.threads = 1;
+  propagator_ = std::make_unique<EnsemblePropagator>(std::move(channels), signals);
+}
+
+absl::Status ExchangeEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
+                                       const Stop& stop) {
+  const absl::Status status = propagator_->Advance(times_s, outputs, stop);
+  failures_ = propagator_->failures();
+  for (PointFailure& failure : failures_) {
+    const Instance& instance = model_->instance(failure.point);
+    if (instance.failure().empty()) continue;
+    failure.reason = instance.failure();
+    failure.flag = instance.failure_status();
+  }
+  return status;
+}
+
+}  // namespace polyest

@@ -1,0 +1,55 @@
+#pragma once
+
+// Instances of an FMU for Model Exchange without events as a state-space model, integrated by the
+// very integrators of the built-in models. Its only parameter is the number of the instance.
+
+#include <memory>
+#include <vector>
+
+#include "core/fmu/worker/instance.h"
+#include "core/model/model.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest {
+
+class ExchangeModel final : public StateSpaceModel {
+ public:
+  ExchangeModel(const InstanceFactory& factory, std::vector<std::unique_ptr<Instance>> instances);
+
+  const ModelDescription& description() const override { return description_; }
+  void InitialStates(const ConstBlock& parameters, Block states) const override;
+  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                   const ConstBlock& inputs, Block derivatives) const override;
+  void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+               const ConstBlock& inputs, Block outputs) const override;
+
+  const Instance& instance(int point) const { return *instances_[static_cast<size_t>(point)]; }
+
+ private:
+  template <class Read>
+  void ForEachRow(double time_s, const ConstBlock& states, const ConstBlock& parameters,
+                  const ConstBlock& inputs, Block results, Read read) const;
+
+  ModelDescription description_;
+  std::vector<std::unique_ptr<Instance>> instances_;
+};
+
+// A block of such instances, with what each said of its failure.
+class ExchangeEnsemble final : public TrajectoryEnsemble {
+ public:
+  // `channels` are the block's own rows.
+  ExchangeEnsemble(std::shared_ptr<const ExchangeModel> model, EnsembleSpecification channels,
+                   const InputSignals* signals);
+
+  int points() const override { return propagator_->points(); }
+  absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
+                       const Stop& stop) override;
+  const std::vector<PointFailure>& failures() const override { return failures_; }
+
+ private:
+  std::shared_ptr<const ExchangeModel> model_;
+  std::unique_ptr<EnsemblePropagator> propagator_;
+  std::vector<PointFailure> failures_;
+};
+
+}  // namespace polyest

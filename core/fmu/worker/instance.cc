@@ -1,0 +1,162 @@
+#include "core/fmu/worker/instance.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <limits>
+
+namespace polyest {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kDiscard = 2;
+constexpr int kError = 3;
+constexpr int kMostEventIterations = 1'000;
+
+const char* StatusInWords(int status) {
+  switch (status) {
+    case 2:
+      return "discarded it";
+    case 3:
+      return "reported an error";
+    case 4:
+      return "reported a fatal error";
+    default:
+      return "answered with a status that is none";
+  }
+}
+
+}  // namespace
+
+Instance::Instance(const InstanceFactory* factory, int point, std::span<const double> parameters,
+                   std::span<const double> inputs)
+    : factory_(*factory), point_(point), next_event_s_(kInfinity) {
+  log_ = [this](int, const std::string& message) {
+    said_ = message;
+    factory_.monitor->Say(message);
+  };
+  Initialize(parameters, inputs);
+}
+
+// The FMU's own end is left to the end of the process: there is nothing in it to be kept.
+Instance::~Instance() = default;
+
+// Calls `call`, which answers an FMI status.
+template <class Call>
+bool Instance::Do(FmuCall kind, Call call) {
+  if (broken_) return false;
+  factory_.monitor->Enter(kind, point_, time_s_);
+  const int status = call();
+  factory_.monitor->Leave();
+  if (status == 0 || status == 1) return true;
+  return Fail(status, absl::StrCat("the FMU ", StatusInWords(status), " while ", InWords(kind)));
+}
+
+bool Instance::Fail(int status, const std::string& what) {
+  failure_ = said_.empty() ? what : absl::StrCat(what, ": ", said_);
+  failure_status_ = status;
+  broken_ = broken_ || status != kDiscard;
+  return false;
+}
+
+bool Instance::Initialize(std::span<const double> parameters, std::span<const double> inputs) {
+  const std::string name = absl::StrCat(factory_.interface.name, "_", point_);
+  factory_.monitor->Enter(FmuCall::kInstantiate, point_, 0);
+  binding_ = factory_.library->Instantiate(name, &log_);
+  factory_.monitor->Leave();
+  if (binding_ == nullptr) return Fail(kError, "the FMU refused to be instantiated");
+  const bool initialized =
+      (parameters.empty() ||
+       Do(FmuCall::kSetVariables,
+          [&] { return binding_->Set(factory_.parameters, parameters.data()); })) &&
+      SetInputs(inputs.data()) &&
+      Do(FmuCall::kInitialize,
+         [&] { return binding_->EnterInitialization(factory_.relative_tolerance); }) &&
+      Do(FmuCall::kInitialize, [&] { return binding_->ExitInitialization(); });
+  if (!initialized) {
+    // At the start there is nothing to be tried again.
+    broken_ = true;
+    return false;
+  }
+  if (factory_.interface.kind == FmuKind::kCoSimulation) return true;
+  return IterateEvents();
+}
+
+bool Instance::IterateEvents() {
+  EventUpdate update;
+  int iterations = 0;
+  do {
+    update = {};
+    if (++iterations > kMostEventIterations) {
+      return Fail(kError, absl::StrCat("an event is not settled after ", kMostEventIterations,
+                                       " iterations"));
+    }
+    if (!Do(FmuCall::kEvents, [&] { return binding_->UpdateDiscreteStates(update); })) return false;
+    if (update.terminate) return Fail(kError, "the FMU asked for the end of the simulation");
+  } while (update.again);
+  next_event_s_ = update.next_time_defined ? update.next_time_s : kInfinity;
+  return Do(FmuCall::kEvents, [&] { return binding_->EnterContinuousTime(); });
+}
+
+bool Instance::SetInputs(const double* values) {
+  if (factory_.inputs.empty()) return !broken_;
+  return Do(FmuCall::kSetVariables, [&] { return binding_->Set(factory_.inputs, values); });
+}
+
+bool Instance::GetOutputs(double* values) {
+  if (factory_.outputs.empty()) return !broken_;
+  return Do(FmuCall::kGetVariables, [&] { return binding_->Get(factory_.outputs, values); });
+}
+
+bool Instance::SetPoint(double time_s, std::span<const double> states) {
+  time_s_ = time_s;
+  return Do(FmuCall::kDerivatives, [&] { return binding_->SetTime(time_s); }) &&
+         (states.empty() || Do(FmuCall::kDerivatives, [&] { return binding_->SetStates(states); }));
+}
+
+bool Instance::GetStates(std::span<double> states) {
+  return states.empty() || Do(FmuCall::kDerivatives, [&] { return binding_->GetStates(states); });
+}
+
+bool Instance::GetNominals(std::span<double> nominals) {
+  return nominals.empty() ||
+         Do(FmuCall::kDerivatives, [&] { return binding_->GetNominals(nominals); });
+}
+
+bool Instance::GetDerivatives(std::span<double> derivatives) {
+  return derivatives.empty() ||
+         Do(FmuCall::kDerivatives, [&] { return binding_->GetDerivatives(derivatives); });
+}
+
+bool Instance::GetEventIndicators(std::span<double> indicators) {
+  return indicators.empty() ||
+         Do(FmuCall::kEvents, [&] { return binding_->GetEventIndicators(indicators); });
+}
+
+bool Instance::CompletedStep(bool& event) {
+  bool terminate = false;
+  if (!Do(FmuCall::kEvents, [&] { return binding_->CompletedStep(event, terminate); })) {
+    return false;
+  }
+  return !terminate || Fail(kError, "the FMU asked for the end of the simulation");
+}
+
+bool Instance::HandleEvent() {
+  return Do(FmuCall::kEvents, [&] { return binding_->EnterEventMode(); }) && IterateEvents();
+}
+
+bool Instance::SetInputRates(const double* rates) {
+  return Do(FmuCall::kSetVariables,
+            [&] { return binding_->SetInputDerivatives(factory_.inputs, rates); });
+}
+
+bool Instance::DoStep(double time_s, double step_s) {
+  time_s_ = time_s;
+  bool terminate = false;
+  if (!Do(FmuCall::kStep, [&] { return binding_->DoStep(time_s, step_s, terminate); })) {
+    return false;
+  }
+  time_s_ = time_s + step_s;
+  return !terminate || Fail(kError, "the FMU asked for the end of the simulation");
+}
+
+}  // namespace polyest

@@ -1,0 +1,40 @@
+#pragma once
+
+// Everything a worker simulates: its blocks of points, each as an ensemble.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <memory>
+#include <vector>
+
+#include "core/fmu/messages.h"
+#include "core/fmu/worker/block_inputs.h"
+#include "core/fmu/worker/instance.h"
+
+namespace polyest {
+
+class Simulation {
+ public:
+  // FAILED_PRECONDITION when the FMU cannot be used at all.
+  static absl::StatusOr<std::unique_ptr<Simulation>> Start(StartMessage start, Monitor* monitor);
+
+  absl::Status Advance(const AdvanceMessage& message, ResultMessage& result);
+
+ private:
+  Simulation(StartMessage start, InputSignals signals, std::unique_ptr<FmuLibrary> library,
+             Monitor* monitor);
+  absl::Status AppendKnots(const AdvanceMessage& message);
+  void MakeBlocks();
+  std::unique_ptr<TrajectoryEnsemble> MakeBlock(int first, int points);
+  std::unique_ptr<Instance> MakeInstance(int row, BlockInputs& inputs);
+
+  StartMessage start_;
+  InputSignals signals_;
+  std::unique_ptr<FmuLibrary> library_;
+  InstanceFactory factory_;
+  EnsembleSpecification channels_;  // amplitudes, delays and offsets of all points
+  std::vector<std::unique_ptr<TrajectoryEnsemble>> blocks_;
+};
+
+}  // namespace polyest

@@ -1,0 +1,190 @@
+#include "core/fmu/worker_ensemble.h"
+
+#include <absl/strings/str_cat.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/fmu/clean_text.h"
+#include "core/propagation/trajectory_block.h"
+
+namespace polyest {
+namespace {
+
+// Between two looks at the stop request and at the workers' progress.
+constexpr int kLookMs = 20;
+
+template <class Message>
+std::string Encode(const Message& message) {
+  Encoder encoder;
+  encoder(message);
+  return encoder.TakeBytes();
+}
+
+Matrix Rows(const Matrix& matrix, const std::vector<int>& rows) {
+  return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
+}
+
+// As it was specified, a table's knots included.
+InputSpecification Specification(const InputSignal& signal) {
+  InputSpecification specification = signal.specification();
+  if (auto* table = std::get_if<TableInput>(&specification)) {
+    table->time_s.assign(signal.knot_times_s().begin(), signal.knot_times_s().end());
+    table->value.assign(signal.knot_values().begin(), signal.knot_values().end());
+  }
+  return specification;
+}
+
+}  // namespace
+
+WorkerEnsemble::WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu,
+                               EnsembleSpecification specification, const InputSignals* inputs,
+                               const WorkerLimits& limits)
+    : fmu_(std::move(fmu)),
+      specification_(std::move(specification)),
+      inputs_(inputs),
+      limits_(limits),
+      knots_sent_(inputs->size(), 0) {}
+
+absl::Status WorkerEnsemble::StartWorkers() {
+  constexpr int kBlock = TrajectoryBlock::kPoints;
+  const int blocks = (points() + kBlock - 1) / kBlock;
+  const int count = std::max(1, std::min(specification_.threads, blocks));
+  std::vector<Worker> workers(static_cast<size_t>(count));
+  for (size_t w = 0; w < workers.size(); ++w) {
+    std::vector<int> block_points;
+    for (int block = static_cast<int>(w); block < blocks; block += count) {
+      block_points.push_back(std::min(kBlock, points() - block * kBlock));
+      for (int i = 0; i < block_points.back(); ++i) workers[w].rows.push_back(block * kBlock + i);
+    }
+    POLYEST_ASSIGN_OR_RETURN(workers[w].process,
+                             WorkerProcess::Start(fmu_->description.interface.name, limits_));
+    workers[w].process->Send(Encode(MakeStart(block_points, workers[w].rows)));
+  }
+  workers_ = std::move(workers);
+  return absl::OkStatus();
+}
+
+StartMessage WorkerEnsemble::MakeStart(const std::vector<int>& block_points,
+                                       const std::vector<int>& rows) const {
+  const FmuDescription& description = fmu_->description;
+  StartMessage start;
+  const std::filesystem::path& folder = fmu_->folder->path();
+  start.library = (folder / LibraryPath(description.interface)).string();
+  start.resources = (folder / "resources").string();
+  start.interface = description.interface;
+  start.parameters = description.parameters;
+  start.inputs = description.inputs;
+  for (const int output : specification_.outputs) {
+    start.outputs.push_back(description.outputs[static_cast<size_t>(output)]);
+  }
+  start.block_points = block_points;
+  start.parameter_values = Rows(specification_.parameters, rows);
+  start.amplitudes = Rows(specification_.amplitudes, rows);
+  start.input_delays_s = Rows(specification_.input_delays_s, rows);
+  start.input_offsets = Rows(specification_.input_offsets, rows);
+  for (const InputSignal& signal : *inputs_) start.signals.push_back(Specification(signal));
+  start.integration = specification_.integration;
+  return start;
+}
+
+AdvanceMessage WorkerEnsemble::MakeAdvance(std::span<const double> times_s) {
+  AdvanceMessage advance;
+  for (size_t i = 0; i < inputs_->size(); ++i) {
+    const InputSignal& signal = (*inputs_)[i];
+    const size_t sent = knots_sent_[i];
+    if (!signal.streamed() || signal.knot_times_s().size() == sent) continue;
+    const auto times = signal.knot_times_s().subspan(sent);
+    const auto values = signal.knot_values().subspan(sent);
+    advance.knots.push_back(
+        {static_cast<int>(i), {times.begin(), times.end()}, {values.begin(), values.end()}});
+    knots_sent_[i] += times.size();
+  }
+  advance.times_s.assign(times_s.begin(), times_s.end());
+  return advance;
+}
+
+absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
+                                     const Stop& stop) {
+  POLYEST_CHECK(outputs.rows() == points());
+  POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * std::ssize(specification_.outputs));
+  POLYEST_RETURN_IF_ERROR(stop.Check());
+  POLYEST_RETURN_IF_ERROR(fmu_->status);
+  if (points() == 0) return absl::OkStatus();
+  if (workers_.empty()) POLYEST_RETURN_IF_ERROR(StartWorkers());
+  const std::string message = Encode(MakeAdvance(times_s));
+  for (Worker& worker : workers_) {
+    worker.process->Send(message);
+    worker.process->AwaitAnswer();
+  }
+  absl::Status status = Converse(stop);
+  for (Worker& worker : workers_) {
+    if (status.ok()) status = ReadResult(worker, outputs);
+  }
+  if (!status.ok()) {
+    KillAll();
+    return status;
+  }
+  failures_.clear();
+  for (const Worker& worker : workers_) {
+    failures_.insert(failures_.end(), worker.failures.begin(), worker.failures.end());
+  }
+  std::sort(failures_.begin(), failures_.end(),
+            [](const PointFailure& a, const PointFailure& b) { return a.point < b.point; });
+  return absl::OkStatus();
+}
+
+// Until each worker has answered.
+absl::Status WorkerEnsemble::Converse(const Stop& stop) {
+  for (;;) {
+    std::vector<pollfd> waiting;
+    for (Worker& worker : workers_) {
+      if (!worker.process->awaits_answer()) continue;
+      POLYEST_RETURN_IF_ERROR(worker.process->Exchange());
+      if (!worker.process->awaits_answer()) continue;
+      const int events = POLLIN | (worker.process->has_to_send() ? POLLOUT : 0);
+      waiting.push_back({worker.process->socket(), static_cast<short>(events), 0});
+    }
+    if (waiting.empty()) return absl::OkStatus();
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    poll(waiting.data(), waiting.size(), kLookMs);
+  }
+}
+
+absl::Status WorkerEnsemble::ReadResult(Worker& worker, MatrixRef outputs) {
+  Decoder decoder(worker.process->TakeAnswer());
+  ResultMessage result;
+  decoder(result);
+  const std::string& name = fmu_->description.interface.name;
+  const auto damaged = [&name] {
+    return absl::FailedPreconditionError(
+        absl::StrCat("fmu ", name, ": its worker's answer is damaged"));
+  };
+  if (!decoder.complete()) return damaged();
+  if (!result.error.empty()) {
+    return absl::FailedPreconditionError(absl::StrCat("fmu ", name, ": ", CleanText(result.error)));
+  }
+  const auto rows = static_cast<Eigen::Index>(worker.rows.size());
+  if (outputs.cols() > 0) {
+    if (result.outputs.rows() != rows || result.outputs.cols() != outputs.cols()) return damaged();
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      outputs.row(worker.rows[static_cast<size_t>(i)]) = result.outputs.row(i);
+    }
+  }
+  for (PointFailure& failure : result.failures) {
+    if (failure.point < 0 || failure.point >= rows) return damaged();
+    failure.point = worker.rows[static_cast<size_t>(failure.point)];
+    failure.reason = CleanText(failure.reason);
+  }
+  worker.failures = std::move(result.failures);
+  return absl::OkStatus();
+}
+
+void WorkerEnsemble::KillAll() {
+  for (Worker& worker : workers_) worker.process->Kill();
+}
+
+}  // namespace polyest

@@ -1,0 +1,53 @@
+#pragma once
+
+// An ensemble of an FMU's trajectories in worker processes. The points are dealt into blocks of
+// TrajectoryBlock::kPoints and the blocks to workers; a block's results do not depend on what else
+// its worker does, so that they are the same for any number of workers.
+
+#include <absl/status/status.h>
+
+#include <memory>
+#include <vector>
+
+#include "core/fmu/fmu_model.h"
+#include "core/fmu/messages.h"
+#include "core/fmu/worker_process.h"
+#include "core/propagation/trajectory_ensemble.h"
+
+namespace polyest {
+
+class WorkerEnsemble final : public TrajectoryEnsemble {
+ public:
+  // Processes start with the first Advance, which also reports why they could not.
+  WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu, EnsembleSpecification specification,
+                 const InputSignals* inputs, const WorkerLimits& limits);
+
+  int points() const override { return static_cast<int>(specification_.parameters.rows()); }
+  absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
+                       const Stop& stop) override;
+  const std::vector<PointFailure>& failures() const override { return failures_; }
+
+ private:
+  struct Worker {
+    std::unique_ptr<WorkerProcess> process;
+    std::vector<int> rows;  // of the ensemble
+    std::vector<PointFailure> failures;
+  };
+
+  absl::Status StartWorkers();
+  StartMessage MakeStart(const std::vector<int>& block_points, const std::vector<int>& rows) const;
+  AdvanceMessage MakeAdvance(std::span<const double> times_s);
+  absl::Status Converse(const Stop& stop);
+  absl::Status ReadResult(Worker& worker, MatrixRef outputs);
+  void KillAll();
+
+  std::shared_ptr<const UnpackedFmu> fmu_;
+  EnsembleSpecification specification_;
+  const InputSignals* inputs_;
+  WorkerLimits limits_;
+  std::vector<Worker> workers_;
+  std::vector<size_t> knots_sent_;  // by input
+  std::vector<PointFailure> failures_;
+};
+
+}  // namespace polyest

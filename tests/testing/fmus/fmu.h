@@ -1,0 +1,33 @@
+/* What a model of the tests' FMUs consists of. A model's file is included by fmu2.c and fmu3.c,
+   which give it the functions of FMI 2.0 and 3.0, of both kinds; it defines
+
+     REALS, STATES, INDICATORS   how many variables, continuous states and event indicators there
+                                 are; a variable's number is its value reference
+     kStart[REALS]               start values
+     kStates[], kDerivatives[]   the numbers of the states and of their derivatives
+     Initialize(fmu)             sets the states from the parameters
+     Evaluate(fmu)               sets all that follows from states, inputs and time
+     Indicate(fmu, z)            the event indicators
+     HandleEvent(fmu)            changes states, or sets next_event_s
+
+   Initialize, Evaluate and HandleEvent answer an FMI status. */
+#ifndef POLYEST_TESTS_FMU_H
+#define POLYEST_TESTS_FMU_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { kOk = 0, kWarning = 1, kDiscard = 2, kError = 3 };
+
+typedef struct Fmu {
+  double real[32];
+  double time_s;
+  double next_event_s; /* none: infinity */
+  void* environment;   /* of the logger */
+  void* log;
+} Fmu;
+
+static void Log(Fmu* fmu, int status, const char* message);
+
+#endif

@@ -1,0 +1,84 @@
+#pragma once
+
+// Ensembles of the tests' FMUs: parameters by name, one value a point.
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/common/check.h"
+#include "core/fmu/catalogue.h"
+#include "core/model/catalogue.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest {
+
+inline FmuCatalogue TestFmus(const WorkerLimits& limits = {}) {
+  return *FmuCatalogue::Open(POLYEST_TEST_FMUS, limits);
+}
+
+inline std::vector<double> TimesUntil(double end_s, double step_s) {
+  std::vector<double> times_s;
+  for (int i = 0; i * step_s <= end_s + step_s / 2; ++i) times_s.push_back(i * step_s);
+  return times_s;
+}
+
+// All parameters at their defaults, all inputs 0.
+struct FmuEnsemble {
+  FmuEnsemble(std::shared_ptr<const Model> model, int points, std::vector<const char*> outputs) {
+    specification.model = std::move(model);
+    const ModelDescription& description = Description();
+    specification.parameters.resize(points, std::ssize(description.parameters));
+    for (Eigen::Index j = 0; j < specification.parameters.cols(); ++j) {
+      specification.parameters.col(j).setConstant(
+          description.parameters[static_cast<size_t>(j)].default_value);
+    }
+    specification.amplitudes.setZero(points, std::ssize(description.inputs));
+    for (const char* output : outputs) {
+      specification.outputs.push_back(*description.FindOutput(output));
+    }
+    inputs.assign(description.inputs.size(), *InputSignal::Make(ConstantInput{}));
+  }
+  FmuEnsemble(const char* fmu, int points, std::vector<const char*> outputs,
+              const WorkerLimits& limits = {})
+      : FmuEnsemble(*TestFmus(limits).Find(fmu), points, std::move(outputs)) {}
+
+  void Set(const char* parameter, int point, double value) {
+    specification.parameters(point, *Description().FindParameter(parameter)) = value;
+  }
+  void Set(const char* parameter, double value) {
+    specification.parameters.col(*Description().FindParameter(parameter)).setConstant(value);
+  }
+  void Drive(const char* input, InputSpecification signal, double amplitude) {
+    const int index = *Description().FindInput(input);
+    inputs[static_cast<size_t>(index)] = *InputSignal::Make(std::move(signal));
+    specification.amplitudes.col(index).setConstant(amplitude);
+  }
+
+  const ModelDescription& Description() const { return specification.model->description(); }
+  int points() const { return static_cast<int>(specification.parameters.rows()); }
+
+  // The outputs at these times, points × (outputs · times).
+  absl::StatusOr<Matrix> TryPropagate(const std::vector<double>& times_s,
+                                      const Stop& stop = Stop()) {
+    EnsemblePropagator propagator(specification, &inputs);
+    Matrix outputs(points(), std::ssize(times_s) * std::ssize(specification.outputs));
+    const absl::Status status = propagator.Advance(times_s, outputs, stop);
+    failures = propagator.failures();
+    if (!status.ok()) return status;
+    return outputs;
+  }
+  Matrix Propagate(const std::vector<double>& times_s) {
+    absl::StatusOr<Matrix> outputs = TryPropagate(times_s);
+    if (!outputs.ok()) std::fprintf(stderr, "%s\n", outputs.status().ToString().c_str());
+    POLYEST_CHECK(outputs.ok());
+    return *std::move(outputs);
+  }
+
+  EnsembleSpecification specification;
+  InputSignals inputs;
+  std::vector<PointFailure> failures;  // of the last propagation
+};
+
+}  // namespace polyest

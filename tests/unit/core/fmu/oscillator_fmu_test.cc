@@ -1,0 +1,108 @@
+// The oscillator as an FMU of either version and kind beside the built-in one.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/unit/core/fmu/fmu_ensemble.h"
+
+namespace polyest {
+namespace {
+
+// 70 points: two blocks, the second not full.
+constexpr int kPoints = 70;
+
+FmuEnsemble Oscillators(std::shared_ptr<const Model> model) {
+  FmuEnsemble ensemble(std::move(model), kPoints, {"x", "v", "a"});
+  for (int point = 0; point < kPoints; ++point) {
+    const double part = point / static_cast<double>(kPoints);
+    ensemble.Set("m", point, 0.8 + 0.4 * part);
+    ensemble.Set("k", point, 30 + 20 * std::fmod(7 * part, 1));
+    ensemble.Set("c", point, 0.1 + 0.3 * std::fmod(3 * part, 1));
+    ensemble.Set("x0", point, 1 - part);
+    ensemble.Set("v0", point, part);
+  }
+  return ensemble;
+}
+
+FmuEnsemble BuiltIn() { return Oscillators(*FindBuiltinModel("mass_spring_damper")); }
+FmuEnsemble Fmu(const char* name) { return Oscillators(*TestFmus().Find(name)); }
+
+class ModelExchangeOscillator : public testing::TestWithParam<const char*> {};
+
+TEST_P(ModelExchangeOscillator, FollowsTheBuiltInToRoundingErrors) {
+  FmuEnsemble fmu = Fmu(GetParam());
+  FmuEnsemble built_in = BuiltIn();
+  fmu.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
+  built_in.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  // The same integrator takes the same steps; rounding errors of 1e-16 grow over some 1000 steps.
+  // Accelerations are up to 60.
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
+}
+
+TEST_P(ModelExchangeOscillator, JumpsWithItsInput) {
+  FmuEnsemble fmu = Fmu(GetParam());
+  FmuEnsemble built_in = BuiltIn();
+  fmu.Drive("force", StepInput{.time_s = 0.33}, 5);
+  built_in.Drive("force", StepInput{.time_s = 0.33}, 5);
+  const std::vector<double> times_s = TimesUntil(1, 0.1);
+  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
+}
+
+INSTANTIATE_TEST_SUITE_P(Versions, ModelExchangeOscillator,
+                         testing::Values("oscillator_me2", "oscillator_me3"));
+
+class CoSimulationOscillator : public testing::TestWithParam<const char*> {};
+
+TEST_P(CoSimulationOscillator, FollowsTheBuiltInToTheErrorOfItsOwnSteps) {
+  FmuEnsemble fmu = Fmu(GetParam());
+  FmuEnsemble built_in = BuiltIn();
+  built_in.specification.integration.relative_tolerance = 1e-11;
+  const std::vector<double> times_s = TimesUntil(5, 0.05);
+  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  // Classical Runge–Kutta on x' = iωx makes the relative error ω^5 h^4 t/120 by the time t; with
+  // ω ≤ √(50/0.8) = 7.9 rad/s, h = 1 ms, t = 5 s and an amplitude of x of at most 1.1, and ω times
+  // that of v and ω² times that of a. The damping adds as much again at most.
+  const double omega = std::sqrt(50 / 0.8);
+  const double error = 2 * 1.1 * std::pow(omega, 5) * 1e-12 * 5 / 120;
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), omega * omega * error);
+  EXPECT_GT(difference.cwiseAbs().maxCoeff(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Versions, CoSimulationOscillator,
+                         testing::Values("oscillator_cs2", "oscillator_cs3"));
+
+TEST(FmuEnsemble, DoesNotDependOnTheNumberOfWorkers) {
+  for (const char* name : {"oscillator_me2", "oscillator_cs3"}) {
+    FmuEnsemble one = Fmu(name);
+    FmuEnsemble two = Fmu(name);
+    two.specification.threads = 2;
+    const std::vector<double> times_s = TimesUntil(1, 0.1);
+    EXPECT_EQ(one.Propagate(times_s), two.Propagate(times_s)) << name;
+  }
+}
+
+TEST(FmuEnsemble, DoesNotDependOnHowTheTimesAreCut) {
+  for (const char* name : {"oscillator_me2", "oscillator_cs2"}) {
+    FmuEnsemble ensemble = Fmu(name);
+    ensemble.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
+    const std::vector<double> times_s = TimesUntil(1, 0.1);
+    const Matrix whole = ensemble.Propagate(times_s);
+    EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
+    Matrix cut(whole.rows(), whole.cols());
+    for (size_t k = 0; k < times_s.size(); ++k) {
+      const auto column = static_cast<Eigen::Index>(3 * k);
+      ASSERT_TRUE(
+          propagator.Advance(std::span(&times_s[k], 1), cut.middleCols(column, 3), Stop()).ok());
+    }
+    EXPECT_EQ(whole, cut) << name;
+  }
+}
+
+}  // namespace
+}  // namespace polyest
