@@ -96,7 +96,7 @@ int KnotsAhead(Interpolation interpolation) {
     case Interpolation::kCubic:
       return kSplineReach;
     case Interpolation::kShapePreserving:
-      return 1;
+      return 2;
   }
   POLYEST_CHECK(false);
 }

@@ -21,7 +21,8 @@ enum class Interpolation {
   kShapePreserving,  // MonotoneSlope
 };
 
-// Knots after a knot that its slope depends on: 3 for kCubic, 1 for kShapePreserving, else 0.
+// Knots after a knot that its slope may depend on: 3 for kCubic; 2 for kShapePreserving, at its
+// first knot; else 0.
 int KnotsAhead(Interpolation interpolation);
 
 // The slope at knot k of the cubic spline through it and the kSplineReach knots on either side, as
