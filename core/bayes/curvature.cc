@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "core/bayes/parameter_covariance.h"
+
 namespace polyest {
 namespace {
 
@@ -12,7 +14,8 @@ constexpr double kSlack = 1e-9;
 
 }  // namespace
 
-Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& prior) {
+Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& prior,
+                                  const ConstVectorRef& xi) {
   const Vector deviation = prior.GermStandardDeviation();
   const Eigen::Index n = deviation.size();
   // H_s = D H D, D = diag(prior standard deviations of ξ); s = D⁻¹ ξ
@@ -31,12 +34,13 @@ Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& pr
       if (!(curvature > 1 + kSlack)) result.limited_by_prior = true;
     }
   }
-  // cov(θ) = (T V √diag(variance)) (…)ᵀ, T = diag(prior standard deviations of θ)
   for (double& value : variance) value = std::sqrt(value);
-  const Matrix root = prior.StandardDeviation().asDiagonal() * directions * variance.asDiagonal();
-  result.covariance = root * root.transpose();
-  result.standard_deviation.resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) result.standard_deviation[i] = root.row(i).norm();
+  // cov(z) = (F D V √diag(variance)) (…)ᵀ
+  const Matrix in_germs = deviation.asDiagonal() * directions * variance.asDiagonal();
+  const Matrix root = prior.correlated() ? Matrix(prior.factor() * in_germs) : in_germs;
+  result.contraction = root.rowwise().norm().cwiseQuotient(deviation);
+  result.covariance = ParameterCovariance(prior, prior.ToScores(xi), root);
+  result.standard_deviation = result.covariance.diagonal().cwiseSqrt();
   return result;
 }
 

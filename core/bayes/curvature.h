@@ -3,7 +3,9 @@
 // Uncertainty from the curvature of the cost: the covariance is the inverse of the Hessian at the
 // minimum. In coordinates s scaled to unit prior standard deviation, H_s = V Λ Vᵀ; along an
 // eigenvector the variance is 1/Λ_i, but never more than the prior's 1: where the curvature knows
-// less than the prior (flat, wider or concave) the prior's own is kept.
+// less than the prior (flat, wider or concave) the prior's own is kept. That is a Gaussian in the
+// germs; parameter_covariance.h maps it to the parameters, so that without data the result is the
+// prior's covariance whatever the map.
 
 #include "core/bayes/prior.h"
 #include "core/common/types.h"
@@ -13,10 +15,12 @@ namespace polyest {
 struct Curvature {
   Matrix covariance;              // of θ, n × n
   Vector standard_deviation;      // of θ
+  Vector contraction;             // of the scores z: standard deviation ÷ the prior's, ≤ 1
   bool limited_by_prior = false;  // in at least one direction
 };
 
-// hessian: of J with respect to the germ ξ, n × n, symmetric.
-Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& prior);
+// hessian: of J with respect to the germ ξ, n × n, symmetric, at xi.
+Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& prior,
+                                  const ConstVectorRef& xi);
 
 }  // namespace polyest

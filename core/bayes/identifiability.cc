@@ -39,7 +39,11 @@ std::vector<Direction> Directions(const ConstMatrixRef& mismatch_hessian, const 
   for (Eigen::Index i = scaled.rows() - 1; i >= 0; --i) {  // eigenvalues come in increasing order
     Direction direction;
     direction.information = std::max(0.0, eigen.eigenvalues()[i]);
-    direction.coefficients = WithPositiveLargest(eigen.eigenvectors().col(i));
+    // A step v of the scaled germs moves the scores by F v (D⁻¹ F D = F, D being 1 where F is not
+    // the identity).
+    Vector coefficients = eigen.eigenvectors().col(i);
+    if (prior.correlated()) coefficients = prior.ToScores(coefficients).normalized();
+    direction.coefficients = WithPositiveLargest(std::move(coefficients));
     direction.verdict = VerdictOfInformation(direction.information);
     directions.push_back(std::move(direction));
   }

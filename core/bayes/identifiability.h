@@ -3,6 +3,11 @@
 // What the data say beside the prior. Eigen-decompose the prior-preconditioned mismatch Hessian,
 // Lᵀ H_mismatch L with L Lᵀ = prior covariance: an eigenvalue λ is the data's information in that
 // direction in units of the prior's.
+//
+// A parameter's verdict compares the posterior of its score z with its prior marginal. So one on
+// which the data are silent is IDENTIFIED all the same when it is correlated a priori with one that
+// they know: what is known of it then rests on that correlation, but known it is. The directions
+// show the difference: they count the data's information alone.
 
 #include <vector>
 
@@ -15,7 +20,9 @@ enum class Verdict { kIdentified, kWeak, kNotIdentified };
 
 struct Direction {
   double information = 0;  // λ ≥ 0 (a negative curvature of the mismatch counts as none)
-  Vector coefficients;     // unit vector over the parameters, each in units of its prior std. dev.
+  // Unit vector over the parameters, each in units of the prior standard deviation of its score.
+  // Correlated parameters move together in a direction on which the data are silent for one.
+  Vector coefficients;
   Verdict verdict = Verdict::kNotIdentified;
 };
 

@@ -24,7 +24,8 @@ struct LogPoint {
 
 double PriorAtModes(const Prior& prior) {
   Vector modes(prior.dimension());
-  for (int i = 0; i < prior.dimension(); ++i) modes[i] = prior.parameters()[i].germ.Mode();
+  for (int i = 0; i < prior.dimension(); ++i)
+    modes[i] = prior.germs()[static_cast<size_t>(i)].Mode();
   return prior.NegativeLogDensity(modes);
 }
 

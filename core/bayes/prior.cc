@@ -1,7 +1,6 @@
 #include "core/bayes/prior.h"
 
-#include <absl/strings/str_cat.h>
-
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -12,135 +11,122 @@
 namespace polyest {
 namespace {
 
-// Squares of anything in between are still finite numbers.
-constexpr double kLeastScale = 1e-100;
-constexpr double kGreatestMagnitude = 1e100;
-// Past it a beta or gamma density is a normal one to a percent.
-constexpr double kGreatestShape = 10'000;
-
-absl::Status Invalid(const std::string& name, const char* family, const std::string& rule) {
-  return absl::InvalidArgumentError(absl::StrCat("uncertain ", name, ": ", family, ": ", rule));
+Matrix Independent(size_t count) {
+  const auto n = static_cast<Eigen::Index>(count);
+  return Matrix::Identity(n, n);
 }
 
-absl::Status CheckName(const std::string& name) {
-  if (name.empty()) return absl::InvalidArgumentError("uncertain: name must not be empty");
-  return absl::OkStatus();
-}
-
-absl::Status CheckLocation(const std::string& name, const char* family, const char* field,
-                           double value) {
-  if (std::abs(value) <= kGreatestMagnitude) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must be finite and at most ", kGreatestMagnitude,
-                              " in magnitude"));
-}
-
-absl::Status CheckScale(const std::string& name, const char* family, const char* field,
-                        double value) {
-  if (!(value > 0)) return Invalid(name, family, absl::StrCat(field, " ", value, " must be > 0"));
-  if (value >= kLeastScale && value <= kGreatestMagnitude) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must lie between ", kLeastScale, " and ",
-                              kGreatestMagnitude));
-}
-
-absl::Status CheckShape(const std::string& name, const char* family, const char* field,
-                        double value) {
-  if (value >= 1 && value <= kGreatestShape) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must lie between 1 and ", kGreatestShape));
-}
-
-absl::Status CheckBounds(const std::string& name, const char* family, double lower, double upper) {
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, family, "lower", lower));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, family, "upper", upper));
-  if (!(lower < upper)) {
-    return Invalid(name, family, absl::StrCat("lower ", lower, " must be below upper ", upper));
-  }
-  return CheckScale(name, family, "upper - lower", upper - lower);
-}
+double NormalDensity(double z) { return Germ::Normal().Density(z); }
 
 }  // namespace
 
-absl::StatusOr<UncertainParameter> UncertainParameter::Normal(std::string name, double mean,
-                                                              double std_dev) {
-  POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, "normal", "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "normal", "standard deviation", std_dev));
-  return UncertainParameter{std::move(name), Germ::Normal(), mean, std_dev};
-}
-
-absl::StatusOr<UncertainParameter> UncertainParameter::Uniform(std::string name, double lower,
-                                                               double upper) {
-  POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckBounds(name, "uniform", lower, upper));
-  return UncertainParameter{std::move(name), Germ::Uniform(), (lower + upper) / 2,
-                            (upper - lower) / 2};
-}
-
-absl::StatusOr<UncertainParameter> UncertainParameter::Beta(std::string name, double alpha,
-                                                            double beta, double lower,
-                                                            double upper) {
-  POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "beta", "alpha", alpha));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "beta", "beta", beta));
-  POLYEST_RETURN_IF_ERROR(CheckBounds(name, "beta", lower, upper));
-  return UncertainParameter{std::move(name), Germ::Beta(alpha, beta), (lower + upper) / 2,
-                            (upper - lower) / 2};
-}
-
-absl::StatusOr<UncertainParameter> UncertainParameter::Gamma(std::string name, double shape,
-                                                             double scale, double shift) {
-  POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "gamma", "shape", shape));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "gamma", "scale", scale));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, "gamma", "shift", shift));
-  return UncertainParameter{std::move(name), Germ::Gamma(shape), shift, scale};
-}
-
-Prior::Prior(std::vector<UncertainParameter> parameters) : parameters_(std::move(parameters)) {
+Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlation)
+    : parameters_(std::move(parameters)), factor_(correlation.llt().matrixL()) {
   POLYEST_CHECK(!parameters_.empty());
   const int n = dimension();
-  location_.resize(n);
-  scale_.resize(n);
   lower_.resize(n);
   upper_.resize(n);
   for (int i = 0; i < n; ++i) {
-    const UncertainParameter& parameter = parameters_[i];
+    const UncertainParameter& parameter = parameters_[static_cast<size_t>(i)];
     POLYEST_CHECK(parameter.scale > 0);
-    location_[i] = parameter.location;
-    scale_[i] = parameter.scale;
-    lower_[i] = parameter.germ.Lower();
-    upper_[i] = parameter.germ.Upper();
+    in_copula_.push_back((correlation.row(i).array() != 0).count() > 1);
+    correlated_ = correlated_ || in_copula_.back();
+    germs_.push_back(in_copula_.back() ? Germ::Normal() : parameter.germ);
+    lower_[i] = germs_.back().Lower();
+    upper_[i] = germs_.back().Upper();
   }
 }
 
-std::vector<Germ> Prior::germs() const {
-  std::vector<Germ> germs;
-  germs.reserve(parameters_.size());
-  for (const UncertainParameter& parameter : parameters_) germs.push_back(parameter.germ);
-  return germs;
+Prior::Prior(std::vector<UncertainParameter> parameters)
+    : Prior(parameters, Independent(parameters.size())) {}
+
+absl::StatusOr<Prior> Prior::Make(std::vector<UncertainParameter> parameters,
+                                  const std::vector<Correlation>& correlations) {
+  POLYEST_ASSIGN_OR_RETURN(const Matrix correlation, CorrelationMatrix(parameters, correlations));
+  return Prior(std::move(parameters), correlation);
+}
+
+bool Prior::IsCurved(int parameter) const {
+  const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
+  return marginal.map != ParameterMap::kAffine ||
+         germs_[static_cast<size_t>(parameter)] != marginal.germ;
+}
+
+double Prior::MarginalGerm(int parameter, double z) const {
+  if (!IsCorrelated(parameter)) return z;
+  return parameters_[static_cast<size_t>(parameter)].germ.OfNormalScore(z);
+}
+
+double Prior::OfScore(int parameter, double z) const {
+  return parameters_[static_cast<size_t>(parameter)].ToParameter(MarginalGerm(parameter, z));
+}
+
+double Prior::ScoreOf(int parameter, double theta) const {
+  const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
+  const double x = marginal.ToGerm(theta);
+  if (!IsCorrelated(parameter)) return x;
+  const bool inside = marginal.germ.Lower() <= x && x <= marginal.germ.Upper();
+  return inside ? marginal.germ.NormalScore(x) : std::numeric_limits<double>::quiet_NaN();
+}
+
+Vector Prior::ToScores(const ConstVectorRef& xi) const {
+  if (!correlated_) return xi;
+  return factor_.triangularView<Eigen::Lower>() * xi;
+}
+
+Vector Prior::OfScores(const ConstVectorRef& z) const {
+  if (!correlated_) return z;
+  return factor_.triangularView<Eigen::Lower>().solve(z);
 }
 
 Vector Prior::ToParameters(const ConstVectorRef& xi) const {
-  return location_ + scale_.cwiseProduct(xi);
+  Vector theta = ToScores(xi);
+  for (int i = 0; i < dimension(); ++i) theta[i] = OfScore(i, theta[i]);
+  return theta;
 }
 
 Vector Prior::ToGerm(const ConstVectorRef& theta) const {
-  return (theta - location_).cwiseQuotient(scale_);
+  Vector z(dimension());
+  for (int i = 0; i < dimension(); ++i) z[i] = ScoreOf(i, theta[i]);
+  return OfScores(z);
+}
+
+// ∂θ/∂ξ = diag(t′) F,  t_i′ = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a correlated
+// one
+Matrix Prior::Jacobian(const ConstVectorRef& xi) const {
+  const Vector z = ToScores(xi);
+  Vector slope(dimension());
+  for (int i = 0; i < dimension(); ++i) {
+    const UncertainParameter& marginal = parameters_[static_cast<size_t>(i)];
+    const double x = MarginalGerm(i, z[i]);
+    slope[i] = marginal.Slope(x);
+    if (!IsCorrelated(i) || marginal.germ.family() == GermFamily::kNormal) continue;
+    // So near a bound that x has rounded to it, θ does not change any more.
+    const double density = marginal.germ.Density(x);
+    slope[i] *= density > 0 ? NormalDensity(z[i]) / density : 0;
+  }
+  return slope.asDiagonal() * factor_;
 }
 
 Vector Prior::Mean() const {
   Vector mean(dimension());
-  for (int i = 0; i < dimension(); ++i) mean[i] = parameters_[i].germ.Mean();
-  return ToParameters(mean);
+  for (int i = 0; i < dimension(); ++i) mean[i] = parameters_[static_cast<size_t>(i)].Mean();
+  return mean;
 }
 
-Vector Prior::StandardDeviation() const { return scale_.cwiseProduct(GermStandardDeviation()); }
+Vector Prior::StandardDeviation() const {
+  Vector deviation(dimension());
+  for (int i = 0; i < dimension(); ++i) {
+    deviation[i] = parameters_[static_cast<size_t>(i)].StandardDeviation();
+  }
+  return deviation;
+}
 
 Vector Prior::GermStandardDeviation() const {
   Vector deviation(dimension());
-  for (int i = 0; i < dimension(); ++i) deviation[i] = parameters_[i].germ.StandardDeviation();
+  for (int i = 0; i < dimension(); ++i) {
+    deviation[i] = germs_[static_cast<size_t>(i)].StandardDeviation();
+  }
   return deviation;
 }
 
@@ -154,14 +140,14 @@ bool Prior::Contains(const ConstVectorRef& xi) const {
 double Prior::NegativeLogDensity(const ConstVectorRef& xi) const {
   if (!Contains(xi)) return std::numeric_limits<double>::infinity();
   double sum = 0;  // J_apriori = −Σ_i log ρ_i(ξ_i)
-  for (int i = 0; i < dimension(); ++i) sum -= parameters_[i].germ.LogDensity(xi[i]);
+  for (int i = 0; i < dimension(); ++i) sum -= germs_[static_cast<size_t>(i)].LogDensity(xi[i]);
   return sum;
 }
 
 Vector Prior::Gradient(const ConstVectorRef& xi) const {
   Vector gradient(dimension());
   for (int i = 0; i < dimension(); ++i) {
-    gradient[i] = -parameters_[i].germ.LogDensityDerivative(xi[i]);
+    gradient[i] = -germs_[static_cast<size_t>(i)].LogDensityDerivative(xi[i]);
   }
   return gradient;
 }
@@ -169,7 +155,7 @@ Vector Prior::Gradient(const ConstVectorRef& xi) const {
 Vector Prior::Curvature(const ConstVectorRef& xi) const {
   Vector curvature(dimension());
   for (int i = 0; i < dimension(); ++i) {
-    curvature[i] = -parameters_[i].germ.LogDensitySecondDerivative(xi[i]);
+    curvature[i] = -germs_[static_cast<size_t>(i)].LogDensitySecondDerivative(xi[i]);
   }
   return curvature;
 }

@@ -1,47 +1,57 @@
 #pragma once
 
-// The prior of the uncertain parameters: each an affine map of an independent germ,
-//   θ_i = location_i + scale_i ξ_i,   J_apriori(ξ) = −Σ_i log ρ_i(ξ_i)   (25).
+// The prior of the uncertain parameters, as a map θ = T(ξ) of independent germs:
+//   z = F ξ,   θ_i = t_i(z_i),   J_apriori(ξ) = −Σ_i log ρ_i(ξ_i)   (25).
+//
+// z_i is the score of parameter i, with the density ρ_i of its germ. Without correlations F = I,
+// and t_i is the parameter's own map (uncertain_parameter.h). The parameters that occur in a
+// correlation have standard normal germs and scores, F Fᵀ = P (copula.h; F lower triangular, rows
+// and columns of the others those of I), and t_i maps to the parameter of the same cumulative
+// probability. So every t_i increases, and parameter i's marginal is that of its score.
 
 #include <absl/status/statusor.h>
 
-#include <string>
 #include <vector>
 
+#include "core/bayes/copula.h"
+#include "core/bayes/uncertain_parameter.h"
 #include "core/chaos/germ.h"
 #include "core/common/types.h"
 
 namespace polyest {
 
-struct UncertainParameter {
-  std::string name;
-  Germ germ = Germ::Uniform();
-  double location = 0;  // θ at ξ = 0
-  double scale = 1;     // dθ/dξ > 0
-
-  // INVALID_ARGUMENT names the parameter, the value and the rule.
-  static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);
-  static absl::StatusOr<UncertainParameter> Uniform(std::string name, double lower, double upper);
-  static absl::StatusOr<UncertainParameter> Beta(std::string name, double alpha, double beta,
-                                                 double lower, double upper);
-  static absl::StatusOr<UncertainParameter> Gamma(std::string name, double shape, double scale,
-                                                  double shift);
-};
-
 class Prior {
  public:
+  // Independent parameters, at least one.
   explicit Prior(std::vector<UncertainParameter> parameters);
+  // INVALID_ARGUMENT as of CorrelationMatrix. At least one parameter.
+  static absl::StatusOr<Prior> Make(std::vector<UncertainParameter> parameters,
+                                    const std::vector<Correlation>& correlations);
 
   int dimension() const { return static_cast<int>(parameters_.size()); }
   const std::vector<UncertainParameter>& parameters() const { return parameters_; }
-  std::vector<Germ> germs() const;
+  // Of ξ_i and of z_i: normal for a correlated parameter, whatever its marginal's germ.
+  const std::vector<Germ>& germs() const { return germs_; }
+  const Matrix& factor() const { return factor_; }  // F
+  bool correlated() const { return correlated_; }
+  bool IsCurved(int parameter) const;  // whether t_i is anything but affine
 
   Vector ToParameters(const ConstVectorRef& xi) const;
+  // ±∞ at a bound of a correlated parameter; not a number outside of its bounds.
   Vector ToGerm(const ConstVectorRef& theta) const;
-  Vector scale() const { return scale_; }  // dθ/dξ
-  Vector Mean() const;                     // of θ
-  Vector StandardDeviation() const;        // of θ
-  Vector GermStandardDeviation() const;    // of ξ
+  Matrix Jacobian(const ConstVectorRef& xi) const;  // ∂θ/∂ξ, n × n
+
+  Vector ToScores(const ConstVectorRef& xi) const;    // z = F ξ
+  Vector OfScores(const ConstVectorRef& z) const;     // ξ = F⁻¹ z
+  double OfScore(int parameter, double z) const;      // θ_i = t_i(z_i)
+  double ScoreOf(int parameter, double theta) const;  // its inverse, as ToGerm
+  // The value x of the parameter's own germ, θ_i = parameters()[i].ToParameter(x): z unless
+  // correlated.
+  double MarginalGerm(int parameter, double z) const;
+
+  Vector Mean() const;                   // of θ
+  Vector StandardDeviation() const;      // of θ
+  Vector GermStandardDeviation() const;  // of ξ, and of z
   // Ω in germ coordinates; ±∞ where the germ has no bound.
   const Vector& lower() const { return lower_; }
   const Vector& upper() const { return upper_; }
@@ -54,8 +64,16 @@ class Prior {
   Vector Curvature(const ConstVectorRef& xi) const;
 
  private:
+  Prior(std::vector<UncertainParameter> parameters, const Matrix& correlation);
+
+  bool IsCorrelated(int parameter) const { return in_copula_[static_cast<size_t>(parameter)]; }
+
   std::vector<UncertainParameter> parameters_;
-  Vector location_, scale_, lower_, upper_;
+  std::vector<Germ> germs_;
+  std::vector<bool> in_copula_;
+  bool correlated_ = false;
+  Matrix factor_;
+  Vector lower_, upper_;
 };
 
 }  // namespace polyest

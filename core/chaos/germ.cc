@@ -5,6 +5,7 @@
 #include <numbers>
 #include <unsupported/Eigen/SpecialFunctions>
 
+#include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
 namespace polyest {
@@ -133,6 +134,16 @@ Germ::Germ(GermFamily family, double first_shape, double second_shape)
     case GermFamily::kGamma:  // 1 / Γ(shape)
       log_normalization_ = -LogGamma(first_shape_);
       break;
+    case GermFamily::kTruncatedNormal: {  // 1/(√(2π) ∫_a^b φ)
+      probability_ = NormalProbability(first_shape_, second_shape_);
+      log_normalization_ = -0.5 * std::log(2 * std::numbers::pi) - std::log(probability_);
+      // a_0 is the mean, b_1 the variance.
+      const RecurrenceCoefficients moments =
+          TruncatedNormalRecurrence(first_shape_, second_shape_, 2);
+      mean_ = moments.a[0];
+      standard_deviation_ = std::sqrt(moments.b[1]);
+      break;
+    }
   }
 }
 
@@ -150,6 +161,11 @@ Germ Germ::Gamma(double shape) {
   return Germ(GermFamily::kGamma, shape, 0);
 }
 
+Germ Germ::TruncatedNormal(double lower, double upper) {
+  POLYEST_CHECK(lower < upper && NormalProbability(lower, upper) >= kLeastTruncatedProbability);
+  return Germ(GermFamily::kTruncatedNormal, lower, upper);
+}
+
 double Germ::Lower() const {
   switch (family_) {
     case GermFamily::kNormal:
@@ -159,11 +175,14 @@ double Germ::Lower() const {
       return -1;
     case GermFamily::kGamma:
       return 0;
+    case GermFamily::kTruncatedNormal:
+      return first_shape_;
   }
   return 0;
 }
 
 double Germ::Upper() const {
+  if (family_ == GermFamily::kTruncatedNormal) return second_shape_;
   return family_ == GermFamily::kUniform || family_ == GermFamily::kBeta ? 1 : kInfinity;
 }
 
@@ -177,6 +196,8 @@ double Germ::Mean() const {
       return (alpha - beta) / (alpha + beta);
     case GermFamily::kGamma:
       return first_shape_;
+    case GermFamily::kTruncatedNormal:
+      return mean_;
   }
   return 0;
 }
@@ -192,6 +213,8 @@ double Germ::StandardDeviation() const {
       return 2 * std::sqrt(alpha * beta / (sum + 1)) / sum;
     case GermFamily::kGamma:
       return std::sqrt(first_shape_);
+    case GermFamily::kTruncatedNormal:
+      return standard_deviation_;
   }
   return 0;
 }
@@ -206,6 +229,8 @@ double Germ::Mode() const {
       return alpha + beta > 2 ? (alpha - beta) / (alpha + beta - 2) : 0;
     case GermFamily::kGamma:
       return first_shape_ - 1;
+    case GermFamily::kTruncatedNormal:
+      return std::clamp(0.0, first_shape_, second_shape_);
   }
   return 0;
 }
@@ -216,6 +241,7 @@ double Germ::LogDensity(double xi) const {
   if (!(xi >= Lower() && xi <= Upper())) return -kInfinity;
   switch (family_) {
     case GermFamily::kNormal:
+    case GermFamily::kTruncatedNormal:
       return log_normalization_ - 0.5 * xi * xi;
     case GermFamily::kUniform:
       return log_normalization_;
@@ -232,6 +258,7 @@ double Germ::LogDensity(double xi) const {
 double Germ::LogDensityDerivative(double xi) const {
   switch (family_) {
     case GermFamily::kNormal:
+    case GermFamily::kTruncatedNormal:
       return -xi;
     case GermFamily::kUniform:
       return 0;
@@ -246,6 +273,7 @@ double Germ::LogDensityDerivative(double xi) const {
 double Germ::LogDensitySecondDerivative(double xi) const {
   switch (family_) {
     case GermFamily::kNormal:
+    case GermFamily::kTruncatedNormal:
       return -1;
     case GermFamily::kUniform:
       return 0;
@@ -268,6 +296,56 @@ double Germ::CumulativeProbability(double xi) const {
       return IncompleteBeta(first_shape_, second_shape_, 0.5 * (1 + xi));
     case GermFamily::kGamma:
       return LowerIncompleteGamma(first_shape_, xi);
+    case GermFamily::kTruncatedNormal:
+      return NormalProbability(first_shape_, std::min(xi, second_shape_)) / probability_;
+  }
+  return 0;
+}
+
+double Germ::UpperProbability(double xi) const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return 0.5 * std::erfc(xi / std::numbers::sqrt2);
+    case GermFamily::kUniform:
+      return std::clamp(0.5 * (1 - xi), 0.0, 1.0);
+    case GermFamily::kBeta:  // the mirrored density
+      return IncompleteBeta(second_shape_, first_shape_, 0.5 * (1 - xi));
+    case GermFamily::kGamma:
+      return UpperIncompleteGamma(first_shape_, xi);
+    case GermFamily::kTruncatedNormal:
+      return NormalProbability(std::max(xi, first_shape_), second_shape_) / probability_;
+  }
+  return 0;
+}
+
+double Germ::LowerQuantile(double probability) const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return Eigen::numext::ndtri(probability);
+    case GermFamily::kUniform:
+      return 2 * probability - 1;
+    case GermFamily::kBeta:
+      return 2 * LowerBetaQuantile(first_shape_, second_shape_, probability) - 1;
+    case GermFamily::kGamma:
+      return LowerGammaQuantile(first_shape_, probability);
+    case GermFamily::kTruncatedNormal:
+      return TruncatedNormalQuantile(first_shape_, second_shape_, probability);
+  }
+  return 0;
+}
+
+double Germ::UpperQuantile(double probability) const {
+  switch (family_) {
+    case GermFamily::kNormal:
+      return -Eigen::numext::ndtri(probability);
+    case GermFamily::kUniform:
+      return 1 - 2 * probability;
+    case GermFamily::kBeta:  // the upper tail is the lower one of the mirrored density
+      return 1 - 2 * LowerBetaQuantile(second_shape_, first_shape_, probability);
+    case GermFamily::kGamma:
+      return UpperGammaQuantile(first_shape_, probability);
+    case GermFamily::kTruncatedNormal:
+      return -TruncatedNormalQuantile(-second_shape_, -first_shape_, probability);
   }
   return 0;
 }
@@ -275,20 +353,21 @@ double Germ::CumulativeProbability(double xi) const {
 double Germ::Quantile(double probability) const {
   POLYEST_CHECK(probability > 0 && probability < 1);
   // The nearer tail is inverted: 1 − p is exact for p ≥ ½.
-  const bool lower_half = probability <= 0.5;
-  switch (family_) {
-    case GermFamily::kNormal:
-      return Eigen::numext::ndtri(probability);
-    case GermFamily::kUniform:
-      return 2 * probability - 1;
-    case GermFamily::kBeta:  // the upper tail is the lower one of the mirrored density
-      return lower_half ? 2 * LowerBetaQuantile(first_shape_, second_shape_, probability) - 1
-                        : 1 - 2 * LowerBetaQuantile(second_shape_, first_shape_, 1 - probability);
-    case GermFamily::kGamma:
-      return lower_half ? LowerGammaQuantile(first_shape_, probability)
-                        : UpperGammaQuantile(first_shape_, 1 - probability);
-  }
-  return 0;
+  return probability <= 0.5 ? LowerQuantile(probability) : UpperQuantile(1 - probability);
+}
+
+double Germ::OfNormalScore(double score) const {
+  if (family_ == GermFamily::kNormal) return score;
+  const double tail = 0.5 * std::erfc(std::min(std::abs(score), kMostScore) / std::numbers::sqrt2);
+  return score <= 0 ? LowerQuantile(tail) : UpperQuantile(tail);
+}
+
+double Germ::NormalScore(double xi) const {
+  if (family_ == GermFamily::kNormal) return xi;
+  const double lower = CumulativeProbability(xi);
+  const double tail = lower <= 0.5 ? lower : UpperProbability(xi);
+  const double score = tail > 0 ? Eigen::numext::ndtri(tail) : -kInfinity;
+  return lower <= 0.5 ? score : -score;
 }
 
 namespace {
@@ -317,6 +396,9 @@ RecurrenceCoefficients Germ::Recurrence(int count) const {
   if (family_ == GermFamily::kBeta) {
     JacobiRecurrence(first_shape_, second_shape_, result);
     return result;
+  }
+  if (family_ == GermFamily::kTruncatedNormal) {
+    return TruncatedNormalRecurrence(first_shape_, second_shape_, count);
   }
   for (int k = 0; k < count; ++k) {
     const double kk = k;

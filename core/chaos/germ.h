@@ -6,6 +6,7 @@
 //   uniform         1/2 on [−1, 1]                                 Legendre
 //   beta(α, β)      ∝ (1+ξ)^(α−1) (1−ξ)^(β−1) on [−1, 1]           Jacobi
 //   gamma(shape)    ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)        Laguerre
+//   truncated normal(a, b)   N(0, 1) cut to [a, b]                 its own (truncated_normal.h)
 //
 // α and β are the statistician's: the paper's "Beta(1,1)" is Beta(2, 2) here.
 
@@ -15,7 +16,7 @@
 
 namespace polyest {
 
-enum class GermFamily { kNormal, kUniform, kBeta, kGamma };
+enum class GermFamily { kNormal, kUniform, kBeta, kGamma, kTruncatedNormal };
 
 // Monic three-term recurrence P_{k+1}(ξ) = (ξ − a_k) P_k(ξ) − b_k P_{k−1}(ξ), k = 0 … count − 1;
 // b_0 = 1, the integral of the density.
@@ -36,12 +37,20 @@ class Germ {
   static Germ Beta(double alpha, double beta);
   // shape ≥ 1, for the same reason.
   static Germ Gamma(double shape);
+  // lower < upper, either may be infinite, with a probability of at least 1e-6 between them: with
+  // less the germ is so far out or so narrow that ξ itself rounds too much.
+  static Germ TruncatedNormal(double lower, double upper);
+  static constexpr double kLeastTruncatedProbability = 1e-6;
+  // The most polynomials of a truncated normal that Recurrence knows, less one.
+  static constexpr int kMostTruncatedNormalOrder = 100;
 
   GermFamily family() const { return family_; }
-  double first_shape() const { return first_shape_; }    // α of beta, shape of gamma, else 0
-  double second_shape() const { return second_shape_; }  // β of beta, else 0
-  double Lower() const;                                  // of the support Ω; −∞ for normal
-  double Upper() const;                                  // +∞ for normal and gamma
+  // α of beta, shape of gamma, lower bound of truncated normal, else 0
+  double first_shape() const { return first_shape_; }
+  // β of beta, upper bound of truncated normal, else 0
+  double second_shape() const { return second_shape_; }
+  double Lower() const;  // of the support Ω; −∞ for normal
+  double Upper() const;  // +∞ for normal and gamma
   double Mean() const;
   double StandardDeviation() const;
   double Mode() const;  // the centre of the support for uniform
@@ -56,6 +65,13 @@ class Germ {
   // standard deviation for shapes up to 1000 and to 1e-9 up to kMostShape: log Γ rounds in
   // proportion to shape · log(shape).
   double Quantile(double probability) const;
+  // The ξ with CumulativeProbability(ξ) = Φ(score), Φ that of N(0, 1): as Quantile, but exact in
+  // the upper tail too. |score| ≤ kMostScore; what lies beyond, with probability 10⁻³⁰⁰, is taken
+  // for kMostScore.
+  double OfNormalScore(double score) const;
+  static constexpr double kMostScore = 37;
+  // The inverse, Φ⁻¹(CumulativeProbability(ξ)); ∓∞ at a bound of the support.
+  double NormalScore(double xi) const;
 
   RecurrenceCoefficients Recurrence(int count) const;
 
@@ -63,11 +79,19 @@ class Germ {
 
  private:
   Germ(GermFamily family, double first_shape, double second_shape);
+  double UpperProbability(double xi) const;  // 1 − CumulativeProbability(ξ)
+  // Of probabilities 0 < p ≤ ½, from below and from above.
+  double LowerQuantile(double probability) const;
+  double UpperQuantile(double probability) const;
 
   GermFamily family_;
   double first_shape_;
   double second_shape_;
   double log_normalization_ = 0;  // log of the density's constant factor
+  // Of a truncated normal: ∫_a^b φ and moments, which have no closed form free of cancellation.
+  double probability_ = 1;
+  double mean_ = 0;
+  double standard_deviation_ = 1;
 };
 
 }  // namespace polyest

@@ -188,60 +188,78 @@ class Assessment {
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
-    const Curvature curvature = CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta)), prior_);
-    const Vector prior_deviation = prior_.StandardDeviation();
+    const Vector informed = ContractionByData(cost, eta);
     const double widening =
         findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
-    const Vector deviation = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
-    const Vector factor = deviation.cwiseQuotient(curvature.standard_deviation);
-    estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
-    const Vector informed = ContractionByData(cost, eta);
+    DescribeSpread(cost, eta, informed, widening);
     estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
-    const Matrix xis = design_.region.ManyToGerm(particles_.etas);
+    const Vector prior_deviation = prior_.StandardDeviation();
+    Matrix scores = design_.region.ManyToGerm(particles_.etas);
+    if (prior_.correlated()) scores *= prior_.factor().transpose();
     for (int i = 0; i < prior_.dimension(); ++i) {
-      const UncertainParameter& uncertain = prior_.parameters()[static_cast<size_t>(i)];
       ParameterEstimate parameter;
-      parameter.name = uncertain.name;
+      parameter.name = prior_.parameters()[static_cast<size_t>(i)].name;
       parameter.unit = problem_.units()[static_cast<size_t>(i)];
       parameter.map = map[i];
-      parameter.std_dev = deviation[i];
+      parameter.std_dev = deviation_[i];
       parameter.prior_mean = prior_mean[i];
       parameter.prior_std_dev = prior_deviation[i];
-      parameter.contraction = deviation[i] / prior_deviation[i];
+      parameter.contraction = deviation_[i] / prior_deviation[i];
       parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
-      DescribePosterior(xis.col(i), i, widening, parameter);
+      DescribePosterior(scores.col(i), i, widening, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
   }
 
-  // Posterior ÷ prior standard deviation as far as it is the data's doing: the larger of what the
-  // curvature gives with the prior at its own weight, whatever α² is (a heavy prior narrows the
-  // posterior, but that is not knowledge), and of
+  // Covariance and standard deviations: never above the prior's. Where the map of a parameter is
+  // curved its slope at the estimate scales what is known of it: a parameter that the data do not
+  // identify then has the prior's own standard deviation, wherever they drew it.
+  void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
+                      double widening) {
+    const Curvature curvature =
+        CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta)), prior_, findings_.map_xi);
+    const Vector prior_deviation = prior_.StandardDeviation();
+    deviation_ = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const Verdict verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
+      if (prior_.IsCurved(i) && verdict == Verdict::kNotIdentified) {
+        deviation_[i] = prior_deviation[i];
+      }
+    }
+    const Vector factor = deviation_.cwiseQuotient(curvature.standard_deviation);
+    estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
+  }
+
+  // Posterior ÷ prior standard deviation of the scores as far as it is the data's doing: the larger
+  // of what the curvature gives with the prior at its own weight, whatever α² is (a heavy prior
+  // narrows the posterior, but that is not knowledge), and of
   //   (H_mismatch + Σ_prior⁻¹)⁻¹,
   // in which a skewed prior's sharp mode does not pass for information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
+    const Vector& xi = findings_.map_xi;
     const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta));
     Matrix curved = mismatch;
-    curved.diagonal() += prior_.Curvature(findings_.map_xi);
+    curved.diagonal() += prior_.Curvature(xi);
     Matrix spread = mismatch;
     spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
-    return CovarianceFromCurvature(curved, prior_)
-        .standard_deviation.cwiseMax(CovarianceFromCurvature(spread, prior_).standard_deviation)
-        .cwiseQuotient(prior_.StandardDeviation());
+    return CovarianceFromCurvature(curved, prior_, xi)
+        .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
   }
 
-  // Mean and quantiles of one parameter's particles, widened about the mean but not past Ω.
-  void DescribePosterior(const Vector& xis, int i, double widening, ParameterEstimate& parameter) {
-    const UncertainParameter& uncertain = prior_.parameters()[static_cast<size_t>(i)];
-    const double mean = xis.mean();
+  // Mean and quantiles of one parameter from its particles' scores, widened about their mean but
+  // not past Ω.
+  void DescribePosterior(const Vector& scores, int i, double widening,
+                         ParameterEstimate& parameter) const {
+    const double centre = scores.mean();
     const auto limit = [&](double probability) {
-      const double xi = mean + widening * (QuantileOfSamples(xis, probability) - mean);
-      return uncertain.location +
-             uncertain.scale * std::clamp(xi, prior_.lower()[i], prior_.upper()[i]);
+      const double z = centre + widening * (QuantileOfSamples(scores, probability) - centre);
+      return prior_.OfScore(i, std::clamp(z, prior_.lower()[i], prior_.upper()[i]));
     };
-    parameter.mean = uncertain.location + uncertain.scale * mean;
+    parameter.mean = prior_.IsCurved(i)
+                         ? scores.unaryExpr([&](double z) { return prior_.OfScore(i, z); }).mean()
+                         : prior_.OfScore(i, centre);
     parameter.lower95 = limit(0.025);
     parameter.upper95 = limit(0.975);
   }
@@ -267,6 +285,7 @@ class Assessment {
   const ExpansionDesign& design_;
   double regularization_ = 1;
   Particles particles_;
+  Vector deviation_;  // of the parameters
   Findings findings_;
   Estimate estimate_;
 };

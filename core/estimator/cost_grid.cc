@@ -73,10 +73,12 @@ absl::StatusOr<Eigen::Index> ChoosePoints(const CostGridOptions& options, size_t
   return static_cast<Eigen::Index>(points);
 }
 
-// The germ at which everything is held: the prior mean, but for the values given.
-absl::StatusOr<Vector> HeldGerm(const Prior& prior, const CostGridOptions& options,
-                                const std::vector<int>& axes) {
-  Vector theta = prior.Mean();
+// The scores at which everything is held: the prior mean, but for the values given.
+absl::StatusOr<Vector> HeldScores(const Prior& prior, const CostGridOptions& options,
+                                  const std::vector<int>& axes) {
+  const Vector mean = prior.Mean();
+  Vector z(prior.dimension());
+  for (int i = 0; i < prior.dimension(); ++i) z[i] = prior.ScoreOf(i, mean[i]);
   for (const auto& [name, value] : options.held) {
     const std::string field = absl::StrFormat("held.%s", name);
     POLYEST_ASSIGN_OR_RETURN(const int column, FindUncertain(prior, field, name));
@@ -84,19 +86,18 @@ absl::StatusOr<Vector> HeldGerm(const Prior& prior, const CostGridOptions& optio
       return absl::InvalidArgumentError(
           absl::StrFormat("%s: %s is on an axis of the grid and cannot be held", field, name));
     }
-    theta[column] = value;
-    const Germ& germ = prior.parameters()[static_cast<size_t>(column)].germ;
-    const double xi = prior.ToGerm(theta)[column];
-    if (!std::isfinite(value) || !(germ.Lower() <= xi && xi <= germ.Upper())) {
+    z[column] = prior.ScoreOf(column, value);
+    if (!std::isfinite(z[column]) || z[column] < prior.lower()[column] ||
+        z[column] > prior.upper()[column]) {
       return absl::InvalidArgumentError(
           absl::StrFormat("%s: %g lies outside the prior of %s", field, value, name));
     }
   }
-  return prior.ToGerm(theta);
+  return z;
 }
 
-// Germ values along an axis: over Ω, or mean ± 4 standard deviations where it has no bound.
-Vector AxisGerm(const Germ& germ, Eigen::Index points) {
+// Scores along an axis: over Ω, or mean ± 4 standard deviations where it has no bound.
+Vector AxisScores(const Germ& germ, Eigen::Index points) {
   const double reach = kDeviations * germ.StandardDeviation();
   const double lower = std::isfinite(germ.Lower()) ? germ.Lower() : germ.Mean() - reach;
   const double upper = std::isfinite(germ.Upper()) ? germ.Upper() : germ.Mean() + reach;
@@ -182,17 +183,18 @@ Matrix WithoutNotANumber(Matrix values) {
   return values;
 }
 
-// J of the points of the grid, `xis` in germ coordinates with the first axis running fastest.
-absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model, const Matrix& xis,
-                      CostGrid& grid, const Stop& stop) {
+// J of the points of the grid, given by their scores with the first axis running fastest.
+absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model,
+                      const Matrix& scores, CostGrid& grid, const Stop& stop) {
   const Prior& prior = problem.prior();
-  Matrix thetas(xis.rows(), xis.cols());
-  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
-    thetas.row(i) = prior.ToParameters(xis.row(i).transpose()).transpose();
-    grid.prior.reshaped()[i] = prior.NegativeLogDensity(xis.row(i).transpose());
+  Matrix thetas(scores.rows(), scores.cols());
+  for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+    const Vector xi = prior.OfScores(scores.row(i).transpose());
+    thetas.row(i) = prior.ToParameters(xi).transpose();
+    grid.prior.reshaped()[i] = prior.NegativeLogDensity(xi);
   }
-  for (Eigen::Index first = 0; first < xis.rows(); first += kPointsAtATime) {
-    const Eigen::Index count = std::min(kPointsAtATime, xis.rows() - first);
+  for (Eigen::Index first = 0; first < scores.rows(); first += kPointsAtATime) {
+    const Eigen::Index count = std::min(kPointsAtATime, scores.rows() - first);
     POLYEST_ASSIGN_OR_RETURN(const Vector mismatch,
                              model.Evaluate(thetas.middleRows(first, count), stop));
     grid.mismatch.reshaped().segment(first, count) = mismatch;
@@ -218,25 +220,25 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
   }
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> axes, ChooseAxes(prior, options));
   POLYEST_ASSIGN_OR_RETURN(const Eigen::Index points, ChoosePoints(options, axes.size()));
-  POLYEST_ASSIGN_OR_RETURN(const Vector held, HeldGerm(prior, options, axes));
+  POLYEST_ASSIGN_OR_RETURN(const Vector held, HeldScores(prior, options, axes));
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
 
   CostGrid grid;
   const Eigen::Index second = axes.size() == 2 ? points : 1;
-  Matrix xis = held.transpose().replicate(points * second, 1);
+  Matrix scores = held.transpose().replicate(points * second, 1);
   for (size_t a = 0; a < axes.size(); ++a) {
-    const UncertainParameter& parameter = prior.parameters()[static_cast<size_t>(axes[a])];
-    const Vector axis = AxisGerm(parameter.germ, points);
-    grid.parameters.push_back(parameter.name);
-    grid.axes.push_back(parameter.location + parameter.scale * axis.array());
-    for (Eigen::Index i = 0; i < xis.rows(); ++i) {
-      xis(i, axes[a]) = axis[a == 0 ? i % points : i / points];
+    const auto parameter = static_cast<size_t>(axes[a]);
+    const Vector axis = AxisScores(prior.germs()[parameter], points);
+    grid.parameters.push_back(prior.parameters()[parameter].name);
+    grid.axes.push_back(axis.unaryExpr([&](double z) { return prior.OfScore(axes[a], z); }));
+    for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+      scores(i, axes[a]) = axis[a == 0 ? i % points : i / points];
     }
   }
   grid.mismatch.resize(points, second);
   grid.prior.resize(points, second);
   const ModelMismatch model(problem, record, options.threads);
-  POLYEST_RETURN_IF_ERROR(FillGrid(problem, model, xis, grid, stop));
+  POLYEST_RETURN_IF_ERROR(FillGrid(problem, model, scores, grid, stop));
   return grid;
 }
 

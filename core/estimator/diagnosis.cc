@@ -62,18 +62,35 @@ void AddMisfit(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
   }
 }
 
-void AddBounds(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+// Whether the estimate lies on a bound of parameter i: < 0 the lower one, > 0 the upper one. Looked
+// for in the marginal's own germ, which has bounds even where a correlated parameter's score has
+// none.
+int BoundReached(const Findings& findings, int i) {
   const Prior& prior = findings.problem->prior();
-  for (int i = 0; i < prior.dimension(); ++i) {
-    const double width = prior.upper()[i] - prior.lower()[i];
-    const double scale = std::isfinite(width) ? width : 1;
-    const bool low = findings.map_xi[i] - prior.lower()[i] < kAtBound * scale;
-    const bool high = prior.upper()[i] - findings.map_xi[i] < kAtBound * scale;
-    if (!low && !high) continue;
+  const Germ& germ = prior.parameters()[static_cast<size_t>(i)].germ;
+  const double x = prior.MarginalGerm(i, prior.ToScores(findings.map_xi)[i]);
+  const double width = germ.Upper() - germ.Lower();
+  const double scale = std::isfinite(width) ? width : 1;
+  if (x - germ.Lower() < kAtBound * scale) return -1;
+  return germ.Upper() - x < kAtBound * scale ? 1 : 0;
+}
+
+// A prior that is densest at a bound puts the estimate there by itself, where the data are silent.
+bool PriorAsksForBound(const Findings& findings, const Estimate& estimate, int i) {
+  const Germ& germ = findings.problem->prior().germs()[static_cast<size_t>(i)];
+  return (germ.Mode() == germ.Lower() || germ.Mode() == germ.Upper()) &&
+         estimate.parameters[static_cast<size_t>(i)].verdict == Verdict::kNotIdentified;
+}
+
+void AddBounds(const Findings& findings, const Estimate& estimate,
+               std::vector<Diagnostic>& diagnostics) {
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const int bound = BoundReached(findings, i);
+    if (bound == 0 || PriorAsksForBound(findings, estimate, i)) continue;
     diagnostics.push_back({DiagnosticCode::kAtPriorBound,
                            absl::StrFormat("%s lies on the %s bound of its prior: the data ask for "
                                            "values beyond it",
-                                           Name(findings, i), low ? "lower" : "upper")});
+                                           Name(findings, i), bound < 0 ? "lower" : "upper")});
   }
 }
 
@@ -129,7 +146,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
              findings.problem->problem().expansion.adaptive ? "" : " or let it be adaptive")});
   }
   AddMisfit(estimate, diagnostics);
-  AddBounds(findings, diagnostics);
+  AddBounds(findings, estimate, diagnostics);
   AddMinima(findings, diagnostics);
   AddFailures(findings, diagnostics);
   return diagnostics;

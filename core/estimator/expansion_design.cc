@@ -74,7 +74,7 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   design.lower = prior.lower();
   design.upper = prior.upper();
   for (int j = 0; j < n; ++j) {
-    const Germ& germ = prior.parameters()[static_cast<size_t>(j)].germ;
+    const Germ& germ = prior.germs()[static_cast<size_t>(j)];
     design.reference[j] = germ.Mean();
     if (!std::isfinite(design.lower[j])) design.lower[j] = germ.Quantile(kTrustedProbability);
     if (!std::isfinite(design.upper[j])) design.upper[j] = germ.Quantile(1 - kTrustedProbability);

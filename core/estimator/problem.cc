@@ -57,6 +57,18 @@ absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
   return absl::OkStatus();
 }
 
+absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) {
+  for (int i = 0; i < prior.dimension(); ++i) {
+    if (prior.germs()[static_cast<size_t>(i)].family() != GermFamily::kTruncatedNormal) continue;
+    if (options.order <= Germ::kMostTruncatedNormalOrder) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "expansion.order: %d must be at most %d with the truncated normal prior of %s",
+        options.order, Germ::kMostTruncatedNormalOrder,
+        prior.parameters()[static_cast<size_t>(i)].name));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
   const NoiseModel& noise = measured.noise;
   for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
@@ -92,6 +104,8 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
   }
   if (!problem.uncertain.empty()) {
     add(ValidateExpansion(problem.expansion, static_cast<int>(problem.uncertain.size())));
+    const absl::StatusOr<Prior> prior = Prior::Make(problem.uncertain, problem.correlations);
+    add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
   }
   add(problem.integration.Validate());
   return refusals;
@@ -270,7 +284,7 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
 absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
   std::vector<absl::Status> refusals = CheckOptions(problem);
   if (!refusals.empty()) return refusals.front();
-  Prior prior(problem.uncertain);
+  POLYEST_ASSIGN_OR_RETURN(Prior prior, Prior::Make(problem.uncertain, problem.correlations));
   ResolvedProblem resolved(std::move(problem), std::move(prior));
   refusals = Resolver(resolved).Run();
   if (!refusals.empty()) return refusals.front();
@@ -280,7 +294,7 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   std::vector<absl::Status> refusals = CheckOptions(problem);
   if (problem.model == nullptr || problem.uncertain.empty()) return refusals;
-  Prior prior(problem.uncertain);
+  Prior prior(problem.uncertain);  // for its names: the correlations may be wrong
   ResolvedProblem resolved(std::move(problem), std::move(prior));
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
   return refusals;

@@ -47,7 +47,8 @@ struct Problem {
   // nor among the uncertain and the derived has the model's default.
   std::map<std::string, double> fixed;
   std::vector<UncertainParameter> uncertain;
-  std::vector<NamedInput> inputs;  // an input not listed is 0
+  std::vector<Correlation> correlations;  // of pairs of them; a pair not listed has none
+  std::vector<NamedInput> inputs;         // an input not listed is 0
   std::vector<MeasuredOutput> measured;
   ExpansionOptions expansion;
   double regularization = 1;  // α² ≥ 0 of (56)

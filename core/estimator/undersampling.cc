@@ -38,15 +38,15 @@ SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
   SamplingInformation information;
   if (beginning.count() == 0 || !problem.streamed_inputs().empty()) return information;
   const Prior& prior = problem.prior();
-  Matrix xis = map_xi.transpose().replicate(2, 1);
-  const double step = 0.5 * prior.GermStandardDeviation()[parameter];
-  xis(0, parameter) = std::max(prior.lower()[parameter], map_xi[parameter] - step);
-  xis(1, parameter) = std::min(prior.upper()[parameter], map_xi[parameter] + step);
-  const double distance =
-      (xis(1, parameter) - xis(0, parameter)) / prior.GermStandardDeviation()[parameter];
-  Matrix thetas(2, prior.dimension());
-  for (int i = 0; i < 2; ++i)
-    thetas.row(i) = prior.ToParameters(xis.row(i).transpose()).transpose();
+  // Scores, so that this parameter moves alone.
+  const Vector map_z = prior.ToScores(map_xi);
+  const double deviation = prior.GermStandardDeviation()[parameter];
+  const double low = std::max(prior.lower()[parameter], map_z[parameter] - 0.5 * deviation);
+  const double high = std::min(prior.upper()[parameter], map_z[parameter] + 0.5 * deviation);
+  const double distance = (high - low) / deviation;
+  Matrix thetas = prior.ToParameters(map_xi).transpose().replicate(2, 1);
+  thetas(0, parameter) = prior.OfScore(parameter, low);
+  thetas(1, parameter) = prior.OfScore(parameter, high);
 
   const InputSignals inputs = problem.MakeInputs();
   EnsemblePropagator propagator(problem.MakeEnsemble(thetas, problem.outputs(), 1), &inputs);

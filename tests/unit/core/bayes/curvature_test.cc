@@ -19,7 +19,7 @@ Prior TwoNormals() {
 TEST(Curvature, OfWellInformedParametersIsTheInverseHessian) {
   Matrix hessian(2, 2);
   hessian << 40, 12, 12, 9;
-  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals());
+  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals(), Vector::Zero(2));
   const Eigen::DiagonalMatrix<double, 2> scale(2, 10);
   const Matrix expected = scale * hessian.inverse() * scale;
   EXPECT_TRUE(curvature.covariance.isApprox(expected, 1e-13));
@@ -30,7 +30,7 @@ TEST(Curvature, OfWellInformedParametersIsTheInverseHessian) {
 TEST(Curvature, KeepsThePriorWhereItKnowsLess) {
   for (const double unknown : {0.25, 0.0, -3.0}) {
     const Matrix hessian = Eigen::Vector2d(100, unknown).asDiagonal();
-    const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals());
+    const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals(), Vector::Zero(2));
     EXPECT_NEAR(curvature.standard_deviation[0], 0.2, 1e-14);
     EXPECT_NEAR(curvature.standard_deviation[1], 10, 1e-13);
     EXPECT_TRUE(curvature.limited_by_prior);
@@ -41,7 +41,7 @@ TEST(Curvature, KeepsThePriorAlongAnObliqueValley) {
   // Known across (1, 1) with curvature 10⁴, not at all along it: variance ½ + ½·10⁻⁴ in each unit.
   const Eigen::Vector2d across(M_SQRT1_2, -M_SQRT1_2);
   const Matrix hessian = 1e4 * across * across.transpose();
-  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals());
+  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals(), Vector::Zero(2));
   EXPECT_NEAR(curvature.standard_deviation[0], 2 * std::sqrt(0.5 + 0.5e-4), 1e-12);
   EXPECT_NEAR(curvature.covariance(0, 1), 20 * (0.5 - 0.5e-4), 1e-11);
 }
@@ -51,7 +51,8 @@ TEST(Curvature, IsMeasuredInPriorStandardDeviations) {
   // curvature of 3 is the prior's own, 12 halves the deviation.
   const Prior prior({UncertainParameter::Uniform("a", 0, 6).value()});
   const auto deviation = [&](double curvature) {
-    return CovarianceFromCurvature(Matrix::Constant(1, 1, curvature), prior).standard_deviation[0];
+    return CovarianceFromCurvature(Matrix::Constant(1, 1, curvature), prior, Vector::Zero(1))
+        .standard_deviation[0];
   };
   EXPECT_NEAR(deviation(2.9), std::sqrt(3.0), 1e-14);
   EXPECT_NEAR(deviation(12), std::sqrt(3.0) / 2, 1e-14);
@@ -60,7 +61,7 @@ TEST(Curvature, IsMeasuredInPriorStandardDeviations) {
 TEST(Curvature, ThatIsNoNumberLeavesThePrior) {
   Matrix hessian = Matrix::Identity(2, 2);
   hessian(0, 1) = hessian(1, 0) = std::numeric_limits<double>::quiet_NaN();
-  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals());
+  const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals(), Vector::Zero(2));
   EXPECT_EQ(curvature.standard_deviation, Vector(Eigen::Vector2d(2, 10)));
   EXPECT_TRUE(curvature.limited_by_prior);
 }

@@ -1,0 +1,76 @@
+#include "core/bayes/copula.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kLeastEigenvalue = 1e-8;
+
+absl::Status Invalid(const std::string& field, const std::string& rule) {
+  return absl::InvalidArgumentError(absl::StrFormat("%s: %s", field, rule));
+}
+
+absl::StatusOr<Eigen::Index> Find(const std::vector<UncertainParameter>& parameters,
+                                  const std::string& field, const std::string& name) {
+  std::vector<std::string> names;
+  for (const UncertainParameter& parameter : parameters) names.push_back(parameter.name);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return found - names.begin();
+  return Invalid(field, absl::StrFormat("unknown parameter \"%s\"; uncertain are %s", name,
+                                        absl::StrJoin(names, ", ")));
+}
+
+absl::Status CheckPositiveDefinite(const Matrix& matrix,
+                                   const std::vector<Correlation>& correlations) {
+  const double least =
+      Eigen::SelfAdjointEigenSolver<Matrix>(matrix, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  if (least >= kLeastEigenvalue) return absl::OkStatus();
+  std::vector<std::string> pairs;
+  for (const Correlation& pair : correlations) {
+    pairs.push_back(absl::StrFormat("%s and %s %g", pair.first, pair.second, pair.coefficient));
+  }
+  return Invalid("correlations",
+                 absl::StrFormat("%s: no parameters can be correlated like this together; the "
+                                 "matrix of the coefficients has the eigenvalue %.3g and must be "
+                                 "positive definite, with none below %g",
+                                 absl::StrJoin(pairs, ", "), least, kLeastEigenvalue));
+}
+
+}  // namespace
+
+absl::StatusOr<Matrix> CorrelationMatrix(const std::vector<UncertainParameter>& parameters,
+                                         const std::vector<Correlation>& correlations) {
+  const auto n = static_cast<Eigen::Index>(parameters.size());
+  Matrix matrix = Matrix::Identity(n, n);
+  std::set<std::pair<Eigen::Index, Eigen::Index>> seen;
+  for (size_t k = 0; k < correlations.size(); ++k) {
+    const Correlation& pair = correlations[k];
+    const std::string field = absl::StrFormat("correlations[%d]", k);
+    POLYEST_ASSIGN_OR_RETURN(const Eigen::Index i, Find(parameters, field, pair.first));
+    POLYEST_ASSIGN_OR_RETURN(const Eigen::Index j, Find(parameters, field, pair.second));
+    if (i == j) {
+      return Invalid(field, absl::StrFormat("%s cannot be correlated with itself", pair.first));
+    }
+    if (!seen.insert(std::minmax({i, j})).second) {
+      return Invalid(field, absl::StrFormat("%s and %s are given twice", pair.first, pair.second));
+    }
+    if (!(pair.coefficient > -1 && pair.coefficient < 1)) {
+      return Invalid(field, absl::StrFormat("coefficient %g of %s and %s must lie between -1 and 1",
+                                            pair.coefficient, pair.first, pair.second));
+    }
+    matrix(i, j) = matrix(j, i) = pair.coefficient;
+  }
+  POLYEST_RETURN_IF_ERROR(CheckPositiveDefinite(matrix, correlations));
+  return matrix;
+}
+
+}  // namespace polyest
