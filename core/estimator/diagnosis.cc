@@ -15,6 +15,8 @@ namespace {
 constexpr double kMisfitDeviations = 6;
 constexpr double kMisfitRatio = 1.5;
 constexpr double kAtBound = 1e-6;  // of the width of Ω
+// The same for a correlated parameter: its score has no bound, and only ever nears the parameter's.
+constexpr double kNearBound = 1e-4;
 constexpr size_t kFailuresNamed = 3;
 
 const std::string& Name(const Findings& findings, int i) {
@@ -70,9 +72,10 @@ int BoundReached(const Findings& findings, int i) {
   const Germ& germ = prior.parameters()[static_cast<size_t>(i)].germ;
   const double x = prior.MarginalGerm(i, prior.ToScores(findings.map_xi)[i]);
   const double width = germ.Upper() - germ.Lower();
-  const double scale = std::isfinite(width) ? width : 1;
-  if (x - germ.Lower() < kAtBound * scale) return -1;
-  return germ.Upper() - x < kAtBound * scale ? 1 : 0;
+  const double part = prior.germs()[static_cast<size_t>(i)] == germ ? kAtBound : kNearBound;
+  const double near = part * (std::isfinite(width) ? width : 1);
+  if (x - germ.Lower() < near) return -1;
+  return germ.Upper() - x < near ? 1 : 0;
 }
 
 // A prior that is densest at a bound puts the estimate there by itself, where the data are silent.

@@ -236,7 +236,8 @@ TEST(Cost, OfTheFrequencyExampleHasItsMinimumInTheValley) {
 TEST(Cost, OfTheFrequencyExampleLeavesTheMassAtItsPrior) {
   const Cost cost = FrequencyCost(0.0628, 1);
   const Minimum minimum = FrequencyMinimum(cost);
-  const Curvature curvature = CovarianceFromCurvature(cost.Hessian(minimum.point), cost.prior());
+  const Curvature curvature =
+      CovarianceFromCurvature(cost.Hessian(minimum.point), cost.prior(), minimum.point);
   // Inverse Hessian of (55) at its minimum.
   EXPECT_NEAR(curvature.standard_deviation[0] / 6.667, 0.973781, 1e-5);
   EXPECT_NEAR(curvature.standard_deviation[1] / 1052.8, 0.267533, 1e-5);

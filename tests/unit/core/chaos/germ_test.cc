@@ -14,11 +14,16 @@
 namespace polyest {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 const std::vector<Germ>& AllGerms() {
   static const std::vector<Germ> germs = {
-      Germ::Normal(),       Germ::Uniform(),  Germ::Beta(2, 2),    Germ::Beta(1, 1),
-      Germ::Beta(1.5, 4.2), Germ::Beta(1, 3), Germ::Beta(30, 2.5), Germ::Gamma(1),
-      Germ::Gamma(2.7),     Germ::Gamma(50)};
+      Germ::Normal(), Germ::Uniform(), Germ::Beta(2, 2), Germ::Beta(1, 1), Germ::Beta(1.5, 4.2),
+      Germ::Beta(1, 3), Germ::Beta(30, 2.5), Germ::Gamma(1), Germ::Gamma(2.7), Germ::Gamma(50),
+      // Lopsided, one-sided, far out in a tail, narrow, and hardly cut at all.
+      Germ::TruncatedNormal(-1, 2.5), Germ::TruncatedNormal(-kInfinity, 0.3),
+      Germ::TruncatedNormal(4.5, kInfinity), Germ::TruncatedNormal(0.4, 0.401),
+      Germ::TruncatedNormal(-9, kInfinity)};
   return germs;
 }
 
@@ -35,13 +40,16 @@ double Integral(const Germ& germ, const std::function<double(double)>& f) {
   for (int i = -12 * 64; i <= 12 * 64; ++i) {
     const double t = i * kStep;
     double xi = t, slope = 1;
-    if (germ.family() == GermFamily::kGamma) {
-      xi = std::exp(t - std::exp(-t));
-      slope = xi * (1 + std::exp(-t));
-    } else if (germ.family() != GermFamily::kNormal) {
+    const bool below = std::isfinite(germ.Lower()), above = std::isfinite(germ.Upper());
+    if (below != above) {  // away from the one bound
+      const double distance = std::exp(t - std::exp(-t));
+      xi = below ? germ.Lower() + distance : germ.Upper() - distance;
+      slope = distance * (1 + std::exp(-t));
+    } else if (below) {
       const double s = std::numbers::pi / 2 * std::sinh(t);
-      xi = std::tanh(s);
-      slope = std::numbers::pi / 2 * std::cosh(t) / (std::cosh(s) * std::cosh(s));
+      const double half = 0.5 * (germ.Upper() - germ.Lower());
+      xi = 0.5 * (germ.Upper() + germ.Lower()) + half * std::tanh(s);
+      slope = half * std::numbers::pi / 2 * std::cosh(t) / (std::cosh(s) * std::cosh(s));
     }
     const double density = germ.Density(xi) * slope;
     if (density > 1e-280) sum += kStep * density * f(xi);
@@ -245,6 +253,89 @@ TEST(Germ, KeepsItsAccuracyUpToTheLargestShape) {
   }
 }
 
+// Robert's formulas: with Z = Φ(b) − Φ(a), mean (φ(a) − φ(b))/Z, variance 1 + (aφ(a) − bφ(b))/Z −
+// mean².
+TEST(TruncatedNormal, HasTheClosedFormsMoments) {
+  const Germ normal = Germ::Normal();
+  for (const auto& [a, b] : {std::pair{-1.0, 2.5}, {-3.0, 0.5}, {0.5, 4.0}}) {
+    const double z = normal.CumulativeProbability(b) - normal.CumulativeProbability(a);
+    const double mean = (normal.Density(a) - normal.Density(b)) / z;
+    const double variance = 1 + (a * normal.Density(a) - b * normal.Density(b)) / z - mean * mean;
+    EXPECT_NEAR(Germ::TruncatedNormal(a, b).Mean(), mean, 1e-13);
+    EXPECT_NEAR(Germ::TruncatedNormal(a, b).StandardDeviation(), std::sqrt(variance), 1e-13);
+  }
+  // The half-normal: √(2/π) and 1 − 2/π.
+  const Germ half = Germ::TruncatedNormal(0, kInfinity);
+  EXPECT_NEAR(half.Mean(), std::sqrt(2 / std::numbers::pi), 1e-14);
+  EXPECT_NEAR(half.StandardDeviation(), std::sqrt(1 - 2 / std::numbers::pi), 1e-14);
+}
+
+TEST(TruncatedNormal, WithoutBoundsIsNormalAndWithNarrowOnesUniform) {
+  const RecurrenceCoefficients whole = Germ::TruncatedNormal(-kInfinity, kInfinity).Recurrence(30);
+  EXPECT_LT(whole.a.cwiseAbs().maxCoeff(), 1e-11);
+  EXPECT_TRUE(whole.b.isApprox(Germ::Normal().Recurrence(30).b, 1e-11));
+  // Over [−h, h] the density changes by h²/2 of itself.
+  const double h = 1e-4;
+  const RecurrenceCoefficients narrow = Germ::TruncatedNormal(-h, h).Recurrence(12);
+  EXPECT_TRUE(narrow.b.tail(11).isApprox(h * h * Germ::Uniform().Recurrence(12).b.tail(11), h * h));
+}
+
+// By panels of 1/50, in each of which eight Gauss–Legendre nodes are exact to rounding for
+// polynomials whose zeros lie no closer.
+TEST(TruncatedNormal, HasAsManyOrthonormalPolynomialsAsItSays) {
+  const int order = Germ::kMostTruncatedNormalOrder;
+  const GaussRule rule = MakeGaussRule(Germ::Uniform(), 8);
+  const double width = 0.02;
+  const Germ germ = Germ::TruncatedNormal(-1, kInfinity);
+  const RecurrenceCoefficients recurrence = germ.Recurrence(order + 1);
+  double square = 0, product = 0;
+  for (int panel = 0; panel < 38 * 50; ++panel) {
+    for (int i = 0; i < 8; ++i) {
+      const double xi = -1 + width * (panel + 0.5 * (1 + rule.nodes[i]));
+      double value = 1, before = 0;
+      for (int k = 0; k < order; ++k) {
+        const double next = (xi - recurrence.a[k]) * value - std::sqrt(recurrence.b[k]) * before;
+        before = value;
+        value = next / std::sqrt(recurrence.b[k + 1]);
+      }
+      const double weight = width * rule.weights[i] * germ.Density(xi);
+      square += weight * value * value;
+      product += weight * value * before;
+    }
+  }
+  EXPECT_NEAR(square, 1, 1e-9);
+  EXPECT_NEAR(product, 0, 1e-9);
+}
+
+TEST(TruncatedNormal, QuantileKeepsBothTails) {
+  const Germ germ = Germ::TruncatedNormal(-kInfinity, 3);
+  // P(ξ < −20 | ξ < 3) = Φ(−20)/Φ(3)
+  const double tail = Germ::Normal().CumulativeProbability(-20) / 0.99865010196836991;
+  EXPECT_NEAR(germ.Quantile(tail), -20, 1e-12);
+  EXPECT_NEAR(germ.CumulativeProbability(-20) / tail, 1, 1e-12);
+  // Beyond 4.5 the density is all but e^{−4.5 (ξ − 4.5)}.
+  EXPECT_NEAR(Germ::TruncatedNormal(4.5, kInfinity).Quantile(1e-9), 4.5 + 1e-9 / 4.7, 1e-10);
+}
+
+TEST(Germ, NormalScoresMapThereAndBackInBothTails) {
+  for (const Germ& germ : AllGerms()) {
+    SCOPED_TRACE(Name(germ));
+    EXPECT_NEAR(germ.NormalScore(germ.Quantile(0.2)), Germ::Normal().Quantile(0.2), 1e-8);
+    for (const double score : {-5.0, -1.0, 0.0, 0.5, 3.0, 5.0}) {
+      const double xi = germ.OfNormalScore(score);
+      // ξ rounds; in the score that is dz/dξ = ρ/φ times as much.
+      const double rounding =
+          4e-16 * (std::abs(xi) + 1) * germ.Density(xi) / Germ::Normal().Density(score);
+      EXPECT_NEAR(germ.NormalScore(xi), score, 1e-11 + 4 * rounding) << score;
+    }
+    EXPECT_LE(germ.OfNormalScore(-40), germ.OfNormalScore(-30));
+    EXPECT_GE(germ.OfNormalScore(40), germ.OfNormalScore(30));
+    EXPECT_TRUE(std::isfinite(germ.OfNormalScore(1000)));
+  }
+  // Exact where 1 − p has rounded to nothing: 1 − e^{−x} = Φ(20), x = −log Φ(−20).
+  EXPECT_NEAR(Germ::Gamma(1).OfNormalScore(20), 203.91715537109727, 1e-9);
+}
+
 TEST(GaussRule, IntegratesPolynomialsExactly) {
   for (const Germ& germ : AllGerms()) {
     SCOPED_TRACE(Name(germ));
@@ -275,6 +366,8 @@ TEST(GermDeathTest, ShapesBelowOneAndCertainProbabilitiesAreProgrammersErrors) {
   EXPECT_DEATH(Germ::Beta(0.5, 2), "check failed");
   EXPECT_DEATH(Germ::Gamma(0.9), "check failed");
   EXPECT_DEATH(Germ::Uniform().Quantile(0), "check failed");
+  EXPECT_DEATH(Germ::TruncatedNormal(2, 2), "check failed");
+  EXPECT_DEATH(Germ::TruncatedNormal(8, 9), "check failed");
 }
 
 }  // namespace
