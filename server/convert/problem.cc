@@ -5,6 +5,7 @@
 #include <absl/strings/string_view.h>
 #include <absl/strings/strip.h>
 
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,18 @@ absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem)
       "model: a model must be named, as in {\"builtin\": \"duffing\"}");
 }
 
+absl::StatusOr<UncertainParameter> ToTruncatedNormal(
+    const std::string& name, const v1::UncertainParameter::TruncatedNormalPrior& prior) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!prior.has_lower() && !prior.has_upper()) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("uncertain %s: truncatedNormal: lower or upper must be given", name));
+  }
+  return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
+                                             prior.has_lower() ? prior.lower() : -kInfinity,
+                                             prior.has_upper() ? prior.upper() : kInfinity);
+}
+
 // The prior, and the name of its family for a message.
 std::pair<absl::StatusOr<UncertainParameter>, const char*> ToPrior(
     const v1::UncertainParameter& parameter) {
@@ -76,13 +89,18 @@ std::pair<absl::StatusOr<UncertainParameter>, const char*> ToPrior(
       return {UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift()),
               "gamma"};
     }
-    case v1::UncertainParameter::kLognormal:
+    case v1::UncertainParameter::kLognormal: {
+      const auto& prior = parameter.lognormal();
+      return {UncertainParameter::Lognormal(name, prior.mean(), prior.std_dev()), "lognormal"};
+    }
     case v1::UncertainParameter::kTruncatedNormal:
+      return {ToTruncatedNormal(name, parameter.truncated_normal()), "truncatedNormal"};
     case v1::UncertainParameter::PRIOR_NOT_SET:
       break;
   }
   return {absl::InvalidArgumentError(absl::StrFormat(
-              "%s needs a prior: uniform, normal, beta or gamma", name.empty() ? "it" : name)),
+              "%s needs a prior: uniform, normal, beta, gamma, lognormal or truncatedNormal",
+              name.empty() ? "it" : name)),
           ""};
 }
 
@@ -108,6 +126,14 @@ absl::StatusOr<std::vector<UncertainParameter>> ToUncertain(const v1::Problem& p
     uncertain.push_back(*std::move(parameter));
   }
   return uncertain;
+}
+
+std::vector<Correlation> ToCorrelations(const v1::Problem& problem) {
+  std::vector<Correlation> correlations;
+  for (const v1::Correlation& pair : problem.correlations()) {
+    correlations.push_back({pair.first(), pair.second(), pair.coefficient()});
+  }
+  return correlations;
 }
 
 // `path` is that of a table or a streamed signal.
@@ -267,6 +293,7 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given) {
   POLYEST_ASSIGN_OR_RETURN(problem.model, ToModel(given));
   problem.fixed = {given.fixed().begin(), given.fixed().end()};
   POLYEST_ASSIGN_OR_RETURN(problem.uncertain, ToUncertain(given));
+  problem.correlations = ToCorrelations(given);
   POLYEST_ASSIGN_OR_RETURN(problem.inputs, ToInputs(given));
   problem.measured = ToMeasured(given);
   POLYEST_ASSIGN_OR_RETURN(problem.expansion, ToExpansion(given.expansion()));

@@ -1,5 +1,8 @@
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <limits>
 
 #include "server/convert/problem.h"
 #include "tests/unit/server/problem_json.h"
@@ -75,7 +78,8 @@ TEST(ToProblem, KnowsEveryPrior) {
     {"name": "k", "uniform": {"lower": 30, "upper": 50}},
     {"name": "c", "normal": {"mean": 0.2, "stdDev": 0.03}},
     {"name": "v0", "beta": {"alpha": 2, "beta": 3, "lower": -1, "upper": 3}},
-    {"name": "m", "gamma": {"shape": 4, "scale": 0.1, "shift": 1}}
+    {"name": "m", "gamma": {"shape": 4, "scale": 0.1, "shift": 1}},
+    {"name": "x0", "lognormal": {"mean": 40, "stdDev": 5}}
   ], "expansion": {"order": 2}})"));
   const auto resolved = ToProblem(given);
   ASSERT_TRUE(resolved.ok()) << resolved.status();
@@ -91,6 +95,50 @@ TEST(ToProblem, KnowsEveryPrior) {
   EXPECT_DOUBLE_EQ(std_dev[2], 4 * std::sqrt(6.0 / 6) / 5);
   EXPECT_DOUBLE_EQ(mean[3], 1.4);
   EXPECT_DOUBLE_EQ(std_dev[3], 0.2);
+  EXPECT_NEAR(mean[4], 40, 1e-12);
+  EXPECT_NEAR(std_dev[4], 5, 1e-12);
+}
+
+absl::StatusOr<ResolvedProblem> WithUncertain(const std::string& rest) {
+  v1::Problem given = SmallProblem();
+  given.clear_fixed();
+  given.clear_uncertain();
+  given.MergeFrom(ProblemFromJson("{" + rest + "}"));
+  return ToProblem(given);
+}
+
+TEST(ToProblem, LeavesABoundThatIsNotGivenOpen) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const auto resolved = WithUncertain(R"("uncertain": [
+    {"name": "c", "truncatedNormal": {"mean": 1, "stdDev": 2, "lower": 0}},
+    {"name": "k", "truncatedNormal": {"mean": 1, "stdDev": 2, "upper": 2}},
+    {"name": "m", "truncatedNormal": {"mean": 1, "stdDev": 2, "lower": 0.5, "upper": 2}}])");
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  const Prior& prior = resolved->prior();
+  EXPECT_EQ(prior.lower(), Vector(Eigen::Vector3d(-0.5, -kInfinity, -0.25)));
+  EXPECT_EQ(prior.upper(), Vector(Eigen::Vector3d(kInfinity, 0.5, 0.5)));
+  EXPECT_EQ(prior.parameters()[0].location, 1);
+  EXPECT_EQ(prior.parameters()[0].scale, 2);
+}
+
+constexpr char kTwoNormals[] = R"("uncertain": [
+    {"name": "k", "normal": {"mean": 40, "stdDev": 1}},
+    {"name": "c", "normal": {"mean": 0.2, "stdDev": 0.03}}])";
+
+TEST(ToProblem, CorrelatesPriors) {
+  const auto resolved = WithUncertain(absl::StrCat(
+      kTwoNormals, R"(, "correlations": [{"first": "k", "second": "c", "coefficient": 0.6}])"));
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_NEAR(resolved->prior().factor()(1, 0), 0.6, 1e-15);
+}
+
+TEST(ToProblem, NamesThePlaceOfABadCorrelation) {
+  EXPECT_EQ(WithUncertain(absl::StrCat(kTwoNormals, R"(, "correlations": [
+                {"first": "k", "second": "c", "coefficient": 0.6},
+                {"first": "kk", "second": "c", "coefficient": 0.6}])"))
+                .status()
+                .message(),
+            "correlations[1]: unknown parameter \"kk\"; uncertain are k, c");
 }
 
 template <typename Signal>
@@ -177,8 +225,18 @@ TEST(ToProblem, NamesThePlaceOfABadPrior) {
               StartsWith("uncertain[0].beta: alpha 0.5"));
   EXPECT_THAT(MessageWith(R"({"uncertain": [{"name": "v0", "gamma": {"shape": 0, "scale": 1}}]})"),
               StartsWith("uncertain[0].gamma: shape 0"));
+  EXPECT_EQ(
+      MessageWith(R"({"uncertain": [{"name": "v0", "lognormal": {"mean": -1, "stdDev": 1}}]})"),
+      "uncertain[0].lognormal: mean -1 must be > 0");
+  EXPECT_EQ(MessageWith(
+                R"({"uncertain": [{"name": "v0", "truncatedNormal": {"mean": 1, "stdDev": 1}}]})"),
+            "uncertain[0].truncatedNormal: lower or upper must be given");
+  EXPECT_EQ(MessageWith(R"({"uncertain": [{"name": "v0", "truncatedNormal": {"mean": 1, "stdDev": 1,
+                                           "lower": 3, "upper": 2}}]})"),
+            "uncertain[0].truncatedNormal: lower 3 must be below upper 2");
   EXPECT_EQ(MessageWith(R"({"uncertain": [{"name": "v0"}]})"),
-            "uncertain[0]: v0 needs a prior: uniform, normal, beta or gamma");
+            "uncertain[0]: v0 needs a prior: uniform, normal, beta, gamma, lognormal or "
+            "truncatedNormal");
   EXPECT_EQ(MessageWith(R"({"uncertain": [{"uniform": {"lower": 0, "upper": 1}}]})"),
             "uncertain[0]: name must not be empty");
 }
