@@ -5,8 +5,9 @@
 //
 //   x − γ f(t, x) − known = 0,
 //
-// Newton's matrix I − γ ∂f/∂x has one small block a point. The blocks of the Jacobian come from
-// differences that move one state of all points at once, and are factored kLanes points at a time.
+// Newton's matrix I − γ ∂f/∂x has one small block a point. The blocks of the Jacobian are
+// exact where the system has them, otherwise they come from differences that move one state of all
+// points at once, and are factored kLanes points at a time.
 // They are kept while the iteration converges: factored anew when γ has changed by more than 30 %,
 // evaluated anew after 20 steps or a failure to converge; in between, the correction is scaled by
 // 2/(1 + γ/γ_factored).

@@ -14,6 +14,11 @@ class EnsembleSystem {
   virtual Eigen::Index points() const = 0;  // a multiple of kLanes
   virtual Eigen::Index states() const = 0;
   virtual void Derivatives(double time_s, const ConstBlock& states, Block derivatives) = 0;
+  // ∂f_i/∂x_s in column s·states() + i, if it is known exactly; otherwise false and nothing is
+  // written.
+  virtual bool StateJacobian(double /*time_s*/, const ConstBlock& /*states*/, Block /*jacobian*/) {
+    return false;
+  }
 };
 
 struct IntegratorOutcome {

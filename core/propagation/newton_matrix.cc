@@ -15,6 +15,14 @@ NewtonMatrix::NewtonMatrix(EnsembleSystem* system)
 
 void NewtonMatrix::Differentiate(double time_s, const Eigen::ArrayXXd& states,
                                  const ErrorScale& scale) {
+  // A derivative may be infinite where the function is not, as that of √x at 0.
+  const bool exact =
+      system_->StateJacobian(time_s, states, jacobian_) && jacobian_.isFinite().all();
+  if (!exact) TakeDifferences(time_s, states, scale);
+}
+
+void NewtonMatrix::TakeDifferences(double time_s, const Eigen::ArrayXXd& states,
+                                   const ErrorScale& scale) {
   const Eigen::Index count = states.cols();
   const double root_epsilon = std::sqrt(std::numeric_limits<double>::epsilon());
   system_->Derivatives(time_s, states, rates_);

@@ -14,12 +14,15 @@ class NewtonMatrix {
  public:
   explicit NewtonMatrix(EnsembleSystem* system);
 
-  // ∂f/∂x at (time_s, states) by forward differences; `scale` says how large a state is.
+  // ∂f/∂x at (time_s, states): exact where the system has it and it is finite, otherwise by forward
+  // differences; `scale` says how large a state is.
   void Differentiate(double time_s, const Eigen::ArrayXXd& states, const ErrorScale& scale);
   void Factor(double gamma);
   void SolveInPlace(Eigen::ArrayXXd& x) { lu_.SolveInPlace(x); }
 
  private:
+  void TakeDifferences(double time_s, const Eigen::ArrayXXd& states, const ErrorScale& scale);
+
   EnsembleSystem* system_;
   Eigen::ArrayXXd jacobian_;  // points × (states · states), column s·states + i is ∂f_i/∂x_s
   Eigen::ArrayXXd moved_, rates_, moved_rates_;

@@ -76,6 +76,12 @@ void TrajectoryBlock::Derivatives(double time_s, const ConstBlock& states, Block
   model_->Derivatives(time_s, states, parameters_, inputs_.At(time_s), derivatives);
 }
 
+bool TrajectoryBlock::StateJacobian(double time_s, const ConstBlock& states, Block jacobian) {
+  if (!model_->has_state_jacobian()) return false;
+  model_->StateJacobian(time_s, states, parameters_, inputs_.At(time_s), jacobian);
+  return true;
+}
+
 TrajectoryBlock::StopTime TrajectoryBlock::NextStop() {
   const BlockInputs::Break next = inputs_.NextBreak();
   const StopTime stop = {next.time_s, next.jumps, true};

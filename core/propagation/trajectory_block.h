@@ -34,6 +34,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   Eigen::Index points() const override { return states_.rows(); }
   Eigen::Index states() const override { return states_.cols(); }
   void Derivatives(double time_s, const ConstBlock& states, Block derivatives) override;
+  bool StateJacobian(double time_s, const ConstBlock& states, Block jacobian) override;
 
   // As EnsemblePropagator::Advance, for this block's rows of outputs.
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);

@@ -9,6 +9,7 @@
 #include "core/common/status.h"
 #include "core/model/equations/differentiate.h"
 #include "core/model/equations/equation_reader.h"
+#include "core/model/equations/equation_units.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/program.h"
 
@@ -154,7 +155,8 @@ Programs Assembly::Compile(const std::vector<Lookup>& tables) {
   return programs;
 }
 
-ModelDescription Describe(const EquationSpecification& specification, const ReadEquations& read) {
+ModelDescription Describe(const EquationSpecification& specification, const ReadEquations& read,
+                          const std::map<std::string, std::string>& output_units) {
   const auto unit = [&specification](const std::string& name) {
     const auto found = specification.units.find(name);
     return found == specification.units.end() ? std::string() : found->second;
@@ -174,7 +176,9 @@ ModelDescription Describe(const EquationSpecification& specification, const Read
     append(intermediate.name, intermediate.syntax.text);
   }
   for (const Definition& output : read.outputs) {
-    description.outputs.push_back({output.name, unit(output.name), ""});
+    const auto output_unit = output_units.find(output.name);
+    description.outputs.push_back(
+        {output.name, output_unit == output_units.end() ? "" : output_unit->second, ""});
     append(output.name, output.syntax.text);
   }
   for (const std::string& input : read.inputs) {
@@ -188,12 +192,14 @@ std::shared_ptr<const StateSpaceModel> Make(const EquationSpecification& specifi
                                             std::vector<absl::Status>& problems) {
   const ReadEquations read = Read(specification, problems);
   if (!problems.empty()) return nullptr;
+  const std::map<std::string, std::string> output_units = CheckUnits(specification, read, problems);
   Assembly assembly(read);
   if (absl::Status status = assembly.Assemble(); !status.ok()) {
     problems.push_back(std::move(status));
-    return nullptr;
   }
-  auto model = std::make_shared<EquationModel>(Describe(specification, read), read.tables);
+  if (!problems.empty()) return nullptr;
+  auto model =
+      std::make_shared<EquationModel>(Describe(specification, read, output_units), read.tables);
   model->set_programs(assembly.Compile(model->tables()));
   return model;
 }

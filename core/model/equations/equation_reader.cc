@@ -17,7 +17,8 @@ namespace {
 std::string Path(const char* member) { return absl::StrCat("model.equations.", member); }
 
 std::string Path(const char* member, const std::string& name) {
-  return absl::StrCat("model.equations.", member, ".", name);
+  return IsName(name) ? absl::StrCat(Path(member), ".", name)
+                      : absl::StrCat(Path(member), "[", Quoted(name), "]");
 }
 
 class Reader {
@@ -171,8 +172,7 @@ void Reader::DeclareOutput(const std::string& name) {
 void Reader::ReadAll(const char* member, const std::map<std::string, std::string>& texts,
                      std::vector<Definition>& definitions) {
   for (const auto& [name, text] : texts) {
-    const std::string path = IsName(name) ? Path(member, name) : Path(member);
-    absl::StatusOr<Syntax> syntax = Parse(path, text, table_arguments_);
+    absl::StatusOr<Syntax> syntax = Parse(Path(member, name), text, table_arguments_);
     if (!syntax.ok()) {
       problems_.push_back(std::move(syntax).status());
       continue;

@@ -25,7 +25,7 @@ struct LookupTable {
   std::vector<double> x = {};      // at least two, strictly increasing
   std::vector<double> y = {};      // empty: one-dimensional
   std::vector<double> value = {};  // x.size(), or row-major x.size() × y.size()
-  bool spline = false;        // linear, or natural cubic (bicubic) spline
+  bool spline = false;             // linear, or natural cubic (bicubic) spline
 };
 
 namespace equations {

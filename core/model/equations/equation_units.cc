@@ -1,0 +1,120 @@
+#include "core/model/equations/equation_units.h"
+
+#include <absl/strings/str_format.h>
+
+#include <optional>
+#include <utility>
+
+#include "core/model/equations/unit_check.h"
+#include "core/model/units.h"
+
+namespace polyest::equations {
+namespace {
+
+class ModelUnits {
+ public:
+  ModelUnits(const EquationSpecification& specification, const ReadEquations& read,
+             std::vector<absl::Status>& problems)
+      : specification_(specification), read_(read), problems_(problems) {}
+
+  std::map<std::string, std::string> Run() {
+    // Who gives no units may write sin(t).
+    if (specification_.units.empty()) return {};
+    ReadGiven();
+    if (!problems_.empty()) return {};
+    SetInitialUnits();
+    const Unit second = *ParseUnit("s");
+    units_["t"] = second;
+    for (const Definition& definition : read_.intermediates) {
+      const std::optional<Unit> unit = Check(definition, Find(definition.name), "");
+      if (unit) units_.emplace(definition.name, *unit);
+    }
+    for (const Definition& definition : read_.states) {
+      const std::optional<Unit> unit = Find(definition.name);
+      Check(definition, unit ? std::optional(*unit / second) : std::nullopt, ", that of it per s");
+    }
+    std::map<std::string, std::string> outputs;
+    for (const Definition& definition : read_.outputs) {
+      const std::optional<Unit> unit = Check(definition, Find(definition.name), "");
+      if (unit) outputs[definition.name] = InWords(definition.name, *unit);
+    }
+    return outputs;
+  }
+
+ private:
+  void ReadGiven() {
+    for (const auto& [name, text] : specification_.units) {
+      absl::StatusOr<Unit> unit = ParseUnit(text);
+      if (unit.ok()) {
+        units_[name] = *unit;
+      } else {
+        Wrong("model.equations.units." + name, std::string(unit.status().message()));
+      }
+    }
+  }
+
+  void SetInitialUnits() {
+    for (const Definition& state : read_.states) {
+      const std::optional<Unit> unit = Find(state.name);
+      if (!unit) continue;
+      const std::string initial = InitialName(state.name);
+      const auto [given, is_new] = units_.emplace(initial, *unit);
+      if (is_new || SameUnit(given->second, *unit)) continue;
+      Wrong("model.equations.units." + initial,
+            absl::StrFormat("is \"%s\"; it must be that of its state %s, \"%s\"",
+                            specification_.units.at(initial), state.name,
+                            specification_.units.at(state.name)));
+    }
+  }
+
+  std::optional<Unit> Find(const std::string& name) const {
+    const auto found = units_.find(name);
+    return found == units_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+  // The unit of the expression, or the one that it should have.
+  std::optional<Unit> Check(const Definition& definition, const std::optional<Unit>& expected,
+                            const char* reason) {
+    const absl::StatusOr<std::optional<Unit>> unit = InferUnit(definition.syntax, units_);
+    if (!unit.ok()) {
+      problems_.push_back(unit.status());
+      return expected;
+    }
+    if (expected && *unit && !SameUnit(**unit, *expected)) {
+      Wrong(definition.syntax.field,
+            absl::StrFormat("the expression has the unit %s; it must have %s%s", FormatUnit(**unit),
+                            FormatUnit(*expected), reason));
+    }
+    return expected ? expected : *unit;
+  }
+
+  // As its user writes it, here or elsewhere.
+  std::string InWords(const std::string& name, const Unit& unit) const {
+    if (const auto given = specification_.units.find(name); given != specification_.units.end()) {
+      return given->second;
+    }
+    for (const auto& [other, text] : specification_.units) {
+      if (SameUnit(units_.at(other), unit)) return text;
+    }
+    return FormatUnit(unit);
+  }
+
+  void Wrong(const std::string& path, const std::string& rule) {
+    problems_.push_back(absl::InvalidArgumentError(path + ": " + rule));
+  }
+
+  const EquationSpecification& specification_;
+  const ReadEquations& read_;
+  std::vector<absl::Status>& problems_;
+  std::map<std::string, Unit> units_;
+};
+
+}  // namespace
+
+std::map<std::string, std::string> CheckUnits(const EquationSpecification& specification,
+                                              const ReadEquations& read,
+                                              std::vector<absl::Status>& problems) {
+  return ModelUnits(specification, read, problems).Run();
+}
+
+}  // namespace polyest::equations
