@@ -38,6 +38,7 @@ struct KnotsMessage {
   int input = 0;
   std::vector<double> time_s;
   std::vector<double> value;
+  bool finished = false;  // no more will come
 };
 
 struct AdvanceMessage {
@@ -72,24 +73,13 @@ template <class Archive>
 void Fields(Archive& archive, HalfSineBumpInput& input) {
   archive(input.amplitude, input.start_s, input.duration_s);
 }
-// How a signal goes between its knots.
-template <class Archive, class Input>
-void InterpolationField(Archive& archive, Input& input) {
-  if constexpr (requires { input.hold; }) {
-    archive(input.hold);
-  } else {
-    archive(input.interpolation);
-  }
-}
 template <class Archive>
 void Fields(Archive& archive, TableInput& input) {
-  archive(input.time_s, input.value, input.amplitude);
-  InterpolationField(archive, input);
+  archive(input.time_s, input.value, input.interpolation, input.amplitude);
 }
 template <class Archive>
 void Fields(Archive& archive, StreamedInput& input) {
-  archive(input.amplitude);
-  InterpolationField(archive, input);
+  archive(input.interpolation, input.amplitude);
 }
 template <class Archive>
 void Fields(Archive& archive, IntegrationOptions& options) {
@@ -118,7 +108,7 @@ void Fields(Archive& archive, StartMessage& start) {
 }
 template <class Archive>
 void Fields(Archive& archive, KnotsMessage& knots) {
-  archive(knots.input, knots.time_s, knots.value);
+  archive(knots.input, knots.time_s, knots.value, knots.finished);
 }
 template <class Archive>
 void Fields(Archive& archive, AdvanceMessage& advance) {

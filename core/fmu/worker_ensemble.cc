@@ -95,12 +95,13 @@ AdvanceMessage WorkerEnsemble::MakeAdvance(std::span<const double> times_s) {
   AdvanceMessage advance;
   for (size_t i = 0; i < inputs_->size(); ++i) {
     const InputSignal& signal = (*inputs_)[i];
-    const size_t sent = knots_sent_[i];
-    if (!signal.streamed() || signal.knot_times_s().size() == sent) continue;
-    const auto times = signal.knot_times_s().subspan(sent);
-    const auto values = signal.knot_values().subspan(sent);
-    advance.knots.push_back(
-        {static_cast<int>(i), {times.begin(), times.end()}, {values.begin(), values.end()}});
+    if (!signal.streamed()) continue;
+    const auto times = signal.knot_times_s().subspan(knots_sent_[i]);
+    const auto values = signal.knot_values().subspan(knots_sent_[i]);
+    advance.knots.push_back({static_cast<int>(i),
+                             {times.begin(), times.end()},
+                             {values.begin(), values.end()},
+                             signal.finished()});
     knots_sent_[i] += times.size();
   }
   advance.times_s.assign(times_s.begin(), times_s.end());

@@ -241,7 +241,10 @@ absl::Status WorkerProcess::Died() {
   } else if (known) {
     end = absl::StrFormat("ended with status %d", WEXITSTATUS(status));
   }
-  const int64_t used_bytes = int64_t{1024} * usage.ru_maxrss;
+  // The kernel counts what this process had when it started the worker as the worker's.
+  rusage own{};
+  getrusage(RUSAGE_SELF, &own);
+  const int64_t used_bytes = usage.ru_maxrss > own.ru_maxrss ? int64_t{1024} * usage.ru_maxrss : 0;
   const std::string memory =
       used_bytes > limits_.most_memory_bytes / 4 * 3
           ? absl::StrFormat("; it had used %d MiB of memory and the limit is %d MiB",

@@ -86,6 +86,7 @@ class InputSignal {
   void Append(double time_s, double value);
   // No more knots of a streamed signal will come.
   void Finish();
+  bool finished() const { return finished_; }
   // Forgets the knots of a streamed signal: a new run begins.
   void Clear();
 

@@ -14,9 +14,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/fmu/worker/block_inputs.h"
 #include "core/fmu/worker/instance.h"
 #include "core/fmu/worker/pointwise_ensemble.h"
+#include "core/propagation/block_inputs.h"
 
 namespace polyest {
 

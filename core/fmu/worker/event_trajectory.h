@@ -26,9 +26,9 @@
 #include <memory>
 #include <string>
 
-#include "core/fmu/worker/block_inputs.h"
 #include "core/fmu/worker/instance.h"
 #include "core/fmu/worker/pointwise_ensemble.h"
+#include "core/propagation/block_inputs.h"
 
 namespace polyest {
 

@@ -8,6 +8,7 @@ namespace polyest {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kWarning = 1;
 constexpr int kDiscard = 2;
 constexpr int kError = 3;
 constexpr int kMostEventIterations = 1'000;
@@ -27,23 +28,60 @@ const char* StatusInWords(int status) {
 
 }  // namespace
 
-Instance::Instance(const InstanceFactory* factory, int point, std::span<const double> parameters,
+Instance::Instance(InstanceFactory* factory, int point, std::span<const double> parameters,
                    std::span<const double> inputs)
     : factory_(*factory), point_(point), next_event_s_(kInfinity) {
-  log_ = [this](int, const std::string& message) {
-    said_ = message;
-    factory_.monitor->Say(message);
-  };
-  Initialize(parameters, inputs);
+  if (Instantiate()) Initialize(parameters, inputs);
 }
 
 // The FMU's own end is left to the end of the process: there is nothing in it to be kept.
-Instance::~Instance() = default;
+Instance::~Instance() {
+  if (factory_.active == this) factory_.active = nullptr;
+}
+
+bool Instance::Instantiate() {
+  const bool shares = factory_.interface.once_per_process && factory_.interface.can_save_state;
+  factory_.monitor->Enter(FmuCall::kInstantiate, point_, 0);
+  if (!shares || factory_.shared == nullptr) {
+    const std::string name = absl::StrCat(factory_.interface.name, "_", point_);
+    factory_.said.clear();
+    own_ = factory_.library->Instantiate(name, &factory_.log);
+    if (own_ == nullptr) return Fail(kError, "the FMU refused to be instantiated");
+  }
+  binding_ = own_.get();
+  if (shares) {
+    if (own_ != nullptr) factory_.shared = std::move(own_);
+    binding_ = factory_.shared.get();
+    if (factory_.untouched == nullptr && binding_->SaveState(&factory_.untouched) > kWarning) {
+      return Fail(kError, "the FMU could not save its state");
+    }
+  }
+  factory_.monitor->Leave();
+  return true;
+}
+
+// Brings this instance's state into the one that all share.
+bool Instance::Activate() {
+  if (factory_.shared == nullptr || factory_.active == this) return true;
+  factory_.monitor->Enter(FmuCall::kState, point_, time_s_);
+  Instance* const other = factory_.active;
+  factory_.active = nullptr;
+  if (other != nullptr && !other->broken_ && binding_->SaveState(&other->state_) > kWarning) {
+    other->Fail(kError, "the FMU could not save its state");
+  }
+  void* const state = state_ == nullptr ? factory_.untouched : state_;
+  if (binding_->RestoreState(state) > kWarning) {
+    return Fail(kError, "the FMU could not restore its state");
+  }
+  factory_.active = this;
+  return true;
+}
 
 // Calls `call`, which answers an FMI status.
 template <class Call>
 bool Instance::Do(FmuCall kind, Call call) {
-  if (broken_) return false;
+  if (broken_ || !Activate()) return false;
+  factory_.said.clear();
   factory_.monitor->Enter(kind, point_, time_s_);
   const int status = call();
   factory_.monitor->Leave();
@@ -52,18 +90,13 @@ bool Instance::Do(FmuCall kind, Call call) {
 }
 
 bool Instance::Fail(int status, const std::string& what) {
-  failure_ = said_.empty() ? what : absl::StrCat(what, ": ", said_);
+  failure_ = factory_.said.empty() ? what : absl::StrCat(what, ": ", factory_.said);
   failure_status_ = status;
   broken_ = broken_ || status != kDiscard;
   return false;
 }
 
 bool Instance::Initialize(std::span<const double> parameters, std::span<const double> inputs) {
-  const std::string name = absl::StrCat(factory_.interface.name, "_", point_);
-  factory_.monitor->Enter(FmuCall::kInstantiate, point_, 0);
-  binding_ = factory_.library->Instantiate(name, &log_);
-  factory_.monitor->Leave();
-  if (binding_ == nullptr) return Fail(kError, "the FMU refused to be instantiated");
   const bool initialized =
       (parameters.empty() ||
        Do(FmuCall::kSetVariables,

@@ -17,19 +17,29 @@
 namespace polyest {
 
 // What one worker's instances have in common.
+class Instance;
+
 struct InstanceFactory {
   FmuInterface interface;
   std::vector<FmuVariable> parameters, inputs, outputs;
   double relative_tolerance = 0;
   FmuLibrary* library = nullptr;
   Monitor* monitor = nullptr;
+
+  std::string said;  // by the FMU, during the present call
+  FmuLog log;
+  // Of an FMU that can be instantiated only once: its one instance, its state before all
+  // initialization, and whose state it has at present.
+  std::unique_ptr<Binding> shared;
+  void* untouched = nullptr;
+  Instance* active = nullptr;
 };
 
 class Instance {
  public:
   // Instantiated and initialized with these values, at t = 0; of Model Exchange also through its
   // first event iteration into continuous time. failure() tells of one that failed.
-  Instance(const InstanceFactory* factory, int point, std::span<const double> parameters,
+  Instance(InstanceFactory* factory, int point, std::span<const double> parameters,
            std::span<const double> inputs);
   ~Instance();
   Instance(const Instance&) = delete;
@@ -60,22 +70,24 @@ class Instance {
   bool DoStep(double time_s, double step_s);
 
  private:
+  bool Instantiate();
+  bool Activate();
   bool Initialize(std::span<const double> parameters, std::span<const double> inputs);
   bool IterateEvents();
   bool Fail(int status, const std::string& what);
   template <class Call>
   bool Do(FmuCall kind, Call call);
 
-  const InstanceFactory& factory_;
+  InstanceFactory& factory_;
   const int point_;
   double time_s_ = 0;
   double next_event_s_;
-  FmuLog log_;
-  std::string said_;  // by the FMU, last
   std::string failure_;
   int failure_status_ = 0;
   bool broken_ = false;
-  std::unique_ptr<Binding> binding_;
+  std::unique_ptr<Binding> own_;
+  Binding* binding_ = nullptr;  // own_ or the shared one
+  void* state_ = nullptr;       // saved, while another has the shared one
 };
 
 }  // namespace polyest

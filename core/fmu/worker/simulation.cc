@@ -19,9 +19,13 @@ Matrix MiddleRows(const Matrix& matrix, int first, int points) {
 }
 
 absl::Status CheckInstances(const FmuInterface& interface, Eigen::Index points) {
-  if (!interface.once_per_process || points == 1) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(
-      "the FMU can be instantiated only once per process, and ", points, " points need one each"));
+  if (!interface.once_per_process || interface.can_save_state || points == 1) {
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat("the FMU can be instantiated only once per process and cannot save its state, "
+                   "but ",
+                   points, " trajectories are asked for"));
 }
 
 }  // namespace
@@ -49,13 +53,17 @@ Simulation::Simulation(StartMessage start, InputSignals signals,
     : start_(std::move(start)),
       signals_(std::move(signals)),
       library_(std::move(library)),
-      factory_{start_.interface,
-               start_.parameters,
-               start_.inputs,
-               start_.outputs,
-               start_.integration.relative_tolerance,
-               library_.get(),
-               monitor} {
+      factory_{.interface = start_.interface,
+               .parameters = start_.parameters,
+               .inputs = start_.inputs,
+               .outputs = start_.outputs,
+               .relative_tolerance = start_.integration.relative_tolerance,
+               .library = library_.get(),
+               .monitor = monitor} {
+  factory_.log = [this](int, const std::string& message) {
+    factory_.said = message;
+    factory_.monitor->Say(message);
+  };
   channels_.amplitudes = start_.amplitudes;
   channels_.input_delays_s = start_.input_delays_s;
   channels_.input_offsets = start_.input_offsets;
@@ -70,6 +78,7 @@ absl::Status Simulation::AppendKnots(const AdvanceMessage& message) {
     for (size_t i = 0; i < knots.time_s.size(); ++i) {
       signals_[input].Append(knots.time_s[i], knots.value[i]);
     }
+    if (knots.finished && !signals_[input].finished()) signals_[input].Finish();
   }
   return absl::OkStatus();
 }

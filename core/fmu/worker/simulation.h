@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/fmu/messages.h"
-#include "core/fmu/worker/block_inputs.h"
 #include "core/fmu/worker/instance.h"
+#include "core/propagation/block_inputs.h"
 
 namespace polyest {
 

@@ -23,6 +23,10 @@ void* fmi2Instantiate(const char* name, int type, const char* guid, const char* 
                       const Callbacks* callbacks, int visible, int logging) {
   (void)name, (void)type, (void)resources, (void)visible, (void)logging;
   if (strcmp(guid, "polyest-test") != 0) return NULL;
+#ifdef ONLY_ONCE
+  static int instances = 0;
+  if (++instances > 1) return NULL;
+#endif
   return NewFmu(NULL, (void*)callbacks);
 }
 int fmi2SetupExperiment(Fmu* fmu, int has_tolerance, double tolerance, double start_s,

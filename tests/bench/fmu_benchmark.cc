@@ -1,0 +1,50 @@
+// The same oscillator built in and as an FMU of either kind: time per trajectory, and how many
+// times the built-in model's that is.
+//
+//   fmu_benchmark [POINTS] [SECONDS]
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+
+#include "tests/unit/core/fmu/fmu_ensemble.h"
+
+namespace polyest {
+namespace {
+
+// The best of some, in µs a trajectory; starting the workers is a part of it.
+double MicrosecondsPerTrajectory(const std::shared_ptr<const Model>& model, int points,
+                                 double until_s) {
+  FmuEnsemble ensemble(model, points, {"x", "v"});
+  for (int point = 0; point < points; ++point) ensemble.Set("k", point, 3 + 2.0 * point / points);
+  ensemble.Set("x0", 1);
+  const std::vector<double> times_s = TimesUntil(until_s, 0.02);
+  double best_s = 1e9;
+  for (int repetition = 0; repetition < 5; ++repetition) {
+    const auto start = std::chrono::steady_clock::now();
+    ensemble.Propagate(times_s);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    best_s = std::min(best_s, taken.count());
+  }
+  return 1e6 * best_s / points;
+}
+
+void Run(int points, double until_s) {
+  const double built_in =
+      MicrosecondsPerTrajectory(*FindBuiltinModel("mass_spring_damper"), points, until_s);
+  std::printf("%d trajectories of %g s, 50 samples a second\n", points, until_s);
+  std::printf("%-18s %10.1f us\n", "built-in", built_in);
+  for (const char* name :
+       {"oscillator_me2", "oscillator_me3", "oscillator_cs2", "oscillator_cs3"}) {
+    const double fmu = MicrosecondsPerTrajectory(*TestFmus().Find(name), points, until_s);
+    std::printf("%-18s %10.1f us  %8.1f times\n", name, fmu, fmu / built_in);
+  }
+}
+
+}  // namespace
+}  // namespace polyest
+
+int main(int argc, char** argv) {
+  polyest::Run(argc > 1 ? std::atoi(argv[1]) : 64, argc > 2 ? std::atof(argv[2]) : 10);
+  return 0;
+}
