@@ -41,6 +41,7 @@ bool CoSimulationPoint::AdvanceTo(double time_s) {
       failure_ = absl::StrFormat(
           "the FMU takes communication steps of %g s only, of which the time %g s is no multiple",
           interface_.communication_step_s, time_s);
+      good_s_ = time_s_;
       return false;
     }
     const double break_s = inputs_.NextBreak().time_s;
@@ -58,6 +59,7 @@ bool CoSimulationPoint::Step(double to_s) {
     return true;
   }
   failure_ = instance_->failure();
+  good_s_ = time_s_;
   return false;
 }
 
@@ -90,11 +92,12 @@ bool CoSimulationPoint::ReadOutputs(double* outputs) {
   const bool finite = std::all_of(outputs, outputs + output_count_,
                                   [](double value) { return std::isfinite(value); });
   if (!finite) failure_ = "an output is not finite";
+  if (finite) good_s_ = time_s_;
   return finite;
 }
 
 PointFailure CoSimulationPoint::failure() const {
-  return {0, time_s_, instance_->failure_status(), failure_};
+  return {0, good_s_, instance_->failure_status(), failure_};
 }
 
 }  // namespace polyest

@@ -41,6 +41,7 @@ class CoSimulationPoint final : public PointTrajectory {
   const int input_count_;
   const int output_count_;
   double time_s_ = 0;
+  double good_s_ = 0;  // the last time at which nothing was wrong
   std::string failure_;
 };
 

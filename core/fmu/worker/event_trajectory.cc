@@ -19,7 +19,6 @@
 namespace polyest {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kAbsoluteTolerance = 1e-14;
 constexpr double kNominalShare = 1e-3;
 // More events than this, each so close to the one before, accumulate at a point in time.
@@ -134,11 +133,16 @@ int EventTrajectory::ErrorWeights(N_Vector states, N_Vector weights, void* self)
 
 // From the present time and states on, forgetting what was before.
 void EventTrajectory::Restart(double span_s) {
-  // Small enough to see an input that is 0 now.
-  constexpr double kFirstStep = 1.0 / 64;
-  const bool accepted =
-      CVodeReInit(solver_, time_s_, states_) == CV_SUCCESS &&
-      CVodeSetInitStep(solver_, std::isfinite(span_s) ? kFirstStep * span_s : 0) == CV_SUCCESS;
+  // Small enough to see an input that is 0 now; and, as the solver looks for an event indicator
+  // that is 0 now only from a tenth of the first step on, small beside the time from the event
+  // before, as the next one may follow as soon.
+  constexpr double kOfSpan = 1.0 / 64;
+  constexpr double kOfEvents = 1.0 / 16;
+  constexpr double kLeast = 1e-12;
+  const double step_s = std::max(std::min(kOfSpan * span_s, kOfEvents * since_event_s_),
+                                 kLeast * std::max(1.0, time_s_));
+  const bool accepted = CVodeReInit(solver_, time_s_, states_) == CV_SUCCESS &&
+                        CVodeSetInitStep(solver_, std::isfinite(step_s) ? step_s : 0) == CV_SUCCESS;
   POLYEST_CHECK(accepted);
 }
 
@@ -201,7 +205,8 @@ bool EventTrajectory::HandleEvent() {
 }
 
 bool EventTrajectory::CheckAccumulation() {
-  const bool close = time_s_ - last_event_s_ < kClose * std::max(1.0, time_s_);
+  since_event_s_ = time_s_ - last_event_s_;
+  const bool close = since_event_s_ < kClose * std::max(1.0, time_s_);
   close_events_ = close ? close_events_ + 1 : 0;
   last_event_s_ = time_s_;
   if (close_events_ <= kMostCloseEvents) return true;
@@ -212,11 +217,13 @@ bool EventTrajectory::CheckAccumulation() {
 bool EventTrajectory::ReadOutputs(double* outputs) {
   if (!failure_.reason.empty()) return false;
   if (!SetPoint(time_s_, states_) || !instance_->GetOutputs(outputs)) {
-    return Fail(instance_->failure());
+    return FailSinceRead(instance_->failure());
   }
   const bool finite = std::all_of(outputs, outputs + factory_.outputs.size(),
                                   [](double value) { return std::isfinite(value); });
-  return finite || Fail("an output is not finite");
+  if (!finite) return FailSinceRead("an output is not finite");
+  read_s_ = time_s_;
+  return true;
 }
 
 bool EventTrajectory::Fail(int flag) {
@@ -235,6 +242,13 @@ bool EventTrajectory::Fail(const std::string& reason) {
   failure_.reason = reason;
   failure_.time_s = time_s_;
   if (failure_.flag == 0) failure_.flag = instance_->failure_status();
+  return false;
+}
+
+// When outputs were last good is known, and not when they ceased to be.
+bool EventTrajectory::FailSinceRead(const std::string& reason) {
+  Fail(reason);
+  failure_.time_s = read_s_;
   return false;
 }
 

@@ -23,6 +23,7 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -43,6 +44,8 @@ class EventTrajectory final : public PointTrajectory {
   PointFailure failure() const override;
 
  private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
   // Callbacks with this object as user data.
   static int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self);
   static int EventIndicators(double time_s, N_Vector states, double* indicators, void* self);
@@ -50,6 +53,7 @@ class EventTrajectory final : public PointTrajectory {
   static void IgnoreMessage(int, const char*, const char*, char*, void*) {}
 
   void MakeSolver(IntegrationMethod method);
+  // A first step that is small for an interval of this length.
   void Restart(double span_s);
   bool SetPoint(double time_s, N_Vector states);
   // Up to stop_s or to an event before it.
@@ -59,6 +63,7 @@ class EventTrajectory final : public PointTrajectory {
   bool CheckAccumulation();
   bool Fail(int flag);
   bool Fail(const std::string& reason);
+  bool FailSinceRead(const std::string& reason);
   // The FMU's states; the solver has one more if there are none.
   std::span<double> States(N_Vector vector) const;
 
@@ -76,6 +81,8 @@ class EventTrajectory final : public PointTrajectory {
   Vector largest_;  // S, floored by the nominal values
   double time_s_ = 0;
   double last_event_s_ = 0;
+  double since_event_s_ = kInfinity;  // the time between the last two events
+  double read_s_ = 0;                 // outputs were read
   int close_events_ = 0;
   int steps_ = 0;  // since the last sample
   PointFailure failure_;

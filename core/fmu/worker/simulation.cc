@@ -50,16 +50,14 @@ absl::StatusOr<std::unique_ptr<Simulation>> Simulation::Start(StartMessage start
 
 Simulation::Simulation(StartMessage start, InputSignals signals,
                        std::unique_ptr<FmuLibrary> library, Monitor* monitor)
-    : start_(std::move(start)),
-      signals_(std::move(signals)),
-      library_(std::move(library)),
-      factory_{.interface = start_.interface,
-               .parameters = start_.parameters,
-               .inputs = start_.inputs,
-               .outputs = start_.outputs,
-               .relative_tolerance = start_.integration.relative_tolerance,
-               .library = library_.get(),
-               .monitor = monitor} {
+    : start_(std::move(start)), signals_(std::move(signals)), library_(std::move(library)) {
+  factory_.interface = start_.interface;
+  factory_.parameters = start_.parameters;
+  factory_.inputs = start_.inputs;
+  factory_.outputs = start_.outputs;
+  factory_.relative_tolerance = start_.integration.relative_tolerance;
+  factory_.library = library_.get();
+  factory_.monitor = monitor;
   factory_.log = [this](int, const std::string& message) {
     factory_.said = message;
     factory_.monitor->Say(message);

@@ -70,7 +70,8 @@ std::vector<std::string> Names(const std::vector<Quantity>& quantities) {
 TEST_F(FmuFolder, ShowsWhatAnFmuHas) {
   for (const char* name : {"oscillator_me2", "oscillator_me3", "oscillator_cs2"}) {
     SCOPED_TRACE(name);
-    const ModelDescription& model = (*TestFmus().Find(name))->description();
+    const std::shared_ptr<const Model> fmu = *TestFmus().Find(name);
+    const ModelDescription& model = fmu->description();
     EXPECT_EQ(model.name, name);
     EXPECT_EQ(model.summary, "A mass on a spring and damper");
     EXPECT_THAT(Names(model.states), ElementsAre("x", "v"));

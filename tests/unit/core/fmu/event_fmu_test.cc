@@ -65,9 +65,11 @@ TEST_P(Ball, ThatNeverRestsFailsWhereItsEventsAccumulate) {
   ASSERT_THAT(ensemble.failures, testing::SizeIs(1));
   EXPECT_EQ(ensemble.failures[0].point, 0);
   EXPECT_THAT(ensemble.failures[0].reason, testing::HasSubstr("accumulate"));
-  // All bounces together take t_1 (1 + e)/(1 − e).
+  // All bounces together take t_1 (1 + e)/(1 − e). Bounces lower than the local errors of some ten
+  // steps, 1e-7 of the first height each, are lost in them: those begin at v = √(2 g 1e-6 m) and
+  // would take 2 v/(g (1 − e)) together.
   const double end_s = std::sqrt(2 / kG) * 1.7 / 0.3;
-  EXPECT_NEAR(ensemble.failures[0].time_s, end_s, 1e-4);
+  EXPECT_NEAR(ensemble.failures[0].time_s, end_s, 2 * std::sqrt(2 * kG * 1e-6) / (kG * 0.3));
   EXPECT_TRUE(std::isfinite(heights(0, 0)));
   EXPECT_TRUE(std::isnan(heights(0, 1)));
   EXPECT_EQ(heights(1, 1), 0);

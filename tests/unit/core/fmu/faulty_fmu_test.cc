@@ -100,8 +100,9 @@ TEST_F(FaultyFmu, WithoutAFunctionIsRefused) {
               HasSubstr("has no function fmi2DoStep"));
 }
 
-// Three points, of which the middle one fails at 0.3 s.
-void ExpectOneFailure(const char* fmu, const char* fault, const char* reason) {
+// Three points, of which the middle one fails at 0.3 s, or before it when a step led there.
+void ExpectOneFailure(const char* fmu, const char* fault, const char* reason,
+                      bool sees_ahead = false) {
   SCOPED_TRACE(fmu);
   FmuEnsemble ensemble(fmu, 3, {"x"});
   ensemble.Set(fault, 1, 0.3);
@@ -110,19 +111,21 @@ void ExpectOneFailure(const char* fmu, const char* fault, const char* reason) {
   ASSERT_THAT(ensemble.failures, SizeIs(1));
   EXPECT_EQ(ensemble.failures[0].point, 1);
   EXPECT_THAT(ensemble.failures[0].reason, HasSubstr(reason));
-  EXPECT_NEAR(ensemble.failures[0].time_s, 0.3, 0.1);
+  EXPECT_LE(ensemble.failures[0].time_s, 0.3);
   // A straight line is exact but for rounding.
   EXPECT_NEAR(x(0, 1), 0.8, 1e-12);
-  EXPECT_NEAR(x(1, 0), 0.2, 1e-12);
+  if (!sees_ahead) {
+    EXPECT_NEAR(x(1, 0), 0.2, 1e-12);
+  }
   EXPECT_TRUE(std::isnan(x(1, 1)));
   EXPECT_NEAR(x(2, 1), 0.4, 1e-12);
 }
 
 TEST_F(FaultyFmu, ThatReportsAnErrorAtOnePointLosesThatPointOnly) {
-  for (const char* fmu : {"faulty_cs2", "faulty_me2"}) {
-    ExpectOneFailure(fmu, "error_at", "reported an error while");
-    ExpectOneFailure(fmu, "error_at", "the test wants it");
-  }
+  ExpectOneFailure("faulty_cs2", "error_at", "reported an error while doing a step");
+  ExpectOneFailure("faulty_cs2", "error_at", "the test wants it");
+  // After an error nothing may be asked of an instance, though the error came of a long step only.
+  ExpectOneFailure("faulty_me2", "error_at", "the test wants it", /*sees_ahead=*/true);
 }
 
 TEST_F(FaultyFmu, ThatDiscardsAStepAtOnePointLosesThatPointOnly) {
