@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -151,7 +152,9 @@ Programs Assembly::Compile(const std::vector<Lookup>& tables) {
   if (states_.empty()) return programs;
   graph_.set_most_nodes(kMostJacobianNodes);
   const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
-  if (!graph_.exhausted()) programs.jacobian = Program(graph_, jacobian, places_, tables);
+  if (graph_.exhausted()) return programs;
+  programs.jacobian = Program(graph_, jacobian, places_, tables);
+  if (programs.jacobian->registers() > kMostRegisters) programs.jacobian.reset();
   return programs;
 }
 
@@ -200,7 +203,15 @@ std::shared_ptr<const StateSpaceModel> Make(const EquationSpecification& specifi
   if (!problems.empty()) return nullptr;
   auto model =
       std::make_shared<EquationModel>(Describe(specification, read, output_units), read.tables);
-  model->set_programs(assembly.Compile(model->tables()));
+  Programs programs = assembly.Compile(model->tables());
+  const int registers = std::max(programs.derivatives.registers(), programs.outputs.registers());
+  if (registers > kMostRegisters) {
+    problems.push_back(absl::ResourceExhaustedError(
+        absl::StrCat("model.equations: needs ", registers, " intermediate values at once; at most ",
+                     kMostRegisters, " are allowed")));
+    return nullptr;
+  }
+  model->set_programs(std::move(programs));
   return model;
 }
 

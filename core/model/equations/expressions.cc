@@ -96,6 +96,10 @@ absl::StatusOr<Expressions> Expressions::Make(std::string field,
   std::vector<NodeId> roots;
   for (const std::string& name : expressions.names_) roots.push_back(nodes.at(name));
   expressions.program_ = Program(graph, roots, places, {});
+  if (expressions.program_.registers() > kMostRegisters) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(field, ": needs too many intermediate values at once"));
+  }
   expressions.variables_ = std::ssize(variables);
   return expressions;
 }

@@ -22,7 +22,7 @@ struct Instruction {
   const Lookup* lookup;       // of a lookup
 };
 
-// `uniform`, of each operand: its slot has one value for all rows, held kLanes times.
+// `uniform`, of each operand: its slot has one value, for all rows.
 Kernel SelectKernel(Operation operation, bool uniform_a, bool uniform_b, bool uniform_c);
 
 // The kernel that copies its operand.

@@ -18,7 +18,8 @@ inline constexpr size_t kMostTableValues = 100'000;  // of one table
 inline constexpr size_t kMostTableValuesInAll = 400'000;
 inline constexpr int kMostNodes = 20'000;  // distinct operations of a model
 inline constexpr int kMostJacobianNodes =
-    60'000;                                 // the same with its Jacobian; past it there is none
-inline constexpr int kMostArguments = 100;  // of min and max
+    60'000;                                  // the same with its Jacobian; past it there is none
+inline constexpr int kMostRegisters = 4096;  // intermediate values at once, 512 bytes each a thread
+inline constexpr int kMostArguments = 100;   // of min and max
 
 }  // namespace polyest::equations

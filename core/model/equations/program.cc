@@ -28,14 +28,10 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
   Scratch& scratch =
       ThreadScratch(first_register_ + static_cast<size_t>(registers_), registers_ * kRows);
   double** const slots = scratch.slots.data();
-  alignas(64) double time[kLanes];
-  std::fill_n(time, kLanes, time_s);
-  slots[0] = time;
+  slots[0] = &time_s;
   // The slots of operands are only read: see Kernel.
   double* const constants = const_cast<double*>(constants_.data());
-  for (Eigen::Index i = 0; i * kLanes < constants_.size(); ++i) {
-    slots[1 + i] = constants + i * kLanes;
-  }
+  for (size_t i = 0; i < constants_.size(); ++i) slots[1 + i] = constants + i;
   for (int i = 0; i < registers_; ++i) {
     slots[first_register_ + static_cast<size_t>(i)] = scratch.registers.data() + i * kRows;
   }

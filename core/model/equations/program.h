@@ -51,7 +51,7 @@ class Program {
 
   std::vector<Instruction> instructions_;
   std::vector<Load> loads_;
-  Eigen::ArrayXd constants_;        // each kLanes times
+  std::vector<double> constants_;
   std::vector<Eigen::Index> zero_;  // columns that are 0 for ever
   // Slots: the time, the constants, the loads, the columns of the results, the registers.
   std::uint32_t first_result_ = 0;

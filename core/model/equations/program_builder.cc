@@ -52,9 +52,7 @@ class ProgramBuilder {
   void PlaceResults();
   void Emit();
   void EmitStep(NodeId id, int position);
-  bool IsUniform(std::uint32_t slot) const {
-    return slot < 1 + static_cast<size_t>(program_.constants_.size() / kLanes);
-  }
+  bool IsUniform(std::uint32_t slot) const { return slot < 1 + program_.constants_.size(); }
 
   const Graph& graph_;
   const std::vector<NodeId>& roots_;
@@ -135,10 +133,8 @@ void ProgramBuilder::PlaceLeaf(NodeId id) {
   const Node& node = graph_.node(id);
   if (step(id).slot != kNowhere) return;
   if (node.operation == Operation::kConstant) {
-    const Eigen::Index end = program_.constants_.size();
-    program_.constants_.conservativeResize(end + kLanes);
-    program_.constants_.tail(kLanes).setConstant(node.value);
-    step(id).slot = 1 + static_cast<std::uint32_t>(end / kLanes);
+    program_.constants_.push_back(node.value);
+    step(id).slot = static_cast<std::uint32_t>(program_.constants_.size());
     return;
   }
   const VariablePlace& place = places_[static_cast<size_t>(node.index)];
@@ -164,7 +160,7 @@ void ProgramBuilder::PlaceOperands() {
   for (const NodeId id : leaves) {
     if (graph_.IsConstant(id)) PlaceLeaf(id);
   }
-  const auto first_load = 1 + static_cast<std::uint32_t>(program_.constants_.size() / kLanes);
+  const auto first_load = 1 + static_cast<std::uint32_t>(program_.constants_.size());
   for (const NodeId id : leaves) {
     if (graph_.IsConstant(id) || step(id).slot != kNowhere) continue;
     const size_t loads = program_.loads_.size();

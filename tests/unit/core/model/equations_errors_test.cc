@@ -282,6 +282,31 @@ TEST(EquationLimits, BoundTheDistinctOperations) {
   EXPECT_THAT(StatusOf(equations).message(), HasSubstr("20000 different operations"));
 }
 
+// Values that are needed once more when all have been computed, 600 for each pair of outputs.
+TEST(EquationLimits, BoundTheValuesAtOnce) {
+  EquationSpecification equations;
+  const auto add = [&equations](int outputs) {
+    for (int i = 0; i < outputs; ++i) {
+      std::string sum = "a", difference = "a";
+      for (int j = 0; j < 200; ++j) {
+        for (const char* function : {"sin(", "cos(", "tan("}) {
+          const std::string value = function + std::to_string(200 * i + j) + "*a)";
+          sum += "+" + value;
+          difference += "-" + value;
+        }
+      }
+      equations.outputs["sum" + std::to_string(i)] = sum;
+      equations.outputs["difference" + std::to_string(i)] = difference;
+    }
+  };
+  add(6);
+  EXPECT_TRUE(StatusOf(equations).ok());
+  equations.outputs.clear();
+  add(7);
+  EXPECT_EQ(StatusOf(equations).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(StatusOf(equations).message(), HasSubstr("values at once; at most 4096"));
+}
+
 TEST(ExpressionErrors, BeginWithTheFieldGiven) {
   const auto error = [](const std::map<std::string, std::string>& definitions) {
     return std::string(Expressions::Make("derived", definitions, {"k1", "m"}).status().message());
