@@ -80,6 +80,9 @@ class Parser {
   void AddPlace(CLI::App& command) {
     CLI::Option* const server = AddServer(command);
     command.add_flag("--local", local_, "Compute in this process (the default)")->excludes(server);
+    command
+        .add_option("--fmu-dir", place_.fmu_dir, "Folder of the FMUs that problems may name here")
+        ->excludes(server);
     command.add_option("--threads", place_.threads, "Threads for computing in this process")
         ->check(CLI::Range(1, 256))
         ->capture_default_str();
@@ -162,7 +165,8 @@ class Parser {
   }
 
   void AddModels() {
-    CLI::App& command = *app_.add_subcommand("models", "List the built-in models, or describe one");
+    CLI::App& command =
+        *app_.add_subcommand("models", "List the models there are, or describe one");
     command.add_option("name", models_.name, "A model's name");
     AddPlace(command);
     AddFormat(command, models_.format, {"table", "json"});

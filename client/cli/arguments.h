@@ -18,6 +18,7 @@ struct Place {
   std::string server;     // HOST:PORT; empty: in this process
   double deadline_s = 0;  // 0: none
   int threads = 1;        // in this process
+  std::string fmu_dir;    // of FMUs, in this process; empty: none
 };
 
 struct EstimateArguments {

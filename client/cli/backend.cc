@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "core/common/status.h"
 #include "core/common/stop.h"
 #include "server/operations/operations.h"
 
@@ -12,7 +13,7 @@ namespace {
 
 class LocalBackend : public Backend {
  public:
-  explicit LocalBackend(const Place& place) : threads_(place.threads) {
+  explicit LocalBackend(const Place& place) : threads_(place.threads), models_(OpenModels(place)) {
     if (place.deadline_s > 0) {
       const std::chrono::duration<double> length(place.deadline_s);
       stop_ =
@@ -21,24 +22,30 @@ class LocalBackend : public Backend {
   }
 
   absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) override {
-    return RunEstimate(request, threads_, stop_);
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunEstimate(request, threads_, stop_, *models_);
   }
   absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) override {
-    return RunPropagate(request, threads_, stop_);
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunPropagate(request, threads_, stop_, *models_);
   }
   absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
       const v1::EvaluateCostRequest& request) override {
-    return RunEvaluateCost(request, threads_, stop_);
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunEvaluateCost(request, threads_, stop_, *models_);
   }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
-    return polyest::ListModels(request);
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return polyest::ListModels(request, *models_);
   }
   absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) override {
-    return polyest::GetModel(request);
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return polyest::GetModel(request, *models_);
   }
 
  private:
   int threads_;
+  absl::StatusOr<ModelLibrary> models_;
   Stop stop_;
 };
 
@@ -81,6 +88,16 @@ ClientOptions ToClientOptions(const Place& place) {
         std::chrono::duration<double>(place.deadline_s));
   }
   return options;
+}
+
+absl::StatusOr<ModelLibrary> OpenModels(const Place& place) {
+  if (place.fmu_dir.empty()) return ModelLibrary();
+  absl::StatusOr<FmuCatalogue> fmus = FmuCatalogue::Open(place.fmu_dir);
+  // A word of the command line is wrong, not a name of a request.
+  if (!fmus.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat("--fmu-dir: ", fmus.status().message()));
+  }
+  return ModelLibrary(*std::move(fmus));
 }
 
 std::unique_ptr<Backend> MakeBackend(const Place& place) {

@@ -8,6 +8,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cpp/client.h"
+#include "core/fmu/model_library.h"
 #include "polyest/v1/estimation_service.pb.h"
 
 namespace polyest {
@@ -25,6 +26,10 @@ class Backend {
 };
 
 ClientOptions ToClientOptions(const Place& place);
+
+// The models of this process: the built-in ones, and the FMUs of --fmu-dir. INVALID_ARGUMENT when
+// there is no such folder.
+absl::StatusOr<ModelLibrary> OpenModels(const Place& place);
 
 std::unique_ptr<Backend> MakeBackend(const Place& place);
 

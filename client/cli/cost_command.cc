@@ -12,7 +12,8 @@ namespace {
 
 absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const CostArguments& arguments) {
   v1::EvaluateCostRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
                            ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());

@@ -12,7 +12,8 @@ namespace {
 
 absl::StatusOr<v1::EstimateResponse> Estimate(const EstimateArguments& arguments) {
   v1::EstimateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
                            ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
   auto response = MakeBackend(arguments.place)->Estimate(request);

@@ -31,8 +31,10 @@ std::string ShortName(const v1::Model& model) {
 }
 
 void PrintList(const v1::ListModelsResponse& list, std::ostream& out) {
-  TextTable table({"model", "summary"});
-  for (const v1::Model& model : list.models()) table.AddRow({ShortName(model), model.summary()});
+  TextTable table({"model", "kind", "summary"});
+  for (const v1::Model& model : list.models()) {
+    table.AddRow({ShortName(model), model.kind(), model.summary()});
+  }
   table.Print(out);
 }
 

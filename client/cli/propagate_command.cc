@@ -18,7 +18,8 @@ namespace {
 
 absl::StatusOr<v1::PropagateResponse> Propagate(const PropagateArguments& arguments) {
   v1::PropagateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(), ReadCheckedProblem(arguments.problem_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
   request.set_until(arguments.until_s);
   request.set_step(arguments.step_s);
   auto response = MakeBackend(arguments.place)->Propagate(request);

@@ -66,7 +66,8 @@ class StreamCommand {
 
   // The last estimate, none without samples.
   absl::StatusOr<std::optional<v1::Estimate>> Run() {
-    POLYEST_ASSIGN_OR_RETURN(problem_, ReadCheckedProblem(arguments_.problem_file));
+    POLYEST_ASSIGN_OR_RETURN(problem_,
+                             ReadCheckedProblem(arguments_.problem_file, arguments_.place));
     if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
     const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {

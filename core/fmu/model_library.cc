@@ -11,7 +11,9 @@ namespace polyest {
 std::vector<std::shared_ptr<const Model>> ModelLibrary::Models() const {
   std::vector<std::shared_ptr<const Model>> models(BuiltinModels().begin(), BuiltinModels().end());
   if (fmus_) {
-    for (std::shared_ptr<const Model>& fmu : fmus_->Models()) models.push_back(std::move(fmu));
+    for (const std::shared_ptr<const Model>& fmu : fmus_->Models()) {
+      if (!FindBuiltinModel(fmu->description().name).ok()) models.push_back(fmu);
+    }
   }
   return models;
 }

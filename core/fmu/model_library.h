@@ -21,7 +21,8 @@ class ModelLibrary {
   ModelLibrary() = default;
   explicit ModelLibrary(FmuCatalogue fmus) : fmus_(std::move(fmus)) {}
 
-  // The built-in models, then the FMUs that can be used.
+  // The built-in models, then the FMUs that can be used; no two of the same name: an FMU with that
+  // of a built-in model is left out.
   std::vector<std::shared_ptr<const Model>> Models() const;
   // By name, a built-in model before an FMU. NOT_FOUND lists the names of the built-in models, or
   // of the FMUs when there are some; FAILED_PRECONDITION for an FMU that cannot be used.

@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "core/fmu/fmu_model.h"
+
 namespace polyest {
 namespace {
 
@@ -18,17 +20,20 @@ void AddQuantities(const std::vector<Quantity>& quantities,
 
 }  // namespace
 
-v1::Model ToProto(const ModelDescription& description) {
-  v1::Model model;
-  model.set_name(absl::StrCat("models/", description.name));
-  model.set_summary(description.summary);
-  model.set_equations(description.equations);
-  model.set_source(description.source);
-  AddQuantities(description.states, *model.mutable_states());
-  AddQuantities(description.parameters, *model.mutable_parameters());
-  AddQuantities(description.inputs, *model.mutable_inputs());
-  AddQuantities(description.outputs, *model.mutable_outputs());
-  return model;
+v1::Model ToProto(const Model& model) {
+  const ModelDescription& description = model.description();
+  const auto* const fmu = dynamic_cast<const FmuModel*>(&model);
+  v1::Model proto;
+  proto.set_name(absl::StrCat("models/", description.name));
+  proto.set_kind(fmu == nullptr ? "built-in" : KindInWords(fmu->interface()));
+  proto.set_summary(description.summary);
+  proto.set_equations(description.equations);
+  proto.set_source(description.source);
+  AddQuantities(description.states, *proto.mutable_states());
+  AddQuantities(description.parameters, *proto.mutable_parameters());
+  AddQuantities(description.inputs, *proto.mutable_inputs());
+  AddQuantities(description.outputs, *proto.mutable_outputs());
+  return proto;
 }
 
 }  // namespace polyest

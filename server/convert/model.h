@@ -6,6 +6,6 @@
 namespace polyest {
 
 // Named `models/{name}`.
-v1::Model ToProto(const ModelDescription& description);
+v1::Model ToProto(const Model& model);
 
 }  // namespace polyest

@@ -35,7 +35,8 @@ EquationSpecification ToEquations(const v1::Equations& given) {
   return equations;
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem) {
+absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem,
+                                                     const ModelLibrary& models) {
   switch (problem.model().source_case()) {
     case v1::Problem::Model::kBuiltin: {
       auto model = FindBuiltinModel(problem.model().builtin());
@@ -45,7 +46,11 @@ absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem)
     }
     case v1::Problem::Model::kEquations:
       return MakeEquationModel(ToEquations(problem.model().equations()));
-    case v1::Problem::Model::kFmu:
+    case v1::Problem::Model::kFmu: {
+      auto model = models.FindFmu(problem.model().fmu());
+      if (!model.ok()) return InvalidField("model.fmu", model.status().message());
+      return model;
+    }
     case v1::Problem::Model::SOURCE_NOT_SET:
       break;
   }
@@ -288,9 +293,9 @@ absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::Regularizat
 
 }  // namespace
 
-absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given) {
+absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {
   Problem problem;
-  POLYEST_ASSIGN_OR_RETURN(problem.model, ToModel(given));
+  POLYEST_ASSIGN_OR_RETURN(problem.model, ToModel(given, models));
   problem.fixed = {given.fixed().begin(), given.fixed().end()};
   POLYEST_ASSIGN_OR_RETURN(problem.uncertain, ToUncertain(given));
   problem.correlations = ToCorrelations(given);

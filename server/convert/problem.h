@@ -5,12 +5,15 @@
 #include <absl/status/statusor.h>
 
 #include "core/estimator/problem.h"
+#include "core/fmu/model_library.h"
 #include "polyest/v1/problem.pb.h"
 
 namespace polyest {
 
 // Fields left out take the defaults that problem.proto names. A message on failure starts with the
 // field's path in the problem file, as in "uncertain[0].uniform: lower 5 must be below upper 3".
-absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem);
+// A built-in model or an FMU is looked for in `models`.
+absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem,
+                                          const ModelLibrary& models = {});
 
 }  // namespace polyest

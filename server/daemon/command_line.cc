@@ -33,6 +33,8 @@ CommandLine ParseCommandLine(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--data-dir", data_dir,
                  "Accepted and not used yet: sessions live in memory and end with the daemon");
+  app.add_option("--fmu-dir", daemon.fmu_dir,
+                 "Folder of the FMUs that problems may name; put in it only what you would run");
   app.add_option("--threads", daemon.threads, "Threads of the numerics; 0: one a core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

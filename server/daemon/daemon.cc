@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 #include "core/common/status.h"
 #include "polyest/v1/estimation_service.grpc.pb.h"
@@ -51,15 +52,25 @@ void SetKeepalive(grpc::ServerBuilder& builder) {
 
 }  // namespace
 
-Daemon::Daemon(const DaemonOptions& options)
+Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
     : options_(options),
       address_(options.listen),
+      models_(std::move(models)),
       executor_(Threads(options.threads), options.most_sessions + kWaitingCalls),
-      sessions_(executor_, static_cast<size_t>(options.most_sessions), Now),
-      service_(MakeEstimationService({executor_, sessions_, calls_, stop_.get_token()})) {}
+      sessions_(executor_, static_cast<size_t>(options.most_sessions), Now, models_),
+      service_(MakeEstimationService({executor_, sessions_, calls_, stop_.get_token(), models_})) {}
 
 absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& options) {
-  std::unique_ptr<Daemon> daemon(new Daemon(options));
+  ModelLibrary models;
+  if (!options.fmu_dir.empty()) {
+    absl::StatusOr<FmuCatalogue> fmus = FmuCatalogue::Open(options.fmu_dir);
+    if (!fmus.ok()) {
+      return absl::Status(fmus.status().code(),
+                          absl::StrFormat("--fmu-dir: %s", fmus.status().message()));
+    }
+    models = ModelLibrary(*std::move(fmus));
+  }
+  std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models)));
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
 }

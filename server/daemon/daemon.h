@@ -11,6 +11,7 @@
 #include <stop_token>
 #include <string>
 
+#include "core/fmu/model_library.h"
 #include "server/daemon/listen_address.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
@@ -23,12 +24,13 @@ struct DaemonOptions {
   int threads = 0;  // of the numerics; 0: one a core
   int most_sessions = 1'000;
   int most_message_mb = 64;
+  std::string fmu_dir;  // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
 };
 
 class Daemon {
  public:
-  // UNAVAILABLE when the address cannot be listened on.
+  // UNAVAILABLE when the address cannot be listened on, NOT_FOUND when there is no folder of FMUs.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
   // Drains first.
   ~Daemon();
@@ -41,11 +43,12 @@ class Daemon {
   void Stop();
 
  private:
-  explicit Daemon(const DaemonOptions& options);
+  Daemon(const DaemonOptions& options, ModelLibrary models);
   absl::Status Listen();
 
   const DaemonOptions options_;
   ListenAddress address_;
+  const ModelLibrary models_;
   std::stop_source stop_;
   OpenCalls calls_;
   Executor executor_;

@@ -4,11 +4,11 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/common/status.h"
 #include "core/estimator/estimator.h"
 #include "core/estimator/studies.h"
-#include "core/model/catalogue.h"
 #include "server/convert/annotate.h"
 #include "server/convert/estimate.h"
 #include "server/convert/measurements.h"
@@ -21,8 +21,8 @@
 namespace polyest {
 
 absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
-                                                 const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem()));
+                                                 const Stop& stop, const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   POLYEST_ASSIGN_OR_RETURN(auto estimator,
                            Estimator::Make(std::move(problem), {.threads = threads, .store = {}}));
@@ -36,8 +36,8 @@ absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& requ
 }
 
 absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& request, int threads,
-                                                   const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem()));
+                                                   const Stop& stop, const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
   PropagationOptions options = ToPropagationOptions(request);
   options.threads = threads;
   POLYEST_ASSIGN_OR_RETURN(Propagation propagation, PropagatePrior(problem, options, stop));
@@ -45,8 +45,9 @@ absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& r
 }
 
 absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostRequest& request,
-                                                         int threads, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem()));
+                                                         int threads, const Stop& stop,
+                                                         const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   CostGridOptions options = ToCostGridOptions(request);
   options.threads = threads;
@@ -54,9 +55,10 @@ absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostR
   return ToProto(grid, problem);
 }
 
-absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) {
+absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
+                                                  const ModelLibrary& library) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
-  const auto& models = BuiltinModels();
+  const std::vector<std::shared_ptr<const Model>> models = library.Models();
   size_t first = 0;
   if (!request.page_token().empty()) {
     // A page's token is the name of its last model.
@@ -68,15 +70,15 @@ absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& r
   }
   v1::ListModelsResponse response;
   const size_t last = std::min(models.size(), first + page_size);
-  for (size_t i = first; i < last; ++i) *response.add_models() = ToProto(models[i]->description());
+  for (size_t i = first; i < last; ++i) *response.add_models() = ToProto(*models[i]);
   if (last < models.size()) response.set_next_page_token(models[last - 1]->description().name);
   return response;
 }
 
-absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) {
+absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request, const ModelLibrary& models) {
   POLYEST_ASSIGN_OR_RETURN(const std::string id, ResourceId("name", "models", request.name()));
-  POLYEST_ASSIGN_OR_RETURN(auto model, FindBuiltinModel(id));
-  return ToProto(model->description());
+  POLYEST_ASSIGN_OR_RETURN(const auto model, models.Find(id));
+  return ToProto(*model);
 }
 
 }  // namespace polyest

@@ -6,19 +6,24 @@
 #include <absl/status/statusor.h>
 
 #include "core/common/stop.h"
+#include "core/fmu/model_library.h"
 #include "polyest/v1/estimation_service.pb.h"
 
 namespace polyest {
 
 // threads is for propagation; answers do not depend on it.
 absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
-                                                 const Stop& stop);
+                                                 const Stop& stop, const ModelLibrary& models = {});
 absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& request, int threads,
-                                                   const Stop& stop);
+                                                   const Stop& stop,
+                                                   const ModelLibrary& models = {});
 absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostRequest& request,
-                                                         int threads, const Stop& stop);
+                                                         int threads, const Stop& stop,
+                                                         const ModelLibrary& models = {});
 
-absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request);
-absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request);
+absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
+                                                  const ModelLibrary& models = {});
+absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request,
+                                   const ModelLibrary& models = {});
 
 }  // namespace polyest

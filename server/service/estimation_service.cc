@@ -117,36 +117,41 @@ EstimationService::Unary* EstimationService::OnStrand(
 EstimationService::Unary* EstimationService::ListModels(Context* context,
                                                         const v1::ListModelsRequest* request,
                                                         v1::ListModelsResponse* response) {
-  return FinishAtOnce(context, Deliver(polyest::ListModels(*request), response));
+  // A folder of FMUs may have to be read.
+  return OnExecutor(context, [=, this](const Stop&) {
+    return Deliver(polyest::ListModels(*request, context_.models), response);
+  });
 }
 
 EstimationService::Unary* EstimationService::GetModel(Context* context,
                                                       const v1::GetModelRequest* request,
                                                       v1::Model* response) {
-  return FinishAtOnce(context, Deliver(polyest::GetModel(*request), response));
+  return OnExecutor(context, [=, this](const Stop&) {
+    return Deliver(polyest::GetModel(*request, context_.models), response);
+  });
 }
 
 EstimationService::Unary* EstimationService::Estimate(Context* context,
                                                       const v1::EstimateRequest* request,
                                                       v1::EstimateResponse* response) {
-  return OnExecutor(context, [=](const Stop& stop) {
-    return Deliver(RunEstimate(*request, kThreadsPerCall, stop), response);
+  return OnExecutor(context, [=, this](const Stop& stop) {
+    return Deliver(RunEstimate(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
 
 EstimationService::Unary* EstimationService::Propagate(Context* context,
                                                        const v1::PropagateRequest* request,
                                                        v1::PropagateResponse* response) {
-  return OnExecutor(context, [=](const Stop& stop) {
-    return Deliver(RunPropagate(*request, kThreadsPerCall, stop), response);
+  return OnExecutor(context, [=, this](const Stop& stop) {
+    return Deliver(RunPropagate(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
 
 EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
                                                           const v1::EvaluateCostRequest* request,
                                                           v1::EvaluateCostResponse* response) {
-  return OnExecutor(context, [=](const Stop& stop) {
-    return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop), response);
+  return OnExecutor(context, [=, this](const Stop& stop) {
+    return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
 

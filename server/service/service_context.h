@@ -2,6 +2,7 @@
 
 #include <stop_token>
 
+#include "core/fmu/model_library.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/session_store.h"
@@ -15,6 +16,7 @@ struct ServiceContext {
   OpenCalls& calls;
   // Asked for when the drain's time is over: ends work that no call waits for.
   std::stop_token stop;
+  const ModelLibrary& models;
 };
 
 }  // namespace polyest

@@ -14,8 +14,9 @@ namespace polyest {
 
 absl::StatusOr<std::shared_ptr<Session>> Session::Make(std::string name, v1::Problem problem,
                                                        google::protobuf::Timestamp create_time,
-                                                       Executor& executor) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem));
+                                                       Executor& executor,
+                                                       const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models));
   POLYEST_ASSIGN_OR_RETURN(auto estimator, Estimator::Make(std::move(resolved)));
   return std::shared_ptr<Session>(new Session(
       std::move(name), std::move(problem), std::move(create_time), std::move(estimator), executor));

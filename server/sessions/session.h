@@ -14,6 +14,7 @@
 
 #include "core/common/stop.h"
 #include "core/estimator/estimator.h"
+#include "core/fmu/model_library.h"
 #include "polyest/v1/estimation_service.pb.h"
 #include "server/execution/executor.h"
 #include "server/sessions/batch_sequence.h"
@@ -36,7 +37,8 @@ class Session {
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
   static absl::StatusOr<std::shared_ptr<Session>> Make(std::string name, v1::Problem problem,
                                                        google::protobuf::Timestamp create_time,
-                                                       Executor& executor);
+                                                       Executor& executor,
+                                                       const ModelLibrary& models = {});
 
   const std::string& name() const { return name_; }
   Strand& strand() { return *strand_; }

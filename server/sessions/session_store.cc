@@ -30,8 +30,12 @@ absl::Status NotFound(const std::string& name) {
 
 }  // namespace
 
-MemorySessionStore::MemorySessionStore(Executor& executor, size_t most_sessions, Clock clock)
-    : executor_(executor), most_sessions_(most_sessions), clock_(std::move(clock)) {}
+MemorySessionStore::MemorySessionStore(Executor& executor, size_t most_sessions, Clock clock,
+                                       ModelLibrary models)
+    : executor_(executor),
+      most_sessions_(most_sessions),
+      clock_(std::move(clock)),
+      models_(std::move(models)) {}
 
 absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(const std::string& id,
                                                                     const v1::Problem& problem) {
@@ -43,7 +47,8 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(const std::s
     POLYEST_RETURN_IF_ERROR(CheckFree(name));
   }
   // Not under the mutex: a large problem takes its time. So look again before it goes in.
-  POLYEST_ASSIGN_OR_RETURN(auto session, Session::Make(name, problem, clock_(), executor_));
+  POLYEST_ASSIGN_OR_RETURN(auto session,
+                           Session::Make(name, problem, clock_(), executor_, models_));
   std::lock_guard lock(mutex_);
   POLYEST_RETURN_IF_ERROR(CheckFree(name));
   sessions_.emplace(name, session);

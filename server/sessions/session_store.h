@@ -39,7 +39,8 @@ class MemorySessionStore final : public SessionStore {
   using Clock = std::function<google::protobuf::Timestamp()>;
 
   // The executor must outlive the store and its sessions.
-  MemorySessionStore(Executor& executor, size_t most_sessions, Clock clock);
+  MemorySessionStore(Executor& executor, size_t most_sessions, Clock clock,
+                     ModelLibrary models = {});
 
   absl::StatusOr<std::shared_ptr<Session>> Create(const std::string& id,
                                                   const v1::Problem& problem) override;
@@ -55,6 +56,7 @@ class MemorySessionStore final : public SessionStore {
   Executor& executor_;
   const size_t most_sessions_;
   const Clock clock_;
+  const ModelLibrary models_;
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
   int64_t chosen_ = 0;
