@@ -1,6 +1,7 @@
 // Writes a demonstration record to the standard output, by its only argument: oscillator,
-// roll_plane, roll_plane_4dof, quarter_car or bicycle. Closed forms, or the equations of motion
-// written down again and integrated in small fixed steps, with noise; the same bytes every time.
+// roll_plane, roll_plane_4dof, quarter_car, bicycle or damper_rig. Closed forms, or the equations
+// of motion written down again and integrated in small fixed steps, with noise; the same bytes
+// every time.
 
 #include <algorithm>
 #include <array>
@@ -280,6 +281,48 @@ void WriteBicycle() {
   }
 }
 
+// The command of a rig's actuator; the actuator follows later.
+double Command(double t) {
+  return t < 0 ? 0
+               : 0.012 * std::sin(2 * pi * 1.3 * t) + 0.008 * std::sin(2 * pi * 3.7 * t) -
+                     0.003 * std::sin(2 * pi * 6.1 * t);
+}
+
+// A damper's force over its speed as its maker gives it, straight between the points.
+double DamperCurve(double speed) {
+  constexpr std::array<double, 7> v = {-1, -0.3, -0.1, 0, 0.1, 0.3, 1};
+  constexpr std::array<double, 7> force_n = {-900, -480, -240, 0, 300, 610, 1200};
+  const auto next = std::upper_bound(v.begin() + 1, v.end() - 1, speed) - v.begin();
+  const auto i = static_cast<size_t>(next);
+  return std::lerp(force_n[i - 1], force_n[i], (speed - v[i - 1]) / (v[i] - v[i - 1]));
+}
+
+// A mass between a damper and two springs to the actuator.
+void WriteDamperRig() {
+  // The truth, which damper_rig.json does not know.
+  constexpr double mass_kg = 42.5, springs_n_per_m = 2 * 11300, damper_share = 1.17;
+  constexpr double delay_s = 0.0073, offset_n = 21;
+  constexpr double acceleration_noise_m_per_s2 = 0.1, force_noise_n = 5;
+  constexpr int samples_per_second = 200;
+  constexpr int seconds = 4;
+  const auto springs = [](double t, double x) {
+    return springs_n_per_m * (Command(t - delay_s) - x);
+  };
+  const auto rates = [&](double t, const std::array<double, 2>& x) -> std::array<double, 2> {
+    return {x[1], (springs(t, x[0]) - damper_share * DamperCurve(x[1])) / mass_kg};
+  };
+  std::array<double, 2> x{};
+  std::mt19937_64 generator(20'061'137);
+  std::puts("t,y,accel,force");
+  for (int i = 0; i <= seconds * samples_per_second; ++i) {
+    const double t = static_cast<double>(i) / samples_per_second;
+    if (i > 0) Advance(x, t - 1.0 / samples_per_second, 1.0 / samples_per_second, rates);
+    const double accel = rates(t, x)[1] + acceleration_noise_m_per_s2 * StandardNormal(generator);
+    const double force = springs(t, x[0]) + offset_n + force_noise_n * StandardNormal(generator);
+    std::printf("%.3f,%.6f,%.3f,%.2f\n", t, Command(t), accel, force);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -294,9 +337,13 @@ int main(int argc, char** argv) {
     WriteQuarterCar();
   } else if (record == "bicycle") {
     WriteBicycle();
+  } else if (record == "damper_rig") {
+    WriteDamperRig();
   } else {
-    std::fputs("usage: generate_demo oscillator|roll_plane|roll_plane_4dof|quarter_car|bicycle\n",
-               stderr);
+    std::fputs(
+        "usage: generate_demo "
+        "oscillator|roll_plane|roll_plane_4dof|quarter_car|bicycle|damper_rig\n",
+        stderr);
     return 2;
   }
   return 0;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <set>
 
@@ -127,6 +128,7 @@ class ResolvedProblem::Resolver {
     ResolveMeasured();
     ResolveFixed();
     ResolveUncertain();
+    ResolveDerived();
     CheckAllHaveValues();
     return std::move(refusals_);
   }
@@ -142,6 +144,7 @@ class ResolvedProblem::Resolver {
   void ResolveMeasured();
   void ResolveFixed();
   void ResolveUncertain();
+  void ResolveDerived();
   void CheckAllHaveValues();
   std::optional<int> Find(const std::string& field, const std::string& name);
   bool Driven(int input) const { return signals_.contains(input); }
@@ -265,18 +268,48 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
       Refuse("%s: %s is both fixed and uncertain", field, parameter.name);
     }
     CheckDelay(field, settable_[*index],
-               parameter.location + parameter.scale * parameter.germ.Lower());
+               parameter.ToParameter(parameter.germ.Lower()));
     resolved_.targets_.push_back(*index);
     resolved_.units_.push_back(settable_[*index].unit);
   }
+}
+
+void ResolvedProblem::Resolver::ResolveDerived() {
+  if (problem_.derived.empty()) return;
+  std::vector<std::string> variables;
+  for (std::string& name : settable_.Names()) {
+    if (!problem_.derived.contains(name)) variables.push_back(std::move(name));
+  }
+  for (const auto& [name, text] : problem_.derived) {
+    const std::string field = absl::StrCat("derived.", name);
+    const auto index = Find(field, name);
+    if (!index) continue;
+    if (problem_.fixed.contains(name)) Refuse("%s: %s is both fixed and derived", field, name);
+    for (const UncertainParameter& parameter : problem_.uncertain) {
+      if (parameter.name == name) Refuse("%s: %s is both uncertain and derived", field, name);
+    }
+    if (settable_[*index].kind == SettableQuantities::Kind::kDelay) {
+      Refuse("%s: a delay cannot be derived; derive others from it", field);
+    }
+    resolved_.derived_targets_.push_back(*index);
+  }
+  auto derived = Expressions::Make("derived", problem_.derived, variables);
+  if (!derived.ok()) {
+    Refuse(derived.status());
+    return;
+  }
+  for (const std::string& variable : variables) {
+    resolved_.derived_variables_.push_back(*settable_.Find(variable));
+  }
+  resolved_.derived_ = std::make_shared<const Expressions>(*std::move(derived));
 }
 
 void ResolvedProblem::Resolver::CheckAllHaveValues() {
   for (int i = 0; i < settable_.size(); ++i) {
     if (settable_[i].has_default || has_value_[static_cast<size_t>(i)]) continue;
     Refuse(
-        "model: parameter %s of model %s has no default; give it a value in fixed or a prior in "
-        "uncertain",
+        "model: parameter %s of model %s has no default; give it a value in fixed, a prior in "
+        "uncertain or an expression in derived",
         settable_[i].name, model_.name);
   }
 }
@@ -322,6 +355,7 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   for (size_t i = 0; i < targets_.size(); ++i) {
     values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
   }
+  if (derived_ != nullptr) Derive(values);
   EnsembleSpecification specification;
   specification.model = problem_.model;
   specification.outputs = std::move(outputs);
@@ -329,6 +363,19 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;
+}
+
+// A derived value that is not finite makes the whole point one that fails.
+void ResolvedProblem::Derive(Matrix& values) const {
+  Matrix results(values.rows(), std::ssize(derived_targets_));
+  derived_->Evaluate(values(Eigen::all, derived_variables_), results);
+  for (size_t i = 0; i < derived_targets_.size(); ++i) {
+    values.col(derived_targets_[i]) = results.col(static_cast<Eigen::Index>(i));
+  }
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    if (results.row(row).allFinite()) continue;
+    values.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
 }
 
 }  // namespace polyest

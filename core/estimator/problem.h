@@ -16,6 +16,7 @@
 #include "core/bayes/prior.h"
 #include "core/chaos/collocation_points.h"
 #include "core/estimator/settable_quantities.h"
+#include "core/model/equations/expressions.h"
 #include "core/model/input_signal.h"
 #include "core/model/model.h"
 #include "core/propagation/ensemble_propagator.h"
@@ -48,7 +49,10 @@ struct Problem {
   std::map<std::string, double> fixed;
   std::vector<UncertainParameter> uncertain;
   std::vector<Correlation> correlations;  // of pairs of them; a pair not listed has none
-  std::vector<NamedInput> inputs;         // an input not listed is 0
+  // Settable quantities tied to others by expressions: {"k2": "k1"}. They may use all that may be
+  // set, other derived ones among them, but not in a circle.
+  std::map<std::string, std::string> derived;
+  std::vector<NamedInput> inputs;  // an input not listed is 0
   std::vector<MeasuredOutput> measured;
   ExpansionOptions expansion;
   double regularization = 1;  // α² ≥ 0 of (56)
@@ -105,11 +109,16 @@ class ResolvedProblem {
         settable_(problem_.model->description()),
         base_(settable_.Defaults()) {}
 
+  void Derive(Matrix& values) const;
+
   Problem problem_;
   Prior prior_;
   SettableQuantities settable_;
   Vector base_;               // values of the settable quantities that are not uncertain
   std::vector<int> targets_;  // the settable quantity of each uncertain parameter
+  std::vector<int> derived_targets_;
+  std::vector<int> derived_variables_;
+  std::shared_ptr<const Expressions> derived_;  // over all settable quantities; null without any
   std::vector<int> outputs_;
   std::vector<std::string> units_;
   std::vector<int> streamed_inputs_;

@@ -58,7 +58,7 @@ Vector SettableQuantities::Defaults() const {
 std::string SettableQuantities::Describe() const {
   std::vector<std::string> parts, inputs, outputs;
   for (const Settable& settable : all_) {
-    const std::string channel = settable.name.substr(0, settable.name.find('.'));
+    const std::string channel = settable.name.substr(0, settable.name.rfind('.'));
     if (settable.kind == Kind::kParameter) parts.push_back(settable.name);
     if (settable.kind == Kind::kAmplitude) inputs.push_back(channel);
     if (settable.kind == Kind::kOutputGain) outputs.push_back(channel);

@@ -299,6 +299,7 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelL
   problem.fixed = {given.fixed().begin(), given.fixed().end()};
   POLYEST_ASSIGN_OR_RETURN(problem.uncertain, ToUncertain(given));
   problem.correlations = ToCorrelations(given);
+  problem.derived = {given.derived().begin(), given.derived().end()};
   POLYEST_ASSIGN_OR_RETURN(problem.inputs, ToInputs(given));
   problem.measured = ToMeasured(given);
   POLYEST_ASSIGN_OR_RETURN(problem.expansion, ToExpansion(given.expansion()));
