@@ -87,7 +87,9 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
     std_dev(i) = result.estimate.parameters[i].std_dev;
   }
   result.map_germ = problem.prior().ToGerm(map);
-  result.std_dev_germ = std_dev.cwiseQuotient(problem.prior().scale());
+  // The paper's priors are affine: one slope serves everywhere.
+  const Matrix slope = problem.prior().Jacobian(result.map_germ);
+  result.std_dev_germ = std_dev.cwiseQuotient(slope.diagonal());
   CostGridOptions options;
   options.threads = threads;
   POLYEST_ASSIGN_OR_RETURN(result.cost, EvaluateCostGrid(problem, result.samples, options, stop));
