@@ -186,6 +186,13 @@ void Reader::ReadNames(const Syntax& syntax) {
   for (const SyntaxNode& node : syntax.nodes) {
     if (node.operation != Operation::kVariable || node.name == "t") continue;
     const auto found = declared_.find(node.name);
+    if (found == declared_.end() && !IsName(node.name)) {
+      problems_.push_back(ErrorAt(
+          syntax.field, syntax.text, node.offset,
+          absl::StrFormat("%s is not a name of a model; those with a point are of its channels",
+                          node.name)));
+      return;
+    }
     if (found == declared_.end()) {
       free_.insert(node.name);
     } else if (found->second == "an output") {

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
 
 #include <algorithm>
 #include <array>
@@ -33,7 +34,8 @@ absl::Status CheckSizes(const std::string& field,
 
 absl::Status CheckName(const std::string& field, const std::string& name,
                        const std::set<std::string>& variables) {
-  if (!IsName(name)) {
+  const std::vector<std::string> parts = absl::StrSplit(name, '.');
+  if (!std::all_of(parts.begin(), parts.end(), IsName)) {
     return absl::InvalidArgumentError(absl::StrCat(field, ": ", Quoted(name), " is not a name"));
   }
   if (IsReserved(name) || variables.contains(name)) {

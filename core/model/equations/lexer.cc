@@ -58,7 +58,12 @@ absl::StatusOr<Token> Lexer::Next() {
   const bool point = first == '.' && offset_ + 1 < text_.size() && IsDigit(text_[offset_ + 1]);
   if (IsDigit(first) || point) return Number();
   if (!BelongsToName(first)) return Symbol();
-  const size_t end = Skip(offset_, BelongsToName);
+  size_t end = Skip(offset_, BelongsToName);
+  // A name may have parts, as in u.delay.
+  while (end + 1 < text_.size() && text_[end] == '.' && BelongsToName(text_[end + 1]) &&
+         !IsDigit(text_[end + 1])) {
+    end = Skip(end + 1, BelongsToName);
+  }
   const Token token{Token::Kind::kName, offset_, text_.substr(offset_, end - offset_)};
   if (token.text.size() > kMostNameLength) {
     return Error(offset_, absl::StrFormat("a name of %d characters; at most %d", token.text.size(),

@@ -319,7 +319,7 @@ TEST(ExpressionErrors, BeginWithTheFieldGiven) {
             "derived.k2: column 1: unknown name \"t\"; the names are k1, m (at \"t\")");
   EXPECT_EQ(error({{"m", "1"}}), "derived.m: m is a variable already");
   EXPECT_EQ(error({{"pi", "1"}}), "derived.pi: pi is reserved in expressions");
-  EXPECT_EQ(error({{"a.b", "1"}}), "derived: \"a.b\" is not a name");
+  EXPECT_EQ(error({{"a.", "1"}}), "derived: \"a.\" is not a name");
   EXPECT_EQ(error({{"a", "b"}, {"b", "a"}}), "derived.a: depends on itself: a → b → a");
   EXPECT_EQ(error({{"a", "1/0"}}), "derived.a: column 2: the value here is not finite (at \"/0\")");
 }
