@@ -42,6 +42,28 @@ int MoveUp(int descriptor) {
   return moved;
 }
 
+// The worker's descriptors: these two, and nothing for what it would read or print.
+void DescribeFiles(int socket, int page, posix_spawn_file_actions_t& actions) {
+  for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
+  }
+  posix_spawn_file_actions_adddup2(&actions, socket, kWorkerSocket);
+  posix_spawn_file_actions_adddup2(&actions, page, kWorkerPage);
+  posix_spawn_file_actions_addclosefrom_np(&actions, kWorkerPage + 1);
+}
+
+// A group of its own, so that Ctrl-C is this process's to handle; no signal blocked or ignored.
+void DescribeSignals(posix_spawnattr_t& attributes) {
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+}
+
 bool IsProgram(const std::filesystem::path& path) { return access(path.c_str(), X_OK) == 0; }
 
 }  // namespace
@@ -114,21 +136,8 @@ absl::Status WorkerProcess::Spawn(const std::filesystem::path& program) {
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);
   };
-  for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
-  }
-  posix_spawn_file_actions_adddup2(&actions, worker_socket, kWorkerSocket);
-  posix_spawn_file_actions_adddup2(&actions, page_descriptor_, kWorkerPage);
-  posix_spawn_file_actions_addclosefrom_np(&actions, kWorkerPage + 1);
-  // A group of its own, so that Ctrl-C is this process's to handle; no signal blocked or ignored.
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  DescribeFiles(worker_socket, page_descriptor_, actions);
+  DescribeSignals(attributes);
   std::string path = program.string();
   std::string memory = absl::StrCat(limits_.most_memory_bytes);
   std::string file = absl::StrCat(limits_.largest_file_bytes);
