@@ -3,6 +3,7 @@
 #
 #   deploy/install-packages.sh            to build and run
 #   deploy/install-packages.sh --tests    to test, benchmark and check the formatting as well
+#   deploy/install-packages.sh --fuzz     to fuzz as well: libFuzzer comes with Clang
 set -euo pipefail
 
 packages=(
@@ -13,6 +14,9 @@ packages=(
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format
+)
+fuzz_packages=(
+  clang-14 libclang-rt-14-dev
 )
 
 say() { echo "install-packages: $*" >&2; }
@@ -53,8 +57,9 @@ install_missing() {
 for argument in "$@"; do
   case "$argument" in
     --tests) packages+=("${test_packages[@]}") ;;
+    --fuzz) packages+=("${fuzz_packages[@]}") ;;
     *)
-      say "unknown argument '$argument'; there is only --tests"
+      say "unknown argument '$argument'; there are --tests and --fuzz"
       exit 2
       ;;
   esac
