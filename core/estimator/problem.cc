@@ -89,6 +89,14 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
   return absl::OkStatus();
 }
 
+// An input's numbers.
+absl::Status ValidateSignal(int index, const NamedInput& input) {
+  const absl::Status signal = InputSignal::Make(input.signal).status();
+  if (signal.ok()) return signal;
+  return {signal.code(),
+          absl::StrFormat("inputs[%d] (%s): %s", index, input.name, signal.message())};
+}
+
 // What can be said without looking into the model.
 std::vector<absl::Status> CheckOptions(const Problem& problem) {
   std::vector<absl::Status> refusals;
@@ -108,7 +116,15 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
     const absl::StatusOr<Prior> prior = Prior::Make(problem.uncertain, problem.correlations);
     add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
   }
-  add(problem.integration.Validate());
+  if (const absl::Status status = problem.integration.Validate(); !status.ok()) {
+    add(absl::Status(status.code(), absl::StrCat("integration.", status.message())));
+  }
+  for (size_t i = 0; i < problem.inputs.size(); ++i) {
+    add(ValidateSignal(static_cast<int>(i), problem.inputs[i]));
+  }
+  for (size_t i = 0; i < problem.measured.size(); ++i) {
+    add(ValidateNoise(static_cast<int>(i), problem.measured[i]));
+  }
   return refusals;
 }
 
@@ -175,11 +191,7 @@ void ResolvedProblem::Resolver::ResolveInputs() {
       continue;
     }
     const absl::StatusOr<InputSignal> signal = InputSignal::Make(input.signal);
-    if (!signal.ok()) {
-      Refuse(absl::Status(signal.status().code(),
-                          absl::StrCat(field, " (", input.name, "): ", signal.status().message())));
-      continue;
-    }
+    if (!signal.ok()) continue;  // CheckOptions has said so
     resolved_.base_[settable_.Amplitude(*column)] = signal->default_amplitude();
     if (!signal->streamed()) continue;
     resolved_.streamed_inputs_.push_back(*column);
@@ -198,8 +210,6 @@ void ResolvedProblem::Resolver::ResolveMeasured() {
       continue;
     }
     if (Measured(*column)) Refuse("%s: output %s is given twice", field, measured.output);
-    const absl::Status noise = ValidateNoise(static_cast<int>(i), measured);
-    if (!noise.ok()) Refuse(noise);
     resolved_.outputs_.push_back(*column);
   }
 }
@@ -326,8 +336,10 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   std::vector<absl::Status> refusals = CheckOptions(problem);
-  if (problem.model == nullptr || problem.uncertain.empty()) return refusals;
-  Prior prior(problem.uncertain);  // for its names: the correlations may be wrong
+  if (problem.model == nullptr) return refusals;
+  // For its names, as the correlations may be wrong. It needs a parameter: if there is none, then
+  // one that no name refers to.
+  Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);
   ResolvedProblem resolved(std::move(problem), std::move(prior));
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
   return refusals;

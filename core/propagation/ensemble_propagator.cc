@@ -14,12 +14,12 @@ namespace polyest {
 
 absl::Status IntegrationOptions::Validate() const {
   if (!(relative_tolerance >= 1e-13 && relative_tolerance <= 1e-2)) {
-    return absl::InvalidArgumentError(absl::StrCat("relative_tolerance: ", relative_tolerance,
+    return absl::InvalidArgumentError(absl::StrCat("relativeTolerance: ", relative_tolerance,
                                                    " must lie between 1e-13 and 0.01"));
   }
   if (most_steps < 1) {
     return absl::InvalidArgumentError(
-        absl::StrCat("most_steps: ", most_steps, " must be at least 1"));
+        absl::StrCat("maxSteps: ", most_steps, " must be at least 1"));
   }
   return absl::OkStatus();
 }

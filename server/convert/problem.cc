@@ -1,5 +1,6 @@
 #include "server/convert/problem.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/string_view.h>
@@ -35,27 +36,54 @@ EquationSpecification ToEquations(const v1::Equations& given) {
   return equations;
 }
 
-absl::StatusOr<std::shared_ptr<const Model>> ToModel(const v1::Problem& problem,
-                                                     const ModelLibrary& models) {
+// All that is wrong with a problem, as far as it is read.
+using Refusals = std::vector<absl::Status>;
+
+// The value, or else `instead`, which has nothing wrong with it that the refusal has not said.
+template <typename Value>
+Value ValueOr(absl::StatusOr<Value> value, Value instead, Refusals& refusals) {
+  if (value.ok()) return *std::move(value);
+  refusals.push_back(value.status());
+  return instead;
+}
+
+std::shared_ptr<const Model> ToEquationModel(const v1::Equations& given, Refusals& refusals) {
+  const EquationSpecification equations = ToEquations(given);
+  auto model = MakeEquationModel(equations);
+  if (model.ok()) return *std::move(model);
+  refusals.push_back(model.status());
+  const std::vector<std::string> messages = CheckEquations(equations);
+  for (size_t i = 1; i < messages.size(); ++i) {
+    refusals.push_back(absl::InvalidArgumentError(messages[i]));
+  }
+  return nullptr;
+}
+
+// Null if there is none.
+std::shared_ptr<const Model> ToModel(const v1::Problem& problem, const ModelLibrary& models,
+                                     Refusals& refusals) {
   switch (problem.model().source_case()) {
     case v1::Problem::Model::kBuiltin: {
       auto model = FindBuiltinModel(problem.model().builtin());
+      if (model.ok()) return *std::move(model);
       // A name that does not exist is here a wrong field of the request, not a missing resource.
-      if (!model.ok()) return InvalidField("model.builtin", model.status().message());
-      return model;
+      refusals.push_back(InvalidField("model.builtin", model.status().message()));
+      return nullptr;
     }
     case v1::Problem::Model::kEquations:
-      return MakeEquationModel(ToEquations(problem.model().equations()));
+      return ToEquationModel(problem.model().equations(), refusals);
     case v1::Problem::Model::kFmu: {
       auto model = models.FindFmu(problem.model().fmu());
-      if (!model.ok()) return InvalidField("model.fmu", model.status().message());
-      return model;
+      if (model.ok()) return *std::move(model);
+      refusals.push_back(InvalidField("model.fmu", model.status().message()));
+      return nullptr;
     }
     case v1::Problem::Model::SOURCE_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError(
-      "model: a model must be named, as in {\"builtin\": \"duffing\"}");
+  refusals.push_back(
+      absl::InvalidArgumentError("model: a model must be named, as in {\"builtin\": \"duffing\"}"));
+  return nullptr;
 }
 
 absl::StatusOr<UncertainParameter> ToTruncatedNormal(
@@ -121,14 +149,14 @@ absl::Status AtPlace(int index, const char* family, const std::string& name,
   return InvalidField(absl::StrFormat("uncertain[%d]", index), rule);
 }
 
-absl::StatusOr<std::vector<UncertainParameter>> ToUncertain(const v1::Problem& problem) {
+std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals& refusals) {
   std::vector<UncertainParameter> uncertain;
   for (int i = 0; i < problem.uncertain_size(); ++i) {
+    const std::string& name = problem.uncertain(i).name();
     auto [parameter, family] = ToPrior(problem.uncertain(i));
-    if (!parameter.ok()) {
-      return AtPlace(i, family, problem.uncertain(i).name(), parameter.status());
-    }
-    uncertain.push_back(*std::move(parameter));
+    if (!parameter.ok()) parameter = AtPlace(i, family, name, parameter.status());
+    // Half a line, which suits every quantity.
+    uncertain.push_back(ValueOr(std::move(parameter), {name, Germ::Gamma(1)}, refusals));
   }
   return uncertain;
 }
@@ -215,14 +243,15 @@ absl::StatusOr<InputSpecification> ToSignal(const v1::Input& input) {
       input.name().empty() ? "it" : input.name()));
 }
 
-absl::StatusOr<std::vector<NamedInput>> ToInputs(const v1::Problem& problem) {
+std::vector<NamedInput> ToInputs(const v1::Problem& problem, Refusals& refusals) {
   std::vector<NamedInput> inputs;
   for (int i = 0; i < problem.inputs_size(); ++i) {
     auto signal = ToSignal(problem.inputs(i));
     if (!signal.ok()) {
-      return InvalidField(absl::StrFormat("inputs[%d]", i), signal.status().message());
+      signal = InvalidField(absl::StrFormat("inputs[%d]", i), signal.status().message());
     }
-    inputs.push_back({problem.inputs(i).name(), *std::move(signal)});
+    inputs.push_back({problem.inputs(i).name(),
+                      ValueOr<InputSpecification>(std::move(signal), ConstantInput{}, refusals)});
   }
   return inputs;
 }
@@ -291,24 +320,44 @@ absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::Regularizat
   }
 }
 
+// The problem as far as it can be understood.
+Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& refusals) {
+  Problem problem;
+  problem.model = ToModel(given, models, refusals);
+  problem.fixed = {given.fixed().begin(), given.fixed().end()};
+  problem.uncertain = ToUncertain(given, refusals);
+  problem.correlations = ToCorrelations(given);
+  problem.derived = {given.derived().begin(), given.derived().end()};
+  problem.inputs = ToInputs(given, refusals);
+  problem.measured = ToMeasured(given);
+  problem.expansion = ValueOr(ToExpansion(given.expansion()), {}, refusals);
+  if (given.has_regularization()) problem.regularization = given.regularization();
+  problem.regularization_mode = ValueOr(ToRegularizationMode(given.regularization_mode()),
+                                        RegularizationMode::kFixed, refusals);
+  problem.integration = ValueOr(ToIntegration(given.integration()), {}, refusals);
+  problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
+  return problem;
+}
+
 }  // namespace
 
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {
-  Problem problem;
-  POLYEST_ASSIGN_OR_RETURN(problem.model, ToModel(given, models));
-  problem.fixed = {given.fixed().begin(), given.fixed().end()};
-  POLYEST_ASSIGN_OR_RETURN(problem.uncertain, ToUncertain(given));
-  problem.correlations = ToCorrelations(given);
-  problem.derived = {given.derived().begin(), given.derived().end()};
-  POLYEST_ASSIGN_OR_RETURN(problem.inputs, ToInputs(given));
-  problem.measured = ToMeasured(given);
-  POLYEST_ASSIGN_OR_RETURN(problem.expansion, ToExpansion(given.expansion()));
-  if (given.has_regularization()) problem.regularization = given.regularization();
-  POLYEST_ASSIGN_OR_RETURN(problem.regularization_mode,
-                           ToRegularizationMode(given.regularization_mode()));
-  POLYEST_ASSIGN_OR_RETURN(problem.integration, ToIntegration(given.integration()));
-  problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
+  Refusals refusals;
+  Problem problem = Convert(given, models, refusals);
+  if (!refusals.empty()) return refusals.front();
   return ResolvedProblem::Make(std::move(problem));
+}
+
+std::vector<absl::Status> CheckProblem(const v1::Problem& given, const ModelLibrary& models) {
+  Refusals refusals;
+  Problem problem = Convert(given, models, refusals);
+  const bool has_model = problem.model != nullptr;
+  for (absl::Status& refusal : ResolvedProblem::Check(std::move(problem))) {
+    // Why there is no model has been said.
+    if (!has_model && absl::StartsWith(refusal.message(), "model: ")) continue;
+    refusals.push_back(std::move(refusal));
+  }
+  return refusals;
 }
 
 }  // namespace polyest

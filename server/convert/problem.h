@@ -2,7 +2,10 @@
 
 // A problem off the wire, or out of a problem file, as the core understands it.
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
+
+#include <vector>
 
 #include "core/estimator/problem.h"
 #include "core/fmu/model_library.h"
@@ -15,5 +18,9 @@ namespace polyest {
 // A built-in model or an FMU is looked for in `models`.
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem,
                                           const ModelLibrary& models = {});
+
+// All that ToProblem has to say against it, not only the first; when the model cannot be had, what
+// can be said without it. Empty: nothing.
+std::vector<absl::Status> CheckProblem(const v1::Problem& problem, const ModelLibrary& models = {});
 
 }  // namespace polyest

@@ -306,10 +306,10 @@ TEST(IntegrationOptions, NameTheValueThatIsWrong) {
   IntegrationOptions options;
   EXPECT_TRUE(options.Validate().ok());
   options.relative_tolerance = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("relative_tolerance: nan"));
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("relativeTolerance: nan"));
   options = {};
   options.most_steps = 0;
-  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("most_steps: 0"));
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("maxSteps: 0"));
 }
 
 }  // namespace
