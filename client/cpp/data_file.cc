@@ -81,7 +81,7 @@ absl::StatusOr<bool> DataReader::NextLine(absl::string_view& line) {
 }
 
 absl::StatusOr<DataReader> DataReader::Open(std::istream& in, std::string name,
-                                            const DataColumns& columns) {
+                                            const DataColumns& columns, RefusedLine refused) {
   DataReader reader(in, std::move(name));
   absl::string_view header;
   POLYEST_ASSIGN_OR_RETURN(const bool found, reader.NextLine(header));
@@ -90,9 +90,15 @@ absl::StatusOr<DataReader> DataReader::Open(std::istream& in, std::string name,
         absl::StrCat(reader.name_, ": is empty; the first line must name the columns, t first"));
   }
   for (const absl::string_view cell : absl::StrSplit(header, ',')) {
-    POLYEST_RETURN_IF_ERROR(reader.AddColumn(absl::StripAsciiWhitespace(cell), columns));
+    const absl::string_view column = absl::StripAsciiWhitespace(cell);
+    absl::Status added = reader.AddColumn(column, columns);
+    if (added.ok()) continue;
+    // Without a time, no row can be understood.
+    if (reader.columns_.empty()) return added;
+    POLYEST_RETURN_IF_ERROR(refused(std::move(added)));
+    reader.columns_.push_back({std::string(column), Role::kRefused, -1});
   }
-  POLYEST_RETURN_IF_ERROR(reader.CheckStreamed(columns));
+  POLYEST_RETURN_IF_ERROR(reader.CheckStreamed(columns, refused));
   return reader;
 }
 
@@ -126,19 +132,19 @@ absl::Status DataReader::AddColumn(absl::string_view name, const DataColumns& kn
   return absl::OkStatus();
 }
 
-absl::Status DataReader::CheckStreamed(const DataColumns& known) const {
+absl::Status DataReader::CheckStreamed(const DataColumns& known, RefusedLine refused) const {
   for (const std::string& name : known.streamed) {
     const bool found = std::any_of(columns_.begin(), columns_.end(),
                                    [&](const Column& column) { return column.name == name; });
     if (!found) {
-      return LineError(absl::StrCat("the column ", Quoted(name),
-                                    " of the streamed input of that name is missing"));
+      POLYEST_RETURN_IF_ERROR(refused(LineError(absl::StrCat(
+          "the column ", Quoted(name), " of the streamed input of that name is missing"))));
     }
   }
   return absl::OkStatus();
 }
 
-absl::StatusOr<v1::Measurements> DataReader::Read(int64_t most_rows) {
+absl::StatusOr<v1::Measurements> DataReader::Read(int64_t most_rows, RefusedLine refused) {
   POLYEST_CHECK(most_rows > 0);
   most_rows = std::min<int64_t>(most_rows, std::numeric_limits<int32_t>::max());
   v1::Measurements batch;
@@ -151,37 +157,61 @@ absl::StatusOr<v1::Measurements> DataReader::Read(int64_t most_rows) {
         if (column.channel >= 0) batch.add_channels()->set_name(column.name);
       }
     }
-    POLYEST_RETURN_IF_ERROR(ParseRow(line, batch));
-    ++rows_;
+    absl::Status parsed = ParseRow(line, batch);
+    if (parsed.ok()) {
+      ++rows_;
+    } else {
+      any_refused_ = true;
+      POLYEST_RETURN_IF_ERROR(refused(std::move(parsed)));
+    }
   }
-  if (rows_ == 0) {
+  if (rows_ == 0 && !any_refused_) {
     return absl::InvalidArgumentError(absl::StrCat(name_, ": has no rows below its header"));
   }
   return batch;
 }
 
+// Takes a row whole or not at all.
 absl::Status DataReader::ParseRow(absl::string_view line, v1::Measurements& batch) {
+  const int32_t previous_run = run_;
+  previous_time_s_ = time_s_;
+  absl::Status parsed = ParseCells(line, batch);
+  if (parsed.ok()) parsed = CheckTime(previous_run);
+  if (!parsed.ok()) {
+    time_s_ = previous_time_s_;
+    run_ = previous_run;
+    const int rows = batch.time_size();
+    for (v1::Measurements::Channel& channel : *batch.mutable_channels()) {
+      if (channel.values_size() > rows) channel.mutable_values()->Truncate(rows);
+      if (!channel.missing().empty() && *channel.missing().rbegin() == rows) {
+        channel.mutable_missing()->RemoveLast();
+      }
+    }
+    return parsed;
+  }
+  batch.add_time(time_s_);
+  if (has_run_) batch.add_run(run_);
+  return absl::OkStatus();
+}
+
+absl::Status DataReader::ParseCells(absl::string_view line, v1::Measurements& batch) {
   const auto cells = 1 + std::count(line.begin(), line.end(), ',');
   if (static_cast<size_t>(cells) != columns_.size()) {
     return LineError(
         absl::StrCat("the row has ", cells, " cells, the header has ", columns_.size()));
   }
-  const int32_t previous_run = run_;
-  previous_time_s_ = time_s_;
   for (const Column& column : columns_) {
     const size_t end = std::min(line.find(','), line.size());
     POLYEST_RETURN_IF_ERROR(
         ParseCell(column, absl::StripAsciiWhitespace(line.substr(0, end)), batch));
     line.remove_prefix(std::min(end + 1, line.size()));
   }
-  POLYEST_RETURN_IF_ERROR(CheckTime(previous_run));
-  batch.add_time(time_s_);
-  if (has_run_) batch.add_run(run_);
   return absl::OkStatus();
 }
 
 absl::Status DataReader::ParseCell(const Column& column, absl::string_view cell,
                                    v1::Measurements& batch) {
+  if (column.role == Role::kRefused) return absl::OkStatus();
   if (column.role == Role::kRun) return ParseRun(cell);
   if (column.role == Role::kMeasured && cell.empty()) {
     v1::Measurements::Channel& channel = *batch.mutable_channels(column.channel);
@@ -247,14 +277,15 @@ absl::StatusOr<double> DataReader::ParseNumber(const Column& column, absl::strin
   return value;
 }
 
-absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns) {
+absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
+                                              RefusedLine refused) {
   std::ifstream in(path, std::ios::binary);
   if (!in) {
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": cannot be opened: ", std::strerror(errno)));
   }
-  POLYEST_ASSIGN_OR_RETURN(DataReader reader, DataReader::Open(in, path, columns));
-  return reader.Read(std::numeric_limits<int64_t>::max());
+  POLYEST_ASSIGN_OR_RETURN(DataReader reader, DataReader::Open(in, path, columns, refused));
+  return reader.Read(std::numeric_limits<int64_t>::max(), refused);
 }
 
 }  // namespace polyest

@@ -7,6 +7,7 @@
 // is a missing sample. Blank lines, spaces around a cell, CR LF and a byte order mark are accepted;
 // quotes are not.
 
+#include <absl/functional/function_ref.h>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
@@ -30,34 +31,42 @@ struct DataColumns {
 
 DataColumns ColumnsOf(const v1::Problem& problem);
 
+// Is told of a line that is refused, in words. OK: the line is left out and reading goes on;
+// anything else ends the reading.
+using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
+
+inline absl::Status StopAtRefusedLine(absl::Status refusal) { return refusal; }
+
 // Reads batches of rows, so that neither a long file nor an endless pipe is ever held whole.
 class DataReader {
  public:
   // Reads the header. `name` stands for the file in messages. `in` must outlive the reader.
   // INVALID_ARGUMENT: no header, or a column that is unknown, repeated or missing.
   static absl::StatusOr<DataReader> Open(std::istream& in, std::string name,
-                                         const DataColumns& columns);
+                                         const DataColumns& columns,
+                                         RefusedLine refused = StopAtRefusedLine);
 
   // The next rows, at most `most_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT names
   // file, line, column, value and rule: a cell that is not a finite number, a time that does not
   // increase within its run, a run that decreases, a row with too few or too many cells, a streamed
   // input without a value, data without any row.
-  absl::StatusOr<v1::Measurements> Read(int64_t most_rows);
+  absl::StatusOr<v1::Measurements> Read(int64_t most_rows, RefusedLine refused = StopAtRefusedLine);
 
  private:
-  enum class Role { kTime, kRun, kMeasured, kStreamed };
+  enum class Role { kTime, kRun, kMeasured, kStreamed, kRefused };
   struct Column {
     std::string name;
     Role role;
-    int channel;  // among the channels of a batch; −1 for t and run
+    int channel;  // among the channels of a batch; −1 for the others
   };
 
   DataReader(std::istream& in, std::string name);
 
   absl::StatusOr<bool> NextLine(absl::string_view& line);
   absl::Status AddColumn(absl::string_view name, const DataColumns& known);
-  absl::Status CheckStreamed(const DataColumns& known) const;
+  absl::Status CheckStreamed(const DataColumns& known, RefusedLine refused) const;
   absl::Status ParseRow(absl::string_view line, v1::Measurements& batch);
+  absl::Status ParseCells(absl::string_view line, v1::Measurements& batch);
   absl::Status ParseRun(absl::string_view cell);
   absl::Status ParseCell(const Column& column, absl::string_view cell, v1::Measurements& batch);
   absl::Status CheckTime(int64_t previous_run) const;
@@ -70,14 +79,16 @@ class DataReader {
   std::vector<Column> columns_;
   int channels_ = 0;
   bool has_run_ = false;
-  int64_t line_ = 0;  // 1-based
-  int64_t rows_ = 0;
-  double time_s_ = 0;  // of the present row, and of the row before while a row is read
+  int64_t line_ = 0;          // 1-based
+  int64_t rows_ = 0;          // that were taken
+  bool any_refused_ = false;  // of the rows
+  double time_s_ = 0;         // of the present row, and of the row before while a row is read
   double previous_time_s_ = 0;
   int32_t run_ = 0;
 };
 
 // A whole file.
-absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns);
+absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
+                                              RefusedLine refused = StopAtRefusedLine);
 
 }  // namespace polyest
