@@ -47,6 +47,9 @@ class Parser {
     AddPropagate();
     AddCost();
     AddModels();
+    AddCheck();
+    AddInit();
+    AddSchema();
     AddPaper();
   }
 
@@ -59,6 +62,9 @@ class Parser {
     if (name == "propagate") return Placed(propagate_);
     if (name == "cost") return Placed(cost_);
     if (name == "models") return Placed(models_);
+    if (name == "check") return Placed(check_);
+    if (name == "init") return Placed(init_);
+    if (name == "schema") return SchemaArguments{};
     return paper_;
   }
 
@@ -77,12 +83,15 @@ class Parser {
         ->check(CLI::Validator(CheckServer, "HOST:PORT"));
   }
 
+  CLI::Option* AddFmuFolder(CLI::App& command) {
+    return command.add_option("--fmu-dir", place_.fmu_dir,
+                              "Folder of the FMUs that problems may name here");
+  }
+
   void AddPlace(CLI::App& command) {
     CLI::Option* const server = AddServer(command);
     command.add_flag("--local", local_, "Compute in this process (the default)")->excludes(server);
-    command
-        .add_option("--fmu-dir", place_.fmu_dir, "Folder of the FMUs that problems may name here")
-        ->excludes(server);
+    AddFmuFolder(command)->excludes(server);
     command.add_option("--threads", place_.threads, "Threads for computing in this process")
         ->check(CLI::Range(1, 256))
         ->capture_default_str();
@@ -172,6 +181,31 @@ class Parser {
     AddFormat(command, models_.format, {"table", "json"});
   }
 
+  void AddCheck() {
+    CLI::App& command = *app_.add_subcommand(
+        "check",
+        "Say all that is wrong with a problem, and with data for it, before anything runs");
+    AddProblem(command, check_.problem_file);
+    command.add_option("data", check_.data_file, "The measurements, a CSV file");
+    AddFmuFolder(command);
+    AddFormat(command, check_.format, {"table", "json"});
+  }
+
+  void AddInit() {
+    CLI::App& command =
+        *app_.add_subcommand("init", "Write a problem file to start from; list the models");
+    CLI::Option* const model = command.add_option("model", init_.model, "A model's name");
+    command.add_flag("--equations", init_.equations, "With a model given by its equations")
+        ->excludes(model);
+    command.add_option("-o,--output", init_.output_file, "The file (default: standard output)");
+    command.add_flag("--force", init_.force, "Overwrite the file if it is there");
+    AddFmuFolder(command);
+  }
+
+  void AddSchema() {
+    app_.add_subcommand("schema", "Print the JSON schema of problem files, for editors");
+  }
+
   void AddPaper() {
     CLI::App& command = *app_.add_subcommand("paper", "Rerun the paper's experiments");
     command.add_option("figure", paper_.figure, "One experiment's name (default: all)");
@@ -189,6 +223,8 @@ class Parser {
   PropagateArguments propagate_;
   CostArguments cost_;
   ModelsArguments models_;
+  CheckArguments check_;
+  InitArguments init_;
   PaperOptions paper_;
 };
 

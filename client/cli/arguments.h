@@ -61,8 +61,26 @@ struct ModelsArguments {
   Format format = Format::kTable;
 };
 
-using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                             ModelsArguments, PaperOptions>;
+struct CheckArguments {
+  Place place;  // this process
+  std::string problem_file;
+  std::string data_file;  // empty: none
+  Format format = Format::kTable;
+};
+
+struct InitArguments {
+  Place place;              // this process
+  std::string model;        // empty: list the models
+  bool equations = false;   // a model as text instead
+  std::string output_file;  // empty: standard output
+  bool force = false;       // overwrite the file
+};
+
+struct SchemaArguments {};
+
+using Command =
+    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

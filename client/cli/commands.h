@@ -1,7 +1,7 @@
 #pragma once
 
-// The commands. Each prints its answer to `out`, errors in one line to `err`, and returns the exit
-// status.
+// The commands. Each prints its answer to `out`, errors in one line each to `err`, and returns the
+// exit status.
 
 #include <ostream>
 
@@ -14,5 +14,8 @@ int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream
 int RunCommand(const PropagateArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const CostArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ModelsArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const SchemaArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

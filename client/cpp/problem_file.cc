@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "client/cpp/field_names.h"
 #include "core/common/status.h"
 
 namespace polyest {
@@ -46,9 +47,14 @@ std::string FieldMessage(absl::string_view message) {
       text = absl::StrCat(message.substr(0, close), member ? "." : "", rest);
     }
   }
+  absl::string_view path = text;
+  if (absl::ConsumeSuffix(&path, ": Cannot find field.")) {
+    const std::string suggestion = SuggestFieldName(path);
+    return absl::StrCat(path, ": there is no field of this name",
+                        suggestion.empty() ? "" : absl::StrCat("; ", suggestion));
+  }
   return absl::StrReplaceAll(
-      text, {{"Cannot find field.", "there is no field of this name"},
-             {"type.googleapis.com/polyest.v1.", ""},
+      text, {{"type.googleapis.com/polyest.v1.", ""},
              {"Root element must be a message.", "the file must hold one JSON object"}});
 }
 

@@ -208,5 +208,60 @@ TEST(ColumnsOf, AreMeasuredOutputsAndStreamedInputs) {
   EXPECT_THAT(columns.streamed, ElementsAre("road"));
 }
 
+// What is refused of a file of which all good lines are read.
+struct Sieved {
+  absl::StatusOr<v1::Measurements> data;
+  std::vector<std::string> refusals;
+};
+
+Sieved Sieve(const std::string& text, const DataColumns& columns = kMeasuredOnly) {
+  Sieved sieved;
+  const auto refused = [&sieved](const absl::Status& refusal) {
+    sieved.refusals.emplace_back(refusal.message());
+    return absl::OkStatus();
+  };
+  std::istringstream in(text);
+  auto reader = DataReader::Open(in, "data.csv", columns, refused);
+  sieved.data =
+      reader.ok() ? reader->Read(std::numeric_limits<int64_t>::max(), refused) : reader.status();
+  return sieved;
+}
+
+TEST(DataReader, GoesOnAfterABadLineIfAsked) {
+  const Sieved sieved =
+      Sieve("t,x,v,run\n0,1,,0\n1,?,2,0\n2,,?,0\n3,4,,0\n2,9,9,0\n4,5,6,x\n5,7\n6,8,9,1\n");
+  EXPECT_THAT(sieved.refusals,
+              ElementsAre(HasSubstr("data.csv:3: column x: \"?\""),
+                          HasSubstr("data.csv:4: column v: \"?\""),
+                          HasSubstr("data.csv:6: column t: 2 must be later than 3"),
+                          HasSubstr("data.csv:7: column run: \"x\""),
+                          HasSubstr("data.csv:8: the row has 2 cells")));
+  ASSERT_TRUE(sieved.data.ok()) << sieved.data.status();
+  // Of a row that is refused nothing is left.
+  EXPECT_THAT(sieved.data->time(), ElementsAre(0, 3, 6));
+  EXPECT_THAT(sieved.data->run(), ElementsAre(0, 0, 1));
+  EXPECT_THAT(sieved.data->channels(0).values(), ElementsAre(1, 4, 8));
+  EXPECT_THAT(sieved.data->channels(0).missing(), IsEmpty());
+  EXPECT_THAT(sieved.data->channels(1).values(), ElementsAre(0, 0, 9));
+  EXPECT_THAT(sieved.data->channels(1).missing(), ElementsAre(0, 1));
+}
+
+TEST(DataReader, GoesOnAfterABadColumnIfAsked) {
+  const Sieved sieved = Sieve("t,x,y,x\n0,1,a,b\n1,?,a,b\n", kColumns);
+  EXPECT_THAT(sieved.refusals,
+              ElementsAre(HasSubstr("unknown column \"y\""), HasSubstr("\"x\" is named twice"),
+                          HasSubstr("the column \"force\" of the streamed input"),
+                          HasSubstr("data.csv:3: column x")));
+  ASSERT_TRUE(sieved.data.ok()) << sieved.data.status();
+  EXPECT_THAT(sieved.data->channels(), SizeIs(1));
+  EXPECT_FALSE(Sieve("x,t\n1,2\n").data.ok());
+}
+
+TEST(DataReader, SaysOnlyOnceThatThereIsNoGoodRow) {
+  const Sieved sieved = Sieve("t,x\n0,?\n");
+  EXPECT_THAT(sieved.refusals, SizeIs(1));
+  EXPECT_TRUE(sieved.data.ok()) << sieved.data.status();
+}
+
 }  // namespace
 }  // namespace polyest

@@ -44,9 +44,17 @@ TEST(ParseProblem, ReadsTheContractsExample) {
 }
 
 TEST(ParseProblem, NamesAFieldThatThereIsNot) {
-  EXPECT_EQ(ErrorOf(R"({"modle": {}})"), "problem.json: modle: there is no field of this name");
+  EXPECT_EQ(ErrorOf(R"({"modle": {}})"),
+            "problem.json: modle: there is no field of this name; did you mean \"model\"?");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "unifrom": {"lower": 1}}]})"),
-            "problem.json: uncertain[0].unifrom: there is no field of this name");
+            "problem.json: uncertain[0].unifrom: there is no field of this name; did you mean "
+            "\"uniform\"?");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "uniform": {"from": 1}}]})"),
+            "problem.json: uncertain[0].uniform.from: there is no field of this name; there are "
+            "lower, upper");
+  EXPECT_EQ(ErrorOf(R"({"model": {"equations": {"tables": {"f": {"vlaue": [1]}}}}})"),
+            "problem.json: model.equations.tables[0].value.vlaue: there is no field of this name; "
+            "did you mean \"value\"?");
 }
 
 TEST(ParseProblem, NamesAFieldOfTheWrongType) {

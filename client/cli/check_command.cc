@@ -1,0 +1,136 @@
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <google/protobuf/struct.pb.h>
+
+#include <optional>
+#include <sstream>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/problem_summary.h"
+#include "client/cli/record_summary.h"
+#include "client/cpp/data_file.h"
+#include "client/cpp/problem_file.h"
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/estimator/sample_checks.h"
+#include "server/convert/measurements.h"
+#include "server/convert/problem.h"
+
+namespace polyest {
+namespace {
+
+// Errors in the lines of one data file that are shown; the others are only counted.
+constexpr int kMostLines = 20;
+
+struct Findings {
+  std::vector<std::string> errors;
+  std::vector<std::string> warnings;
+  std::string summary;  // if there is no error
+
+  void AddError(const absl::Status& status, const std::string& file) {
+    std::string message = absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}});
+    if (!absl::StartsWith(message, file)) message = absl::StrCat(file, ": ", message);
+    errors.push_back(std::move(message));
+  }
+};
+
+// As much of the data as can be read.
+std::optional<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
+                                         Findings& findings) {
+  int refused = 0;
+  const auto note = [&](const absl::Status& refusal) {
+    if (++refused <= kMostLines) findings.AddError(refusal, file);
+    return absl::OkStatus();
+  };
+  auto data = ReadDataFile(file, columns, note);
+  if (!data.ok()) findings.AddError(data.status(), file);
+  if (refused > kMostLines) {
+    findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMostLines, " more"));
+  }
+  if (!data.ok()) return std::nullopt;
+  return *std::move(data);
+}
+
+absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements& data,
+                         Findings& findings, std::ostream& out) {
+  POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(data));
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, SampleChecks(problem).Check(samples));
+  RecordSummary record = Summarize(problem, checked);
+  out << "\ndata: " << record.rows << '\n';
+  for (const std::string& channel : record.channels) out << "  " << channel << '\n';
+  for (std::string& warning : record.warnings) findings.warnings.push_back(std::move(warning));
+  return absl::OkStatus();
+}
+
+Findings Check(const CheckArguments& arguments) {
+  Findings findings;
+  const auto problem = ReadProblemFile(arguments.problem_file);
+  if (!problem.ok()) {
+    findings.AddError(problem.status(), arguments.problem_file);
+    return findings;
+  }
+  const auto models = OpenModels(arguments.place);
+  if (!models.ok()) {
+    findings.errors.emplace_back(models.status().message());
+    return findings;
+  }
+  for (const absl::Status& refusal : CheckProblem(*problem, *models)) {
+    findings.AddError(refusal, arguments.problem_file);
+  }
+  std::optional<v1::Measurements> data;
+  if (!arguments.data_file.empty()) {
+    data = ReadData(arguments.data_file, ColumnsOf(*problem), findings);
+  }
+  if (!findings.errors.empty()) return findings;
+  const auto resolved = ToProblem(*problem, *models);
+  POLYEST_CHECK(resolved.ok());
+  std::ostringstream summary;
+  const absl::Status printed = PrintProblem(*problem, *resolved, summary);
+  if (!printed.ok()) findings.AddError(printed, arguments.problem_file);
+  if (problem->measured().empty()) {
+    findings.warnings.emplace_back(
+        "nothing is measured: the problem can be propagated, but not estimated");
+  }
+  if (data) {
+    const absl::Status checked = CheckRecord(*resolved, *data, findings, summary);
+    if (!checked.ok()) findings.AddError(checked, arguments.data_file);
+  }
+  findings.summary = summary.str();
+  return findings;
+}
+
+std::string AsJson(const Findings& findings) {
+  google::protobuf::Struct json;
+  auto& fields = *json.mutable_fields();
+  fields["ok"].set_bool_value(findings.errors.empty());
+  for (const auto& [name, texts] :
+       {std::pair{"errors", &findings.errors}, {"warnings", &findings.warnings}}) {
+    auto& list = *fields[name].mutable_list_value();
+    for (const std::string& text : *texts) list.add_values()->set_string_value(text);
+  }
+  return ToJson(json, /*several_lines=*/true);
+}
+
+}  // namespace
+
+int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream& err) {
+  const Findings findings = Check(arguments);
+  const bool ok = findings.errors.empty();
+  if (arguments.format == Format::kJson) {
+    out << AsJson(findings) << '\n';
+  } else if (ok) {
+    out << findings.summary;
+    for (const std::string& warning : findings.warnings) out << "warning: " << warning << '\n';
+  }
+  if (ok) return kExitOk;
+  for (const std::string& error : findings.errors) err << "polyest: " << error << '\n';
+  const size_t count = findings.errors.size();
+  err << "polyest: " << count << (count == 1 ? " error" : " errors") << std::endl;
+  return kExitBadInput;
+}
+
+}  // namespace polyest

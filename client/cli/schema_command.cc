@@ -1,0 +1,12 @@
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "proto/problem_schema.h"
+
+namespace polyest {
+
+int RunCommand(const SchemaArguments&, std::ostream& out, std::ostream&) {
+  out << kProblemSchema;
+  return kExitOk;
+}
+
+}  // namespace polyest

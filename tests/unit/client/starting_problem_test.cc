@@ -1,0 +1,50 @@
+#include "client/cli/starting_problem.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/cpp/problem_file.h"
+#include "core/model/catalogue.h"
+#include "server/convert/problem.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::IsEmpty;
+
+TEST(StartingProblem, IsValidForEveryModel) {
+  for (const auto& model : BuiltinModels()) {
+    const ModelDescription& description = model->description();
+    const auto problem = ParseProblem(StartingProblem(description), description.name);
+    ASSERT_TRUE(problem.ok()) << problem.status();
+    EXPECT_THAT(CheckProblem(*problem), IsEmpty()) << description.name;
+    EXPECT_EQ(problem->inputs_size(), description.inputs.size());
+    EXPECT_EQ(problem->measured_size(), description.outputs.size());
+    EXPECT_GE(problem->uncertain_size(), 1);
+    // Only what has no finite default is named nowhere.
+    for (const Quantity& parameter : description.parameters) {
+      const bool uncertain =
+          std::any_of(problem->uncertain().begin(), problem->uncertain().end(),
+                      [&](const auto& unknown) { return unknown.name() == parameter.name; });
+      EXPECT_EQ(uncertain || problem->fixed().contains(parameter.name),
+                std::isfinite(parameter.default_value))
+          << description.name << " " << parameter.name;
+    }
+  }
+}
+
+TEST(StartingProblem, MovesAModelThatNothingDrives) {
+  const auto model = FindBuiltinModel("pendulum");
+  const auto problem = ParseProblem(StartingProblem((*model)->description()), "pendulum");
+  ASSERT_TRUE(problem.ok()) << problem.status();
+  EXPECT_EQ(problem->fixed().at("theta0"), 0.5);
+}
+
+TEST(StartingProblem, AsEquationsIsValid) {
+  const auto problem = ParseProblem(kStartingEquations, "equations");
+  ASSERT_TRUE(problem.ok()) << problem.status();
+  EXPECT_THAT(CheckProblem(*problem), IsEmpty());
+}
+
+}  // namespace
+}  // namespace polyest
