@@ -277,8 +277,7 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
     if (problem_.fixed.contains(parameter.name)) {
       Refuse("%s: %s is both fixed and uncertain", field, parameter.name);
     }
-    CheckDelay(field, settable_[*index],
-               parameter.ToParameter(parameter.germ.Lower()));
+    CheckDelay(field, settable_[*index], parameter.ToParameter(parameter.germ.Lower()));
     resolved_.targets_.push_back(*index);
     resolved_.units_.push_back(settable_[*index].unit);
   }

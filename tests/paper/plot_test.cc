@@ -150,8 +150,9 @@ TEST(PaperCommand, AnswersAnUnknownFigureWithTheFiguresThereAre) {
   std::ostringstream out, err;
   EXPECT_EQ(RunPaper({.figure = "9", .plot_file = ""}, out, err), 2);
   EXPECT_EQ(out.str(), "");
-  EXPECT_EQ(err.str(),
-            "polyest: figure: \"9\" must be one of 4, 5, 6, 7, 8, 11, 12, 13, 14, 3.5, 3.6, reference\n");
+  EXPECT_EQ(
+      err.str(),
+      "polyest: figure: \"9\" must be one of 4, 5, 6, 7, 8, 11, 12, 13, 14, 3.5, 3.6, reference\n");
 }
 
 TEST(PaperCommand, RefusesAPlotOfNoFigure) {

@@ -20,9 +20,7 @@ static int Evaluate(Fmu* fmu) {
   return kOk;
 }
 
-static void Indicate(const Fmu* fmu, double* z) {
-  z[0] = fmu->real[kResting] ? 1 : fmu->real[kH];
-}
+static void Indicate(const Fmu* fmu, double* z) { z[0] = fmu->real[kResting] ? 1 : fmu->real[kH]; }
 
 static int HandleEvent(Fmu* fmu) {
   double* r = fmu->real;

@@ -2,14 +2,26 @@
 #include <signal.h>
 #include <unistd.h>
 
-enum { kX0, kRate, kErrorAt, kDiscardAt, kNanAt, kCrashAt, kHangAt, kLeakAt, kExitAt, kX, kXRate,
-       REALS };
+enum {
+  kX0,
+  kRate,
+  kErrorAt,
+  kDiscardAt,
+  kNanAt,
+  kCrashAt,
+  kHangAt,
+  kLeakAt,
+  kExitAt,
+  kX,
+  kXRate,
+  REALS
+};
 #define STATES 1
 #define INDICATORS 0
 #define NEVER 1e300
 
 static const double kStart[REALS] = {
-    [kRate] = 1,       [kErrorAt] = NEVER, [kDiscardAt] = NEVER, [kNanAt] = NEVER,
+    [kRate] = 1,        [kErrorAt] = NEVER, [kDiscardAt] = NEVER, [kNanAt] = NEVER,
     [kCrashAt] = NEVER, [kHangAt] = NEVER,  [kLeakAt] = NEVER,    [kExitAt] = NEVER};
 static const int kStates[STATES] = {kX};
 static const int kDerivatives[STATES] = {kXRate};

@@ -132,8 +132,8 @@ TEST(TableInput, IsLinearBetweenItsKnotsAndConstantOutside) {
 }
 
 TEST(TableInput, HoldsEachValueUntilTheNextKnot) {
-  const InputSignal signal =
-      Make(TableInput{.time_s = {1, 2, 4}, .value = {10, 20, -20}, .interpolation = Interpolation::kHold});
+  const InputSignal signal = Make(TableInput{
+      .time_s = {1, 2, 4}, .value = {10, 20, -20}, .interpolation = Interpolation::kHold});
   EXPECT_EQ(signal.default_amplitude(), 1);
   EXPECT_EQ(signal.Shape(0), 10);
   EXPECT_EQ(FromTheLeft(signal, 2), 10);

@@ -188,7 +188,8 @@ class StreamedForce : public ::testing::TestWithParam<bool> {
     }
     time_s_[0] = 0;
     for (int point = 0; point < 10; ++point) Set(ensemble_, point, oscillator_);
-    ensemble_.Drive("force", StreamedInput{GetParam() ? Interpolation::kHold : Interpolation::kLinear, 1}, 1.0);
+    ensemble_.Drive(
+        "force", StreamedInput{GetParam() ? Interpolation::kHold : Interpolation::kLinear, 1}, 1.0);
     ensemble_.specification.integration.relative_tolerance = 1e-9;
   }
   Matrix KnotByKnot() {
