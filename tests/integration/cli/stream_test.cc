@@ -73,6 +73,19 @@ TEST_F(StreamTest, DoesNotDependOnHowRowsAreCutIntoBatches) {
   ExpectSame(LastEstimate(small.out), LastEstimate(large.out));
 }
 
+// The curve of an input up to the last rows depends on there being no more.
+TEST_F(StreamTest, TakesTheLastRowsOfASmoothInputToo) {
+  const std::string data = Example("damper_rig.csv");
+  const Finished streamed = Run({"stream", Example("damper_rig.json"), data, "--server",
+                                 daemon_.address(), "--batch", "300", "--format", "jsonl"});
+  ASSERT_EQ(streamed.exit_status, 0) << streamed.err;
+  const Finished whole = Run({"estimate", Example("damper_rig.json"), data, "--format", "json"});
+  ASSERT_EQ(whole.exit_status, 0) << whole.err;
+  const v1::Estimate last = LastEstimate(streamed.out);
+  EXPECT_EQ(last.samples(), 1602);
+  ExpectSame(last, ParseEstimate(whole.out));
+}
+
 TEST_F(StreamTest, ReadsStandardInputAndPrintsATableAtTheEnd) {
   const Finished run = Run(Command("-", {"--rate", "1000"}), DemoRows(60));
   ASSERT_EQ(run.exit_status, 0) << run.err;
