@@ -48,7 +48,7 @@ TEST_F(CheckTest, SaysWhatWouldBeEstimated) {
 
 TEST_F(CheckTest, HasNothingAgainstTheExamples) {
   for (const char* const name :
-       {"bicycle", "oscillator", "quarter_car", "roll_plane", "roll_plane_4dof"}) {
+       {"bicycle", "damper_rig", "oscillator", "quarter_car", "roll_plane", "roll_plane_4dof"}) {
     const Finished run =
         Run({"check", Example(absl::StrCat(name, ".json")), Example(absl::StrCat(name, ".csv"))});
     EXPECT_EQ(run.exit_status, 0) << run.err;
@@ -111,6 +111,15 @@ TEST_F(CheckTest, WarnsOfDataThatDeserveASecondLook) {
               HasSubstr("noise of 0.01 is larger than the spread of its samples"));
   EXPECT_THAT(Warnings("t,x,force\n0,0,0\n0.1,10,1\n0.2,-10,0\n0.3,20,2\n"),
               HasSubstr("noise of at most 0.01 is less than the rounding of its samples, 2.9"));
+}
+
+TEST_F(CheckTest, WarnsOfNoiseThatVanishesWithTheSignal) {
+  std::string problem = kProblem;
+  problem.replace(problem.find("absolute"), 8, "relative");
+  const Finished run = Run({"check", File("p.json", problem),
+                            File("d.csv", "t,x,force\n0,1,0\n0.1,0.0001,1\n0.2,-1,0\n")});
+  EXPECT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("x: its noise goes down to 1e-06"));
 }
 
 TEST_F(CheckTest, ChecksWhatInitWrites) {
