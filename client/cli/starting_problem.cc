@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <set>
 #include <vector>
@@ -55,12 +56,17 @@ std::vector<Quantity> ChooseUnknowns(const ModelDescription& model) {
   return unknowns;
 }
 
+// Four digits, and no exponent where a person would write none.
+std::string Rounded(double value) {
+  return FormatExact(std::strtod(FormatNumber(value).c_str(), nullptr));
+}
+
 std::string Uncertain(const Quantity& parameter) {
   const double half_width =
       parameter.default_value == 0 ? 1 : kPriorHalfWidth * std::abs(parameter.default_value);
-  return absl::StrCat("{\"name\": ", Quoted(parameter.name), ", \"uniform\": {\"lower\": ",
-                      FormatNumber(parameter.default_value - half_width),
-                      ", \"upper\": ", FormatNumber(parameter.default_value + half_width), "}}");
+  return absl::StrCat("{\"name\": ", Quoted(parameter.name),
+                      ", \"uniform\": {\"lower\": ", Rounded(parameter.default_value - half_width),
+                      ", \"upper\": ", Rounded(parameter.default_value + half_width), "}}");
 }
 
 // Its default; where nothing else would move the model, its first initial state.
