@@ -1,5 +1,5 @@
-// A whole model made of arbitrary bytes: none may crash it, hang it or make it ask for more memory
-// than its limits allow.
+// A whole model, and tied parameters, made of arbitrary bytes: none may crash it, hang it or make
+// it ask for more memory than its limits allow.
 //
 // Each line of the input is an entry of the specification, by its first character:
 //   s name=text   a state          o name=text   an output     i name=text   an intermediate
@@ -15,6 +15,7 @@
 
 #include "core/common/check.h"
 #include "core/model/equations/equation_model.h"
+#include "core/model/equations/expressions.h"
 
 namespace {
 
@@ -84,6 +85,16 @@ void Evaluate(const polyest::StateSpaceModel& model) {
   model.InitialStates(parameters, states);
 }
 
+// The intermediates once more, as parameters tied to others.
+void Tie(const EquationSpecification& equations) {
+  const auto expressions =
+      polyest::Expressions::Make("derived", equations.intermediates, {"k1", "m", "u.delay"});
+  if (!expressions.ok()) return;
+  const polyest::Matrix variables = polyest::Matrix::Random(5, 3);
+  polyest::Matrix results(5, std::ssize(expressions->names()));
+  expressions->Evaluate(variables, results);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
@@ -97,5 +108,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
   const auto model = polyest::MakeEquationModel(equations);
   POLYEST_CHECK(model.ok() == polyest::CheckEquations(equations).empty());
   if (model.ok()) Evaluate(**model);
+  Tie(equations);
   return 0;
 }
