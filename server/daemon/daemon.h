@@ -24,7 +24,7 @@ struct DaemonOptions {
   int threads = 0;  // of the numerics; 0: one a core
   int most_sessions = 1'000;
   int most_message_mb = 64;
-  std::string fmu_dir;  // of FMUs that problems may name; empty: none
+  std::string fmu_dir{};  // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
 };
 
