@@ -50,6 +50,7 @@ class Parser {
     AddCheck();
     AddInit();
     AddSchema();
+    AddSensitivity();
     AddPaper();
   }
 
@@ -65,6 +66,7 @@ class Parser {
     if (name == "check") return Placed(check_);
     if (name == "init") return Placed(init_);
     if (name == "schema") return SchemaArguments{};
+    if (name == "sensitivity") return Placed(sensitivity_);
     return paper_;
   }
 
@@ -99,6 +101,10 @@ class Parser {
 
   static void AddProblem(CLI::App& command, std::string& file) {
     command.add_option("problem", file, "The problem, a JSON file")->required();
+  }
+
+  static void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {
+    command.add_option("--outputs", outputs, help)->allow_extra_args(false)->delimiter(',');
   }
 
   static void AddFormat(CLI::App& command, Format& format, std::vector<std::string> names) {
@@ -206,6 +212,18 @@ class Parser {
     app_.add_subcommand("schema", "Print the JSON schema of problem files, for editors");
   }
 
+  void AddSensitivity() {
+    CLI::App& command = *app_.add_subcommand(
+        "sensitivity", "Say which uncertain parameters the outputs depend on, and when");
+    AddProblem(command, sensitivity_.problem_file);
+    command.add_option("--until", sensitivity_.until_s, "The last time, s")->required();
+    command.add_option("--step", sensitivity_.step_s,
+                       "From one time to the next, s (default: a hundredth of the last)");
+    AddOutputs(command, sensitivity_.outputs, "The outputs, comma-separated (default: measured)");
+    AddPlace(command);
+    AddFormat(command, sensitivity_.format, {"table", "json", "csv"});
+  }
+
   void AddPaper() {
     CLI::App& command = *app_.add_subcommand("paper", "Rerun the paper's experiments");
     command.add_option("figure", paper_.figure, "One experiment's name (default: all)");
@@ -225,6 +243,7 @@ class Parser {
   ModelsArguments models_;
   CheckArguments check_;
   InitArguments init_;
+  SensitivityArguments sensitivity_;
   PaperOptions paper_;
 };
 

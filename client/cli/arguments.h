@@ -78,9 +78,18 @@ struct InitArguments {
 
 struct SchemaArguments {};
 
-using Command =
-    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments, PaperOptions>;
+struct SensitivityArguments {
+  Place place;
+  std::string problem_file;
+  double until_s = 0;
+  double step_s = 0;  // 0: the default
+  std::vector<std::string> outputs;
+  Format format = Format::kTable;
+};
+
+using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                             SensitivityArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -20,6 +20,8 @@ class Backend {
   virtual absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) = 0;
   virtual absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
       const v1::EvaluateCostRequest& request) = 0;
+  virtual absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
+      const v1::AnalyzeSensitivityRequest& request) = 0;
   virtual absl::StatusOr<v1::ListModelsResponse> ListModels(
       const v1::ListModelsRequest& request) = 0;
   virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;

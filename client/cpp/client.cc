@@ -73,6 +73,11 @@ absl::StatusOr<v1::EvaluateCostResponse> Client::EvaluateCost(
   return Call(&Stub::EvaluateCost, request);
 }
 
+absl::StatusOr<v1::AnalyzeSensitivityResponse> Client::AnalyzeSensitivity(
+    const v1::AnalyzeSensitivityRequest& request) {
+  return Call(&Stub::AnalyzeSensitivity, request);
+}
+
 absl::StatusOr<v1::Session> Client::CreateSession(const v1::CreateSessionRequest& request) {
   return Call(&Stub::CreateSession, request);
 }

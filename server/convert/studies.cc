@@ -1,7 +1,6 @@
 #include "server/convert/studies.h"
 
-#include <absl/strings/str_format.h>
-
+#include "core/estimator/prior_expansion.h"
 #include "server/convert/estimate.h"
 
 namespace polyest {
@@ -37,13 +36,15 @@ void ToProto(const PropagatedOutput& output, v1::PropagateResponse::Output& prot
   }
 }
 
-Diagnostic PointsFailed(const Propagation& propagation) {
-  const PointFailure& first = propagation.failures.front();
-  return {
-      DiagnosticCode::kPointsFailed,
-      absl::StrFormat("%d of %d trajectories could not be integrated and were left out; the "
-                      "first of them failed after %g s: %s",
-                      propagation.failures.size(), propagation.points, first.time_s, first.reason)};
+void ToProto(const OutputSensitivity& output, v1::AnalyzeSensitivityResponse::Output& proto) {
+  proto.set_name(output.output);
+  proto.set_unit(output.unit);
+  Append(output.mean, *proto.mutable_mean());
+  Append(output.standard_deviation, *proto.mutable_std_dev());
+  Append(output.first_order, *proto.mutable_first_order());
+  Append(output.total, *proto.mutable_total());
+  Append(output.residual, *proto.mutable_residual());
+  Append(output.noise, *proto.mutable_noise_std_dev());
 }
 
 const std::string& UnitOf(const std::string& parameter, const ResolvedProblem& problem) {
@@ -79,7 +80,8 @@ v1::PropagateResponse ToProto(const Propagation& propagation,
   response.set_terms(propagation.terms);
   response.set_points(propagation.points);
   if (!propagation.failures.empty()) {
-    *response.add_diagnostics() = ToProto(PointsFailed(propagation));
+    *response.add_diagnostics() =
+        ToProto(DescribeFailures(propagation.failures, propagation.points));
   }
   return response;
 }
@@ -103,6 +105,36 @@ v1::EvaluateCostResponse ToProto(const CostGrid& grid, const ResolvedProblem& pr
   Append(grid.mismatch, *response.mutable_mismatch());
   Append(grid.prior, *response.mutable_prior());
   Append(grid.total, *response.mutable_total());
+  return response;
+}
+
+SensitivityOptions ToSensitivityOptions(const v1::AnalyzeSensitivityRequest& request) {
+  SensitivityOptions options;
+  options.until_s = request.until();
+  options.step_s = request.step() != 0 ? request.step() : request.until() / 100;
+  options.outputs.assign(request.outputs().begin(), request.outputs().end());
+  return options;
+}
+
+v1::AnalyzeSensitivityResponse ToProto(const SensitivityAnalysis& analysis) {
+  v1::AnalyzeSensitivityResponse response;
+  response.mutable_time()->Add(analysis.time_s.begin(), analysis.time_s.end());
+  response.mutable_parameters()->Add(analysis.parameters.begin(), analysis.parameters.end());
+  for (const OutputSensitivity& output : analysis.outputs) {
+    ToProto(output, *response.add_outputs());
+  }
+  for (const ParameterActivity& activity : analysis.activity) {
+    v1::AnalyzeSensitivityResponse::Activity& added = *response.add_activity();
+    added.set_parameter(activity.parameter);
+    added.set_share(activity.share);
+    added.set_peak_to_noise(activity.peak_to_noise);
+  }
+  response.set_order(analysis.order);
+  response.set_terms(analysis.terms);
+  response.set_points(analysis.points);
+  for (const Diagnostic& diagnostic : analysis.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
+  }
   return response;
 }
 

@@ -55,6 +55,17 @@ absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostR
   return ToProto(grid, problem);
 }
 
+absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
+    const v1::AnalyzeSensitivityRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
+  SensitivityOptions options = ToSensitivityOptions(request);
+  options.threads = threads;
+  POLYEST_ASSIGN_OR_RETURN(SensitivityAnalysis analysis,
+                           AnalyzeSensitivity(problem, options, stop));
+  return ToProto(analysis);
+}
+
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& library) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));

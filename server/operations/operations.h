@@ -20,6 +20,9 @@ absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& r
 absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostRequest& request,
                                                          int threads, const Stop& stop,
                                                          const ModelLibrary& models = {});
+absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
+    const v1::AnalyzeSensitivityRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models = {});
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& models = {});

@@ -65,6 +65,8 @@ class EstimationService final : public v1::EstimationService::CallbackService {
                    v1::PropagateResponse* response) override;
   Unary* EvaluateCost(Context* context, const v1::EvaluateCostRequest* request,
                       v1::EvaluateCostResponse* response) override;
+  Unary* AnalyzeSensitivity(Context* context, const v1::AnalyzeSensitivityRequest* request,
+                            v1::AnalyzeSensitivityResponse* response) override;
 
   Unary* CreateSession(Context* context, const v1::CreateSessionRequest* request,
                        v1::Session* response) override;
@@ -152,6 +154,15 @@ EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
                                                           v1::EvaluateCostResponse* response) {
   return OnExecutor(context, [=, this](const Stop& stop) {
     return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop, context_.models), response);
+  });
+}
+
+EstimationService::Unary* EstimationService::AnalyzeSensitivity(
+    Context* context, const v1::AnalyzeSensitivityRequest* request,
+    v1::AnalyzeSensitivityResponse* response) {
+  return OnExecutor(context, [=, this](const Stop& stop) {
+    return Deliver(RunAnalyzeSensitivity(*request, kThreadsPerCall, stop, context_.models),
+                   response);
   });
 }
 

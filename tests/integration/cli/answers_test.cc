@@ -57,6 +57,16 @@ TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
 }
 
+TEST_F(AnswersTest, SensitivitiesAgreeToTheLastDigit) {
+  const std::vector<std::string> command = {
+      "sensitivity", Example("oscillator.json"), "--until", "2", "--outputs", "x,v"};
+  for (const char* const format : {"table", "json", "csv"}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--format", format});
+    ExpectSameAnswer(arguments);
+  }
+}
+
 TEST_F(AnswersTest, ModelsAgree) {
   ExpectSameAnswer({"models"});
   ExpectSameAnswer({"models", "--format", "json"});
@@ -158,6 +168,34 @@ TEST_F(CommandTest, PrintsOneCsvRowATimeOfAPropagation) {
   EXPECT_THAT(lines[5], StartsWith("1,"));
 }
 
+TEST_F(CommandTest, RanksTheParametersThatMatter) {
+  const Finished run =
+      Run({"sensitivity", Example("oscillator.json"), "--until", "4", "--format", "json"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  v1::AnalyzeSensitivityResponse response;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(run.out, &response).ok()) << run.out;
+  ASSERT_EQ(response.activity_size(), 2);
+  // What the README says of it.
+  EXPECT_EQ(response.activity(0).parameter(), "k");
+  EXPECT_NEAR(response.activity(0).share(), 0.99, 0.01);
+  EXPECT_EQ(response.activity(1).parameter(), "c");
+  EXPECT_NEAR(response.activity(1).peak_to_noise(), 7, 0.5);
+  EXPECT_EQ(response.time_size(), 101);
+  EXPECT_EQ(response.diagnostics_size(), 0);
+}
+
+TEST_F(CommandTest, PrintsOneCsvRowATimeOfTheSensitivities) {
+  const Finished run = Run(
+      {"sensitivity", Example("forced.json"), "--until", "1", "--step", "0.25", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(6));
+  EXPECT_EQ(lines[0],
+            "t,x.mean,x.stdDev,x.residual,x.noise,x.first.c,x.total.c,x.first.force.amplitude,"
+            "x.total.force.amplitude");
+  EXPECT_THAT(lines[5], StartsWith("1,"));
+}
+
 TEST_F(CommandTest, PrintsOneCsvRowAPointOfTheCost) {
   const std::string data = File("data.csv", DemoRows(20));
   const Finished run = Run({"cost", Example("oscillator.json"), data, "--grid", "3", "--parameter",
@@ -182,7 +220,8 @@ TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
 TEST_F(CommandTest, ExplainsItself) {
   const Finished help = Run({"--help"});
   EXPECT_EQ(help.exit_status, 0);
-  for (const char* const command : {"estimate", "stream", "propagate", "cost", "models", "paper"}) {
+  for (const char* const command :
+       {"estimate", "stream", "propagate", "cost", "models", "paper", "sensitivity"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
   }

@@ -155,5 +155,41 @@ TEST(CostGridOptions, ComeFromTheRequest) {
   EXPECT_EQ(options.held.at("c"), 0.5);
 }
 
+TEST(AnalyzeSensitivity, AnswersRowsOfTimesByParameters) {
+  v1::AnalyzeSensitivityRequest request;
+  *request.mutable_problem() = ProblemFromJson(R"({
+    "model": {"equations": {"states": {"x": "a"}, "outputs": {"x": "x"}}},
+    "uncertain": [{"name": "x_0", "normal": {"mean": 0, "stdDev": 2}},
+                  {"name": "a", "normal": {"mean": 0, "stdDev": 3}}]
+  })");
+  request.set_until(2);
+  request.set_step(1);
+  const auto response = RunAnalyzeSensitivity(request, 1, {});
+  ASSERT_TRUE(response.ok()) << response.status();
+  EXPECT_THAT(response->time(), testing::ElementsAre(0, 1, 2));
+  EXPECT_THAT(response->parameters(), testing::ElementsAre("x_0", "a"));
+  ASSERT_EQ(response->outputs_size(), 1);
+  const auto& x = response->outputs(0);
+  EXPECT_EQ(x.name(), "x");
+  ASSERT_EQ(x.total_size(), 6);
+  ASSERT_EQ(x.first_order_size(), 6);
+  // V = 4 + 9 t²
+  EXPECT_NEAR(x.total(2), 4.0 / 13, 1e-9);
+  EXPECT_NEAR(x.first_order(5), 36.0 / 40, 1e-9);
+  EXPECT_EQ(x.residual_size(), 3);
+  EXPECT_EQ(x.noise_std_dev_size(), 3);
+  EXPECT_EQ(response->activity(0).parameter(), "a");
+  EXPECT_EQ(response->order(), 3);
+}
+
+TEST(AnalyzeSensitivity, TakesAHundredthOfUntilForTheStep) {
+  v1::AnalyzeSensitivityRequest request;
+  *request.mutable_problem() = SmallProblem();
+  request.set_until(0.1);
+  const auto response = RunAnalyzeSensitivity(request, 1, {});
+  ASSERT_TRUE(response.ok()) << response.status();
+  EXPECT_EQ(response->time_size(), 101);
+}
+
 }  // namespace
 }  // namespace polyest

@@ -1,0 +1,130 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/text_table.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+using Analysis = v1::AnalyzeSensitivityResponse;
+
+constexpr int kMostTableRows = 21;  // of an output; the other formats have all times
+
+absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& arguments) {
+  v1::AnalyzeSensitivityRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  request.set_until(arguments.until_s);
+  request.set_step(arguments.step_s);
+  request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
+  auto response = MakeBackend(arguments.place)->AnalyzeSensitivity(request);
+  if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
+  return response;
+}
+
+std::string Share(double share) { return absl::StrFormat("%.3f", share); }
+
+// First-order and total index of each parameter; none where the output does not vary.
+std::vector<std::string> Row(const Analysis& analysis, const Analysis::Output& output, int k) {
+  const int n = analysis.parameters_size();
+  const auto totals = output.total().begin() + k * n;
+  const bool varies = std::any_of(totals, totals + n, [](double share) { return share > 0; });
+  const double sd = varies ? output.std_dev(k) : 0;
+  std::vector<std::string> row = {FormatNumber(analysis.time(k), 6),
+                                  FormatValue(output.mean(k), sd), FormatNumber(sd, 3),
+                                  FormatNumber(varies ? output.residual(k) : 0, 2)};
+  for (int i = k * n; i < (k + 1) * n; ++i) {
+    row.push_back(varies ? Share(output.first_order(i)) : "-");
+    row.push_back(varies ? Share(output.total(i)) : "-");
+  }
+  return row;
+}
+
+void PrintOutput(const Analysis& analysis, const Analysis::Output& output, std::ostream& out) {
+  const std::string unit = output.unit() == "1" ? "" : absl::StrCat(" (", output.unit(), ")");
+  out << output.name() << unit << '\n';
+  std::vector<std::string> header = {"t (s)", "mean", "sd", "residual"};
+  for (const std::string& parameter : analysis.parameters()) {
+    header.push_back(parameter);
+    header.push_back("total");
+  }
+  TextTable table(std::move(header), TextTable::Align::kRight);
+  const int times = analysis.time_size();
+  const int stride = std::max(1, (times + kMostTableRows - 3) / (kMostTableRows - 1));
+  for (int k = 0; k < times; k += stride) table.AddRow(Row(analysis, output, k));
+  table.Print(out);
+  out << '\n';
+}
+
+void PrintActivity(const Analysis& analysis, std::ostream& out) {
+  TextTable table({"parameter", "share of the variance", "largest effect/noise"});
+  for (const auto& activity : analysis.activity()) {
+    table.AddRow(
+        {activity.parameter(), Share(activity.share()), FormatNumber(activity.peak_to_noise(), 3)});
+  }
+  table.Print(out);
+}
+
+void PrintTables(const Analysis& analysis, std::ostream& out) {
+  out << "Shares of the variance that each parameter has alone, and in all (total)\n\n";
+  for (const auto& output : analysis.outputs()) PrintOutput(analysis, output, out);
+  PrintActivity(analysis, out);
+  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", analysis.order(),
+                         analysis.terms(), analysis.points());
+  PrintDiagnostics(analysis.diagnostics(), out);
+}
+
+// One row a time: x.mean, x.stdDev, x.residual, x.noise, x.first.k, x.total.k … for each output.
+void PrintCsv(const Analysis& analysis, std::ostream& out) {
+  out << 't';
+  for (const auto& output : analysis.outputs()) {
+    for (const char* const what : {"mean", "stdDev", "residual", "noise"}) {
+      out << ',' << output.name() << '.' << what;
+    }
+    for (const std::string& parameter : analysis.parameters()) {
+      out << ',' << output.name() << ".first." << parameter << ',' << output.name() << ".total."
+          << parameter;
+    }
+  }
+  out << '\n';
+  const int n = analysis.parameters_size();
+  for (int k = 0; k < analysis.time_size(); ++k) {
+    out << FormatExact(analysis.time(k));
+    for (const auto& output : analysis.outputs()) {
+      out << ',' << FormatExact(output.mean(k)) << ',' << FormatExact(output.std_dev(k)) << ','
+          << FormatExact(output.residual(k)) << ',' << FormatExact(output.noise_std_dev(k));
+      for (int i = k * n; i < (k + 1) * n; ++i) {
+        out << ',' << FormatExact(output.first_order(i)) << ',' << FormatExact(output.total(i));
+      }
+    }
+    out << '\n';
+  }
+}
+
+}  // namespace
+
+int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = AnalyzeSensitivity(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else if (arguments.format == Format::kCsv) {
+    PrintCsv(*response, out);
+  } else {
+    PrintTables(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

@@ -1,0 +1,88 @@
+#pragma once
+
+// Which uncertain parameters matter, and when, before anything is measured: Sobol' indices of the
+// outputs, read off the coefficients of their expansions over the prior (B. Sudret, "Global
+// sensitivity analysis using polynomial chaos expansions", Reliab. Eng. Syst. Saf. 93, 2008).
+//
+// In an orthonormal basis the variance of y = Σ_s c_s φ_s(ξ) is V = Σ_{s≥1} c_s². Of it are
+//   first order  S_i = Σ c_s²/V over the terms s in which ξ_i alone occurs: the share that would go
+//                      on average if parameter i were known;
+//   total        T_i = Σ c_s²/V over the terms s in which ξ_i occurs: the share that would be left
+//                      on average if all others were known. T_i ≥ S_i, the difference being what i
+//                      does together with others; Σ_i S_i ≤ 1 ≤ Σ_i T_i.
+// The germs stand for the parameters one to one, so that these are the parameters' own indices; of
+// correlated parameters there are none.
+//
+// The activity of a parameter is its share in the variance of all outputs over all of the time,
+// each in units of its noise σ_o:
+//   a_i = Σ_o ∫ T_i V/σ_o² dt ÷ Σ_o ∫ V/σ_o² dt                     (trapezoidal rule).
+
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <vector>
+
+#include "core/common/stop.h"
+#include "core/common/types.h"
+#include "core/estimator/estimate.h"
+#include "core/estimator/problem.h"
+
+namespace polyest {
+
+struct SensitivityOptions {
+  double until_s = 0;                // > 0
+  double step_s = 0;                 // > 0; times 0, step, 2 step … until
+  std::vector<std::string> outputs;  // empty: the measured ones, or all if none is
+  int threads = 1;
+
+  absl::Status Validate() const;
+};
+
+// Vectors have one entry a time, matrices are times × parameters.
+struct OutputSensitivity {
+  std::string output;
+  std::string unit;
+  Vector mean;
+  Vector standard_deviation;  // √V
+  // 0 where the output does not vary: where √V is no more than an error of the integration, ten
+  // times its relative tolerance of the output's largest magnitude.
+  Matrix first_order;
+  Matrix total;
+  // Root mean square of model − expansion at the collocation points (degrees of freedom Q − S).
+  // Where it is not small beside √V the indices cannot be believed.
+  Vector residual;
+  // σ_o of a sample equal to the mean: the problem's noise of the output, or 1 % of the range of
+  // its predictions (assumed_noise.h).
+  Vector noise;
+};
+
+struct ParameterActivity {
+  std::string parameter;
+  double share = 0;  // a_i; 0 when nothing varies
+  // The largest √(T_i V)/σ_o of any output at any time: the most that not knowing this parameter
+  // changes one sample, in standard deviations of its noise.
+  double peak_to_noise = 0;
+};
+
+struct SensitivityAnalysis {
+  std::vector<double> time_s;
+  std::vector<std::string> parameters;
+  std::vector<OutputSensitivity> outputs;
+  std::vector<ParameterActivity> activity;  // the most active first
+  int order = 0;
+  int terms = 0;
+  int points = 0;
+  // EXPANSION_INACCURATE when the expansion leaves more than kUnexplained of an output's variance
+  // unexplained, or has no points to spare that would show it; POINTS_FAILED.
+  std::vector<Diagnostic> diagnostics;
+};
+
+inline constexpr double kUnexplained = 0.05;  // residual² ÷ V
+
+// INVALID_ARGUMENT names the field, the value and the rule, `correlations` when there are any;
+// otherwise as PropagatePrior.
+absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& problem,
+                                                       const SensitivityOptions& options,
+                                                       const Stop& stop);
+
+}  // namespace polyest
