@@ -51,6 +51,7 @@ class Parser {
     AddInit();
     AddSchema();
     AddSensitivity();
+    AddDesign();
     AddPaper();
   }
 
@@ -67,6 +68,7 @@ class Parser {
     if (name == "init") return Placed(init_);
     if (name == "schema") return SchemaArguments{};
     if (name == "sensitivity") return Placed(sensitivity_);
+    if (name == "design") return Placed(design_);
     return paper_;
   }
 
@@ -224,6 +226,28 @@ class Parser {
     AddFormat(command, sensitivity_.format, {"table", "json", "csv"});
   }
 
+  void AddDesign() {
+    CLI::App& command =
+        *app_.add_subcommand("design", "Say which samples of a next experiment would tell most");
+    AddProblem(command, design_.problem_file);
+    command.add_option("data", design_.data_file, "What has been measured so far, a CSV file");
+    command.add_option("--until", design_.until_s, "The last possible sample time, s")->required();
+    command.add_option("--step", design_.step_s,
+                       "From one possible sample time to the next, s (default: a hundredth of the "
+                       "last)");
+    command.add_option("--samples", design_.samples, "Sample times to choose (default: 10)")
+        ->check(CLI::Range(1, 1000));
+    command
+        .add_option("--candidate", design_.candidate_files,
+                    "A problem file whose inputs are another candidate")
+        ->expected(1)
+        ->take_all();
+    AddOutputs(command, design_.outputs,
+               "Further outputs that could be measured, comma-separated (default: all)");
+    AddPlace(command);
+    AddFormat(command, design_.format, {"table", "json"});
+  }
+
   void AddPaper() {
     CLI::App& command = *app_.add_subcommand("paper", "Rerun the paper's experiments");
     command.add_option("figure", paper_.figure, "One experiment's name (default: all)");
@@ -244,6 +268,7 @@ class Parser {
   CheckArguments check_;
   InitArguments init_;
   SensitivityArguments sensitivity_;
+  DesignArguments design_;
   PaperOptions paper_;
 };
 

@@ -87,9 +87,21 @@ struct SensitivityArguments {
   Format format = Format::kTable;
 };
 
+struct DesignArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;  // empty: none
+  double until_s = 0;
+  double step_s = 0;  // 0: the default
+  int samples = 0;    // 0: the default
+  std::vector<std::string> candidate_files;
+  std::vector<std::string> outputs;
+  Format format = Format::kTable;
+};
+
 using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
                              ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                             SensitivityArguments, PaperOptions>;
+                             SensitivityArguments, DesignArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -39,6 +39,11 @@ class LocalBackend : public Backend {
     POLYEST_RETURN_IF_ERROR(models_.status());
     return RunAnalyzeSensitivity(request, threads_, stop_, *models_);
   }
+  absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
+      const v1::DesignExperimentRequest& request) override {
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunDesignExperiment(request, threads_, stop_, *models_);
+  }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
     return polyest::ListModels(request, *models_);
@@ -76,6 +81,10 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
       const v1::AnalyzeSensitivityRequest& request) override {
     return client_.AnalyzeSensitivity(request);
+  }
+  absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
+      const v1::DesignExperimentRequest& request) override {
+    return client_.DesignExperiment(request);
   }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
     return client_.ListModels(request);

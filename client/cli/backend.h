@@ -22,6 +22,8 @@ class Backend {
       const v1::EvaluateCostRequest& request) = 0;
   virtual absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
       const v1::AnalyzeSensitivityRequest& request) = 0;
+  virtual absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
+      const v1::DesignExperimentRequest& request) = 0;
   virtual absl::StatusOr<v1::ListModelsResponse> ListModels(
       const v1::ListModelsRequest& request) = 0;
   virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;

@@ -18,5 +18,6 @@ int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream&
 int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const SchemaArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

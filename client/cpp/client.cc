@@ -78,6 +78,11 @@ absl::StatusOr<v1::AnalyzeSensitivityResponse> Client::AnalyzeSensitivity(
   return Call(&Stub::AnalyzeSensitivity, request);
 }
 
+absl::StatusOr<v1::DesignExperimentResponse> Client::DesignExperiment(
+    const v1::DesignExperimentRequest& request) {
+  return Call(&Stub::DesignExperiment, request);
+}
+
 absl::StatusOr<v1::Session> Client::CreateSession(const v1::CreateSessionRequest& request) {
   return Call(&Stub::CreateSession, request);
 }

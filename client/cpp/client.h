@@ -43,6 +43,8 @@ class Client {
   absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const v1::EvaluateCostRequest& request);
   absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
       const v1::AnalyzeSensitivityRequest& request);
+  absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
+      const v1::DesignExperimentRequest& request);
   absl::StatusOr<v1::Session> CreateSession(const v1::CreateSessionRequest& request);
   absl::StatusOr<v1::Session> GetSession(const v1::GetSessionRequest& request);
   absl::StatusOr<v1::ListSessionsResponse> ListSessions(const v1::ListSessionsRequest& request);

@@ -12,6 +12,10 @@ namespace polyest {
 // Of an output whose noise nobody has told: this much of the range of its predictions.
 inline constexpr double kAssumedNoise = 0.01;
 
+inline bool HasNumbers(const NoiseModel& noise) {
+  return noise.absolute > 0 || noise.relative > 0 || noise.relative_to_max > 0;
+}
+
 // The noise that the problem gives of the output `column` of its model; null when it does not
 // measure the output, or does not know the noise.
 inline const NoiseModel* GivenNoise(const ResolvedProblem& problem, int column) {
@@ -20,8 +24,7 @@ inline const NoiseModel* GivenNoise(const ResolvedProblem& problem, int column) 
   if (found == outputs.end()) return nullptr;
   const auto channel = static_cast<size_t>(found - outputs.begin());
   const NoiseModel& noise = problem.problem().measured[channel].noise;
-  const bool given = noise.absolute > 0 || noise.relative > 0 || noise.relative_to_max > 0;
-  return given ? &noise : nullptr;
+  return HasNumbers(noise) ? &noise : nullptr;
 }
 
 // kAssumedNoise of the range from the least mean − 2 standard deviations to the largest mean + 2

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "core/estimator/studies.h"
 #include "server/convert/annotate.h"
 #include "server/convert/estimate.h"
+#include "server/convert/experiment_design.h"
 #include "server/convert/measurements.h"
 #include "server/convert/model.h"
 #include "server/convert/problem.h"
@@ -19,15 +21,47 @@
 #include "server/operations/pages.h"
 
 namespace polyest {
+namespace {
 
-absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
-                                                 const Stop& stop, const ModelLibrary& models) {
+// An estimator of a request's problem that holds all its measurements, not yet processed.
+template <typename Request>
+absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const Request& request, int threads,
+                                                   const ModelLibrary& models) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   POLYEST_ASSIGN_OR_RETURN(auto estimator,
                            Estimator::Make(std::move(problem), {.threads = threads, .store = {}}));
   samples.end_of_run = true;
   POLYEST_RETURN_IF_ERROR(estimator->Append(samples));
+  return estimator;
+}
+
+// What the measurements of a request have told, if there are any.
+absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::DesignExperimentRequest& request,
+                                                      int threads, const Stop& stop,
+                                                      const ModelLibrary& models) {
+  if (request.measurements().time().empty()) return std::optional<Estimate>();
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  return estimator->CurrentEstimate(stop);
+}
+
+// The next experiment with the inputs of a candidate.
+absl::StatusOr<ResolvedProblem> NextExperiment(
+    const v1::Problem& given, const v1::DesignExperimentRequest::Candidate& candidate,
+    const std::optional<Estimate>& known, const ModelLibrary& models) {
+  v1::Problem next = given;
+  *next.mutable_inputs() = candidate.inputs();
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(next, models));
+  if (known) return WithEstimateAsPrior(problem, *known);
+  return problem;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
+                                                 const Stop& stop, const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
   v1::EstimateResponse response;
@@ -64,6 +98,40 @@ absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
   POLYEST_ASSIGN_OR_RETURN(SensitivityAnalysis analysis,
                            AnalyzeSensitivity(problem, options, stop));
   return ToProto(analysis);
+}
+
+absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
+    const v1::DesignExperimentRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models) {
+  ExperimentOptions options = ToExperimentOptions(request);
+  options.threads = threads;
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_ASSIGN_OR_RETURN(const std::optional<Estimate> known,
+                           EstimateSoFar(request, threads, stop, models));
+  v1::DesignExperimentRequest::Candidate own;
+  *own.mutable_inputs() = request.problem().inputs();
+  v1::DesignExperimentResponse response;
+  for (int i = 0; i < std::max(1, request.candidates_size()); ++i) {
+    const bool given = !request.candidates().empty();
+    const auto& candidate = given ? request.candidates(i) : own;
+    const auto problem = NextExperiment(request.problem(), candidate, known, models);
+    auto design = problem.ok() ? DesignExperiment(*problem, options, stop) : problem.status();
+    if (!design.ok()) {
+      if (!given || !absl::IsInvalidArgument(design.status())) return design.status();
+      return InvalidField(absl::StrCat("candidates[", i, "]"), design.status().message());
+    }
+    if (i == 0) AddParameters(*problem, response);
+    *response.add_candidates() = ToProto(*design);
+    response.mutable_candidates()->rbegin()->set_name(candidate.name());
+  }
+  std::stable_sort(response.mutable_candidates()->begin(), response.mutable_candidates()->end(),
+                   [](const auto& a, const auto& b) { return a.gain().bits() > b.gain().bits(); });
+  if (known) {
+    for (const Diagnostic& diagnostic : known->diagnostics) {
+      *response.add_diagnostics() = ToProto(diagnostic);
+    }
+  }
+  return response;
 }
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,

@@ -23,6 +23,9 @@ absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostR
 absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
     const v1::AnalyzeSensitivityRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models = {});
+absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
+    const v1::DesignExperimentRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models = {});
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& models = {});

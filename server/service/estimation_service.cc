@@ -67,6 +67,8 @@ class EstimationService final : public v1::EstimationService::CallbackService {
                       v1::EvaluateCostResponse* response) override;
   Unary* AnalyzeSensitivity(Context* context, const v1::AnalyzeSensitivityRequest* request,
                             v1::AnalyzeSensitivityResponse* response) override;
+  Unary* DesignExperiment(Context* context, const v1::DesignExperimentRequest* request,
+                          v1::DesignExperimentResponse* response) override;
 
   Unary* CreateSession(Context* context, const v1::CreateSessionRequest* request,
                        v1::Session* response) override;
@@ -163,6 +165,14 @@ EstimationService::Unary* EstimationService::AnalyzeSensitivity(
   return OnExecutor(context, [=, this](const Stop& stop) {
     return Deliver(RunAnalyzeSensitivity(*request, kThreadsPerCall, stop, context_.models),
                    response);
+  });
+}
+
+EstimationService::Unary* EstimationService::DesignExperiment(
+    Context* context, const v1::DesignExperimentRequest* request,
+    v1::DesignExperimentResponse* response) {
+  return OnExecutor(context, [=, this](const Stop& stop) {
+    return Deliver(RunDesignExperiment(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
 

@@ -67,6 +67,13 @@ TEST_F(AnswersTest, SensitivitiesAgreeToTheLastDigit) {
   }
 }
 
+TEST_F(AnswersTest, DesignsAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(40));
+  ExpectSameAnswer({"design", Example("oscillator.json"), "--until", "2"});
+  ExpectSameAnswer({"design", Example("oscillator.json"), data, "--until", "2", "--outputs", "v",
+                    "--samples", "3", "--format", "json"});
+}
+
 TEST_F(AnswersTest, ModelsAgree) {
   ExpectSameAnswer({"models"});
   ExpectSameAnswer({"models", "--format", "json"});
@@ -196,6 +203,63 @@ TEST_F(CommandTest, PrintsOneCsvRowATimeOfTheSensitivities) {
   EXPECT_THAT(lines[5], StartsWith("1,"));
 }
 
+v1::DesignExperimentResponse DesignOf(const Finished& run) {
+  EXPECT_EQ(run.exit_status, 0) << run.err;
+  v1::DesignExperimentResponse response;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(run.out, &response).ok()) << run.out;
+  return response;
+}
+
+// The inputs of forced.json at a tenth of its frequency, and at its own.
+TEST_F(CommandTest, RanksTheInputsOfANextExperiment) {
+  const std::string slow = File("slow.json", R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "inputs": [{"name": "force", "sinusoid": {"amplitude": 1, "frequencyHz": 0.08}}]
+  })");
+  const Finished run = Run({"design", Example("forced.json"), "--until", "10", "--candidate", slow,
+                            "--samples", "4", "--format", "json"});
+  const v1::DesignExperimentResponse response = DesignOf(run);
+  ASSERT_EQ(response.candidates_size(), 2);
+  EXPECT_EQ(response.candidates(0).name(), Example("forced.json"));
+  EXPECT_EQ(response.candidates(1).name(), slow);
+  EXPECT_GT(response.candidates(0).gain().bits(), response.candidates(1).gain().bits() + 1);
+  EXPECT_EQ(response.candidates(0).samples_size(), 4);
+  ASSERT_EQ(response.parameters_size(), 2);
+  EXPECT_NEAR(response.parameters(0).std_dev(), 0.05, 1e-12);
+}
+
+// The demonstration record's own parameters are somewhere in the prior, and its curvature hangs on
+// its noise: the mean over the prior is near what it turns out to be, not equal.
+TEST_F(CommandTest, PromisesOfARecordWhatItsEstimateThenHas) {
+  const auto design = DesignOf(Run({"design", Example("oscillator.json"), "--until", "2", "--step",
+                                    "0.05", "--format", "json"}));
+  const Finished run = Run(
+      {"estimate", Example("oscillator.json"), File("data.csv", DemoRows(40)), "--format", "json"});
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  for (int i = 0; i < 2; ++i) {
+    const double std_dev = estimate.parameters(i).std_dev();
+    EXPECT_NEAR(design.candidates(0).gain().std_dev(i), std_dev, 0.2 * std_dev);
+  }
+}
+
+TEST_F(CommandTest, DesignsAfterWhatHasBeenMeasured) {
+  const std::string data = File("data.csv", DemoRows(100));
+  const auto after = DesignOf(
+      Run({"design", Example("oscillator.json"), data, "--until", "5", "--format", "json"}));
+  // What the estimate says of the same record is what is known beforehand.
+  const Finished run = Run({"estimate", Example("oscillator.json"), data, "--format", "json"});
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(after.parameters(i).mean(), estimate.parameters(i).mean(),
+                1e-3 * estimate.parameters(i).std_dev());
+    EXPECT_NEAR(after.parameters(i).std_dev(), estimate.parameters(i).std_dev(),
+                1e-3 * estimate.parameters(i).std_dev());
+  }
+  // As many samples again: both standard deviations fall by about √2, a bit in all.
+  EXPECT_NEAR(after.candidates(0).gain().bits(), 1, 0.1);
+  EXPECT_EQ(after.candidates(0).diagnostics_size(), 0);
+}
+
 TEST_F(CommandTest, PrintsOneCsvRowAPointOfTheCost) {
   const std::string data = File("data.csv", DemoRows(20));
   const Finished run = Run({"cost", Example("oscillator.json"), data, "--grid", "3", "--parameter",
@@ -221,7 +285,7 @@ TEST_F(CommandTest, ExplainsItself) {
   const Finished help = Run({"--help"});
   EXPECT_EQ(help.exit_status, 0);
   for (const char* const command :
-       {"estimate", "stream", "propagate", "cost", "models", "paper", "sensitivity"}) {
+       {"estimate", "stream", "propagate", "cost", "models", "paper", "sensitivity", "design"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
   }

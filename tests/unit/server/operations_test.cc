@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/model/catalogue.h"
 #include "server/convert/studies.h"
 #include "server/operations/names.h"
@@ -189,6 +191,85 @@ TEST(AnalyzeSensitivity, TakesAHundredthOfUntilForTheStep) {
   const auto response = RunAnalyzeSensitivity(request, 1, {});
   ASSERT_TRUE(response.ok()) << response.status();
   EXPECT_EQ(response->time_size(), 101);
+}
+
+v1::DesignExperimentRequest LineDesign() {
+  v1::DesignExperimentRequest request;
+  *request.mutable_problem() = ProblemFromJson(R"({
+    "model": {"equations": {"states": {"x": "a*u"}, "outputs": {"x": "x", "v": "a*u"},
+                            "inputs": ["u"]}},
+    "uncertain": [{"name": "a", "normal": {"mean": 1, "stdDev": 2}}],
+    "inputs": [{"name": "u", "constant": {"amplitude": 1}}],
+    "measured": [{"output": "x", "noise": {"absolute": 1}}]
+  })");
+  request.set_until(2);
+  request.set_step(1);
+  return request;
+}
+
+void AddConstant(const char* name, double amplitude, v1::DesignExperimentRequest& request) {
+  auto& candidate = *request.add_candidates();
+  candidate.set_name(name);
+  auto& input = *candidate.add_inputs();
+  input.set_name("u");
+  input.mutable_constant()->set_amplitude(amplitude);
+}
+
+TEST(DesignExperiment, AnswersForTheProblemsOwnInputs) {
+  const auto response = RunDesignExperiment(LineDesign(), 1, {});
+  ASSERT_TRUE(response.ok()) << response.status();
+  ASSERT_EQ(response->parameters_size(), 1);
+  EXPECT_EQ(response->parameters(0).name(), "a");
+  EXPECT_EQ(response->parameters(0).mean(), 1);
+  EXPECT_EQ(response->parameters(0).std_dev(), 2);
+  ASSERT_EQ(response->candidates_size(), 1);
+  const auto& own = response->candidates(0);
+  EXPECT_EQ(own.name(), "");
+  // x = a t at t = 1 and 2: precision ¼ + 1 + 4.
+  EXPECT_NEAR(own.gain().bits(), 0.5 * std::log2(4 * 5.25), 1e-7);
+  EXPECT_NEAR(own.gain().std_dev(0), 1 / std::sqrt(5.25), 1e-7);
+  ASSERT_EQ(own.outputs_size(), 2);
+  EXPECT_EQ(own.outputs(0).name(), "x");
+  EXPECT_TRUE(own.outputs(0).measured());
+  EXPECT_FALSE(own.outputs(1).measured());
+  ASSERT_EQ(own.samples_size(), 2);
+  EXPECT_EQ(own.samples(0).time(), 2);
+  EXPECT_EQ(own.order(), 3);
+}
+
+TEST(DesignExperiment, PutsTheBestCandidateFirst) {
+  v1::DesignExperimentRequest request = LineDesign();
+  AddConstant("weak", 0.1, request);
+  AddConstant("strong", 10, request);
+  const auto response = RunDesignExperiment(request, 1, {});
+  ASSERT_TRUE(response.ok()) << response.status();
+  ASSERT_EQ(response->candidates_size(), 2);
+  EXPECT_EQ(response->candidates(0).name(), "strong");
+  EXPECT_EQ(response->candidates(1).name(), "weak");
+  EXPECT_EQ(response->parameters_size(), 1);
+}
+
+TEST(DesignExperiment, NamesTheCandidateThatIsWrong) {
+  v1::DesignExperimentRequest request = LineDesign();
+  AddConstant("good", 1, request);
+  request.add_candidates()->add_inputs()->set_name("w");
+  const auto status = RunDesignExperiment(request, 1, {}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), testing::StartsWith("candidates[1]: inputs[0]"));
+}
+
+TEST(DesignExperiment, StartsFromWhatHasBeenMeasured) {
+  v1::DesignExperimentRequest request = LineDesign();
+  request.mutable_measurements()->add_time(2);
+  auto& x = *request.mutable_measurements()->add_channels();
+  x.set_name("x");
+  x.add_values(3);
+  const auto response = RunDesignExperiment(request, 1, {});
+  ASSERT_TRUE(response.ok()) << response.status();
+  // Precision ¼ + 4 now, 5 more then.
+  EXPECT_NEAR(response->parameters(0).mean(), (0.25 * 1 + 2 * 3) / 4.25, 0.02);
+  EXPECT_NEAR(response->parameters(0).std_dev(), 1 / std::sqrt(4.25), 1e-3);
+  EXPECT_NEAR(response->candidates(0).gain().std_dev(0), 1 / std::sqrt(9.25), 1e-3);
 }
 
 }  // namespace

@@ -1,0 +1,156 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/text_table.h"
+#include "client/cpp/data_file.h"
+#include "client/cpp/problem_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+using Design = v1::DesignExperimentResponse;
+
+bool HasStreamedInput(const v1::Problem& problem) {
+  return std::any_of(problem.inputs().begin(), problem.inputs().end(),
+                     [](const v1::Input& input) { return input.has_streamed(); });
+}
+
+// The problem's own inputs, unless the data had to carry one, and those of further files.
+absl::Status AddCandidates(const DesignArguments& arguments, v1::DesignExperimentRequest& request) {
+  if (arguments.candidate_files.empty()) return absl::OkStatus();
+  if (!HasStreamedInput(request.problem())) {
+    auto& own = *request.add_candidates();
+    own.set_name(arguments.problem_file);
+    *own.mutable_inputs() = request.problem().inputs();
+  }
+  for (const std::string& file : arguments.candidate_files) {
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem other, ReadProblemFile(file));
+    auto& candidate = *request.add_candidates();
+    candidate.set_name(file);
+    *candidate.mutable_inputs() = other.inputs();
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
+  v1::DesignExperimentRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  if (!arguments.data_file.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                             ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  }
+  POLYEST_RETURN_IF_ERROR(AddCandidates(arguments, request));
+  request.set_until(arguments.until_s);
+  request.set_step(arguments.step_s);
+  request.set_samples(arguments.samples);
+  for (const std::string& output : arguments.outputs) request.add_possible()->set_output(output);
+  auto response = MakeBackend(arguments.place)->DesignExperiment(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  return response;
+}
+
+// The gain and the expected standard deviation of each parameter.
+void AddGain(const Design::Gain& gain, std::vector<std::string>& row) {
+  row.push_back(FormatNumber(gain.bits(), 3));
+  for (const double sd : gain.std_dev()) row.push_back(FormatNumber(sd, 2));
+}
+
+std::vector<std::string> Header(const Design& design, std::vector<std::string> first) {
+  first.push_back("bits");
+  for (const auto& parameter : design.parameters()) first.push_back("sd " + parameter.name());
+  return first;
+}
+
+void PrintCandidates(const Design& design, std::ostream& out) {
+  TextTable table(Header(design, {"inputs"}));
+  std::vector<std::string> now = {"(known beforehand)", "0"};
+  for (const auto& p : design.parameters()) now.push_back(FormatNumber(p.std_dev(), 2));
+  table.AddRow(std::move(now));
+  for (const auto& candidate : design.candidates()) {
+    std::vector<std::string> row = {candidate.name().empty() ? "the problem's" : candidate.name()};
+    AddGain(candidate.gain(), row);
+    table.AddRow(std::move(row));
+  }
+  table.Print(out);
+}
+
+void PrintOutputs(const Design& design, const Design::Candidate& candidate, std::ostream& out) {
+  TextTable table(Header(design, {"output", "unit", "noise sd", "measured", "bits alone"}));
+  for (const auto& output : candidate.outputs()) {
+    std::vector<std::string> row = {output.name(), output.unit() == "1" ? "" : output.unit(),
+                                    FormatNumber(output.noise_std_dev(), 3),
+                                    output.measured() ? "yes" : "no",
+                                    FormatNumber(output.alone().bits(), 3)};
+    AddGain(output.together(), row);
+    table.AddRow(std::move(row));
+  }
+  table.Print(out);
+}
+
+void PrintSamples(const Design& design, const Design::Candidate& candidate, std::ostream& out) {
+  TextTable table(Header(design, {"t (s)"}));
+  for (const auto& sample : candidate.samples()) {
+    std::vector<std::string> row = {FormatNumber(sample.time(), 6)};
+    AddGain(sample.gain(), row);
+    table.AddRow(std::move(row));
+  }
+  table.Print(out);
+}
+
+// The outputs that are sampled in any case.
+std::string Planned(const Design::Candidate& candidate) {
+  std::vector<std::string> measured;
+  for (const auto& output : candidate.outputs()) {
+    if (output.measured()) measured.push_back(output.name());
+  }
+  return measured.empty() ? "all outputs" : absl::StrJoin(measured, ", ");
+}
+
+void PrintTables(const Design& design, std::ostream& out) {
+  const Design::Candidate& best = design.candidates(0);
+  out << "Expected information gain, and standard deviations afterwards, of samples of "
+      << Planned(best) << " at all times:\n\n";
+  PrintCandidates(design, out);
+  const std::string of_best =
+      design.candidates_size() > 1 ? absl::StrCat(" with ", best.name()) : "";
+  out << "\nOf each output at all times" << of_best
+      << ", alone, and together with all that is measured:\n\n";
+  PrintOutputs(design, best, out);
+  out << "\nThe best times for samples of " << Planned(best) << of_best
+      << ", each beside those above it:\n\n";
+  PrintSamples(design, best, out);
+  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", best.order(), best.terms(),
+                         best.points());
+  PrintDiagnostics(design.diagnostics(), out);
+  PrintDiagnostics(best.diagnostics(), out);
+}
+
+}  // namespace
+
+int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = DesignExperiment(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else {
+    PrintTables(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest
