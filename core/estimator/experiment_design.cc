@@ -55,11 +55,12 @@ absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& pro
           absl::StrFormat("%s: model %s has no output \"%s\"; it has %s", field, model.name,
                           possible.output, ListNames(model.outputs)));
     }
-    if (known(*column)) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "%s: output %s is given twice, or measured anyway", field, possible.output));
-    }
     POLYEST_RETURN_IF_ERROR(CheckNoise(possible.noise, field));
+    if (known(*column)) {
+      if (!HasNumbers(possible.noise)) continue;
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%s.noise: output %s has a noise already", field, possible.output));
+    }
     candidates.push_back({*column, HasNumbers(possible.noise) ? &possible.noise : nullptr});
   }
   if (options.possible.empty()) {
@@ -182,8 +183,9 @@ std::vector<Matrix> Sum(const std::vector<Matrix>& a, const std::vector<Matrix>&
 }
 
 // `planned`: how many of the candidates, from the first on, are to be measured in any case.
-void CompareOutputs(const ResolvedProblem& problem, const std::vector<Candidate>& candidates,
-                    const Outlook& outlook, int planned, ExperimentDesign& design) {
+absl::Status CompareOutputs(const ResolvedProblem& problem,
+                            const std::vector<Candidate>& candidates, const Outlook& outlook,
+                            int planned, const Stop& stop, ExperimentDesign& design) {
   std::vector<std::vector<Matrix>> information;
   for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {
     information.push_back(outlook.Information(i));
@@ -195,6 +197,7 @@ void CompareOutputs(const ResolvedProblem& problem, const std::vector<Candidate>
   design.gain = outlook.draws().Expected(all_planned);
   const auto& outputs = problem.problem().model->description().outputs;
   for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
     const auto index = static_cast<size_t>(i);
     const Quantity& output = outputs[static_cast<size_t>(candidates[index].column)];
     OutputGain gain{output.name,
@@ -207,6 +210,7 @@ void CompareOutputs(const ResolvedProblem& problem, const std::vector<Candidate>
         i < planned ? design.gain : outlook.draws().Expected(Sum(all_planned, information[index]));
     design.outputs.push_back(std::move(gain));
   }
+  return absl::OkStatus();
 }
 
 absl::Status ChooseTimes(const Outlook& outlook, const TimeGrid& grid, int planned, int most,
@@ -282,7 +286,7 @@ absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem
   const Outlook outlook(problem, *expansion, candidates, record);
   const int planned = problem.channels() > 0 ? problem.channels() : m;
   ExperimentDesign design;
-  CompareOutputs(problem, candidates, outlook, planned, design);
+  POLYEST_RETURN_IF_ERROR(CompareOutputs(problem, candidates, outlook, planned, stop, design));
   POLYEST_RETURN_IF_ERROR(ChooseTimes(outlook, grid, planned, options.samples, stop, design));
   design.order = expansion->basis().order();
   design.terms = expansion->basis().size();

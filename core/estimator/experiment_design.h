@@ -25,7 +25,8 @@ struct ExperimentOptions {
   double step_s = 0;   // > 0; samples may be taken at 0, step, 2 step … until
   int samples = 10;    // sample times to choose, 1 … kMostSampleTimes
   // Outputs that could be measured besides those of the problem; empty: all others of the model.
-  // The noise of one without numbers is 1 % of the range of its predictions (assumed_noise.h).
+  // The noise of one without numbers is 1 % of the range of its predictions (assumed_noise.h); one
+  // that is measured, or given before, has a noise already and must be without.
   std::vector<MeasuredOutput> possible;
   int threads = 1;
 

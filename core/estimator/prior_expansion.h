@@ -65,7 +65,7 @@ class PriorExpansion {
   const std::vector<PointFailure>& failures() const { return ensemble_.failures(); }
 
   // Calls `visit` with all times of the grid, in order, some at a time. Once. FAILED_PRECONDITION
-  // when no more than S trajectories are left; a stop request's status.
+  // when no more than S trajectories are left or an output passes 10¹⁴⁰; a stop request's status.
   absl::Status Run(const TimeGrid& grid, absl::FunctionRef<void(const ExpandedOutputs&)> visit,
                    const Stop& stop);
 

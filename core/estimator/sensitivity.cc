@@ -91,9 +91,13 @@ double Accuracy(const ResolvedProblem& problem, const OutputSensitivity& output)
 void DivideByVariance(double accuracy, OutputSensitivity& output) {
   for (Eigen::Index k = 0; k < output.mean.size(); ++k) {
     const double deviation = output.standard_deviation[k];
-    const double share = deviation > accuracy ? 1 / (deviation * deviation) : 0;
-    output.first_order.row(k) *= share;
-    output.total.row(k) *= share;
+    if (deviation > accuracy) {
+      output.first_order.row(k) /= deviation * deviation;
+      output.total.row(k) /= deviation * deviation;
+    } else {
+      output.first_order.row(k).setZero();
+      output.total.row(k).setZero();
+    }
   }
 }
 

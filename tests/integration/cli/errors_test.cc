@@ -198,6 +198,27 @@ TEST_F(ErrorsTest, AVehicleThatComesToAStop) {
               AllOf(HasSubstr("only 0 of"), HasSubstr("could be integrated")));
 }
 
+TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
+  const std::string problem = File("p.json", kProblem);
+  for (const char* const command : {"sensitivity", "design"}) {
+    EXPECT_THAT(OneLine(Run({command, problem}), 2), HasSubstr("--until"));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "0"}), 2), HasSubstr("until: 0"));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--step", "-1"}), 2),
+                HasSubstr("step: -1"));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,q"}), 2),
+                AllOf(HasSubstr("\"q\""), HasSubstr("x, v, a")));
+  }
+  EXPECT_THAT(OneLine(Run({"sensitivity", Example("damper_rig.json"), "--until", "1"}), 2),
+              HasSubstr("correlations: m and k1"));
+  const std::string streamed = Example("quarter_car.json");
+  EXPECT_THAT(OneLine(Run({"design", streamed, "--until", "1"}), 2), HasSubstr("road is streamed"));
+  const std::string other = File("other.json", R"({"inputs": [{"name": "wind"}]})");
+  EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", other}), 2),
+              HasSubstr("candidates[1]: inputs[0]"));
+  EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", "absent.json"}), 2),
+              HasSubstr("absent.json"));
+}
+
 TEST_F(ErrorsTest, BadUsage) {
   const std::string problem = File("p.json", kProblem);
   const std::string data = File("d.csv", kData);

@@ -136,6 +136,11 @@ TEST(ExperimentDesign, AssumesOnePercentOfTheRangeForNoiseThatIsNotKnown) {
   EXPECT_NEAR(design.outputs[1].noise, 0.12, 1e-9);
 }
 
+TEST(ExperimentDesign, TakesAnOutputThatIsMeasuredAnywayOnce) {
+  EXPECT_EQ(Design(Line(), 2, 0.5, 1, {{"x", {}}, {"v", {}}, {"v", {}}}).outputs.size(), 2u);
+  EXPECT_EQ(Design(Line(), 2, 0.5, 1, {{"x", {}}}).outputs.size(), 1u);
+}
+
 TEST(ExperimentDesign, PlansAllOutputsWhenNoneIsMeasured) {
   Problem problem = Line();
   problem.measured.clear();
@@ -229,7 +234,10 @@ TEST(ExperimentDesign, RefusalNamesFieldValueAndRule) {
                 o.possible = {{"w", {}}};
               }),
               AllOf(HasSubstr("possible[0]"), HasSubstr("\"w\""), HasSubstr("v, x")));
-  EXPECT_THAT(refusal([](auto& o) { o.possible = {{"x", {}}}; }), HasSubstr("measured anyway"));
+  EXPECT_THAT(refusal([](auto& o) {
+                o.possible = {{"x", {.absolute = 1}}};
+              }),
+              HasSubstr("possible[0].noise: output x has a noise already"));
   EXPECT_THAT(refusal([](auto& o) {
                 o.possible = {{"v", {.absolute = -1}}};
               }),
