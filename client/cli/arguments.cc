@@ -53,6 +53,7 @@ class Parser {
     AddSensitivity();
     AddDesign();
     AddPaper();
+    AddPosterior();
   }
 
   CLI::App& app() { return app_; }
@@ -69,6 +70,7 @@ class Parser {
     if (name == "schema") return SchemaArguments{};
     if (name == "sensitivity") return Placed(sensitivity_);
     if (name == "design") return Placed(design_);
+    if (name == "posterior") return Placed(posterior_);
     return paper_;
   }
 
@@ -257,6 +259,29 @@ class Parser {
         ->capture_default_str();
   }
 
+  void AddPosterior() {
+    CLI::App& command = *app_.add_subcommand(
+        "posterior", "The posterior in detail: densities, quantiles and samples");
+    AddProblem(command, posterior_.problem_file);
+    command.add_option("data", posterior_.data_file, "The measurements, a CSV file")->required();
+    command.add_option("--samples", posterior_.samples, "Samples of the posterior to print")
+        ->check(CLI::Range(0, 100'000));
+    command
+        .add_option("--quantiles", posterior_.probabilities,
+                    "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
+        ->delimiter(',');
+    command
+        .add_option("--joint", posterior_.joints,
+                    "Two parameters whose joint density is wanted, NAME,NAME; may be repeated")
+        ->expected(1)
+        ->take_all();
+    command.footer(
+        "As csv: the samples if --samples is given, else the joint densities if --joint is, else "
+        "one row a parameter. The densities of single parameters are in json.");
+    AddPlace(command);
+    AddFormat(command, posterior_.format, {"table", "json", "csv"});
+  }
+
   CLI::App app_;
   Place place_;
   bool local_ = false;
@@ -270,6 +295,7 @@ class Parser {
   SensitivityArguments sensitivity_;
   DesignArguments design_;
   PaperOptions paper_;
+  PosteriorArguments posterior_;
 };
 
 }  // namespace

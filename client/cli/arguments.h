@@ -99,9 +99,20 @@ struct DesignArguments {
   Format format = Format::kTable;
 };
 
-using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                             SensitivityArguments, DesignArguments, PaperOptions>;
+struct PosteriorArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  int samples = 0;
+  std::vector<double> probabilities;  // of the quantiles; empty: the default
+  std::vector<std::string> joints;    // of two parameters each, "k,c"
+  Format format = Format::kTable;
+};
+
+using Command =
+    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                 SensitivityArguments, DesignArguments, PosteriorArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -52,6 +52,11 @@ class LocalBackend : public Backend {
     POLYEST_RETURN_IF_ERROR(models_.status());
     return polyest::GetModel(request, *models_);
   }
+  absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
+      const v1::GetPosteriorRequest& request) override {
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunGetPosterior(request, threads_, stop_, *models_);
+  }
 
  private:
   int threads_;
@@ -91,6 +96,10 @@ class RemoteBackend : public Backend {
   }
   absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) override {
     return client_.GetModel(request);
+  }
+  absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
+      const v1::GetPosteriorRequest& request) override {
+    return client_.GetPosterior(request);
   }
 
  private:

@@ -27,6 +27,8 @@ class Backend {
   virtual absl::StatusOr<v1::ListModelsResponse> ListModels(
       const v1::ListModelsRequest& request) = 0;
   virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;
+  virtual absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
+      const v1::GetPosteriorRequest& request) = 0;
 };
 
 ClientOptions ToClientOptions(const Place& place);

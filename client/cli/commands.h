@@ -19,5 +19,6 @@ int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& 
 int RunCommand(const SchemaArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

@@ -32,6 +32,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "not converged";
     case v1::Diagnostic::POINTS_FAILED:
       return "trajectories failed";
+    case v1::Diagnostic::NON_GAUSSIAN:
+      return "not Gaussian";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }

@@ -109,6 +109,11 @@ absl::StatusOr<v1::EstimateResponse> Client::GetEstimate(const v1::GetEstimateRe
   return Call(&Stub::GetEstimate, request);
 }
 
+absl::StatusOr<v1::GetPosteriorResponse> Client::GetPosterior(
+    const v1::GetPosteriorRequest& request) {
+  return Call(&Stub::GetPosterior, request);
+}
+
 absl::Status Client::WatchSession(
     const v1::WatchSessionRequest& request,
     const std::function<bool(const v1::EstimateResponse&)>& estimate) {

@@ -43,6 +43,8 @@ const char* NameOf(DiagnosticCode code) {
       return "NOT_CONVERGED";
     case DiagnosticCode::kPointsFailed:
       return "POINTS_FAILED";
+    case DiagnosticCode::kNonGaussian:
+      return "NON_GAUSSIAN";
   }
   return "";
 }

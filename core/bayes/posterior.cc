@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "core/chaos/collocation_points.h"
@@ -17,10 +16,7 @@ namespace {
 constexpr int kCoverPerParticle = 4;  // points of the cover of the box for each particle
 constexpr int kLeastStartingPoints = 50;
 constexpr double kEffectiveFraction = 0.5;
-constexpr double kShrink = 0.7;           // of the guesses, mixed with 0.3 of the cover
-constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
-constexpr double kStepSpread = 0.5;       // standard deviation of log γ
-constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box widths
+constexpr double kShrink = 0.7;  // of the guesses, mixed with 0.3 of the cover
 constexpr int kBisections = 50;
 
 // A cover of the box, count × n.
@@ -35,7 +31,7 @@ Matrix CoverOfBox(const Vector& lower, const Vector& upper, int count) {
 class Sampler {
  public:
   Sampler(const Cost& cost, const Vector& lower, const Vector& upper, const SamplerOptions& options)
-      : cost_(cost), lower_(lower), upper_(upper), options_(options), generator_(options.seed) {}
+      : lower_(lower), upper_(upper), options_(options), moves_(cost, lower, upper, options.seed) {}
 
   absl::StatusOr<Particles> Run(const Matrix& guesses, const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(Start(guesses));
@@ -50,24 +46,13 @@ class Sampler {
       done += sweeps;
       for (int i = 0; i < sweeps; ++i) {
         POLYEST_RETURN_IF_ERROR(stop.Check());
-        Sweep(beta);
+        moves_.Sweep(beta, 0, particles_.etas.rows(), particles_);
       }
     }
     return std::move(particles_);
   }
 
  private:
-  // J at each row; +∞ outside the box.
-  void Evaluate(const Matrix& etas, Vector& costs) const {
-    cost_.EvaluateMany(etas, costs);
-    for (Eigen::Index i = 0; i < etas.rows(); ++i) {
-      const auto row = etas.row(i).transpose().array();
-      if ((row < lower_.array()).any() || (row > upper_.array()).any()) {
-        costs[i] = std::numeric_limits<double>::infinity();
-      }
-    }
-  }
-
   absl::Status Start(const Matrix& guesses) {
     const Matrix cover = CoverOfBox(lower_, upper_, kCoverPerParticle * options_.particles);
     const Eigen::Index g = std::min(guesses.rows(), cover.rows());
@@ -75,7 +60,7 @@ class Sampler {
     const auto used = guesses.topRows(g);
     start << used, kShrink * used + (1 - kShrink) * cover.topRows(g), cover;
     Vector costs;
-    Evaluate(start, costs);
+    moves_.Evaluate(start, costs);
     Eigen::Index kept = 0;
     for (Eigen::Index i = 0; i < start.rows(); ++i) {
       if (!std::isfinite(costs[i])) continue;
@@ -116,7 +101,7 @@ class Sampler {
   void Resample(double step) {
     const Vector weights = Weights(step);
     const double spacing = weights.sum() / options_.particles;
-    double pointer = spacing * uniform_(generator_);
+    double pointer = spacing * moves_.Uniform();
     Particles chosen{Matrix(options_.particles, particles_.etas.cols()),
                      Vector(options_.particles)};
     Eigen::Index source = 0;
@@ -134,62 +119,17 @@ class Sampler {
   // depend on that order.
   void Shuffle() {
     for (Eigen::Index i = particles_.etas.rows() - 1; i > 0; --i) {
-      const Eigen::Index j = Draw(i + 1);
+      const Eigen::Index j = moves_.Draw(i + 1);
       particles_.etas.row(i).swap(particles_.etas.row(j));
       std::swap(particles_.costs[i], particles_.costs[j]);
     }
   }
 
-  // One move of every particle: each half is moved by differences within the other, which leaves
-  // the density invariant though all of a half move at once.
-  void Sweep(double beta) {
-    const Eigen::Index half = particles_.etas.rows() / 2;
-    MoveHalf(beta, 0, half, half, particles_.etas.rows() - half);
-    MoveHalf(beta, half, particles_.etas.rows() - half, 0, half);
-  }
-
-  void MoveHalf(double beta, Eigen::Index first, Eigen::Index count, Eigen::Index other,
-                Eigen::Index other_count) {
-    const Eigen::Index n = particles_.etas.cols();
-    const double scale = 2.38 / std::sqrt(2.0 * static_cast<double>(n));
-    const Vector width = upper_ - lower_;
-    proposal_.resize(count, n);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const bool jump = uniform_(generator_) < kJumpProbability;
-      const double gamma = jump ? 1 : scale * std::exp(kStepSpread * normal_(generator_));
-      const Eigen::Index j = other + Draw(other_count);
-      const Eigen::Index k = other + Draw(other_count);
-      for (Eigen::Index d = 0; d < n; ++d) {
-        proposal_(i, d) = particles_.etas(first + i, d) +
-                          gamma * (particles_.etas(j, d) - particles_.etas(k, d)) +
-                          kJitter * width[d] * normal_(generator_);
-      }
-    }
-    Evaluate(proposal_, proposal_costs_);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double change = proposal_costs_[i] - particles_.costs[first + i];
-      if (std::log(uniform_(generator_)) < -beta * change) {
-        particles_.etas.row(first + i) = proposal_.row(i);
-        particles_.costs[first + i] = proposal_costs_[i];
-      }
-    }
-  }
-
-  Eigen::Index Draw(Eigen::Index count) {
-    return std::min(static_cast<Eigen::Index>(uniform_(generator_) * static_cast<double>(count)),
-                    count - 1);
-  }
-
-  const Cost& cost_;
   const Vector& lower_;
   const Vector& upper_;
   const SamplerOptions& options_;
-  std::mt19937_64 generator_;
-  std::uniform_real_distribution<double> uniform_{0, 1};
-  std::normal_distribution<double> normal_{0, 1};
+  DifferentialEvolution moves_;
   Particles particles_;
-  Matrix proposal_;
-  Vector proposal_costs_;
 };
 
 }  // namespace

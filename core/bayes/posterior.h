@@ -4,8 +4,7 @@
 //
 // The density is tempered, ∝ e^{−βJ} with β rising from 0 to 1; a step of β is as large as halves
 // the effective size 1/Σ w² of the particles, which are then resampled and moved by differential
-// evolution: η_i + γ (η_j − η_k), γ = 2.38/√(2n) times a lognormal factor, now and then γ = 1 to
-// jump between pieces (ter Braak 2006). Cold starts and single Gaussians miss what tempering finds:
+// evolution (differential_evolution.h). Cold starts and single Gaussians miss what tempering finds:
 // narrow valleys, bounds, separate pieces.
 
 #include <absl/status/statusor.h>
@@ -13,6 +12,7 @@
 #include <cstdint>
 
 #include "core/bayes/cost.h"
+#include "core/bayes/differential_evolution.h"
 #include "core/common/stop.h"
 #include "core/common/types.h"
 
@@ -26,11 +26,6 @@ struct SamplerOptions {
   // sweeps × steps + final_sweeps passes it.
   int total_sweeps = 0;
   uint64_t seed = 1;  // the particles are a function of the arguments alone
-};
-
-struct Particles {
-  Matrix etas;   // particles × n, in the cost's local coordinates
-  Vector costs;  // J at each
 };
 
 // lower, upper: the box (n) in local coordinates that particles must not leave; the cost must be

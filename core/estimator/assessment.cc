@@ -7,76 +7,19 @@
 #include "core/bayes/curvature.h"
 #include "core/bayes/l_curve.h"
 #include "core/bayes/minimizer.h"
-#include "core/chaos/expansion.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/diagnosis.h"
 #include "core/estimator/reexpansion.h"
+#include "core/estimator/search_domain.h"
 
 namespace polyest {
 namespace {
 
-constexpr int kParticles = 2000;
-constexpr int kSweeps = 6;         // after each tempering step
-constexpr int kTotalSweeps = 120;  // so that an estimate takes the same time after any record
-constexpr uint64_t kSeed = 20'071'121;
-constexpr int kStarts = 6;
 // Other minima count when their density is not below this part of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
-// Kept from a bound of Ω, of its width: a density that vanishes at the bound has no finite cost.
-constexpr double kOffBound = 1e-9;
 // An isolated minimum has all its curvatures above the prior's; a valley's floor has not.
 constexpr double kIsolatedCurvature = 1;
-
-// Ω in local coordinates as rows a with aᵀη ≤ bound, and the box of the search.
-MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& prior) {
-  MinimizationProblem search;
-  SamplingBox(design, search.lower, search.upper);
-  const int n = prior.dimension();
-  search.constraint.resize(0, n);
-  search.bound.resize(0);
-  for (int i = 0; i < n; ++i) {
-    const bool finite = std::isfinite(prior.lower()[i]) && std::isfinite(prior.upper()[i]);
-    const double off = kOffBound * (finite ? prior.upper()[i] - prior.lower()[i] : 1);
-    for (const double sign : {1.0, -1.0}) {
-      const double bound = sign > 0 ? prior.upper()[i] : -prior.lower()[i];
-      if (!std::isfinite(bound)) continue;
-      if (design.whole_prior) {
-        if (sign > 0) search.upper[i] = std::min(search.upper[i], bound - off);
-        if (sign < 0) search.lower[i] = std::max(search.lower[i], -(bound - off));
-        continue;
-      }
-      search.constraint.conservativeResize(search.constraint.rows() + 1, n);
-      search.bound.conservativeResize(search.bound.size() + 1);
-      search.constraint.bottomRows(1) = sign * design.region.axes().row(i);
-      search.bound.tail(1)[0] = bound - off - sign * design.region.centre()[i];
-    }
-  }
-  return search;
-}
-
-// The particle of least cost, then each time the one farthest from those chosen, in standard
-// deviations of the particles.
-Matrix Starts(const Particles& particles) {
-  const Eigen::Index count = particles.etas.rows();
-  const Vector mean = particles.etas.colwise().mean().transpose();
-  const Matrix centred = particles.etas.rowwise() - mean.transpose();
-  const Vector scale =
-      (centred.colwise().squaredNorm() / static_cast<double>(count)).cwiseSqrt().transpose();
-  Matrix starts(kStarts, particles.etas.cols());
-  Eigen::Index chosen;
-  particles.costs.minCoeff(&chosen);
-  Vector distance = Vector::Constant(count, std::numeric_limits<double>::infinity());
-  for (int i = 0; i < kStarts; ++i) {
-    starts.row(i) = particles.etas.row(chosen);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const auto difference = (particles.etas.row(k) - starts.row(i)).transpose().array() /
-                              scale.array().max(std::numeric_limits<double>::min());
-      distance[k] = std::min(distance[k], difference.square().sum());
-    }
-    distance.maxCoeff(&chosen);
-  }
-  return starts;
-}
 
 class Assessment {
  public:
@@ -86,16 +29,15 @@ class Assessment {
         request_(request),
         design_(request.expansion->design()) {}
 
-  absl::StatusOr<Estimate> Run(const Stop& stop) {
+  absl::StatusOr<Assessed> Run(const Stop& stop) {
     regularization_ = problem_.problem().regularization;
     if (problem_.problem().regularization_mode == RegularizationMode::kLCurve) {
       POLYEST_RETURN_IF_ERROR(ChooseRegularization(stop));
     }
     const Cost cost = request_.expansion->MakeCost(regularization_);
-    POLYEST_RETURN_IF_ERROR(SamplePosteriorOf(cost, stop));
-    const std::vector<Minimum> minima =
-        FindMinima(MinimizationOf(cost), Starts(particles_), MinimizerOptions(), stop);
-    POLYEST_RETURN_IF_ERROR(stop.Check());
+    POLYEST_ASSIGN_OR_RETURN(
+        posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
+    const std::vector<Minimum>& minima = posterior_.minima;
     const Vector eta = minima.front().point;
     findings_.problem = &problem_;
     findings_.expansion = request_.expansion;
@@ -108,45 +50,22 @@ class Assessment {
     DescribeParameters(cost, eta);
     DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
-    return std::move(estimate_);
+    return Assessed{std::move(estimate_), std::move(posterior_)};
   }
 
  private:
-  MinimizationProblem MinimizationOf(const Cost& cost) const {
-    MinimizationProblem search = SearchDomain(design_, prior_);
-    search.function = [&cost](const Vector& eta, Vector* gradient) {
-      if (gradient == nullptr) return cost.Evaluate(eta).total;
-      return cost.EvaluateWithGradient(eta, *gradient).total;
-    };
-    return search;
-  }
-
   // α² at the corner of the L-curve, each point of which is a minimum of its own.
   absl::Status ChooseRegularization(const Stop& stop) {
     Matrix starts = design_.reference.transpose();
     const auto minimum = [&](double regularization) {
       const Cost cost = request_.expansion->MakeCost(regularization);
       const Minimum best =
-          FindMinima(MinimizationOf(cost), starts, MinimizerOptions(), stop).front();
+          FindMinima(SearchOf(cost, design_), starts, MinimizerOptions(), stop).front();
       starts = best.point.transpose();
       return cost.Evaluate(best.point);
     };
     regularization_ = ChooseByLCurve(minimum, prior_).regularization;
     return stop.Check();
-  }
-
-  absl::Status SamplePosteriorOf(const Cost& cost, const Stop& stop) {
-    Vector lower, upper;
-    SamplingBox(design_, lower, upper);
-    SamplerOptions options;
-    options.particles = kParticles;
-    options.seed = kSeed;
-    options.sweeps = kSweeps;
-    options.total_sweeps = kTotalSweeps;
-    POLYEST_ASSIGN_OR_RETURN(
-        particles_, SamplePosterior(cost, lower, upper,
-                                    design_.region.ManyToLocal(*request_.guesses), options, stop));
-    return absl::OkStatus();
   }
 
   // J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
@@ -196,8 +115,7 @@ class Assessment {
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
-    Matrix scores = design_.region.ManyToGerm(particles_.etas);
-    if (prior_.correlated()) scores *= prior_.factor().transpose();
+    WidenPosterior(widening);
     for (int i = 0; i < prior_.dimension(); ++i) {
       ParameterEstimate parameter;
       parameter.name = prior_.parameters()[static_cast<size_t>(i)].name;
@@ -208,7 +126,7 @@ class Assessment {
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation_[i] / prior_deviation[i];
       parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
-      DescribePosterior(scores.col(i), i, widening, parameter);
+      DescribePosterior(i, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
   }
@@ -248,20 +166,24 @@ class Assessment {
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
   }
 
-  // Mean and quantiles of one parameter from its particles' scores, widened about their mean but
-  // not past Ω.
-  void DescribePosterior(const Vector& scores, int i, double widening,
-                         ParameterEstimate& parameter) const {
-    const double centre = scores.mean();
-    const auto limit = [&](double probability) {
-      const double z = centre + widening * (QuantileOfSamples(scores, probability) - centre);
-      return prior_.OfScore(i, std::clamp(z, prior_.lower()[i], prior_.upper()[i]));
-    };
-    parameter.mean = prior_.IsCurved(i)
-                         ? scores.unaryExpr([&](double z) { return prior_.OfScore(i, z); }).mean()
-                         : prior_.OfScore(i, centre);
-    parameter.lower95 = limit(0.025);
-    parameter.upper95 = limit(0.975);
+  // Draws' scores widened about their mean but not past Ω.
+  void WidenPosterior(double widening) {
+    if (!(widening > 1)) return;
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      auto scores = posterior_.scores.col(i).array();
+      const double centre = WeightedMean(posterior_.scores.col(i), posterior_.weights);
+      scores =
+          (centre + widening * (scores - centre)).max(prior_.lower()[i]).min(prior_.upper()[i]);
+    }
+  }
+
+  void DescribePosterior(int i, ParameterEstimate& parameter) const {
+    const Vector theta = posterior_.Parameter(prior_, i);
+    const WeightedQuantiles quantile(theta, posterior_.weights);
+    parameter.mean = WeightedMean(theta, posterior_.weights);
+    parameter.posterior_std_dev = WeightedStandardDeviation(theta, posterior_.weights);
+    parameter.lower95 = quantile(0.025);
+    parameter.upper95 = quantile(0.975);
   }
 
   void DescribeChannels(const Cost& cost, const Vector& eta) {
@@ -284,7 +206,7 @@ class Assessment {
   const AssessmentRequest& request_;
   const ExpansionDesign& design_;
   double regularization_ = 1;
-  Particles particles_;
+  PosteriorDraws posterior_;
   Vector deviation_;  // of the parameters
   Findings findings_;
   Estimate estimate_;
@@ -292,7 +214,7 @@ class Assessment {
 
 }  // namespace
 
-absl::StatusOr<Estimate> Assess(const AssessmentRequest& request, const Stop& stop) {
+absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop) {
   return Assessment(request).Run(stop);
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/common/stop.h"
 #include "core/estimator/estimate.h"
+#include "core/estimator/posterior_draws.h"
 #include "core/estimator/record_summary.h"
 #include "core/estimator/regional_expansion.h"
 
@@ -20,9 +21,15 @@ struct AssessmentRequest {
   const Matrix* guesses = nullptr;  // particles, germ coordinates (may have no rows)
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // trajectories × rows
+  PosteriorEffort effort;
+};
+
+struct Assessed {
+  Estimate estimate;
+  PosteriorDraws posterior;  // that it sums up
 };
 
 // Only a stop request makes it not OK.
-absl::StatusOr<Estimate> Assess(const AssessmentRequest& request, const Stop& stop);
+absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop);
 
 }  // namespace polyest

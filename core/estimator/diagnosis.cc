@@ -17,6 +17,8 @@ constexpr double kMisfitRatio = 1.5;
 constexpr double kAtBound = 1e-6;  // of the width of Ω
 // The same for a correlated parameter: its score has no bound, and only ever nears the parameter's.
 constexpr double kNearBound = 1e-4;
+// Of the posterior's and the curvature's standard deviations, either way.
+constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
 
 const std::string& Name(const Findings& findings, int i) {
@@ -97,6 +99,23 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
   }
 }
 
+// Of what the data inform: where they say nothing, what is reported is the prior's by contract.
+void AddNonGaussian(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
+  std::vector<std::string> ratios;
+  for (const ParameterEstimate& parameter : estimate.parameters) {
+    if (parameter.verdict == Verdict::kNotIdentified) continue;
+    const double ratio = parameter.posterior_std_dev / parameter.std_dev;
+    if (ratio <= kGaussianRatio && ratio >= 1 / kGaussianRatio) continue;
+    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large", parameter.name, ratio));
+  }
+  if (ratios.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kNonGaussian,
+       absl::StrFormat("the posterior's standard deviation is not what the curvature of the cost "
+                       "says: %s; go by the posterior's own mean, standard deviation and interval",
+                       absl::StrJoin(ratios, ", "))});
+}
+
 void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   const auto& failures = findings.expansion->failures();
   if (failures.empty()) return;
@@ -150,6 +169,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   }
   AddMisfit(estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
+  AddNonGaussian(estimate, diagnostics);
   AddMinima(findings, diagnostics);
   AddFailures(findings, diagnostics);
   return diagnostics;

@@ -21,6 +21,7 @@ enum class DiagnosticCode {
   kMultipleMinima,       // other minima of comparable cost
   kNotConverged,         // the minimizer gave up
   kPointsFailed,         // trajectories that could not be integrated were left out
+  kNonGaussian,          // the posterior's spread is not that of the cost's curvature
 };
 
 struct Diagnostic {
@@ -36,6 +37,7 @@ struct ParameterEstimate {
   double mean = 0;     // of the posterior
   double lower95 = 0;  // 2.5 % quantile of the posterior
   double upper95 = 0;  // 97.5 %
+  double posterior_std_dev = 0;  // of the posterior itself
   double prior_mean = 0;
   double prior_std_dev = 0;
   double contraction = 0;  // std_dev ÷ prior_std_dev

@@ -58,10 +58,13 @@ class Estimator::Implementation {
   absl::Status Append(const Samples& samples);
   absl::Status Process(const Stop& stop);
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
+  absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
+                                             const Stop& stop) const;
 
  private:
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
   int64_t SettledRows() const;
+  AssessmentRequest RequestAssessment() const;
   absl::Status Recover(const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
@@ -223,7 +226,7 @@ absl::StatusOr<bool> Estimator::Implementation::Settle(const Stop& stop) {
   return true;
 }
 
-absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
+AssessmentRequest Estimator::Implementation::RequestAssessment() const {
   AssessmentRequest request;
   request.problem = &problem_;
   request.expansion = expansion_.get();
@@ -231,7 +234,21 @@ absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& 
   request.guesses = &particles_;
   request.reexpansions = reexpansions_;
   request.propagated_rows = abandoned_rows_ + expansion_->propagated_rows();
-  return Assess(request, stop);
+  return request;
+}
+
+absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
+  POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(RequestAssessment(), stop));
+  return std::move(assessed.estimate);
+}
+
+absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
+    const PosteriorOptions& options, const Stop& stop) const {
+  POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
+  AssessmentRequest request = RequestAssessment();
+  request.effort = options.Effort();
+  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(request, stop));
+  return DescribePosterior(assessed, problem_.prior(), options);
 }
 
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)
@@ -262,6 +279,10 @@ absl::Status Estimator::Append(const Samples& samples) { return implementation_-
 absl::Status Estimator::Process(const Stop& stop) { return implementation_->Process(stop); }
 absl::StatusOr<Estimate> Estimator::CurrentEstimate(const Stop& stop) const {
   return implementation_->CurrentEstimate(stop);
+}
+absl::StatusOr<Posterior> Estimator::CurrentPosterior(const PosteriorOptions& options,
+                                                      const Stop& stop) const {
+  return implementation_->CurrentPosterior(options, stop);
 }
 int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }

@@ -9,6 +9,7 @@
 
 #include "core/common/stop.h"
 #include "core/estimator/estimate.h"
+#include "core/estimator/posterior_study.h"
 #include "core/estimator/problem.h"
 #include "core/estimator/samples.h"
 
@@ -43,6 +44,10 @@ class Estimator {
   // The estimate from all samples processed. Does not change the estimator: how often it is asked
   // never changes a later answer. Its cost does not depend on the number of samples.
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop = {}) const;
+
+  // The posterior of the same samples in detail. INVALID_ARGUMENT as PosteriorOptions::Validate.
+  absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
+                                             const Stop& stop = {}) const;
 
   int64_t rows_appended() const;
   int64_t rows_processed() const;

@@ -35,6 +35,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::NOT_CONVERGED;
     case DiagnosticCode::kPointsFailed:
       return v1::Diagnostic::POINTS_FAILED;
+    case DiagnosticCode::kNonGaussian:
+      return v1::Diagnostic::NON_GAUSSIAN;
   }
   POLYEST_CHECK(false);
 }
@@ -51,6 +53,7 @@ void ToProto(const ParameterEstimate& parameter, v1::ParameterEstimate& proto) {
   proto.set_prior_std_dev(parameter.prior_std_dev);
   proto.set_contraction(parameter.contraction);
   proto.set_verdict(ToProto(parameter.verdict));
+  proto.set_posterior_std_dev(parameter.posterior_std_dev);
 }
 
 void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {

@@ -15,6 +15,7 @@
 #include "server/convert/experiment_design.h"
 #include "server/convert/measurements.h"
 #include "server/convert/model.h"
+#include "server/convert/posterior.h"
 #include "server/convert/problem.h"
 #include "server/convert/studies.h"
 #include "server/operations/names.h"
@@ -132,6 +133,17 @@ absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
     }
   }
   return response;
+}
+
+absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorRequest& request,
+                                                         int threads, const Stop& stop,
+                                                         const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+  const PosteriorOptions options = ToPosteriorOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate(estimator->problem().prior()));
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator->CurrentPosterior(options, stop));
+  return ToProto(posterior, options);
 }
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,

@@ -26,6 +26,10 @@ absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
 absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
     const v1::DesignExperimentRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models = {});
+// The one-shot form, without a session.
+absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorRequest& request,
+                                                         int threads, const Stop& stop,
+                                                         const ModelLibrary& models = {});
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& models = {});

@@ -5,6 +5,7 @@
 
 #include "core/common/status.h"
 #include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/convert/annotate.h"
 #include "server/operations/names.h"
 #include "server/operations/operations.h"
 #include "server/operations/pages.h"
@@ -47,6 +48,12 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionStore& sessions,
   return response;
 }
 
+absl::Status SessionAndProblem(const std::string& session) {
+  return InvalidField("session", absl::StrCat("\"", session,
+                                              "\" is given and a problem or measurements too; "
+                                              "a session has its own"));
+}
+
 class EstimationService final : public v1::EstimationService::CallbackService {
  public:
   explicit EstimationService(ServiceContext context) : context_(std::move(context)) {}
@@ -87,6 +94,9 @@ class EstimationService final : public v1::EstimationService::CallbackService {
   StreamMeasurements(Context* context) override;
   grpc::ServerWriteReactor<v1::EstimateResponse>* WatchSession(
       Context* context, const v1::WatchSessionRequest* request) override;
+
+  Unary* GetPosterior(Context* context, const v1::GetPosteriorRequest* request,
+                      v1::GetPosteriorResponse* response) override;
 
  private:
   using Work = std::function<absl::Status(const Stop&)>;
@@ -252,6 +262,23 @@ EstimationService::StreamMeasurements(Context* context) {
 grpc::ServerWriteReactor<v1::EstimateResponse>* EstimationService::WatchSession(
     Context* context, const v1::WatchSessionRequest* request) {
   return new SessionWatch(context_, *context, request->session());
+}
+
+EstimationService::Unary* EstimationService::GetPosterior(Context* context,
+                                                          const v1::GetPosteriorRequest* request,
+                                                          v1::GetPosteriorResponse* response) {
+  if (request->session().empty()) {
+    return OnExecutor(context, [=, this](const Stop& stop) {
+      return Deliver(RunGetPosterior(*request, kThreadsPerCall, stop, context_.models), response);
+    });
+  }
+  if (request->has_problem() || request->has_measurements()) {
+    return FinishAtOnce(context, SessionAndProblem(request->session()));
+  }
+  return OnStrand(context, "session", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
+                    return Deliver(session->CurrentPosterior(*request, stop), response);
+                  });
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "core/common/status.h"
 #include "server/convert/estimate.h"
 #include "server/convert/measurements.h"
+#include "server/convert/posterior.h"
 #include "server/convert/problem.h"
 
 namespace polyest {
@@ -135,6 +136,18 @@ absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {
   }
   for (const auto& observer : observers) observer->OnEstimate(latest_);
   return latest_;
+}
+
+absl::StatusOr<v1::GetPosteriorResponse> Session::CurrentPosterior(
+    const v1::GetPosteriorRequest& request, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  const PosteriorOptions options = ToPosteriorOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
+  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator_->CurrentPosterior(options, stop));
+  v1::GetPosteriorResponse response = ToProto(posterior, options);
+  response.set_sequence(sequence_.last());
+  return response;
 }
 
 absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop) {

@@ -61,6 +61,9 @@ class Session {
   absl::Status Process(const Stop& stop);
   // The estimate from everything added. A new one is passed on to the observers.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
+  // The posterior in detail, from everything added.
+  absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
+                                                            const Stop& stop);
   // Passes on the present estimate, if there are samples, and every new one from here on.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   void Unobserve(const SessionObserver* observer);

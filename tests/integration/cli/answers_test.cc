@@ -57,6 +57,17 @@ TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
 }
 
+TEST_F(AnswersTest, PosteriorsAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(100));
+  const std::vector<std::string> command = {
+      "posterior", Example("oscillator.json"), data, "--samples", "5", "--joint", "k,c"};
+  for (const char* const format : {"table", "json", "csv"}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--format", format});
+    ExpectSameAnswer(arguments);
+  }
+}
+
 TEST_F(AnswersTest, SensitivitiesAgreeToTheLastDigit) {
   const std::vector<std::string> command = {
       "sensitivity", Example("oscillator.json"), "--until", "2", "--outputs", "x,v"};
@@ -273,6 +284,47 @@ TEST_F(CommandTest, PrintsOneCsvRowAPointOfTheCost) {
   EXPECT_NEAR(std::stod(lines[3]), 47.376, 1e-9);
 }
 
+TEST_F(CommandTest, PrintsThePosteriorOfTheDemonstrationRecord) {
+  const Finished run = Run({"posterior", Example("oscillator.json"), Example("oscillator.csv"),
+                            "--quantiles", "0.05,0.95", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(3));
+  EXPECT_EQ(lines[0], "parameter,mean,stdDev,q0.05,q0.95,effectiveSampleSize,rHat");
+  EXPECT_THAT(lines[1], StartsWith("k,41.2"));
+  EXPECT_THAT(lines[2], StartsWith("c,0.2"));
+  const Finished table = Run({"posterior", Example("oscillator.json"), Example("oscillator.csv")});
+  ASSERT_EQ(table.exit_status, 0) << table.err;
+  EXPECT_THAT(table.out, HasSubstr("importance sampling"));
+  EXPECT_THAT(table.out, HasSubstr("97.5 %"));
+}
+
+TEST_F(CommandTest, PrintsSamplesOfThePosterior) {
+  const std::string data = File("data.csv", DemoRows(100));
+  const Finished run =
+      Run({"posterior", Example("oscillator.json"), data, "--samples", "1000", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(1001));
+  EXPECT_EQ(lines[0], "k,c");
+  for (size_t i = 1; i < lines.size(); ++i) {
+    const double k = std::stod(lines[i]);
+    EXPECT_GT(k, 31.584);  // the prior's bounds
+    EXPECT_LT(k, 47.376);
+  }
+}
+
+TEST_F(CommandTest, PrintsAJointDensityOfThePosterior) {
+  const std::string data = File("data.csv", DemoRows(100));
+  const Finished run =
+      Run({"posterior", Example("oscillator.json"), data, "--joint", "k,c", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(1 + 40 * 40));
+  EXPECT_EQ(lines[0], "first,second,firstValue,secondValue,density");
+  EXPECT_THAT(lines[1], StartsWith("k,c,"));
+}
+
 TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
   const std::string plot = folder_ / "figure.svg";
   const Finished run = Run({"paper", "5", "--plot", plot});
@@ -284,8 +336,8 @@ TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
 TEST_F(CommandTest, ExplainsItself) {
   const Finished help = Run({"--help"});
   EXPECT_EQ(help.exit_status, 0);
-  for (const char* const command :
-       {"estimate", "stream", "propagate", "cost", "models", "paper", "sensitivity", "design"}) {
+  for (const char* const command : {"estimate", "stream", "propagate", "cost", "models", "paper",
+                                    "sensitivity", "design", "posterior"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
   }

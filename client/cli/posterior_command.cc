@@ -1,0 +1,150 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_split.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/text_table.h"
+#include "client/cpp/data_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kSketchWidth = 30;  // characters
+
+absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(const PosteriorArguments& arguments) {
+  v1::GetPosteriorRequest request;
+  for (const std::string& joint : arguments.joints) {
+    const std::vector<std::string> names = absl::StrSplit(joint, ',');
+    if (names.size() != 2) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--joint: \"", joint, "\" must be two parameters, NAME,NAME"));
+    }
+    auto& pair = *request.add_joints();
+    pair.set_first(names[0]);
+    pair.set_second(names[1]);
+  }
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  request.mutable_probabilities()->Add(arguments.probabilities.begin(),
+                                       arguments.probabilities.end());
+  request.set_samples(arguments.samples);
+  if (arguments.format == Format::kTable) request.set_density_bins(kSketchWidth);
+  auto response = MakeBackend(arguments.place)->GetPosterior(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  return response;
+}
+
+std::string Percent(double probability) { return FormatNumber(100 * probability) + " %"; }
+
+// A density as a line of bars.
+std::string Sketch(const google::protobuf::RepeatedField<double>& density) {
+  static constexpr std::array<const char*, 9> kBars = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  const double highest = density.empty() ? 0 : *std::max_element(density.begin(), density.end());
+  std::string text;
+  for (const double value : density) {
+    const double height = highest > 0 ? value / highest * (kBars.size() - 1) : 0;
+    text += kBars[static_cast<size_t>(height + 0.5)];
+  }
+  return text;
+}
+
+void PrintTable(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+  const bool chains = posterior.method() == v1::GetPosteriorResponse::MARKOV_CHAINS;
+  std::vector<std::string> header = {"parameter", "mean ± sd", "unit"};
+  for (const double probability : posterior.probabilities()) {
+    header.push_back(Percent(probability));
+  }
+  header.insert(header.end(), {"density over the central 99.9 %", "effective samples"});
+  if (chains) header.push_back("R̂");
+  TextTable table(std::move(header));
+  for (const auto& parameter : posterior.parameters()) {
+    const double sd = parameter.std_dev();
+    std::vector<std::string> row = {parameter.name(), FormatUncertain(parameter.mean(), sd),
+                                    parameter.unit() == "1" ? "" : parameter.unit()};
+    for (const double quantile : parameter.quantiles()) row.push_back(FormatValue(quantile, sd));
+    row.push_back(Sketch(parameter.density()));
+    row.push_back(absl::StrFormat("%.0f", parameter.effective_sample_size()));
+    if (chains) row.push_back(absl::StrFormat("%.3f", parameter.r_hat()));
+    table.AddRow(std::move(row));
+  }
+  table.Print(out);
+  out << absl::StrFormat(
+      "\n%d measured values up to t = %.6g s; %d draws by %s\n", posterior.measured_values(),
+      posterior.time(), posterior.draws(),
+      chains ? "Markov chains" : "importance sampling from the curvature's Gaussian");
+  PrintDiagnostics(posterior.diagnostics(), out);
+}
+
+void PrintSamples(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+  const int columns = posterior.parameters_size();
+  for (int j = 0; j < columns; ++j) {
+    out << posterior.parameters(j).name() << (j + 1 < columns ? ',' : '\n');
+  }
+  for (int i = 0; i < posterior.samples_size(); ++i) {
+    out << FormatExact(posterior.samples(i)) << ((i + 1) % columns != 0 ? ',' : '\n');
+  }
+}
+
+void PrintJoints(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+  out << "first,second,firstValue,secondValue,density\n";
+  for (const auto& joint : posterior.joints()) {
+    const int inner = joint.second_value_size();
+    for (int i = 0; i < joint.density_size(); ++i) {
+      out << joint.first() << ',' << joint.second() << ','
+          << FormatExact(joint.first_value(i / inner)) << ','
+          << FormatExact(joint.second_value(i % inner)) << ',' << FormatExact(joint.density(i))
+          << '\n';
+    }
+  }
+}
+
+void PrintParameters(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+  out << "parameter,mean,stdDev";
+  for (const double probability : posterior.probabilities()) {
+    out << ",q" << FormatExact(probability);
+  }
+  out << ",effectiveSampleSize,rHat\n";
+  for (const auto& parameter : posterior.parameters()) {
+    out << parameter.name() << ',' << FormatExact(parameter.mean()) << ','
+        << FormatExact(parameter.std_dev());
+    for (const double quantile : parameter.quantiles()) out << ',' << FormatExact(quantile);
+    out << ',' << FormatExact(parameter.effective_sample_size()) << ','
+        << FormatExact(parameter.r_hat()) << '\n';
+  }
+}
+
+}  // namespace
+
+int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = GetPosterior(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else if (arguments.format == Format::kTable) {
+    PrintTable(*response, out);
+  } else if (arguments.samples > 0) {
+    PrintSamples(*response, out);
+  } else if (!arguments.joints.empty()) {
+    PrintJoints(*response, out);
+  } else {
+    PrintParameters(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

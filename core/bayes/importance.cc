@@ -1,0 +1,83 @@
+#include "core/bayes/importance.h"
+
+#include <array>
+#include <cmath>
+
+#include "core/bayes/differential_evolution.h"
+#include "core/chaos/collocation_points.h"
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+struct Component {
+  double share;
+  double scale;
+};
+constexpr std::array<Component, 2> kComponents = {{{0.85, 1.1}, {0.15, 2.0}}};
+
+// log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²}
+double LogProposal(double squared_radius, int dimension) {
+  double density = 0;
+  // Relative to the widest, whose exponential vanishes last.
+  const double widest = 0.5 * squared_radius / std::pow(kComponents.back().scale, 2);
+  for (const Component& c : kComponents) {
+    density += c.share * std::pow(c.scale, -dimension) *
+               std::exp(widest - 0.5 * squared_radius / (c.scale * c.scale));
+  }
+  return std::log(density) - widest;
+}
+
+// Standard normal points, the first share of them scaled for the first component and so on:
+// stretches of a Halton sequence are low-discrepancy points of their own.
+Matrix MixturePoints(int dimension, int points) {
+  const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
+  Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, points).value();
+  const auto first = static_cast<Eigen::Index>(kComponents.front().share * points);
+  normal.topRows(first) *= kComponents.front().scale;
+  normal.bottomRows(points - first) *= kComponents.back().scale;
+  return normal;
+}
+
+}  // namespace
+
+WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vector& upper,
+                               const ConstVectorRef& minimum, const ConstMatrixRef& hessian_factor,
+                               int points) {
+  POLYEST_CHECK(points >= 100);
+  const int n = cost.dimension();
+  const Matrix normal = MixturePoints(n, points);
+  // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
+  Matrix etas = hessian_factor.triangularView<Eigen::Lower>()
+                    .transpose()
+                    .solve(normal.transpose())
+                    .transpose();
+  etas.rowwise() += minimum.transpose();
+  WeightedDraws draws;
+  Vector costs;
+  const DifferentialEvolution box(cost, lower, upper, 0);
+  box.Evaluate(etas, costs);
+  const double least = costs.minCoeff();
+  if (!std::isfinite(least)) return draws;
+  Vector log_weights(points);
+  for (Eigen::Index i = 0; i < points; ++i) {
+    // log w = −J − log q
+    log_weights[i] = least - costs[i] - LogProposal(normal.row(i).squaredNorm(), n);
+  }
+  Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
+  Eigen::Index kept = 0;
+  for (Eigen::Index i = 0; i < points; ++i) {
+    // A vectorized exponential of −∞ need not be 0.
+    if (!std::isfinite(costs[i]) || !(weights[i] > 0)) continue;
+    etas.row(kept) = etas.row(i);
+    costs[kept] = costs[i];
+    weights[kept++] = weights[i];
+  }
+  draws.etas = etas.topRows(kept);
+  draws.costs = costs.head(kept);
+  draws.weights = weights.head(kept) / weights.head(kept).sum();
+  draws.effective_size = 1 / draws.weights.squaredNorm();
+  return draws;
+}
+
+}  // namespace polyest

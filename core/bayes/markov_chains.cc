@@ -1,0 +1,111 @@
+#include "core/bayes/markov_chains.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/convergence.h"
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kMostTimes = 64;     // kept; when full every second is dropped
+constexpr int kFirstInterval = 2;  // sweeps from one time kept to the next
+constexpr int kFirstSweeps = 64;   // before convergence is looked at, and the least added later
+constexpr Eigen::Index kLeastInGroup = 8;
+
+class ChainRunner {
+ public:
+  ChainRunner(const Cost& cost, const Vector& lower, const Vector& upper,
+              const Particles& particles, const Matrix& quantities, const ChainOptions& options)
+      : quantities_(quantities),
+        options_(options),
+        in_group_(particles.etas.rows() / options.groups),
+        chains_(in_group_ * options.groups),
+        state_{particles.etas.topRows(chains_), particles.costs.head(chains_)},
+        moves_(cost, lower, upper, options.seed),
+        etas_(kMostTimes * chains_, particles.etas.cols()),
+        costs_(kMostTimes * chains_) {
+    POLYEST_CHECK(options.groups >= 2 && in_group_ >= kLeastInGroup);
+  }
+
+  absl::StatusOr<Chains> Run(const Stop& stop) {
+    int sweeps = std::min(kFirstSweeps, options_.most_sweeps);
+    int done = 0;
+    while (true) {
+      for (; done < sweeps; ++done) {
+        POLYEST_RETURN_IF_ERROR(stop.Check());
+        for (int g = 0; g < options_.groups; ++g) {
+          moves_.Sweep(1, g * in_group_, in_group_, state_);
+        }
+        if ((done + 1) % interval_ == 0) Keep();
+      }
+      Judge();
+      const double effective = result_.effective_size.minCoeff();
+      if (effective >= options_.effective_size || done >= options_.most_sweeps) break;
+      // In proportion, and a little more.
+      const double more = 1.1 * done * (options_.effective_size / effective - 1);
+      sweeps =
+          done + static_cast<int>(std::clamp(more, static_cast<double>(kFirstSweeps),
+                                             static_cast<double>(options_.most_sweeps - done)));
+    }
+    result_.etas = etas_.topRows(times_ * chains_);
+    result_.costs = costs_.head(times_ * chains_);
+    return std::move(result_);
+  }
+
+ private:
+  void Keep() {
+    if (times_ == kMostTimes) {
+      for (int t = 1; 2 * t < kMostTimes + 1; ++t) {
+        Copy(2 * t - 1, t - 1);
+      }
+      times_ /= 2;
+      interval_ *= 2;
+      return;  // this one is the odd one out
+    }
+    etas_.middleRows(times_ * chains_, chains_) = state_.etas;
+    costs_.segment(times_ * chains_, chains_) = state_.costs;
+    ++times_;
+  }
+
+  void Copy(int from, int to) {
+    etas_.middleRows(to * chains_, chains_) = etas_.middleRows(from * chains_, chains_);
+    costs_.segment(to * chains_, chains_) = costs_.segment(from * chains_, chains_);
+  }
+
+  void Judge() {
+    const Eigen::Index count = quantities_.rows();
+    result_.r_hat.resize(count);
+    result_.effective_size.resize(count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const Vector draws = etas_.topRows(times_ * chains_) * quantities_.row(j).transpose();
+      const Matrix normalized = RankNormalized(draws.reshaped(chains_, times_).transpose());
+      result_.r_hat[j] = SplitRHat(normalized, options_.groups);
+      result_.effective_size[j] = EffectiveSize(normalized);
+    }
+  }
+
+  const Matrix& quantities_;
+  const ChainOptions& options_;
+  Eigen::Index in_group_;
+  Eigen::Index chains_;
+  Particles state_;
+  DifferentialEvolution moves_;
+  Matrix etas_;
+  Vector costs_;
+  int times_ = 0;
+  int interval_ = kFirstInterval;
+  Chains result_;
+};
+
+}  // namespace
+
+absl::StatusOr<Chains> RunChains(const Cost& cost, const Vector& lower, const Vector& upper,
+                                 const Particles& particles, const Matrix& quantities,
+                                 const ChainOptions& options, const Stop& stop) {
+  return ChainRunner(cost, lower, upper, particles, quantities, options).Run(stop);
+}
+
+}  // namespace polyest

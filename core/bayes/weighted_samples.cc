@@ -1,0 +1,130 @@
+#include "core/bayes/weighted_samples.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kTail = 5e-4;  // of the probability, left out of a density at each side
+
+// Bins of equal width over the central part of the draws.
+class Bins {
+ public:
+  Bins(const ConstVectorRef& draws, const ConstVectorRef& weights, int count) : count_(count) {
+    const WeightedQuantiles quantile(draws, weights);
+    lowest_ = quantile(kTail);
+    width_ = (quantile(1 - kTail) - lowest_) / count;
+    // Not at all varying, or so little that the density would overflow.
+    if (width_ > std::numeric_limits<double>::min()) return;
+    count_ = 1;
+    width_ = 1;
+    lowest_ -= 0.5;
+  }
+
+  int count() const { return count_; }
+  double width() const { return width_; }
+  Vector Centres() const {
+    return lowest_ + (Vector::LinSpaced(count_, 0, count_ - 1).array() + 0.5) * width_;
+  }
+  // −1 outside.
+  int Of(double draw) const {
+    const double position = (draw - lowest_) / width_;
+    if (!(position >= 0 && position <= count_)) return -1;
+    return std::min(static_cast<int>(position), count_ - 1);
+  }
+
+ private:
+  int count_;
+  double lowest_ = 0;
+  double width_ = 0;
+};
+
+}  // namespace
+
+double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights) {
+  return weights.dot(draws);
+}
+
+double WeightedStandardDeviation(const ConstVectorRef& draws, const ConstVectorRef& weights) {
+  const double mean = WeightedMean(draws, weights);
+  return std::sqrt(weights.dot((draws.array() - mean).square().matrix()));
+}
+
+WeightedQuantiles::WeightedQuantiles(const ConstVectorRef& draws, const ConstVectorRef& weights)
+    : draws_(draws.size()), cumulative_(draws.size()) {
+  POLYEST_CHECK(draws.size() > 0 && draws.size() == weights.size());
+  std::vector<Eigen::Index> order(static_cast<size_t>(draws.size()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::sort(order.begin(), order.end(),
+            [&](Eigen::Index a, Eigen::Index b) { return draws[a] < draws[b]; });
+  double below = 0;
+  for (Eigen::Index i = 0; i < draws.size(); ++i) {
+    const Eigen::Index source = order[static_cast<size_t>(i)];
+    draws_[i] = draws[source];
+    cumulative_[i] = below + weights[source] / 2;
+    below += weights[source];
+  }
+}
+
+double WeightedQuantiles::operator()(double probability) const {
+  POLYEST_CHECK(probability >= 0 && probability <= 1);
+  const double* const first = cumulative_.data();
+  const Eigen::Index above =
+      std::lower_bound(first, first + cumulative_.size(), probability) - first;
+  if (above == 0) return draws_[0];
+  if (above == draws_.size()) return draws_[above - 1];
+  const double span = cumulative_[above] - cumulative_[above - 1];
+  if (!(span > 0)) return draws_[above];
+  const double fraction = (probability - cumulative_[above - 1]) / span;
+  return (1 - fraction) * draws_[above - 1] + fraction * draws_[above];
+}
+
+DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRef& weights,
+                                int count) {
+  POLYEST_CHECK(count >= 1);
+  const Bins bins(draws, weights, count);
+  DensityEstimate estimate{bins.Centres(), Vector::Zero(bins.count())};
+  for (Eigen::Index i = 0; i < draws.size(); ++i) {
+    const int bin = bins.Of(draws[i]);
+    if (bin >= 0) estimate.density[bin] += weights[i] / bins.width();
+  }
+  return estimate;
+}
+
+JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
+                                  const ConstVectorRef& weights, int count) {
+  POLYEST_CHECK(count >= 1 && first.size() == second.size());
+  const Bins rows(first, weights, count);
+  const Bins columns(second, weights, count);
+  JointDensity joint{rows.Centres(), columns.Centres(),
+                     Matrix::Zero(rows.count(), columns.count())};
+  for (Eigen::Index i = 0; i < first.size(); ++i) {
+    const int row = rows.Of(first[i]);
+    const int column = columns.Of(second[i]);
+    if (row < 0 || column < 0) continue;
+    joint.density(row, column) += weights[i] / rows.width() / columns.width();
+  }
+  return joint;
+}
+
+std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count) {
+  POLYEST_CHECK(weights.size() > 0 && count >= 0);
+  std::vector<Eigen::Index> chosen;
+  chosen.reserve(static_cast<size_t>(count));
+  Eigen::Index source = 0;
+  double cumulative = weights[0];
+  const double all = weights.sum();
+  for (int i = 0; i < count; ++i) {
+    const double pointer = all * (i + 0.5) / count;
+    while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
+    chosen.push_back(source);
+  }
+  return chosen;
+}
+
+}  // namespace polyest

@@ -1,0 +1,128 @@
+#include "core/estimator/posterior_study.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kImportancePoints = 65'536;
+constexpr double kChainEffectiveSize = 60'000;
+constexpr int kMostSweeps = 2'000;
+// Importance points for each sample given out, so that hardly any is given out twice.
+constexpr int kPointsPerSample = 4;
+
+std::vector<std::string> Names(const Prior& prior) {
+  std::vector<std::string> names;
+  for (const UncertainParameter& parameter : prior.parameters()) names.push_back(parameter.name);
+  return names;
+}
+
+// −1 when there is none.
+int Find(const Prior& prior, const std::string& name) {
+  const std::vector<std::string> names = Names(prior);
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+absl::Status CheckRange(const char* field, int value, int least, int most) {
+  if (value >= least && value <= most) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrFormat("%s: %d must be from %d to %d", field, value, least, most));
+}
+
+absl::Status CheckJoint(const Prior& prior, size_t index,
+                        const std::pair<std::string, std::string>& joint) {
+  for (const std::string& name : {joint.first, joint.second}) {
+    if (Find(prior, name) >= 0) continue;
+    return absl::InvalidArgumentError(
+        absl::StrFormat("joints[%d]: \"%s\" is not among the uncertain parameters %s", index, name,
+                        absl::StrJoin(Names(prior), ", ")));
+  }
+  if (joint.first == joint.second) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "joints[%d]: %s is given twice; a pair is of two parameters", index, joint.first));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status PosteriorOptions::Validate(const Prior& prior) const {
+  if (probabilities.size() > kMostProbabilities) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "probabilities: %d are given; the limit is %d", probabilities.size(), kMostProbabilities));
+  }
+  for (size_t i = 0; i < probabilities.size(); ++i) {
+    if (probabilities[i] > 0 && probabilities[i] < 1) continue;
+    return absl::InvalidArgumentError(
+        absl::StrFormat("probabilities[%d]: %g must lie between 0 and 1", i, probabilities[i]));
+  }
+  POLYEST_RETURN_IF_ERROR(CheckRange("densityBins", density_bins, 0, kMostPosteriorBins));
+  POLYEST_RETURN_IF_ERROR(CheckRange("jointBins", joint_bins, 1, kMostJointBins));
+  POLYEST_RETURN_IF_ERROR(CheckRange("samples", samples, 0, kMostPosteriorSamples));
+  if (joints.size() > kMostJointDensities) {
+    return absl::InvalidArgumentError(absl::StrFormat("joints: %d are given; the limit is %d",
+                                                      joints.size(), kMostJointDensities));
+  }
+  for (size_t i = 0; i < joints.size(); ++i) {
+    POLYEST_RETURN_IF_ERROR(CheckJoint(prior, i, joints[i]));
+  }
+  return absl::OkStatus();
+}
+
+PosteriorEffort PosteriorOptions::Effort() const {
+  PosteriorEffort effort;
+  effort.importance_points = std::max(kImportancePoints, kPointsPerSample * samples);
+  effort.chain_effective_size = kChainEffectiveSize;
+  effort.most_sweeps = kMostSweeps;
+  return effort;
+}
+
+Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
+                            const PosteriorOptions& options) {
+  const PosteriorDraws& draws = assessed.posterior;
+  const Vector& weights = draws.weights;
+  Matrix thetas(draws.scores.rows(), prior.dimension());
+  Posterior posterior;
+  for (int i = 0; i < prior.dimension(); ++i) {
+    thetas.col(i) = draws.Parameter(prior, i);
+    const ParameterEstimate& estimate = assessed.estimate.parameters[static_cast<size_t>(i)];
+    PosteriorMarginal marginal;
+    marginal.parameter = estimate.name;
+    marginal.unit = estimate.unit;
+    marginal.mean = WeightedMean(thetas.col(i), weights);
+    marginal.std_dev = WeightedStandardDeviation(thetas.col(i), weights);
+    const WeightedQuantiles quantile(thetas.col(i), weights);
+    marginal.quantiles.resize(static_cast<Eigen::Index>(options.probabilities.size()));
+    std::transform(options.probabilities.begin(), options.probabilities.end(),
+                   marginal.quantiles.begin(), quantile);
+    if (options.density_bins > 0) {
+      marginal.density = WeightedDensity(thetas.col(i), weights, options.density_bins);
+    }
+    marginal.effective_size = draws.effective_size[i];
+    if (draws.r_hat.size() > 0) marginal.r_hat = draws.r_hat[i];
+    posterior.marginals.push_back(std::move(marginal));
+  }
+  for (const auto& [first, second] : options.joints) {
+    posterior.joints.push_back(
+        {first, second,
+         WeightedJointDensity(thetas.col(Find(prior, first)), thetas.col(Find(prior, second)),
+                              weights, options.joint_bins)});
+  }
+  posterior.samples = thetas(EquallyWeighted(weights, options.samples), Eigen::all);
+  posterior.method = draws.method;
+  posterior.draws = draws.scores.rows();
+  posterior.effective_size = draws.effective_size.minCoeff();
+  if (draws.r_hat.size() > 0) posterior.r_hat = draws.r_hat.maxCoeff();
+  posterior.diagnostics = assessed.estimate.diagnostics;
+  posterior.time_s = assessed.estimate.time_s;
+  posterior.sample_values = assessed.estimate.samples;
+  return posterior;
+}
+
+}  // namespace polyest

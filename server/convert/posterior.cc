@@ -1,0 +1,89 @@
+#include "server/convert/posterior.h"
+
+#include "core/common/check.h"
+#include "server/convert/estimate.h"
+
+namespace polyest {
+namespace {
+
+using Doubles = google::protobuf::RepeatedField<double>;
+
+void Append(const Vector& values, Doubles& added) {
+  added.Add(values.data(), values.data() + values.size());
+}
+
+// Row-major, whatever the matrix is.
+void Append(const Matrix& values, Doubles& added) {
+  added.Reserve(static_cast<int>(values.size()));
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+      added.Add(values(row, column));
+    }
+  }
+}
+
+v1::GetPosteriorResponse::Method ToProto(PosteriorMethod method) {
+  switch (method) {
+    case PosteriorMethod::kImportanceSampling:
+      return v1::GetPosteriorResponse::IMPORTANCE_SAMPLING;
+    case PosteriorMethod::kMarkovChains:
+      return v1::GetPosteriorResponse::MARKOV_CHAINS;
+  }
+  POLYEST_CHECK(false);
+}
+
+void ToProto(const PosteriorMarginal& marginal, v1::GetPosteriorResponse::Marginal& proto) {
+  proto.set_name(marginal.parameter);
+  proto.set_unit(marginal.unit);
+  proto.set_mean(marginal.mean);
+  proto.set_std_dev(marginal.std_dev);
+  Append(marginal.quantiles, *proto.mutable_quantiles());
+  Append(marginal.density.value, *proto.mutable_value());
+  Append(marginal.density.density, *proto.mutable_density());
+  proto.set_effective_sample_size(marginal.effective_size);
+  proto.set_r_hat(marginal.r_hat);
+}
+
+}  // namespace
+
+PosteriorOptions ToPosteriorOptions(const v1::GetPosteriorRequest& request) {
+  PosteriorOptions options;
+  if (!request.probabilities().empty()) {
+    options.probabilities.assign(request.probabilities().begin(), request.probabilities().end());
+  }
+  if (request.density_bins() != 0) options.density_bins = request.density_bins();
+  for (const auto& pair : request.joints())
+    options.joints.emplace_back(pair.first(), pair.second());
+  if (request.joint_bins() != 0) options.joint_bins = request.joint_bins();
+  options.samples = request.samples();
+  return options;
+}
+
+v1::GetPosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options) {
+  v1::GetPosteriorResponse response;
+  for (const PosteriorMarginal& marginal : posterior.marginals) {
+    ToProto(marginal, *response.add_parameters());
+  }
+  response.mutable_probabilities()->Add(options.probabilities.begin(), options.probabilities.end());
+  for (const PosteriorJoint& joint : posterior.joints) {
+    v1::GetPosteriorResponse::Joint& added = *response.add_joints();
+    added.set_first(joint.first);
+    added.set_second(joint.second);
+    Append(joint.density.first, *added.mutable_first_value());
+    Append(joint.density.second, *added.mutable_second_value());
+    Append(joint.density.density, *added.mutable_density());
+  }
+  Append(posterior.samples, *response.mutable_samples());
+  response.set_method(ToProto(posterior.method));
+  response.set_draws(posterior.draws);
+  response.set_effective_sample_size(posterior.effective_size);
+  response.set_r_hat(posterior.r_hat);
+  for (const Diagnostic& diagnostic : posterior.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
+  }
+  response.set_time(posterior.time_s);
+  response.set_measured_values(posterior.sample_values);
+  return response;
+}
+
+}  // namespace polyest

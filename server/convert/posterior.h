@@ -1,0 +1,14 @@
+#pragma once
+
+// Requests and answers of GetPosterior.
+
+#include "core/estimator/posterior_study.h"
+#include "polyest/v1/estimation_service.pb.h"
+
+namespace polyest {
+
+PosteriorOptions ToPosteriorOptions(const v1::GetPosteriorRequest& request);
+// options: those used. `sequence` stays 0.
+v1::GetPosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options);
+
+}  // namespace polyest

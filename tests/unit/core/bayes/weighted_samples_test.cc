@@ -1,0 +1,75 @@
+#include "core/bayes/weighted_samples.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace polyest {
+namespace {
+
+using ::testing::ElementsAre;
+
+const Eigen::Vector4d kDraws(4, 1, 3, 2);
+const Eigen::Vector4d kWeights(0.1, 0.4, 0.2, 0.3);
+
+TEST(WeightedSamples, HaveTheMomentsOfTheirWeights) {
+  EXPECT_NEAR(WeightedMean(kDraws, kWeights), 2, 1e-15);
+  // 0.1·4 + 0.4·1 + 0.2·1 + 0.3·0
+  EXPECT_NEAR(WeightedStandardDeviation(kDraws, kWeights), 1, 1e-15);
+}
+
+// Cumulative probabilities at the draws 1, 2, 3, 4: 0.2, 0.55, 0.8, 0.95.
+TEST(WeightedQuantiles, RunLinearlyBetweenDraws) {
+  const WeightedQuantiles quantile(kDraws, kWeights);
+  EXPECT_NEAR(quantile(0.2), 1, 1e-12);
+  EXPECT_NEAR(quantile(0.375), 1.5, 1e-12);
+  EXPECT_NEAR(quantile(0.8), 3, 1e-12);
+  EXPECT_EQ(quantile(0), 1);
+  EXPECT_EQ(quantile(0.99), 4);
+}
+
+TEST(WeightedDensity, HoldsTheProbabilityOfItsBins) {
+  const int count = 10'000;
+  const Vector draws = Vector::LinSpaced(count, 0, 1).array().sqrt();  // density 2x on [0, 1]
+  const Vector weights = Vector::Constant(count, 1.0 / count);
+  const DensityEstimate density = WeightedDensity(draws, weights, 20);
+  ASSERT_EQ(density.value.size(), 20);
+  const double width = density.value[1] - density.value[0];
+  EXPECT_NEAR(density.density.sum() * width, 0.999, 2e-4);
+  for (int i = 0; i < 20; ++i) {
+    // A bin holds whole draws: one more or less of 10⁴.
+    EXPECT_NEAR(density.density[i], 2 * density.value[i], 2 * 1e-4 / width);
+  }
+}
+
+TEST(WeightedDensity, OfDrawsThatDoNotVaryIsOneBin) {
+  const DensityEstimate density =
+      WeightedDensity(Vector::Constant(5, 3), Vector::Constant(5, 0.2), 10);
+  ASSERT_EQ(density.value.size(), 1);
+  EXPECT_EQ(density.value[0], 3);
+  EXPECT_NEAR(density.density[0], 1, 1e-12);
+}
+
+TEST(WeightedJointDensity, OfIndependentDrawsIsTheProductOfTheMarginals) {
+  const int side = 300;
+  Vector first(side * side), second(side * side);
+  for (int i = 0; i < side * side; ++i) {
+    first[i] = (i % side + 0.5) / side;
+    second[i] = 10 * (i / side + 0.5) / side;
+  }
+  const Vector weights = Vector::Constant(side * side, 1.0 / (side * side));
+  const JointDensity joint = WeightedJointDensity(first, second, weights, 5);
+  ASSERT_EQ(joint.density.rows(), 5);
+  ASSERT_EQ(joint.density.cols(), 5);
+  // Uniform on [0, 1] × [0, 10]; a bin holds 60 ± 1 draws a side.
+  EXPECT_NEAR(joint.density.minCoeff(), 0.1, 0.004);
+  EXPECT_NEAR(joint.density.maxCoeff(), 0.1, 0.004);
+  EXPECT_NEAR(joint.second[4], 9, 0.02);
+}
+
+TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
+  EXPECT_THAT(EquallyWeighted(kWeights, 10), ElementsAre(0, 1, 1, 1, 1, 2, 2, 3, 3, 3));
+  EXPECT_TRUE(EquallyWeighted(kWeights, 0).empty());
+}
+
+}  // namespace
+}  // namespace polyest
