@@ -54,6 +54,7 @@ class Parser {
     AddDesign();
     AddPaper();
     AddPosterior();
+    AddProfile();
   }
 
   CLI::App& app() { return app_; }
@@ -71,6 +72,7 @@ class Parser {
     if (name == "sensitivity") return Placed(sensitivity_);
     if (name == "design") return Placed(design_);
     if (name == "posterior") return Placed(posterior_);
+    if (name == "profile") return Placed(profile_);
     return paper_;
   }
 
@@ -282,6 +284,25 @@ class Parser {
     AddFormat(command, posterior_.format, {"table", "json", "csv"});
   }
 
+  void AddProfile() {
+    CLI::App& command = *app_.add_subcommand(
+        "profile", "The cost over each parameter, minimized over all the others");
+    AddProblem(command, profile_.problem_file);
+    command.add_option("data", profile_.data_file, "The measurements, a CSV file")->required();
+    command
+        .add_option("--parameter", profile_.parameters,
+                    "A parameter to profile; may be repeated (default: all)")
+        ->expected(1)
+        ->take_all();
+    command.add_option("--points", profile_.points, "Values of each parameter (default 41)")
+        ->check(CLI::Range(3, 1'001));
+    command.footer(
+        "On the expansion, over four posterior standard deviations to each side of the minimum as "
+        "far as the prior and the region go in which the expansion is trusted.");
+    AddPlace(command);
+    AddFormat(command, profile_.format, {"table", "json", "csv"});
+  }
+
   CLI::App app_;
   Place place_;
   bool local_ = false;
@@ -296,6 +317,7 @@ class Parser {
   DesignArguments design_;
   PaperOptions paper_;
   PosteriorArguments posterior_;
+  ProfileArguments profile_;
 };
 
 }  // namespace

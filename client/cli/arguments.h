@@ -109,10 +109,19 @@ struct PosteriorArguments {
   Format format = Format::kTable;
 };
 
-using Command =
-    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                 SensitivityArguments, DesignArguments, PosteriorArguments, PaperOptions>;
+struct ProfileArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  std::vector<std::string> parameters;
+  int points = 0;  // 0: the default
+  Format format = Format::kTable;
+};
+
+using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                             SensitivityArguments, DesignArguments, PosteriorArguments,
+                             ProfileArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -57,6 +57,11 @@ class LocalBackend : public Backend {
     POLYEST_RETURN_IF_ERROR(models_.status());
     return RunGetPosterior(request, threads_, stop_, *models_);
   }
+  absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
+      const v1::ProfileCostRequest& request) override {
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunProfileCost(request, threads_, stop_, *models_);
+  }
 
  private:
   int threads_;
@@ -100,6 +105,10 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
       const v1::GetPosteriorRequest& request) override {
     return client_.GetPosterior(request);
+  }
+  absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
+      const v1::ProfileCostRequest& request) override {
+    return client_.ProfileCost(request);
   }
 
  private:

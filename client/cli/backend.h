@@ -29,6 +29,8 @@ class Backend {
   virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;
   virtual absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
       const v1::GetPosteriorRequest& request) = 0;
+  virtual absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
+      const v1::ProfileCostRequest& request) = 0;
 };
 
 ClientOptions ToClientOptions(const Place& place);

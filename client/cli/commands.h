@@ -20,5 +20,6 @@ int RunCommand(const SchemaArguments& arguments, std::ostream& out, std::ostream
 int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

@@ -114,6 +114,10 @@ absl::StatusOr<v1::GetPosteriorResponse> Client::GetPosterior(
   return Call(&Stub::GetPosterior, request);
 }
 
+absl::StatusOr<v1::ProfileCostResponse> Client::ProfileCost(const v1::ProfileCostRequest& request) {
+  return Call(&Stub::ProfileCost, request);
+}
+
 absl::Status Client::WatchSession(
     const v1::WatchSessionRequest& request,
     const std::function<bool(const v1::EstimateResponse&)>& estimate) {

@@ -53,6 +53,7 @@ class Client {
       const v1::AddMeasurementsRequest& request);
   absl::StatusOr<v1::EstimateResponse> GetEstimate(const v1::GetEstimateRequest& request);
   absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(const v1::GetPosteriorRequest& request);
+  absl::StatusOr<v1::ProfileCostResponse> ProfileCost(const v1::ProfileCostRequest& request);
   // Calls `estimate` with each one until it returns false (then OK) or the daemon ends the stream.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::EstimateResponse&)>& estimate);

@@ -60,6 +60,8 @@ class Estimator::Implementation {
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop) const;
+  absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
+                                               const Stop& stop) const;
 
  private:
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
@@ -251,6 +253,14 @@ absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
   return DescribePosterior(assessed, problem_.prior(), options);
 }
 
+absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
+    const ProfileOptions& options, const Stop& stop) const {
+  POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
+  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(RequestAssessment(), stop));
+  const Cost cost = expansion_->MakeCost(assessed.estimate.regularization);
+  return ProfileCost(assessed, cost, expansion_->design(), options, stop);
+}
+
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 Estimator::~Estimator() = default;
@@ -283,6 +293,10 @@ absl::StatusOr<Estimate> Estimator::CurrentEstimate(const Stop& stop) const {
 absl::StatusOr<Posterior> Estimator::CurrentPosterior(const PosteriorOptions& options,
                                                       const Stop& stop) const {
   return implementation_->CurrentPosterior(options, stop);
+}
+absl::StatusOr<CostProfiles> Estimator::CurrentProfiles(const ProfileOptions& options,
+                                                        const Stop& stop) const {
+  return implementation_->CurrentProfiles(options, stop);
 }
 int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }

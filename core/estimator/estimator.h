@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "core/common/stop.h"
+#include "core/estimator/cost_profile.h"
 #include "core/estimator/estimate.h"
 #include "core/estimator/posterior_study.h"
 #include "core/estimator/problem.h"
@@ -48,6 +49,10 @@ class Estimator {
   // The posterior of the same samples in detail. INVALID_ARGUMENT as PosteriorOptions::Validate.
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop = {}) const;
+
+  // The profiles of the cost of the same samples. INVALID_ARGUMENT as ProfileOptions::Validate.
+  absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
+                                               const Stop& stop = {}) const;
 
   int64_t rows_appended() const;
   int64_t rows_processed() const;

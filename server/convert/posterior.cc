@@ -86,4 +86,34 @@ v1::GetPosteriorResponse ToProto(const Posterior& posterior, const PosteriorOpti
   return response;
 }
 
+ProfileOptions ToProfileOptions(const v1::ProfileCostRequest& request) {
+  ProfileOptions options;
+  options.parameters.assign(request.parameters().begin(), request.parameters().end());
+  if (request.points() != 0) options.points = request.points();
+  return options;
+}
+
+v1::ProfileCostResponse ToProto(const CostProfiles& profiles) {
+  v1::ProfileCostResponse response;
+  for (const CostProfile& profile : profiles.profiles) {
+    v1::ProfileCostResponse::Profile& added = *response.add_profiles();
+    added.set_parameter(profile.parameter);
+    added.set_unit(profile.unit);
+    Append(profile.value, *added.mutable_value());
+    Append(profile.total, *added.mutable_total());
+    Append(profile.mismatch, *added.mutable_mismatch());
+    Append(profile.prior, *added.mutable_prior());
+    Append(profile.at, *added.mutable_minima());
+    for (const bool converged : profile.converged) added.add_converged(converged);
+  }
+  response.mutable_parameters()->Add(profiles.parameters.begin(), profiles.parameters.end());
+  response.mutable_least()->set_total(profiles.least.total);
+  response.mutable_least()->set_mismatch(profiles.least.mismatch);
+  response.mutable_least()->set_prior(profiles.least.prior);
+  for (const Diagnostic& diagnostic : profiles.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
+  }
+  return response;
+}
+
 }  // namespace polyest

@@ -1,7 +1,8 @@
 #pragma once
 
-// Requests and answers of GetPosterior.
+// Requests and answers of GetPosterior and ProfileCost.
 
+#include "core/estimator/cost_profile.h"
 #include "core/estimator/posterior_study.h"
 #include "polyest/v1/estimation_service.pb.h"
 
@@ -10,5 +11,9 @@ namespace polyest {
 PosteriorOptions ToPosteriorOptions(const v1::GetPosteriorRequest& request);
 // options: those used. `sequence` stays 0.
 v1::GetPosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options);
+
+ProfileOptions ToProfileOptions(const v1::ProfileCostRequest& request);
+// `sequence` stays 0.
+v1::ProfileCostResponse ToProto(const CostProfiles& profiles);
 
 }  // namespace polyest

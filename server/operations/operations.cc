@@ -146,6 +146,17 @@ absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorR
   return ToProto(posterior, options);
 }
 
+absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequest& request,
+                                                       int threads, const Stop& stop,
+                                                       const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+  const ProfileOptions options = ToProfileOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate(estimator->problem().prior()));
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator->CurrentProfiles(options, stop));
+  return ToProto(profiles);
+}
+
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& library) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));

@@ -30,6 +30,9 @@ absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
 absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorRequest& request,
                                                          int threads, const Stop& stop,
                                                          const ModelLibrary& models = {});
+absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequest& request,
+                                                       int threads, const Stop& stop,
+                                                       const ModelLibrary& models = {});
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& models = {});

@@ -97,6 +97,8 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 
   Unary* GetPosterior(Context* context, const v1::GetPosteriorRequest* request,
                       v1::GetPosteriorResponse* response) override;
+  Unary* ProfileCost(Context* context, const v1::ProfileCostRequest* request,
+                     v1::ProfileCostResponse* response) override;
 
  private:
   using Work = std::function<absl::Status(const Stop&)>;
@@ -278,6 +280,23 @@ EstimationService::Unary* EstimationService::GetPosterior(Context* context,
   return OnStrand(context, "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) {
                     return Deliver(session->CurrentPosterior(*request, stop), response);
+                  });
+}
+
+EstimationService::Unary* EstimationService::ProfileCost(Context* context,
+                                                         const v1::ProfileCostRequest* request,
+                                                         v1::ProfileCostResponse* response) {
+  if (request->session().empty()) {
+    return OnExecutor(context, [=, this](const Stop& stop) {
+      return Deliver(RunProfileCost(*request, kThreadsPerCall, stop, context_.models), response);
+    });
+  }
+  if (request->has_problem() || request->has_measurements()) {
+    return FinishAtOnce(context, SessionAndProblem(request->session()));
+  }
+  return OnStrand(context, "session", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
+                    return Deliver(session->CurrentProfiles(*request, stop), response);
                   });
 }
 

@@ -150,6 +150,18 @@ absl::StatusOr<v1::GetPosteriorResponse> Session::CurrentPosterior(
   return response;
 }
 
+absl::StatusOr<v1::ProfileCostResponse> Session::CurrentProfiles(
+    const v1::ProfileCostRequest& request, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  const ProfileOptions options = ToProfileOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
+  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator_->CurrentProfiles(options, stop));
+  v1::ProfileCostResponse response = ToProto(profiles);
+  response.set_sequence(sequence_.last());
+  return response;
+}
+
 absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
   if (samples() > 0) {

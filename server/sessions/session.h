@@ -64,6 +64,8 @@ class Session {
   // The posterior in detail, from everything added.
   absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
                                                             const Stop& stop);
+  absl::StatusOr<v1::ProfileCostResponse> CurrentProfiles(const v1::ProfileCostRequest& request,
+                                                          const Stop& stop);
   // Passes on the present estimate, if there are samples, and every new one from here on.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   void Unobserve(const SessionObserver* observer);

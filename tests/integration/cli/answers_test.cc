@@ -85,6 +85,13 @@ TEST_F(AnswersTest, DesignsAgreeToTheLastDigit) {
                     "--samples", "3", "--format", "json"});
 }
 
+TEST_F(AnswersTest, ProfilesAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(100));
+  for (const char* const format : {"table", "json", "csv"}) {
+    ExpectSameAnswer({"profile", Example("oscillator.json"), data, "--format", format});
+  }
+}
+
 TEST_F(AnswersTest, ModelsAgree) {
   ExpectSameAnswer({"models"});
   ExpectSameAnswer({"models", "--format", "json"});
@@ -325,6 +332,16 @@ TEST_F(CommandTest, PrintsAJointDensityOfThePosterior) {
   EXPECT_THAT(lines[1], StartsWith("k,c,"));
 }
 
+TEST_F(CommandTest, PrintsOneCsvRowAValueOfAProfile) {
+  const Finished run = Run({"profile", Example("oscillator.json"), Example("oscillator.csv"),
+                            "--parameter", "c", "--points", "5", "--format", "csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(6));
+  EXPECT_EQ(lines[0], "parameter,value,total,mismatch,prior,k,c");
+  EXPECT_THAT(lines[3], StartsWith("c,0.230"));  // the middle one, the minimum
+}
+
 TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
   const std::string plot = folder_ / "figure.svg";
   const Finished run = Run({"paper", "5", "--plot", plot});
@@ -337,7 +354,7 @@ TEST_F(CommandTest, ExplainsItself) {
   const Finished help = Run({"--help"});
   EXPECT_EQ(help.exit_status, 0);
   for (const char* const command : {"estimate", "stream", "propagate", "cost", "models", "paper",
-                                    "sensitivity", "design", "posterior"}) {
+                                    "sensitivity", "design", "posterior", "profile"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
   }

@@ -14,6 +14,7 @@ Estimate TwoParameters() {
                           .mean = 3,
                           .lower95 = 4,
                           .upper95 = 5,
+                          .posterior_std_dev = 8,
                           .prior_mean = 6,
                           .prior_std_dev = 7,
                           .contraction = 0.5,
@@ -48,6 +49,7 @@ TEST(EstimateToProto, CarriesParametersAndCovarianceRowMajor) {
   EXPECT_EQ(k.mean(), 3);
   EXPECT_EQ(k.lower95(), 4);
   EXPECT_EQ(k.upper95(), 5);
+  EXPECT_EQ(k.posterior_std_dev(), 8);
   EXPECT_EQ(k.prior_mean(), 6);
   EXPECT_EQ(k.prior_std_dev(), 7);
   EXPECT_EQ(k.contraction(), 0.5);
@@ -93,7 +95,8 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kAtPriorBound, v1::Diagnostic::AT_PRIOR_BOUND},
       {DiagnosticCode::kMultipleMinima, v1::Diagnostic::MULTIPLE_MINIMA},
       {DiagnosticCode::kNotConverged, v1::Diagnostic::NOT_CONVERGED},
-      {DiagnosticCode::kPointsFailed, v1::Diagnostic::POINTS_FAILED}};
+      {DiagnosticCode::kPointsFailed, v1::Diagnostic::POINTS_FAILED},
+      {DiagnosticCode::kNonGaussian, v1::Diagnostic::NON_GAUSSIAN}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};

@@ -1,0 +1,111 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/text_table.h"
+#include "client/cpp/data_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kTablePoints = 17;
+
+absl::StatusOr<v1::ProfileCostResponse> Profile(const ProfileArguments& arguments) {
+  v1::ProfileCostRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
+  request.set_points(arguments.points);
+  // A person reads fewer rows than a plot takes.
+  if (arguments.format == Format::kTable && arguments.points == 0) request.set_points(kTablePoints);
+  auto response = MakeBackend(arguments.place)->ProfileCost(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  return response;
+}
+
+// Without the minus sign of a rounding error.
+double Rise(double total, double least) {
+  const double rise = total - least;
+  return std::abs(rise) < 5e-4 ? 0 : rise;
+}
+
+// One table a parameter: its values, the rise of the cost and where the others are then.
+void PrintTables(const v1::ProfileCostResponse& response, std::ostream& out) {
+  const int columns = response.parameters_size();
+  for (const auto& profile : response.profiles()) {
+    const int count = profile.value_size();
+    const double range = count > 0 ? profile.value(count - 1) - profile.value(0) : 0;
+    const std::string unit = profile.unit() == "1" ? "" : absl::StrCat(" (", profile.unit(), ")");
+    std::vector<std::string> header = {profile.parameter() + unit, "cost above the least",
+                                       "mismatch", "prior"};
+    for (const std::string& name : response.parameters()) {
+      if (name != profile.parameter()) header.push_back(name);
+    }
+    TextTable table(std::move(header), TextTable::Align::kRight);
+    for (int k = 0; k < count; ++k) {
+      std::vector<std::string> row = {
+          FormatValue(profile.value(k), range / 8),
+          absl::StrFormat("%.3f", Rise(profile.total(k), response.least().total())),
+          FormatNumber(profile.mismatch(k), 6), FormatNumber(profile.prior(k), 4)};
+      for (int j = 0; j < columns; ++j) {
+        if (response.parameters(j) == profile.parameter()) continue;
+        row.push_back(FormatNumber(profile.minima(k * columns + j), 6));
+      }
+      table.AddRow(std::move(row));
+    }
+    table.Print(out);
+    out << '\n';
+  }
+  out << "0.5 above the least is one standard deviation of a Gaussian posterior, 2 are two\n";
+  PrintDiagnostics(response.diagnostics(), out);
+}
+
+// One row a value: the parameter profiled, its value, the costs and all parameters at the minimum.
+void PrintCsv(const v1::ProfileCostResponse& response, std::ostream& out) {
+  out << "parameter,value,total,mismatch,prior";
+  for (const std::string& name : response.parameters()) out << ',' << name;
+  out << '\n';
+  const int columns = response.parameters_size();
+  for (const auto& profile : response.profiles()) {
+    for (int k = 0; k < profile.value_size(); ++k) {
+      out << profile.parameter() << ',' << FormatExact(profile.value(k)) << ','
+          << FormatExact(profile.total(k)) << ',' << FormatExact(profile.mismatch(k)) << ','
+          << FormatExact(profile.prior(k));
+      for (int j = 0; j < columns; ++j) {
+        out << ',' << FormatExact(profile.minima(k * columns + j));
+      }
+      out << '\n';
+    }
+  }
+}
+
+}  // namespace
+
+int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto response = Profile(arguments);
+  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*response, /*several_lines=*/true) << '\n';
+  } else if (arguments.format == Format::kCsv) {
+    PrintCsv(*response, out);
+  } else {
+    PrintTables(*response, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

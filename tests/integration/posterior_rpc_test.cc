@@ -1,0 +1,109 @@
+// GetPosterior and ProfileCost: of a session, and from measurements that are all there.
+
+#include "tests/integration/daemon_fixture.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+
+class PosteriorRpcTest : public DaemonTest {
+ protected:
+  template <typename Request>
+  static Request OneShot(int rows) {
+    Request request;
+    *request.mutable_problem() = Oscillator();
+    *request.mutable_measurements() = OscillatorRows(0, rows);
+    return request;
+  }
+
+  grpc::Status Get(const v1::GetPosteriorRequest& request, v1::GetPosteriorResponse* response) {
+    grpc::ClientContext context;
+    return stub_->GetPosterior(&context, request, response);
+  }
+
+  grpc::Status Profile(const v1::ProfileCostRequest& request, v1::ProfileCostResponse* response) {
+    grpc::ClientContext context;
+    return stub_->ProfileCost(&context, request, response);
+  }
+
+  // A session that has taken rows [0, 60).
+  void FeedSession() {
+    ASSERT_TRUE(Create("rig").ok());
+    ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 60)).ok());
+  }
+};
+
+TEST_F(PosteriorRpcTest, IsTheSameOfASessionAndFromTheMeasurementsAtOnce) {
+  FeedSession();
+  auto one_shot = OneShot<v1::GetPosteriorRequest>(60);
+  v1::GetPosteriorRequest of_session;
+  of_session.set_session("sessions/rig");
+  for (v1::GetPosteriorRequest* request : {&one_shot, &of_session}) {
+    request->set_samples(10);
+    auto& pair = *request->add_joints();
+    pair.set_first("k");
+    pair.set_second("c");
+  }
+  v1::GetPosteriorResponse whole, session;
+  ASSERT_TRUE(Get(one_shot, &whole).ok());
+  ASSERT_TRUE(Get(of_session, &session).ok());
+  EXPECT_EQ(session.sequence(), 1);
+  session.clear_sequence();
+  EXPECT_EQ(whole.SerializeAsString(), session.SerializeAsString());
+  ASSERT_EQ(whole.parameters_size(), 2);
+  EXPECT_EQ(whole.parameters(0).quantiles_size(), 3);
+  EXPECT_EQ(whole.parameters(0).density_size(), 100);
+  EXPECT_EQ(whole.samples_size(), 20);
+  ASSERT_EQ(whole.joints_size(), 1);
+  EXPECT_EQ(whole.joints(0).density_size(), 40 * 40);
+  EXPECT_EQ(whole.measured_values(), 60);
+  // The truth lies within 4 standard deviations.
+  EXPECT_NEAR(whole.parameters(0).mean(), 40.66, 4 * whole.parameters(0).std_dev());
+}
+
+TEST_F(PosteriorRpcTest, ProfilesAreTheSameOfASessionAndFromTheMeasurementsAtOnce) {
+  FeedSession();
+  auto one_shot = OneShot<v1::ProfileCostRequest>(60);
+  v1::ProfileCostRequest of_session;
+  of_session.set_session("sessions/rig");
+  v1::ProfileCostResponse whole, session;
+  ASSERT_TRUE(Profile(one_shot, &whole).ok());
+  ASSERT_TRUE(Profile(of_session, &session).ok());
+  EXPECT_EQ(session.sequence(), 1);
+  session.clear_sequence();
+  EXPECT_EQ(whole.SerializeAsString(), session.SerializeAsString());
+  ASSERT_EQ(whole.profiles_size(), 2);
+  EXPECT_GT(whole.profiles(0).value_size(), 20);
+  for (const double total : whole.profiles(0).total()) {
+    EXPECT_GE(total, whole.least().total() * (1 - 1e-12));
+  }
+}
+
+TEST_F(PosteriorRpcTest, RefusesBadRequestsByTheirFields) {
+  v1::GetPosteriorResponse response;
+  auto request = OneShot<v1::GetPosteriorRequest>(20);
+  request.set_samples(-1);
+  grpc::Status status = Get(request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(), "samples: -1 must be from 0 to 100000");
+  request.set_samples(0);
+  request.set_session("sessions/rig");
+  status = Get(request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(),
+              HasSubstr("session: \"sessions/rig\" is given and a problem"));
+  v1::GetPosteriorRequest missing;
+  missing.set_session("sessions/rig");
+  EXPECT_EQ(Get(missing, &response).error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(Get({}, &response).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  v1::ProfileCostResponse profile;
+  auto profile_request = OneShot<v1::ProfileCostRequest>(20);
+  profile_request.set_points(2);
+  status = Profile(profile_request, &profile);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(), "points: 2 must be from 3 to 1001");
+}
+
+}  // namespace
+}  // namespace polyest
