@@ -19,7 +19,7 @@ enum class DiagnosticCode {
   kModelMisfit,          // residuals far larger than the noise
   kAtPriorBound,         // the estimate lies on a bound of the prior
   kMultipleMinima,       // other minima of comparable cost
-  kNotConverged,         // the minimizer gave up
+  kNotConverged,         // the minimizer gave up, or the posterior's chains have not mixed
   kPointsFailed,         // trajectories that could not be integrated were left out
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
 };

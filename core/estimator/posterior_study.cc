@@ -15,6 +15,8 @@ constexpr double kChainEffectiveSize = 60'000;
 constexpr int kMostSweeps = 2'000;
 // Importance points for each sample given out, so that hardly any is given out twice.
 constexpr int kPointsPerSample = 4;
+constexpr double kMostRHat = 1.01;
+constexpr double kLeastEffectiveSize = 400;
 
 std::vector<std::string> Names(const Prior& prior) {
   std::vector<std::string> names;
@@ -48,6 +50,19 @@ absl::Status CheckJoint(const Prior& prior, size_t index,
         "joints[%d]: %s is given twice; a pair is of two parameters", index, joint.first));
   }
   return absl::OkStatus();
+}
+
+// By the rules of Vehtari et al. (bayes/convergence.h).
+void AddNotConverged(Posterior& posterior) {
+  if (posterior.method != PosteriorMethod::kMarkovChains) return;
+  if (posterior.r_hat <= kMostRHat && posterior.effective_size >= kLeastEffectiveSize) return;
+  posterior.diagnostics.push_back(
+      {DiagnosticCode::kNotConverged,
+       absl::StrFormat(
+           "the Markov chains have not mixed: R̂ is %.3f and should be at most %.2f, and "
+           "the draws are worth %.0f independent ones and should be worth %d",
+           posterior.r_hat, kMostRHat, posterior.effective_size,
+           static_cast<int>(kLeastEffectiveSize))});
 }
 
 }  // namespace
@@ -120,6 +135,7 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
   posterior.effective_size = draws.effective_size.minCoeff();
   if (draws.r_hat.size() > 0) posterior.r_hat = draws.r_hat.maxCoeff();
   posterior.diagnostics = assessed.estimate.diagnostics;
+  AddNotConverged(posterior);
   posterior.time_s = assessed.estimate.time_s;
   posterior.sample_values = assessed.estimate.samples;
   return posterior;

@@ -58,7 +58,8 @@ struct Posterior {
   std::vector<PosteriorMarginal> marginals;
   std::vector<PosteriorJoint> joints;
   Matrix samples;  // samples × n, equally weighted, of θ
-  // What an estimate from the same draws is warned of.
+  // What an estimate from the same draws is warned of, and NOT_CONVERGED where its chains have not
+  // mixed.
   std::vector<Diagnostic> diagnostics;
   double time_s = 0;
   int64_t sample_values = 0;  // taken, as Estimate::samples

@@ -140,6 +140,23 @@ TEST(Estimate, SaysThatItIsNotGaussianAndByHowMuch) {
               ::testing::HasSubstr("that of a is 0."));
 }
 
+TEST(Posterior, SaysThatItsChainsHaveNotMixed) {
+  const Prior prior({UncertainParameter::Normal("a", 0, 1).value()});
+  Assessed assessed;
+  assessed.estimate.parameters.resize(1);
+  assessed.posterior.method = PosteriorMethod::kMarkovChains;
+  assessed.posterior.scores = Vector::LinSpaced(100, -1, 1);
+  assessed.posterior.weights = Vector::Constant(100, 0.01);
+  assessed.posterior.effective_size = Vector::Constant(1, 5000);
+  assessed.posterior.r_hat = Vector::Constant(1, 1.005);
+  EXPECT_THAT(DescribePosterior(assessed, prior, {}).diagnostics, IsEmpty());
+  assessed.posterior.r_hat[0] = 1.2;
+  const auto diagnostics = DescribePosterior(assessed, prior, {}).diagnostics;
+  ASSERT_THAT(diagnostics, SizeIs(1));
+  EXPECT_EQ(diagnostics[0].code, DiagnosticCode::kNotConverged);
+  EXPECT_THAT(diagnostics[0].message, ::testing::HasSubstr("R̂ is 1.200"));
+}
+
 TEST(PosteriorOptions, NameFieldValueAndRule) {
   const Prior prior({UncertainParameter::Normal("a", 0, 1).value(),
                      UncertainParameter::Normal("b", 0, 1).value()});
