@@ -34,6 +34,10 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "trajectories failed";
     case v1::Diagnostic::NON_GAUSSIAN:
       return "not Gaussian";
+    case v1::Diagnostic::CORRELATED_RESIDUALS:
+      return "correlated residuals";
+    case v1::Diagnostic::NOISE_NOT_LEARNED:
+      return "noise not learned";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }
@@ -54,15 +58,24 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
 
 void PrintChannels(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.channels().empty()) return;
-  TextTable table({"channel", "samples", "χ²", "χ²/samples", "noise sd"});
+  TextTable table({"channel", "samples", "χ²", "χ²/samples", "noise sd", "lag-1", "effective"});
   for (const v1::ChannelEstimate& c : estimate.channels()) {
     const bool any = c.samples() > 0;
     table.AddRow({c.output(), absl::StrCat(c.samples()), any ? FormatNumber(c.chi_squared()) : "-",
                   any ? FormatNumber(c.chi_squared() / static_cast<double>(c.samples()), 3) : "-",
-                  any ? FormatNumber(c.noise_std_dev(), 3) : "-"});
+                  any ? FormatNumber(c.noise_std_dev(), 3) : "-",
+                  any ? FormatNumber(c.lag1_correlation(), 2) : "-",
+                  any ? FormatNumber(c.effective_samples(), 3) : "-"});
   }
   out << '\n';
   table.Print(out);
+  for (const v1::ChannelEstimate& c : estimate.channels()) {
+    if (c.noise_time_constant_s() > 0) {
+      out << absl::StrCat(c.output(), ": noise correlated over ",
+                          FormatNumber(c.noise_time_constant_s(), 3), " s\n");
+    }
+    if (c.outliers() > 0) out << absl::StrCat(c.output(), ": ", c.outliers(), " outliers\n");
+  }
 }
 
 void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {

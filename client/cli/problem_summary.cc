@@ -106,7 +106,17 @@ std::string DescribeNoise(const v1::MeasuredOutput::Noise& noise, const std::str
   if (noise.relative_to_max() > 0) {
     parts.push_back(absl::StrCat(Number(100 * noise.relative_to_max()), " % of the largest"));
   }
-  return absl::StrJoin(parts, " + ");
+  std::string text = absl::StrJoin(parts, " + ");
+  if (noise.unknown()) text = parts.empty() ? "of unknown size" : "unknown times " + text;
+  if (noise.correlation().has_time_constant_s()) {
+    absl::StrAppend(&text, ", correlated over ",
+                    WithUnit(noise.correlation().time_constant_s(), "s"));
+  } else if (noise.correlation().auto_()) {
+    absl::StrAppend(&text, ", perhaps correlated");
+  }
+  if (noise.outliers() == v1::MeasuredOutput::Noise::STUDENT_T) text += ", outliers by Student's t";
+  if (noise.outliers() == v1::MeasuredOutput::Noise::HUBER) text += ", outliers by Huber";
+  return text;
 }
 
 std::string DescribeSignal(const v1::Input& input, const std::string& unit) {

@@ -196,6 +196,7 @@ class Summarizer {
   }
 
   void WarnOfNoise(const MeasuredOutput& measured, const Channel& channel) {
+    if (measured.noise.unknown) return;
     const std::string& name = measured.output;
     if (channel.values.size() < 3 || channel.smallest == channel.largest) return;
     if (channel.least_noise > channel.spread) {

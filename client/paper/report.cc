@@ -45,6 +45,10 @@ const char* NameOf(DiagnosticCode code) {
       return "POINTS_FAILED";
     case DiagnosticCode::kNonGaussian:
       return "NON_GAUSSIAN";
+    case DiagnosticCode::kCorrelatedResiduals:
+      return "CORRELATED_RESIDUALS";
+    case DiagnosticCode::kNoiseNotLearned:
+      return "NOISE_NOT_LEARNED";
   }
   return "";
 }

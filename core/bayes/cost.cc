@@ -21,18 +21,18 @@ double Total(double mismatch, double prior, double regularization) {
 
 }  // namespace
 
-Cost::Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, MismatchSums sums,
+Cost::Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, Mismatch mismatch,
            Prior prior, double regularization)
     : basis_(std::move(basis)),
       region_(std::move(region)),
       reference_phi_(basis_->size()),
-      sums_(std::move(sums)),
+      mismatch_(std::move(mismatch)),
       prior_(std::move(prior)),
       regularization_(regularization) {
   POLYEST_CHECK(regularization_ >= 0);
   POLYEST_CHECK(basis_->dimension() == region_.dimension());
   POLYEST_CHECK(basis_->dimension() == prior_.dimension());
-  POLYEST_CHECK(basis_->size() == sums_.terms());
+  POLYEST_CHECK(basis_->size() == mismatch_.terms());
   basis_->Evaluate(reference, reference_phi_);
 }
 
@@ -44,7 +44,7 @@ Vector Cost::BasisDifference(const ConstVectorRef& eta) const {
 
 CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   CostValue value;
-  value.mismatch = sums_.ChiSquared(BasisDifference(eta)) / 2;
+  value.mismatch = mismatch_.Evaluate(BasisDifference(eta));
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
   value.total =
@@ -57,14 +57,13 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   Matrix phi_gradient(basis_->size(), dimension());
   basis_->EvaluateWithGradient(eta, d, phi_gradient);
   d -= reference_phi_;
-  const Vector g_d = sums_.G() * d;
+  Vector by_d(d.size());
   CostValue value;
-  // ½ (dᵀ G d − 2 bᵀ d + w)
-  value.mismatch = std::max(0.0, d.dot(g_d) - 2 * sums_.b().dot(d) + sums_.w()) / 2;
+  value.mismatch = mismatch_.EvaluateWithGradient(d, by_d);
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
-  // ∇J = ∂φᵀ (G d − b) + α² axesᵀ ∇J_apriori(ξ)
-  gradient = phi_gradient.transpose() * (g_d - sums_.b());
+  // ∇J = ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
+  gradient = phi_gradient.transpose() * by_d;
   value.total = kInfinity;
   if (prior_.Contains(xi)) {
     value.total = Total(value.mismatch, value.prior, regularization_);
@@ -75,19 +74,21 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   return value;
 }
 
-Matrix Cost::MismatchHessian(const ConstVectorRef& eta) const {
+Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
   Vector d(basis_->size());
   Matrix phi_gradient(basis_->size(), dimension());
   basis_->EvaluateWithGradient(eta, d, phi_gradient);
   d -= reference_phi_;
-  // ∂φᵀ G ∂φ + Σ_s (G d − b)_s ∇²φ_s
-  const Matrix hessian = phi_gradient.transpose() * (sums_.G() * phi_gradient) +
-                         basis_->WeightedHessian(eta, sums_.G() * d - sums_.b());
+  Vector by_d(d.size());
+  mismatch_.EvaluateWithGradient(d, by_d);
+  // ∂φᵀ ∂²J/∂d² ∂φ + Σ_s (∂J/∂d)_s ∇²φ_s
+  const Matrix hessian =
+      mismatch_.Curvature(d, phi_gradient, spent) + basis_->WeightedHessian(eta, by_d);
   return (hessian + hessian.transpose()) / 2;
 }
 
-Matrix Cost::Hessian(const ConstVectorRef& eta) const {
-  Matrix hessian = MismatchHessian(eta);
+Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
+  Matrix hessian = MismatchHessian(eta, spent);
   if (regularization_ > 0) {
     // + α² axesᵀ diag(J_apriori″) axes
     const Vector curvature = prior_.Curvature(region_.ToGerm(eta));
@@ -101,7 +102,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   POLYEST_CHECK(etas.cols() == dimension());
   // Kept from call to call, so that a sampler's sweeps do not allocate.
   thread_local Matrix difference;  // D = Φ − 1 φ_0ᵀ
-  thread_local Matrix product;     // D G
+  thread_local Matrix product;
   thread_local Matrix xis;
   totals.resize(etas.rows());
   for (Eigen::Index first = 0; first < etas.rows(); first += kBlock) {
@@ -109,12 +110,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
     const auto block = etas.middleRows(first, count);
     basis_->EvaluateMany(block, difference);
     difference.rowwise() -= reference_phi_.transpose();
-    product.resize(count, difference.cols());
-    product.noalias() = difference * sums_.G();
-    // ½ (rowwise (D G)∘D − 2 D b + w)
-    product.rowwise() -= 2 * sums_.b().transpose();
-    totals.segment(first, count) =
-        (product.cwiseProduct(difference).rowwise().sum().array() + sums_.w()).max(0.0) / 2;
+    mismatch_.EvaluateMany(difference, product, totals.segment(first, count));
     xis.resize(count, dimension());
     xis.noalias() = block * region_.axes().transpose();
     xis.rowwise() += region_.centre().transpose();

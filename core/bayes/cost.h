@@ -2,11 +2,12 @@
 
 // The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
 //   J(η) = J_mismatch(η) + α² J_apriori(ξ(η)),   ξ = centre + axes η,
-// with exact derivatives: J_mismatch is a quadratic form in φ(η), φ a polynomial.
+// with exact derivatives: J_mismatch is a function of quadratic forms in φ(η) (mismatch.h), φ a
+// polynomial.
 
 #include <memory>
 
-#include "core/bayes/mismatch_sums.h"
+#include "core/bayes/mismatch.h"
 #include "core/bayes/prior.h"
 #include "core/bayes/region.h"
 #include "core/chaos/basis.h"
@@ -21,8 +22,8 @@ struct CostValue {
 
 class Cost {
  public:
-  // sums taken about reference (η_0). regularization = α² ≥ 0.
-  Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, MismatchSums sums,
+  // mismatch's sums taken about reference (η_0). regularization = α² ≥ 0.
+  Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, Mismatch mismatch,
        Prior prior, double regularization);
 
   int dimension() const { return region_.dimension(); }
@@ -33,9 +34,11 @@ class Cost {
   CostValue Evaluate(const ConstVectorRef& eta) const;
   // gradient is n, with respect to η.
   CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
-  // n × n, with respect to η.
-  Matrix MismatchHessian(const ConstVectorRef& eta) const;
-  Matrix Hessian(const ConstVectorRef& eta) const;  // of the total
+  // n × n, with respect to η. Where a noise scale is unknown the likelihood is a Student's t in the
+  // parameters, whose curvature at the mode is that of a Gaussian too narrow: `spent` degrees of
+  // freedom (parameters fitted, plus 2) less make it that of a Gaussian of the t's variance.
+  Matrix MismatchHessian(const ConstVectorRef& eta, double spent = 0) const;
+  Matrix Hessian(const ConstVectorRef& eta, double spent = 0) const;  // of the total
   // total at W points (W × n) at once by matrix products; +∞ outside Ω. totals is W (resized).
   void EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const;
   // d = φ(η) − φ(η_0), for the sums of single channels.
@@ -45,7 +48,7 @@ class Cost {
   std::shared_ptr<const Basis> basis_;
   Region region_;
   Vector reference_phi_;
-  MismatchSums sums_;
+  Mismatch mismatch_;
   Prior prior_;
   double regularization_;
 };

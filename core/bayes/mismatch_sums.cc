@@ -33,4 +33,20 @@ double MismatchSums::ChiSquared(const ConstVectorRef& d) const {
   return std::max(0.0, d.dot(g_ * d) - 2 * b_.dot(d) + w_);
 }
 
+double MismatchSums::ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
+  gradient.noalias() = g_ * d;
+  const double value = std::max(0.0, d.dot(gradient) - 2 * b_.dot(d) + w_);
+  gradient = 2 * (gradient - b_);  // 2 (G d − b)
+  return value;
+}
+
+void MismatchSums::ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product,
+                                  VectorRef values) const {
+  product.resize(differences.rows(), differences.cols());
+  product.noalias() = differences * g_;
+  // rowwise (D G)∘D − 2 D b + w
+  product.rowwise() -= 2 * b_.transpose();
+  values = (product.cwiseProduct(differences).rowwise().sum().array() + w_).max(0.0);
+}
+
 }  // namespace polyest

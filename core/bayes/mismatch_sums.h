@@ -30,6 +30,10 @@ class MismatchSums {
   void Add(const MismatchSums& other);
   // 2 J_mismatch = χ² at d.
   double ChiSquared(const ConstVectorRef& d) const;
+  // The same; gradient (S) is with respect to d.
+  double ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
+  // The same at W points: differences is W × S, values W (sized). product is scratch (resized).
+  void ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
  private:
   Matrix g_;  // symmetric, both triangles kept

@@ -10,12 +10,15 @@
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/diagnosis.h"
+#include "core/estimator/noise_learning.h"
 #include "core/estimator/reexpansion.h"
 #include "core/estimator/search_domain.h"
 
 namespace polyest {
 namespace {
 
+constexpr Eigen::Index kDrawsForNoise = 200;
+constexpr double kLeastMeanSquare = 1e-24;  // of residuals that vanish
 // Other minima count when their density is not below this part of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
 // An isolated minimum has all its curvatures above the prior's; a valley's floor has not.
@@ -47,6 +50,8 @@ class Assessment {
     findings_.minimizer_reason = minima.front().reason;
     NoteOtherMinima(cost, minima);
     Summarize(cost, eta);
+    fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
+    spent_ = fitted_ + 2;
     DescribeParameters(cost, eta);
     DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
@@ -111,7 +116,7 @@ class Assessment {
     const double widening =
         findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
     DescribeSpread(cost, eta, informed, widening);
-    estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta)), prior_);
+    estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
@@ -137,7 +142,7 @@ class Assessment {
   void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
                       double widening) {
     const Curvature curvature =
-        CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta)), prior_, findings_.map_xi);
+        CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
     const Vector prior_deviation = prior_.StandardDeviation();
     deviation_ = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
     for (int i = 0; i < prior_.dimension(); ++i) {
@@ -157,7 +162,7 @@ class Assessment {
   // in which a skewed prior's sharp mode does not pass for information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
     const Vector& xi = findings_.map_xi;
-    const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta));
+    const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta, spent_));
     Matrix curved = mismatch;
     curved.diagonal() += prior_.Curvature(xi);
     Matrix spread = mismatch;
@@ -191,14 +196,44 @@ class Assessment {
     for (int c = 0; c < problem_.channels(); ++c) {
       ChannelEstimate channel;
       channel.output = problem_.problem().measured[static_cast<size_t>(c)].output;
-      channel.chi_squared = request_.expansion->ChannelSums(c).ChiSquared(d);
-      if (!request_.record->channels().empty()) {
-        const RecordSummary::Channel& summary = request_.record->channels()[static_cast<size_t>(c)];
-        channel.samples = summary.samples;
-        channel.noise_std_dev = summary.RootMeanSquareNoise();
-      }
+      if (!request_.record->channels().empty()) DescribeChannel(cost, d, c, channel);
       estimate_.channels.push_back(std::move(channel));
     }
+  }
+
+  void DescribeChannel(const Cost& cost, const Vector& d, int c, ChannelEstimate& channel) const {
+    const RecordSummary::Channel& summary = request_.record->channels()[static_cast<size_t>(c)];
+    const ChannelSums& sums = request_.expansion->sums()[static_cast<size_t>(c)];
+    const ChannelNoise& noise = request_.expansion->noise().channels[static_cast<size_t>(c)];
+    channel.samples = summary.samples;
+    if (summary.samples == 0) return;
+    const auto samples = static_cast<double>(summary.samples);
+    // With N the degrees of freedom, χ² ÷ N of a working noise of the right size is 1 in the mean.
+    const double mean_square = sums.scale_unknown ? MeanChiSquared(cost, sums) / sums.Degrees() : 1;
+    channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
+    channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
+    const double share = fitted_ / static_cast<double>(request_.record->samples());
+    channel.lag1_correlation = std::clamp(sums.Lag1Correlation(d) + share, -1.0, 1.0);
+    channel.noise_time_constant_s = noise.time_constant_s;
+    channel.outliers = request_.expansion->Outliers(c);
+    // That of the noise before whitening.
+    const double a = noise.time_constant_s > 0 ? summary.Correlation(noise)
+                                               : std::max(0.0, channel.lag1_correlation);
+    channel.effective_samples = samples * (1 - a) / (1 + a);
+  }
+
+  // E[χ²] over the posterior, where E[σ²] = E[χ²]/N of an unknown scale.
+  double MeanChiSquared(const Cost& cost, const ChannelSums& sums) const {
+    const Eigen::Index stride =
+        std::max<Eigen::Index>(1, posterior_.scores.rows() / kDrawsForNoise);
+    double sum = 0, weights = 0;
+    for (Eigen::Index i = 0; i < posterior_.scores.rows(); i += stride) {
+      const Vector xi = prior_.OfScores(posterior_.scores.row(i).transpose());
+      const double weight = posterior_.weights[i];
+      sum += weight * sums.samples.ChiSquared(cost.BasisDifference(design_.region.ToLocal(xi)));
+      weights += weight;
+    }
+    return sum / weights;
   }
 
   const ResolvedProblem& problem_;
@@ -206,6 +241,8 @@ class Assessment {
   const AssessmentRequest& request_;
   const ExpansionDesign& design_;
   double regularization_ = 1;
+  double fitted_ = 0;  // parameters fitted by the data
+  double spent_ = 0;   // degrees of freedom, see Cost::MismatchHessian
   PosteriorDraws posterior_;
   Vector deviation_;  // of the parameters
   Findings findings_;

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "core/bayes/mismatch.h"
 #include "core/common/status.h"
+#include "core/estimator/noise_learning.h"
 #include "core/estimator/sample_checks.h"
 #include "core/estimator/studies.h"
+#include "core/estimator/whitening.h"
 
 namespace polyest {
 namespace {
@@ -106,7 +109,8 @@ Vector AxisScores(const Germ& germ, Eigen::Index points) {
   return axis;
 }
 
-// J_mismatch of every row of `thetas`, from runs of the model over the whole record.
+// J_mismatch of every row of `thetas`, from runs of the model over the whole record. Outliers are
+// not looked for: there is no estimate to look from.
 class ModelMismatch {
  public:
   ModelMismatch(const ResolvedProblem& problem, const CheckedSamples& record, int threads)
@@ -117,20 +121,30 @@ class ModelMismatch {
         width_(channels_ + problem.streamed_inputs().size()) {}
 
   absl::StatusOr<Vector> Evaluate(const Matrix& thetas, const Stop& stop) const {
-    Vector mismatch = Vector::Zero(thetas.rows());
+    const auto m = static_cast<Eigen::Index>(channels_);
+    Sums sums{Matrix::Zero(thetas.rows(), m), Matrix::Zero(thetas.rows(), m),
+              Matrix::Zero(thetas.rows(), m), Vector::Zero(m)};
     for (size_t first = 0; first < record_.rows.size();) {
       size_t end = first + 1;
       while (end < record_.rows.size() && record_.rows[end].run == record_.rows[first].run) ++end;
-      POLYEST_RETURN_IF_ERROR(AddRun(thetas, first, end, mismatch, stop));
+      POLYEST_RETURN_IF_ERROR(AddRun(thetas, first, end, sums, stop));
       first = end;
     }
-    return mismatch;
+    return Total(sums);
   }
 
  private:
+  // With u_k a residual in units of its noise: Σ u_k², Σ (u_k − u_{k−1})² and the last u_k, by
+  // point and channel; samples by channel.
+  struct Sums {
+    Matrix chi_squared, differences, previous;
+    Vector samples;
+  };
+
   // The rows [first, end) of one run: the model starts anew, with inputs of its own.
-  absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Vector& mismatch,
+  absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Sums& sums,
                       const Stop& stop) const {
+    sums.previous.setZero();
     InputSignals inputs = problem_.MakeInputs();
     std::vector<double> times;
     for (size_t k = first; k < end; ++k) {
@@ -143,29 +157,58 @@ class ModelMismatch {
     for (const int input : problem_.streamed_inputs()) inputs[static_cast<size_t>(input)].Finish();
     EnsemblePropagator ensemble(problem_.MakeEnsemble(thetas, problem_.outputs(), threads_),
                                 &inputs);
+    std::vector<ChannelNoise> noise = NoiseToBeginWith(problem_.problem()).channels;
+    for (ChannelNoise& channel : noise) channel.scale = 1;
+    Whitening whitening(noise, thetas.rows());
+    RowBlock block = record_;
     Matrix outputs;
     for (size_t k = 0; k < times.size(); k += kTimesAtATime) {
       POLYEST_RETURN_IF_ERROR(stop.Check());
       const size_t count = std::min(kTimesAtATime, times.size() - k);
       outputs.resize(thetas.rows(), static_cast<Eigen::Index>(count * channels_));
       POLYEST_RETURN_IF_ERROR(ensemble.Advance(std::span(times).subspan(k, count), outputs, stop));
+      whitening.Apply(static_cast<int>(first + k), static_cast<int>(count), block, outputs);
       for (size_t row = 0; row < count; ++row) {
-        AddRow(first + k + row, outputs, row * channels_, mismatch);
+        AddRow(block, first + k + row, outputs, row * channels_, sums);
       }
     }
-    for (const PointFailure& failure : ensemble.failures()) mismatch[failure.point] = kInfinity;
+    for (const PointFailure& failure : ensemble.failures()) {
+      sums.chi_squared.row(failure.point).setConstant(kInfinity);
+    }
     return absl::OkStatus();
   }
 
-  void AddRow(size_t row, const Matrix& outputs, size_t first_column, Vector& mismatch) const {
+  void AddRow(const RowBlock& block, size_t row, const Matrix& outputs, size_t first_column,
+              Sums& sums) const {
     for (size_t channel = 0; channel < channels_; ++channel) {
-      const double sigma = record_.noise[row * channels_ + channel];
+      const double sigma = block.noise[row * channels_ + channel];
       if (!(sigma > 0)) continue;  // missing
-      const double z = record_.values[row * width_ + channel];
-      // J_mismatch += ½ (z − y)²/R
+      const double z = block.values[row * width_ + channel];
+      const auto c = static_cast<Eigen::Index>(channel);
       const auto y = outputs.col(static_cast<Eigen::Index>(first_column + channel)).array();
-      mismatch.array() += 0.5 * ((z - y) / sigma).square();
+      const Eigen::ArrayXd u = (z - y) / sigma;
+      sums.chi_squared.col(c).array() += u.square();
+      sums.differences.col(c).array() += (u - sums.previous.col(c).array()).square();
+      sums.previous.col(c) = u.matrix();
+      ++sums.samples[c];
     }
+  }
+
+  Vector Total(const Sums& sums) const {
+    Vector mismatch = Vector::Zero(sums.chi_squared.rows());
+    for (Eigen::Index c = 0; c < sums.samples.size(); ++c) {
+      const NoiseModel& noise = problem_.problem().measured[static_cast<size_t>(c)].noise;
+      for (Eigen::Index i = 0; i < mismatch.size(); ++i) {
+        const double chi_squared = sums.chi_squared(i, c);
+        // A failed point's later values are no numbers.
+        mismatch[i] += std::isfinite(chi_squared)
+                           ? NegativeLogLikelihood(sums.samples[c], chi_squared,
+                                                   sums.differences(i, c), noise.unknown,
+                                                   noise.correlation == NoiseCorrelation::kUnknown)
+                           : kInfinity;
+      }
+    }
+    return mismatch;
   }
 
   const ResolvedProblem& problem_;

@@ -14,6 +14,11 @@ namespace {
 // and half as much again.
 constexpr double kMisfitDeviations = 6;
 constexpr double kMisfitRatio = 1.5;
+// A lag-1 correlation of independent residuals has a standard deviation of 1/√N. Below kCorrelated
+// it changes the uncertainty by less than a sixth.
+constexpr double kCorrelationDeviations = 4;
+constexpr double kCorrelated = 0.15;
+constexpr int64_t kLeastForCorrelation = 20;
 constexpr double kAtBound = 1e-6;  // of the width of Ω
 // The same for a correlated parameter: its score has no bound, and only ever nears the parameter's.
 constexpr double kNearBound = 1e-4;
@@ -40,8 +45,9 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
   for (int i = 0; i < findings.problem->dimension(); ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     if (parameter.verdict != Verdict::kNotIdentified) continue;
-    const SamplingInformation information = InformationBetweenSamples(
-        *findings.problem, findings.record->beginning(), findings.map_xi, i);
+    const SamplingInformation information =
+        InformationBetweenSamples(*findings.problem, findings.expansion->noise(),
+                                  findings.record->beginning(), findings.map_xi, i);
     if (!information.undersampled) continue;
     diagnostics.push_back(
         {DiagnosticCode::kUndersampled,
@@ -52,8 +58,12 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
   }
 }
 
-void AddMisfit(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
-  for (const ChannelEstimate& channel : estimate.channels) {
+// Of a scale learned, χ² says nothing: it is what the scale was learned from.
+void AddMisfit(const Findings& findings, const Estimate& estimate,
+               std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    if (findings.problem->problem().measured[c].noise.unknown) continue;
     const auto samples = static_cast<double>(channel.samples);
     if (channel.chi_squared > kMisfitRatio * samples &&
         channel.chi_squared > samples + kMisfitDeviations * std::sqrt(2 * samples)) {
@@ -63,6 +73,60 @@ void AddMisfit(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
                            "prior is wrong, and the uncertainty reported is too small",
                            channel.output, std::sqrt(channel.chi_squared / samples))});
     }
+  }
+}
+
+// Residuals that hang together in time although the noise is taken not to, or otherwise than it is
+// taken to.
+void AddCorrelation(const Findings& findings, const Estimate& estimate,
+                    std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    const double correlation = channel.lag1_correlation;
+    if (std::abs(correlation) < kCorrelated || channel.samples < kLeastForCorrelation ||
+        std::abs(correlation) * std::sqrt(static_cast<double>(channel.samples)) <
+            kCorrelationDeviations) {
+      continue;
+    }
+    const NoiseModel& noise = findings.problem->problem().measured[c].noise;
+    if (noise.correlation != NoiseCorrelation::kWhite) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f) even after the "
+                           "noise's own correlation is taken out; model or noise is wrong",
+                           channel.output, correlation)});
+    } else if (correlation > 0) {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f), so that %d "
+                           "samples tell no more than %.0f independent ones and the uncertainty "
+                           "reported is too small; let the noise have a correlation "
+                           "({\"auto\": true}), or improve the model",
+                           channel.output, correlation, channel.samples,
+                           channel.effective_samples)});
+    } else {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat(
+               "output %s: successive residuals alternate (correlation %.2f); the noise "
+               "is not white",
+               channel.output, correlation)});
+    }
+  }
+}
+
+void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
+                       std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    if (!findings.problem->problem().measured[c].noise.unknown ||
+        findings.expansion->noise().channels[c].learned) {
+      continue;
+    }
+    diagnostics.push_back(
+        {DiagnosticCode::kNoiseNotLearned,
+         absl::StrFormat("output %s: too few samples (%d) to learn its noise from; it is taken to "
+                         "be as large as the signal",
+                         estimate.channels[c].output, estimate.channels[c].samples)});
   }
 }
 
@@ -167,7 +231,9 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
              estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
              findings.problem->problem().expansion.adaptive ? "" : " or let it be adaptive")});
   }
-  AddMisfit(estimate, diagnostics);
+  AddMisfit(findings, estimate, diagnostics);
+  AddCorrelation(findings, estimate, diagnostics);
+  AddUnlearnedNoise(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
   AddNonGaussian(estimate, diagnostics);
   AddMinima(findings, diagnostics);

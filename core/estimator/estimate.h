@@ -22,6 +22,8 @@ enum class DiagnosticCode {
   kNotConverged,         // the minimizer gave up, or the posterior's chains have not mixed
   kPointsFailed,         // trajectories that could not be integrated were left out
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
+  kCorrelatedResiduals,  // residuals are not white, and the noise is taken to be
+  kNoiseNotLearned,      // a noise of unknown size, of which there are too few samples
 };
 
 struct Diagnostic {
@@ -47,8 +49,16 @@ struct ParameterEstimate {
 struct ChannelEstimate {
   std::string output;
   int64_t samples = 0;
-  double chi_squared = 0;    // Σ (z − y)²/R at map
-  double noise_std_dev = 0;  // root mean square of the noise assumed, in the output's unit
+  // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples` when
+  // model and noise are right, and by its making when the noise was unknown.
+  double chi_squared = 0;
+  // Root mean square of the noise assumed or, where it was unknown, estimated; in the output's
+  // unit.
+  double noise_std_dev = 0;
+  double lag1_correlation = 0;   // of the residuals (whitened), free of the fit's bias
+  double effective_samples = 0;  // independent ones that would tell as much: N (1 − a)/(1 + a)
+  double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
+  int64_t outliers = 0;              // samples with less than half their weight
 };
 
 struct ExpansionSummary {

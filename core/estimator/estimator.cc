@@ -10,6 +10,7 @@
 #include "core/common/status.h"
 #include "core/estimator/assessment.h"
 #include "core/estimator/memory_store.h"
+#include "core/estimator/noise_learning.h"
 #include "core/estimator/reexpansion.h"
 #include "core/estimator/sample_checks.h"
 
@@ -32,6 +33,11 @@ constexpr double kTightestTolerance = 1e-12;
 // before the next one is tried.
 constexpr int64_t kPatience = 8;
 constexpr int kMostSettlementsAtRow = 4;
+// Of the noise, where a window ends. A scale that falls from the signal's size to 10⁻⁶ of it takes
+// 20 halvings.
+constexpr int kMostRevisions = 24;
+// By how much a scale not learned yet exceeds the largest sample.
+constexpr double kAboveSignal = 2;
 
 }  // namespace
 
@@ -42,12 +48,14 @@ class Estimator::Implementation {
         threads_(options.threads),
         store_(options.store ? std::move(options.store) : std::make_shared<MemoryStore>()),
         checks_(problem_),
+        learns_noise_(LearnsNoise(problem_.problem())),
         particles_(0, problem_.dimension()) {}
 
   absl::Status Begin() {
     POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(problem_));
-    POLYEST_ASSIGN_OR_RETURN(expansion_,
-                             RegionalExpansion::Make(problem_, std::move(design), threads_));
+    POLYEST_ASSIGN_OR_RETURN(
+        expansion_, RegionalExpansion::Make(problem_, std::move(design),
+                                            NoiseToBeginWith(problem_.problem()), threads_));
     return absl::OkStatus();
   }
 
@@ -65,12 +73,18 @@ class Estimator::Implementation {
 
  private:
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
+  bool learns_noise() const { return learns_noise_; }
+  bool WindowEnds() const { return (adaptive() || learns_noise()) && processed_ >= window_end_; }
   int64_t SettledRows() const;
   AssessmentRequest RequestAssessment() const;
   absl::Status Recover(const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
+  absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
+  absl::StatusOr<bool> LearnNoise(const Stop& stop);
+  absl::Status TakeAnew(LearnedNoise noise, const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
 
@@ -78,6 +92,7 @@ class Estimator::Implementation {
   int threads_;
   std::shared_ptr<SampleStore> store_;
   SampleChecks checks_;
+  bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
   bool broken_ = false;  // a stop left the expansion between two rows
   Matrix particles_;     // of the last settlement, germ coordinates
@@ -102,9 +117,7 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
 absl::Status Estimator::Implementation::Process(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   // A window's end that an earlier stop left open.
-  if (adaptive() && processed_ >= window_end_) {
-    POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
-  }
+  if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
   RowBlock block;
   const int64_t settled = SettledRows();
   while (processed_ < settled) {
@@ -131,8 +144,8 @@ int64_t Estimator::Implementation::SettledRows() const {
 // taken.
 absl::Status Estimator::Implementation::Recover(const Stop& stop) {
   if (!broken_) return absl::OkStatus();
-  POLYEST_ASSIGN_OR_RETURN(
-      expansion_, Replay(problem_, expansion_->design(), *store_, processed_, threads_, stop));
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, expansion_->design(), expansion_->noise(),
+                                              *store_, processed_, threads_, stop));
   broken_ = false;
   return absl::OkStatus();
 }
@@ -141,6 +154,8 @@ absl::Status Estimator::Implementation::Recover(const Stop& stop) {
 absl::StatusOr<bool> Estimator::Implementation::AbsorbBlock(const RowBlock& block,
                                                             const Stop& stop) {
   for (int row = 0; row < block.count(); ++row) {
+    POLYEST_ASSIGN_OR_RETURN(const bool raised, RaiseUnlearnedScales(block, row, stop));
+    if (raised) return false;
     const bool short_of_trajectories = row == expansion_->fitted_rows();
     const bool coarse = !short_of_trajectories && processed_ >= patient_until_ &&
                         expansion_->ResidualToNoise(row) > kResidualToNoise;
@@ -151,7 +166,7 @@ absl::StatusOr<bool> Estimator::Implementation::AbsorbBlock(const RowBlock& bloc
     expansion_->Absorb(row);
     summary_.Add(block, row, problem_.channels());
     ++processed_;
-    if (adaptive() && processed_ >= window_end_) {
+    if (WindowEnds()) {
       POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleAfterWindow(stop));
       if (moved) return false;
     }
@@ -175,12 +190,14 @@ absl::StatusOr<bool> Estimator::Implementation::SettleBefore(bool short_of_traje
 }
 
 absl::StatusOr<bool> Estimator::Implementation::SettleAfterWindow(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(bool moved, TightenTolerance(stop));
-  const Agreement agreement =
-      AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
-  if (agreement.shift > kMostShift) {
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop));
-    moved = moved || settled;
+  bool moved = false;
+  if (learns_noise()) {
+    POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
+  }
+  if (adaptive()) {
+    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    moved = moved || tightened || settled;
   }
   window_end_ =
       std::max(processed_ + 2,
@@ -188,15 +205,74 @@ absl::StatusOr<bool> Estimator::Implementation::SettleAfterWindow(const Stop& st
   return moved;
 }
 
+absl::StatusOr<bool> Estimator::Implementation::SettleIfInaccurate(const Stop& stop) {
+  const Agreement agreement =
+      AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
+  if (agreement.shift <= kMostShift) return false;
+  return Settle(stop);
+}
+
+// Scales that are not learned yet follow the signal, so that the first samples weigh little however
+// large they are. True when the record was taken anew.
+absl::StatusOr<bool> Estimator::Implementation::RaiseUnlearnedScales(const RowBlock& block, int row,
+                                                                     const Stop& stop) {
+  if (!learns_noise()) return false;
+  LearnedNoise noise = expansion_->noise();
+  bool raised = false;
+  const size_t m = noise.channels.size();
+  const size_t width = block.values.size() / block.rows.size();
+  for (size_t c = 0; c < m; ++c) {
+    const double shape = block.noise[static_cast<size_t>(row) * m + c];
+    if (!problem_.problem().measured[c].noise.unknown || noise.channels[c].learned || shape <= 0) {
+      continue;
+    }
+    const double size = std::abs(block.values[static_cast<size_t>(row) * width + c]) / shape;
+    if (size <= noise.channels[c].scale) continue;
+    noise.channels[c].scale = kAboveSignal * size;
+    raised = true;
+  }
+  if (!raised) return false;
+  POLYEST_RETURN_IF_ERROR(TakeAnew(std::move(noise), stop));
+  return true;
+}
+
+// True when the record was taken anew with another noise. Less noise asks more of the expansion.
+absl::StatusOr<bool> Estimator::Implementation::LearnNoise(const Stop& stop) {
+  bool moved = false;
+  for (int i = 0; i < kMostRevisions; ++i) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    std::optional<LearnedNoise> revised = ReviseNoise(problem_, *expansion_, summary_, stop);
+    if (!revised) break;
+    POLYEST_RETURN_IF_ERROR(TakeAnew(*std::move(revised), stop));
+    moved = true;
+    if (!adaptive()) continue;
+    POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
+    POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+  }
+  return moved;
+}
+
+// The same expansion with the record so far weighed by another noise.
+absl::Status Estimator::Implementation::TakeAnew(LearnedNoise noise, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(auto replayed, Replay(problem_, expansion_->design(), std::move(noise),
+                                                 *store_, processed_, threads_, stop));
+  abandoned_rows_ += expansion_->propagated_rows();
+  expansion_ = std::move(replayed);
+  broken_ = false;
+  return absl::OkStatus();
+}
+
 // True when the noise asked for a tighter tolerance and the record was propagated again with it.
 absl::StatusOr<bool> Estimator::Implementation::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
-  const double needed = std::max(kTightestTolerance, kTolerancePerNoise * summary_.NoiseToSignal());
+  const double needed = std::max(kTightestTolerance,
+                                 kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()));
   const double present = problem_.problem().integration.relative_tolerance;
   if (needed >= present) return false;
   // Half of what is needed now, so that a slowly falling ratio does not ask again and again.
   problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
-  auto replayed = Replay(problem_, expansion_->design(), *store_, processed_, threads_, stop);
+  auto replayed = Replay(problem_, expansion_->design(), expansion_->noise(), *store_, processed_,
+                         threads_, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
     if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present one stays

@@ -80,7 +80,13 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
           "measured[%d].noise.%s: %g must be a finite number ≥ 0", index, field, value));
     }
   }
-  if (noise.absolute + noise.relative + noise.relative_to_max <= 0) {
+  if (!std::isfinite(noise.time_constant_s) || noise.time_constant_s < 0 ||
+      (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "measured[%d].noise.correlation.timeConstantS: %g must be a finite time > 0", index,
+        noise.time_constant_s));
+  }
+  if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
     return absl::InvalidArgumentError(absl::StrFormat(
         "measured[%d].noise: output %s needs a noise: at least one of absolute, relative, "
         "relativeToMax must be above 0",

@@ -9,6 +9,23 @@ double RecordSummary::Channel::RootMeanSquareNoise() const {
   return samples == 0 ? 0 : std::sqrt(noise_variance_sum / static_cast<double>(samples));
 }
 
+double RecordSummary::Channel::MeanInterval() const {
+  return intervals == 0 ? 0 : interval_sum_s / static_cast<double>(intervals);
+}
+
+double RecordSummary::Channel::Correlation(const ChannelNoise& noise) const {
+  return noise.time_constant_s > 0 ? std::exp(-MeanInterval() / noise.time_constant_s) : 0;
+}
+
+void RecordSummary::Channel::AddTime(const SampleRow& row) {
+  if (row.run == last_run) {
+    ++intervals;
+    interval_sum_s += row.time_s - last_time_s;
+  }
+  last_run = row.run;
+  last_time_s = row.time_s;
+}
+
 void RecordSummary::Add(const RowBlock& block, int row, int channels) {
   const auto k = static_cast<size_t>(row);
   const auto m = static_cast<size_t>(channels);
@@ -18,6 +35,7 @@ void RecordSummary::Add(const RowBlock& block, int row, int channels) {
     const double sigma = block.noise[k * m + c];
     if (sigma <= 0) continue;  // no sample
     ++channels_[c].samples;
+    channels_[c].AddTime(block.rows[k]);
     channels_[c].noise_variance_sum += sigma * sigma;
     channels_[c].largest = std::max(channels_[c].largest, std::abs(block.values[k * width + c]));
   }
@@ -33,12 +51,13 @@ void RecordSummary::Add(const RowBlock& block, int row, int channels) {
   beginning_.noise.insert(beginning_.noise.end(), noise, noise + static_cast<std::ptrdiff_t>(m));
 }
 
-double RecordSummary::NoiseToSignal() const {
+double RecordSummary::NoiseToSignal(const LearnedNoise& noise) const {
   double least = 1;
-  for (const Channel& channel : channels_) {
-    if (channel.largest > 0) {
-      least = std::min(least, channel.RootMeanSquareNoise() / channel.largest);
-    }
+  for (size_t c = 0; c < channels_.size(); ++c) {
+    if (channels_[c].largest <= 0) continue;
+    const double a = channels_[c].Correlation(noise.channels[c]);
+    const double innovation = noise.channels[c].scale * std::sqrt(1 - a * a);
+    least = std::min(least, innovation * channels_[c].RootMeanSquareNoise() / channels_[c].largest);
   }
   return least;
 }

@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/estimator/regional_expansion.h"
+#include "core/estimator/learned_noise.h"
+#include "core/estimator/samples.h"
 
 namespace polyest {
 
@@ -13,10 +14,18 @@ class RecordSummary {
  public:
   struct Channel {
     int64_t samples = 0;
-    double noise_variance_sum = 0;
-    double largest = 0;  // |z|
+    double noise_variance_sum = 0;  // of the noise as the problem gives it
+    double largest = 0;             // |z|
+    int64_t intervals = 0;          // between successive samples of a run
+    double interval_sum_s = 0;
+    double last_time_s = 0;
+    int last_run = -1;
 
-    double RootMeanSquareNoise() const;
+    double RootMeanSquareNoise() const;  // as the problem gives it
+    double MeanInterval() const;         // s; 0 without intervals
+    // Of successive samples with this noise, at the mean interval: exp(−Δt/τ).
+    double Correlation(const ChannelNoise& noise) const;
+    void AddTime(const SampleRow& row);
   };
 
   void Add(const RowBlock& block, int row, int channels);
@@ -24,8 +33,9 @@ class RecordSummary {
   int64_t rows() const { return rows_; }
   int64_t samples() const;  // over all channels
   double time_s() const { return time_s_; }
-  // The least over the channels of root mean square noise ÷ largest sample; 1 before any sample.
-  double NoiseToSignal() const;
+  // The least over the channels of root mean square noise ÷ largest sample, of correlated noise its
+  // innovations; 1 before any sample.
+  double NoiseToSignal(const LearnedNoise& noise) const;
   const std::vector<Channel>& channels() const { return channels_; }
   // The first rows of the first run, at most kBeginning: enough to see how the record is sampled.
   const RowBlock& beginning() const { return beginning_; }

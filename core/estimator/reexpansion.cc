@@ -77,8 +77,8 @@ class Settler {
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
     design.check_costs = particles_.costs.head(checks);
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
-        Replay(*request_.problem, std::move(design), *request_.store, request_.rows,
-               request_.threads, stop_);
+        Replay(*request_.problem, std::move(design), present_.noise(), *request_.store,
+               request_.rows, request_.threads, stop_);
     if (absl::IsFailedPrecondition(moved.status())) return false;
     if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
@@ -103,10 +103,12 @@ absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const Settle
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
+                                                          LearnedNoise noise,
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(std::unique_ptr<RegionalExpansion> expansion,
-                           RegionalExpansion::Make(problem, std::move(design), threads));
+  POLYEST_ASSIGN_OR_RETURN(
+      std::unique_ptr<RegionalExpansion> expansion,
+      RegionalExpansion::Make(problem, std::move(design), std::move(noise), threads));
   RowBlock block;
   for (int64_t first = 0; first < rows; first += kReplayRows) {
     const int64_t count = std::min(kReplayRows, rows - first);
@@ -118,15 +120,35 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   return expansion;
 }
 
+namespace {
+
+// J_mismatch of the model itself at check point i.
+double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
+                     const RegionalExpansion::Check& check, Eigen::Index i) {
+  double mismatch = 0;
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    const ChannelSums& sums = expansion.sums()[c];
+    const double chi_squared = check.chi_squared(i, static_cast<Eigen::Index>(c));
+    const double differences = 2 * chi_squared * (1 - sums.Lag1Correlation(d));
+    mismatch += NegativeLogLikelihood(sums.Degrees(), chi_squared, differences, sums.scale_unknown,
+                                      sums.correlation_unknown);
+  }
+  return mismatch;
+}
+
+}  // namespace
+
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
   const ExpansionDesign& design = expansion.design();
   const RegionalExpansion::Check check = expansion.Checks();
   std::vector<double> log_weight, difference, residual;
   for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
-    const CostValue value = cost.Evaluate(design.check_points.row(i).transpose());
+    const Vector eta = design.check_points.row(i).transpose();
+    const CostValue value = cost.Evaluate(eta);
     if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
     log_weight.push_back(design.check_costs[i] - value.total);
-    difference.push_back(check.model_mismatch[i] - value.mismatch);
+    difference.push_back(ModelMismatch(expansion, cost.BasisDifference(eta), check, i) -
+                         value.mismatch);
     residual.push_back(check.residual_to_noise[i]);
   }
   Agreement agreement;

@@ -42,12 +42,14 @@ absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const Settle
 // FAILED_PRECONDITION when it cannot be factored or too few trajectories are left.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
+                                                          LearnedNoise noise,
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop);
 
 // How far the posterior on the expansion may be trusted, from the check points. To first order a
 // posterior mean is off, in units of its standard deviation, by no more than either of
-//   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion,
+//   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
+//   (at the expansion's lag-1 correlation, where that enters),
 //   ‖(model − expansion)/σ‖ over the samples,
 // both by the Cauchy–Schwarz inequality, over particles and over samples. The first is the sharper
 // but needs check points where the posterior is; the second holds wherever they are.

@@ -22,25 +22,34 @@ Matrix Stack(const Matrix& top, const Matrix& bottom) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
-    const ResolvedProblem& problem, ExpansionDesign design, int threads) {
+    const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
                            CollocationMatrix::Factor(*design.basis, design.points));
-  return std::unique_ptr<RegionalExpansion>(
-      new RegionalExpansion(problem, std::move(design), std::move(matrix), threads));
+  return std::unique_ptr<RegionalExpansion>(new RegionalExpansion(
+      problem, std::move(design), std::move(noise), std::move(matrix), threads));
 }
 
 RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
-                                     CollocationMatrix matrix, int threads)
+                                     LearnedNoise noise, CollocationMatrix matrix, int threads)
     : problem_(problem),
       design_(std::move(design)),
+      noise_(std::move(noise)),
       matrix_(std::move(matrix)),
       threads_(threads),
       channels_(problem.channels()),
       reference_phi_(design_.basis->size()),
       kept_(static_cast<size_t>(design_.points.rows())),
       check_valid_(static_cast<size_t>(design_.check_points.rows()), true),
-      check_mismatch_(Vector::Zero(design_.check_points.rows())),
+      whitening_(noise_.channels, design_.points.rows() + design_.check_points.rows()),
+      sums_(static_cast<size_t>(channels_), ChannelSums(design_.basis->size())),
+      discount_(Vector::Zero(channels_)),
+      outliers_(static_cast<size_t>(channels_), 0),
+      previous_coefficients_(design_.basis->size(), channels_),
+      previous_error_(channels_),
+      difference_(design_.basis->size()),
+      check_chi_squared_(Matrix::Zero(design_.check_points.rows(), channels_)),
       check_residual_(Vector::Zero(design_.check_points.rows())) {
+  POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
   design_.basis->EvaluateMany(design_.check_points, check_phi_);
@@ -49,6 +58,30 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
   for (Eigen::Index i = 0; i < xis.rows(); ++i) {
     thetas_.row(i) = problem_.prior().ToParameters(xis.row(i).transpose()).transpose();
   }
+  for (int c = 0; c < channels_; ++c) {
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    ChannelSums& sums = sums_[static_cast<size_t>(c)];
+    const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
+    sums.scale_unknown = model.unknown && learned;
+    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned;
+    sums.degrees_factor = model.DegreesFactor();
+  }
+  LookFromPosterior();
+}
+
+void RegionalExpansion::LookFromPosterior() {
+  const int terms = design_.basis->size();
+  if (noise_.posterior.centre.size() == 0) {
+    // Not known yet: what the expansion itself leaves open, Σ c_s² over s ≥ 1 (12).
+    centre_phi_ = reference_phi_;
+    spread_ = Matrix::Identity(terms, terms).rightCols(terms - 1);
+    return;
+  }
+  const Vector eta = design_.region.ToLocal(noise_.posterior.centre);
+  centre_phi_.resize(terms);
+  Matrix phi_gradient(terms, eta.size());
+  design_.basis->EvaluateWithGradient(eta, centre_phi_, phi_gradient);
+  spread_ = phi_gradient * design_.region.axes().inverse() * noise_.posterior.factor;
 }
 
 // A run begins at t = 0 from the initial states, with inputs of its own.
@@ -56,6 +89,7 @@ void RegionalExpansion::StartRun(int run) {
   run_ = run;
   knot_time_s_ = -std::numeric_limits<double>::infinity();
   inputs_finished_ = false;
+  whitening_.BeginRun();
   propagator_.reset();
   inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
   propagator_ = std::make_unique<EnsemblePropagator>(
@@ -90,6 +124,7 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
   }
   POLYEST_RETURN_IF_ERROR(
       propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
+  whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
   return absl::OkStatus();
 }
@@ -203,7 +238,8 @@ void RegionalExpansion::Absorb(int row) {
   const int run = block_.rows[static_cast<size_t>(row)].run;
   if (run != summed_run_) {
     summed_run_ = run;
-    sums_.emplace_back(static_cast<size_t>(channels_), MismatchSums(design_.basis->size()));
+    previous_coefficients_.setZero();
+    previous_error_.setZero();
   }
   for (int c = 0; c < channels_; ++c) {
     const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
@@ -211,18 +247,49 @@ void RegionalExpansion::Absorb(int row) {
     const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
     const int column = row * channels_ + c;
     const auto coefficients = coefficients_.col(column);
-    // e = z − cᵀφ_0,  R = σ² + the residual's variance
-    sums_.back()[static_cast<size_t>(c)].Add(coefficients, z - coefficients.dot(reference_phi_),
-                                             sigma * sigma + residual_variance_[column]);
-    Compare(column, z, sigma);
+    const double weight =
+        OutlierWeight(c, coefficients, z, sigma * sigma + residual_variance_[column]);
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    // e = z − cᵀφ_0,  R = σ²/w + the residual's variance ρ
+    const double noise = model.VarianceFactor() * sigma * sigma / weight;
+    const double variance = noise + residual_variance_[column];
+    const double error = z - coefficients.dot(reference_phi_);
+    sums_[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
+    AddDifference(c, coefficients, error, variance);
+    discount_[c] += residual_variance_[column] / variance;
+    if (weight < 0.5) ++outliers_[static_cast<size_t>(c)];
+    Compare(column, z, noise);
     ++absorbed_samples_;
   }
   ++absorbed_rows_;
   propagated_rows_ += thetas_.rows();
 }
 
+// variance: of the sample about the expansion.
+double RegionalExpansion::OutlierWeight(int channel, const ConstVectorRef& coefficients, double z,
+                                        double variance) const {
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  if (model.outliers == OutlierHandling::kNone) return 1;
+  const double error = z - coefficients.dot(centre_phi_);
+  const double open = (spread_.transpose() * coefficients).squaredNorm();
+  return model.Weight(error / std::sqrt(variance + open));
+}
+
+// u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
+void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coefficients, double error,
+                                      double variance) {
+  const double unit = 1 / std::sqrt(variance);
+  auto previous = previous_coefficients_.col(channel);
+  difference_ = unit * coefficients - previous;
+  sums_[static_cast<size_t>(channel)].differences.Add(difference_,
+                                                      unit * error - previous_error_[channel], 1);
+  previous = unit * coefficients;
+  previous_error_[channel] = unit * error;
+}
+
 // The check points' own trajectories beside the expansion at one sample.
-void RegionalExpansion::Compare(int column, double z, double sigma) {
+void RegionalExpansion::Compare(int column, double z, double variance) {
+  const int channel = column % channels_;
   for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
     if (!check_valid_[static_cast<size_t>(i)]) continue;
     const double y = outputs_(points() + i, column);
@@ -230,33 +297,20 @@ void RegionalExpansion::Compare(int column, double z, double sigma) {
       check_valid_[static_cast<size_t>(i)] = false;
       continue;
     }
-    const double error = (z - y) / sigma;
-    const double difference = (y - check_phi_.row(i).dot(coefficients_.col(column))) / sigma;
-    check_mismatch_[i] += 0.5 * error * error;
-    check_residual_[i] += difference * difference;
+    const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
+    check_chi_squared_(i, channel) += (z - y) * (z - y) / variance;
+    check_residual_[i] += difference * difference / variance;
   }
 }
 
-MismatchSums RegionalExpansion::ChannelSums(int channel) const {
-  MismatchSums total(design_.basis->size());
-  for (const auto& run : sums_) total.Add(run[static_cast<size_t>(channel)]);
-  return total;
-}
-
-MismatchSums RegionalExpansion::TotalSums() const {
-  MismatchSums total(design_.basis->size());
-  for (int c = 0; c < channels_; ++c) total.Add(ChannelSums(c));
-  return total;
-}
-
 Cost RegionalExpansion::MakeCost(double regularization) const {
-  return Cost(design_.basis, design_.region, design_.reference, TotalSums(), problem_.prior(),
+  return Cost(design_.basis, design_.region, design_.reference, Mismatch(sums_), problem_.prior(),
               regularization);
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {
   const double samples = std::max<double>(1, static_cast<double>(absorbed_samples_));
-  return {check_mismatch_, (check_residual_ / samples).cwiseSqrt(), check_valid_,
+  return {check_chi_squared_, (check_residual_ / samples).cwiseSqrt(), check_valid_,
           absorbed_samples_};
 }
 

@@ -6,7 +6,9 @@
 //
 // The expansion's own error is treated as noise: a sample enters the sums with R = σ² + the
 // residual variance of the fit at its time, so that a region still too wide gives a posterior that
-// is wide and not wrong.
+// is wide and not wrong. The noise is what has been learned of it so far (learned_noise.h):
+// correlated samples are whitened first, outliers lose weight by their residual at the posterior's
+// centre, beside what the posterior leaves open there.
 
 #include <absl/status/statusor.h>
 
@@ -14,9 +16,12 @@
 #include <string>
 #include <vector>
 
+#include "core/bayes/mismatch.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/estimator/expansion_design.h"
+#include "core/estimator/learned_noise.h"
 #include "core/estimator/samples.h"
+#include "core/estimator/whitening.h"
 
 namespace polyest {
 
@@ -35,7 +40,7 @@ class RegionalExpansion {
   // outlive the expansion.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
                                                                  ExpansionDesign design,
-                                                                 int threads);
+                                                                 LearnedNoise noise, int threads);
 
   // Propagates over a block of rows that follows the rows propagated before, and fits the outputs
   // of the first fitted_rows(): all, unless too few trajectories are left at the one after, which
@@ -51,22 +56,26 @@ class RegionalExpansion {
   void Absorb(int row);
 
   const ExpansionDesign& design() const { return design_; }
+  const LearnedNoise& noise() const { return noise_; }
   int points() const { return static_cast<int>(design_.points.rows()); }
   int64_t absorbed_rows() const { return absorbed_rows_; }
   // Trajectories × rows.
   int64_t propagated_rows() const { return propagated_rows_; }
   const std::vector<FailedTrajectory>& failures() const { return failures_; }
 
-  // The sums of one channel over all runs, and of all channels.
-  MismatchSums ChannelSums(int channel) const;
-  MismatchSums TotalSums() const;
+  // One a measured channel, over all runs.
+  const std::vector<ChannelSums>& sums() const { return sums_; }
+  // Of a channel: Σ ρ_k/R_k, how many of its samples the expansion's own error ρ has cost.
+  double Discount(int channel) const { return discount_[channel]; }
+  // Samples of a channel with less than half their weight.
+  int64_t Outliers(int channel) const { return outliers_[static_cast<size_t>(channel)]; }
   // The cost on this expansion with α² = regularization.
   Cost MakeCost(double regularization) const;
 
-  // Agreement with the model itself, at the check points: each one's mismatch from its own
+  // Agreement with the model itself, at the check points: each one's χ² by channel from its own
   // trajectory, and root mean square of (model − expansion)/σ over the samples.
   struct Check {
-    Vector model_mismatch;
+    Matrix chi_squared;  // check points × m
     Vector residual_to_noise;
     std::vector<bool> valid;  // the trajectory could be integrated
     int64_t samples = 0;
@@ -74,7 +83,7 @@ class RegionalExpansion {
   Check Checks() const;
 
  private:
-  RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
+  RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise,
                     CollocationMatrix matrix, int threads);
 
   void StartRun(int run);
@@ -84,10 +93,16 @@ class RegionalExpansion {
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
   void NoteFailures(int row);
-  void Compare(int column, double z, double sigma);
+  void LookFromPosterior();
+  double OutlierWeight(int channel, const ConstVectorRef& coefficients, double z,
+                       double variance) const;
+  void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
+                     double variance);
+  void Compare(int column, double z, double variance);
 
   const ResolvedProblem& problem_;
   ExpansionDesign design_;
+  LearnedNoise noise_;
   CollocationMatrix matrix_;
   int threads_;
   int channels_;
@@ -112,9 +127,21 @@ class RegionalExpansion {
   int fitted_rows_ = 0;
   absl::Status shortage_;
 
-  std::vector<std::vector<MismatchSums>> sums_;  // by run met, then channel
+  Whitening whitening_;
+  // Outliers are looked for at φ(η̂), η̂ the posterior's centre, beside the posterior's own spread:
+  // of an output cᵀφ its variance there is ‖spread_ᵀ c‖².
+  Vector centre_phi_;
+  Matrix spread_;  // S × n
+
+  std::vector<ChannelSums> sums_;  // by channel
+  Vector discount_;
+  std::vector<int64_t> outliers_;
+  // By channel, the sample before in units of its noise; a zero where a run begins.
   int summed_run_ = -1;
-  Vector check_mismatch_;
+  Matrix previous_coefficients_;  // S × m
+  Vector previous_error_;
+  Vector difference_;  // S
+  Matrix check_chi_squared_;
   Vector check_residual_;  // Σ ((model − expansion)/σ)²
   int64_t absorbed_rows_ = 0;
   int64_t absorbed_samples_ = 0;

@@ -54,8 +54,9 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
       if (place >= channels) continue;
       double& largest = checked.after.largest[static_cast<Eigen::Index>(place)];
       largest = std::max(largest, std::abs(z));
-      const double sigma = problem_.problem().measured[place].noise.StandardDeviation(z, largest);
-      if (std::abs(z) > kMostSignalToNoise * sigma) {
+      const NoiseModel& noise = problem_.problem().measured[place].noise;
+      const double sigma = noise.StandardDeviation(z, largest);
+      if (!noise.unknown && std::abs(z) > kMostSignalToNoise * sigma) {
         return absl::InvalidArgumentError(absl::StrFormat(
             "row %d, column %s: %g is more than %g times its noise of %g; check its "
             "unit or the noise",

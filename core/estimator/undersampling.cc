@@ -33,8 +33,8 @@ Times FineTimes(const RowBlock& beginning) {
 }  // namespace
 
 SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
-                                              const RowBlock& beginning, const Vector& map_xi,
-                                              int parameter) {
+                                              const LearnedNoise& noise, const RowBlock& beginning,
+                                              const Vector& map_xi, int parameter) {
   SamplingInformation information;
   if (beginning.count() == 0 || !problem.streamed_inputs().empty()) return information;
   const Prior& prior = problem.prior();
@@ -66,6 +66,7 @@ SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
       if (beginning.noise[static_cast<size_t>(times.row[i] * m + c)] <= 0) continue;  // no sample
       const auto column = static_cast<Eigen::Index>(i) * m + c;
       const double sigma =
+          noise.channels[static_cast<size_t>(c)].scale *
           problem.problem().measured[static_cast<size_t>(c)].noise.StandardDeviation(
               outputs.col(column).mean(), largest[c]);
       const double slope = (outputs(1, column) - outputs(0, column)) / distance / sigma;

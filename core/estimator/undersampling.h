@@ -19,7 +19,7 @@ struct SamplingInformation {
 // From runs of the model over the beginning of the record, the parameter moved by half a prior
 // standard deviation to each side of the estimate (or to the bounds of Ω).
 SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
-                                              const RowBlock& beginning, const Vector& map_xi,
-                                              int parameter);
+                                              const LearnedNoise& noise, const RowBlock& beginning,
+                                              const Vector& map_xi, int parameter);
 
 }  // namespace polyest

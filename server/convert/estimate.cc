@@ -37,6 +37,10 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::POINTS_FAILED;
     case DiagnosticCode::kNonGaussian:
       return v1::Diagnostic::NON_GAUSSIAN;
+    case DiagnosticCode::kCorrelatedResiduals:
+      return v1::Diagnostic::CORRELATED_RESIDUALS;
+    case DiagnosticCode::kNoiseNotLearned:
+      return v1::Diagnostic::NOISE_NOT_LEARNED;
   }
   POLYEST_CHECK(false);
 }
@@ -61,6 +65,10 @@ void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {
   proto.set_samples(channel.samples);
   proto.set_chi_squared(channel.chi_squared);
   proto.set_noise_std_dev(channel.noise_std_dev);
+  proto.set_lag1_correlation(channel.lag1_correlation);
+  proto.set_effective_samples(channel.effective_samples);
+  proto.set_noise_time_constant_s(channel.noise_time_constant_s);
+  proto.set_outliers(channel.outliers);
 }
 
 void ToProto(const ExpansionSummary& expansion, v1::ExpansionSummary& proto) {

@@ -256,12 +256,43 @@ std::vector<NamedInput> ToInputs(const v1::Problem& problem, Refusals& refusals)
   return inputs;
 }
 
-std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem) {
+absl::StatusOr<OutlierHandling> ToOutlierHandling(const v1::MeasuredOutput::Noise& noise) {
+  switch (noise.outliers()) {
+    case v1::MeasuredOutput::Noise::OUTLIERS_UNSPECIFIED:
+    case v1::MeasuredOutput::Noise::NONE:
+      return OutlierHandling::kNone;
+    case v1::MeasuredOutput::Noise::STUDENT_T:
+      return OutlierHandling::kStudentT;
+    case v1::MeasuredOutput::Noise::HUBER:
+      return OutlierHandling::kHuber;
+    default:
+      return UnknownEnumerator("noise.outliers", noise.outliers());
+  }
+}
+
+absl::StatusOr<NoiseModel> ToNoise(const v1::MeasuredOutput::Noise& given) {
+  NoiseModel noise{given.absolute(), given.relative(), given.relative_to_max(), given.unknown()};
+  const auto& correlation = given.correlation();
+  if (correlation.has_time_constant_s()) {
+    noise.correlation = NoiseCorrelation::kKnown;
+    noise.time_constant_s = correlation.time_constant_s();
+  } else if (correlation.auto_()) {
+    noise.correlation = NoiseCorrelation::kUnknown;
+  }
+  POLYEST_ASSIGN_OR_RETURN(noise.outliers, ToOutlierHandling(given));
+  return noise;
+}
+
+std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem, Refusals& refusals) {
   std::vector<MeasuredOutput> measured;
-  for (const v1::MeasuredOutput& output : problem.measured()) {
-    const auto& noise = output.noise();
+  for (int i = 0; i < problem.measured_size(); ++i) {
+    const v1::MeasuredOutput& output = problem.measured(i);
+    auto noise = ToNoise(output.noise());
+    if (!noise.ok()) {
+      noise = InvalidField(absl::StrFormat("measured[%d]", i), noise.status().message());
+    }
     measured.push_back(
-        {output.output(), {noise.absolute(), noise.relative(), noise.relative_to_max()}});
+        {output.output(), ValueOr<NoiseModel>(std::move(noise), NoiseModel(), refusals)});
   }
   return measured;
 }
@@ -329,7 +360,7 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
   problem.correlations = ToCorrelations(given);
   problem.derived = {given.derived().begin(), given.derived().end()};
   problem.inputs = ToInputs(given, refusals);
-  problem.measured = ToMeasured(given);
+  problem.measured = ToMeasured(given, refusals);
   problem.expansion = ValueOr(ToExpansion(given.expansion()), {}, refusals);
   if (given.has_regularization()) problem.regularization = given.regularization();
   problem.regularization_mode = ValueOr(ToRegularizationMode(given.regularization_mode()),

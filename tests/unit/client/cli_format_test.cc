@@ -114,7 +114,7 @@ TEST(PrintEstimate, DividesByNoSamples) {
   estimate.mutable_channels(0)->set_samples(0);
   std::ostringstream out;
   PrintEstimate(estimate, out);
-  EXPECT_THAT(out.str(), HasSubstr("x        0        -   -           -\n"));
+  EXPECT_THAT(out.str(), HasSubstr("x        0        -   -           -         -      -\n"));
 }
 
 TEST(EstimateLine, ShowsTimeAndEveryParameter) {

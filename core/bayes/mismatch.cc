@@ -1,0 +1,175 @@
+#include "core/bayes/mismatch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+// Residuals at the level of rounding are as good as none: keeps the logarithms finite.
+constexpr double kLeastMeanSquare = 1e-24;
+constexpr double kMostCorrelation = 1 - 1e-12;
+
+// J of a channel as a function of A = χ² and D = Σ (u_k − u_{k−1})², with B = A − D/2 and r = B/A,
+// and its derivatives.
+struct Likelihood {
+  double value = 0;
+  double by_a = 0, by_d = 0;
+  double by_aa = 0, by_ad = 0, by_dd = 0;
+};
+
+double Correlation(double a, double d) {
+  return a > 0 ? std::clamp(1 - 0.5 * d / a, -kMostCorrelation, kMostCorrelation) : 0;
+}
+
+Likelihood Evaluate(double n, double chi_squared, double differences, bool scale_unknown,
+                    bool correlation_unknown) {
+  const double a = std::max(chi_squared, n * kLeastMeanSquare);
+  const double d = differences;
+  Likelihood l;
+  if (n <= 0) return l;
+  if (scale_unknown) {
+    // ½ N (1 + log(A/N))
+    l.value = 0.5 * n * (1 + std::log(a / n));
+    l.by_a = 0.5 * n / a;
+    l.by_aa = -0.5 * n / (a * a);
+  } else {
+    l.value = 0.5 * a;
+    l.by_a = 0.5;
+  }
+  if (!correlation_unknown) return l;
+  const double r = Correlation(a, d);
+  const double r_a = 0.5 * d / (a * a), r_d = -0.5 / a;
+  if (scale_unknown) {
+    // ½ (N − 1) log(1 − r²)
+    const double m = 0.5 * (n - 1), s = 1 - r * r;
+    const double by_r = -2 * m * r / s, by_rr = -2 * m * (1 + r * r) / (s * s);
+    l.value += m * std::log(s);
+    l.by_a += by_r * r_a;
+    l.by_d += by_r * r_d;
+    l.by_aa += by_rr * r_a * r_a - by_r * d / (a * a * a);
+    l.by_ad += by_rr * r_a * r_d + 0.5 * by_r / (a * a);
+    l.by_dd += by_rr * r_d * r_d;
+  } else {
+    // −½ A r² = −½ B²/A
+    const double b = a * r;
+    l.value -= 0.5 * b * r;
+    l.by_a += -r + 0.5 * r * r;  // ∂B/∂A = 1
+    l.by_d += 0.5 * r;           // ∂B/∂D = −½
+    // second derivatives of −½ B²/A with B = A − D/2 are those of −½ (A − D + D²/4A)
+    l.by_aa += -0.25 * d * d / (a * a * a);
+    l.by_ad += 0.25 * d / (a * a);
+    l.by_dd += -0.25 / a;
+  }
+  return l;
+}
+
+// factor: of N, for the degrees of freedom that parameters have spent.
+Likelihood Evaluate(const ChannelSums& channel, double chi_squared, double differences,
+                    double factor = 1) {
+  return Evaluate(factor * channel.Degrees(), chi_squared, differences, channel.scale_unknown,
+                  channel.correlation_unknown);
+}
+
+}  // namespace
+
+double NegativeLogLikelihood(double degrees, double chi_squared, double differences,
+                             bool scale_unknown, bool correlation_unknown) {
+  return Evaluate(degrees, chi_squared, differences, scale_unknown, correlation_unknown).value;
+}
+
+double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
+  return samples.count() == 0 ? 0 : Correlation(samples.ChiSquared(d), differences.ChiSquared(d));
+}
+
+Mismatch::Mismatch(MismatchSums sums) : known_(std::move(sums)), count_(known_.count()) {}
+
+Mismatch::Mismatch(std::vector<ChannelSums> channels)
+    : known_(channels.empty() ? 0 : channels.front().samples.terms()) {
+  POLYEST_CHECK(!channels.empty());
+  for (ChannelSums& channel : channels) {
+    count_ += channel.samples.count();
+    if (channel.IsKnown()) {
+      known_.Add(channel.samples);
+    } else {
+      other_.push_back(std::move(channel));
+    }
+  }
+}
+
+double Mismatch::Evaluate(const ConstVectorRef& d) const {
+  double value = known_.ChiSquared(d) / 2;
+  for (const ChannelSums& channel : other_) {
+    const double differences = channel.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
+    value += polyest::Evaluate(channel, channel.samples.ChiSquared(d), differences).value;
+  }
+  return value;
+}
+
+double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
+  // of a χ²: 2 (G d − b)
+  double value = known_.ChiSquaredWithGradient(d, gradient) / 2;
+  gradient /= 2;
+  Vector by_samples(d.size()), by_differences(d.size());
+  for (const ChannelSums& channel : other_) {
+    const double a = channel.samples.ChiSquaredWithGradient(d, by_samples);
+    double differences = 0;
+    if (channel.correlation_unknown) {
+      differences = channel.differences.ChiSquaredWithGradient(d, by_differences);
+    }
+    const Likelihood l = polyest::Evaluate(channel, a, differences);
+    value += l.value;
+    gradient += l.by_a * by_samples;
+    if (channel.correlation_unknown) gradient += l.by_d * by_differences;
+  }
+  return value;
+}
+
+Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
+                           double spent) const {
+  Matrix curvature = phi_gradient.transpose() * (known_.G() * phi_gradient);
+  const double factor =
+      std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, count_)));
+  Vector gradient(d.size());
+  for (const ChannelSums& channel : other_) {
+    const double a = channel.samples.ChiSquaredWithGradient(d, gradient);
+    const Vector by_a = phi_gradient.transpose() * gradient;
+    const double differences = channel.differences.ChiSquaredWithGradient(d, gradient);
+    const Vector by_d = phi_gradient.transpose() * gradient;
+    const Likelihood l = polyest::Evaluate(channel, a, differences, factor);
+    // Σ J_A ∂²A + J_AA ∂A ∂Aᵀ + …, with ∂²χ² = 2 G
+    curvature += 2 * l.by_a * (phi_gradient.transpose() * (channel.samples.G() * phi_gradient)) +
+                 l.by_aa * by_a * by_a.transpose();
+    if (!channel.correlation_unknown) continue;
+    curvature +=
+        2 * l.by_d * (phi_gradient.transpose() * (channel.differences.G() * phi_gradient)) +
+        l.by_ad * (by_a * by_d.transpose() + by_d * by_a.transpose()) +
+        l.by_dd * by_d * by_d.transpose();
+  }
+  return curvature;
+}
+
+void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
+                            VectorRef values) const {
+  values.setZero();
+  if (known_.count() > 0) {
+    known_.ChiSquaredMany(differences, product, values);
+    values /= 2;
+  }
+  thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
+  a.resize(values.size());
+  d.resize(values.size());
+  for (const ChannelSums& channel : other_) {
+    channel.samples.ChiSquaredMany(differences, product, a);
+    if (channel.correlation_unknown) channel.differences.ChiSquaredMany(differences, product, d);
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      values[i] += polyest::Evaluate(channel, a[i], channel.correlation_unknown ? d[i] : 0).value;
+    }
+  }
+}
+
+}  // namespace polyest

@@ -1,0 +1,181 @@
+#include "core/estimator/noise_learning.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/estimator/search_domain.h"
+
+namespace polyest {
+namespace {
+
+// Changes of a scale below this factor are left to the sums, in which it is marginalized.
+constexpr double kWorthIt = 1.25;
+constexpr double kMostFall = 0.5;  // of a scale at a time: the expansion must follow
+constexpr double kMostRise = 4;
+// Where the expansion's own error makes up more than this of χ², the scale cannot be seen.
+constexpr double kMostDiscount = 0.8;
+constexpr double kSignificance = 2;  // standard deviations of a lag-1 correlation, 1/√N each
+constexpr double kLeastCorrelation = 0.02;
+constexpr double kMostCorrelation = 0.9999;
+// Of the correlation left. The whole of it is right for noise of the kind assumed, but goes back and
+// forth for other noise.
+constexpr double kCorrelationStep = 0.6;
+// The posterior's centre has moved when by this many of its standard deviations; its spread, when
+// by this factor.
+constexpr double kMoved = 0.2;
+constexpr double kSpread = 1.3;
+
+class Revision {
+ public:
+  Revision(const ResolvedProblem& problem, const RegionalExpansion& expansion,
+           const RecordSummary& record)
+      : problem_(problem),
+        expansion_(expansion),
+        record_(record),
+        cost_(expansion.MakeCost(problem.problem().regularization)),
+        noise_(expansion.noise()) {}
+
+  std::optional<LearnedNoise> Run(const Stop& stop) {
+    if (record_.samples() == 0) return std::nullopt;
+    Minimize(stop);
+    for (int c = 0; c < problem_.channels(); ++c) {
+      const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
+      if (sums.samples.count() < kLeastSamplesForNoise + 4 * problem_.dimension()) continue;
+      const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+      // Of the parameters fitted.
+      const double share = fitted_ * static_cast<double>(sums.samples.count()) /
+                           static_cast<double>(record_.samples());
+      ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
+      if (model.unknown) ReviseScale(c, sums, share, noise);
+      if (model.correlation == NoiseCorrelation::kUnknown) ReviseCorrelation(c, sums, share, noise);
+      if (!noise.learned) changed_ = noise.learned = true;
+    }
+    if (HandlesOutliers()) RevisePosterior();
+    if (!changed_) return std::nullopt;
+    return noise_;
+  }
+
+ private:
+  void Minimize(const Stop& stop) {
+    const ExpansionDesign& design = expansion_.design();
+    Vector start = design.reference;
+    const Vector& known = noise_.posterior.centre;
+    if (known.size() > 0) start = design.region.ToLocal(known);
+    eta_ = FindMinima(SearchOf(cost_, design), start.transpose(), MinimizerOptions(), stop)
+               .front()
+               .point;
+    d_ = cost_.BasisDifference(eta_);
+    to_local_ = design.region.axes().inverse();
+    fitted_ = FittedParameters(to_local_.transpose() * cost_.MismatchHessian(eta_) * to_local_,
+                               problem_.prior());
+  }
+
+  void ReviseScale(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
+    const double discount = expansion_.Discount(c);
+    if (discount > kMostDiscount * sums.Degrees()) return;
+    const double degrees = std::max(1.0, sums.Degrees() - discount - share);
+    const double chi_squared = std::max(0.0, sums.samples.ChiSquared(d_) - discount);
+    const double factor = std::clamp(std::sqrt(chi_squared / degrees), kMostFall, kMostRise);
+    const double typical =
+        record_.channels()[static_cast<size_t>(c)].RootMeanSquareNoise();  // without the scale
+    const double revised =
+        std::max(noise.scale * factor, NoiseModel::kLeastStandardDeviation / typical);
+    const double ratio = revised / noise.scale;
+    if (ratio < kWorthIt && ratio > 1 / kWorthIt) return;
+    noise.scale = revised;
+    changed_ = true;
+  }
+
+  void ReviseCorrelation(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
+    const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
+    const auto samples = static_cast<double>(sums.samples.count());
+    const double left = sums.Lag1Correlation(d_) + share / samples;
+    if (channel.intervals == 0 || std::abs(left) * std::sqrt(samples) < kSignificance) return;
+    const double present = channel.Correlation(noise);
+    const double step = present > 0 ? kCorrelationStep : 1;
+    const double revised = std::min(kMostCorrelation, present + step * left);
+    // Noise that alternates is not of this kind: white is the nearest.
+    const double time_constant_s =
+        revised > kLeastCorrelation ? -channel.MeanInterval() / std::log(revised) : 0;
+    if (std::abs(channel.Correlation({1, time_constant_s, true}) - present) < kLeastCorrelation) {
+      return;
+    }
+    noise.time_constant_s = time_constant_s;
+    changed_ = true;
+  }
+
+  bool HandlesOutliers() const {
+    return std::ranges::any_of(problem_.problem().measured, [](const MeasuredOutput& measured) {
+      return measured.noise.outliers != OutlierHandling::kNone;
+    });
+  }
+
+  // Centre and covariance of the posterior by the curvature, no wider than the prior in any
+  // direction.
+  void RevisePosterior() {
+    const Vector unit = problem_.prior().GermStandardDeviation();
+    const Matrix hessian = to_local_.transpose() * cost_.Hessian(eta_) * to_local_;
+    const Matrix scaled = unit.asDiagonal() * hessian * unit.asDiagonal();
+    if (!scaled.allFinite()) return;
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(scaled);
+    const Vector deviation = eigen.eigenvalues().cwiseMax(1).cwiseSqrt().cwiseInverse();
+    PosteriorSummary present;
+    present.centre = expansion_.design().region.ToGerm(eta_);
+    present.factor = unit.asDiagonal() * eigen.eigenvectors() * deviation.asDiagonal();
+    PosteriorSummary& before = noise_.posterior;
+    if (before.centre.size() > 0) {
+      const Matrix inverse = present.factor.inverse();
+      const double moved = (inverse * (present.centre - before.centre)).norm();
+      const double spread = (inverse * before.factor).norm() / std::sqrt(deviation.size());
+      if (moved < kMoved && spread < kSpread && spread > 1 / kSpread) return;
+    }
+    before = std::move(present);
+    changed_ = true;
+  }
+
+  const ResolvedProblem& problem_;
+  const RegionalExpansion& expansion_;
+  const RecordSummary& record_;
+  const Cost cost_;
+  LearnedNoise noise_;
+  Vector eta_, d_;
+  Matrix to_local_;  // axes⁻¹
+  double fitted_ = 0;
+  bool changed_ = false;
+};
+
+}  // namespace
+
+LearnedNoise NoiseToBeginWith(const Problem& problem) {
+  LearnedNoise noise;
+  for (const MeasuredOutput& measured : problem.measured) {
+    ChannelNoise channel;
+    if (measured.noise.unknown) channel.scale = NoiseModel::kLeastStandardDeviation;
+    channel.time_constant_s = measured.noise.time_constant_s;
+    noise.channels.push_back(channel);
+  }
+  return noise;
+}
+
+bool LearnsNoise(const Problem& problem) {
+  return std::ranges::any_of(problem.measured,
+                             [](const MeasuredOutput& m) { return m.noise.Learns(); });
+}
+
+std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
+                                        const RegionalExpansion& expansion,
+                                        const RecordSummary& record, const Stop& stop) {
+  return Revision(problem, expansion, record).Run(stop);
+}
+
+double FittedParameters(const ConstMatrixRef& mismatch_hessian, const Prior& prior) {
+  const Vector unit = prior.GermStandardDeviation();
+  const Matrix scaled = unit.asDiagonal() * mismatch_hessian * unit.asDiagonal();
+  if (!scaled.allFinite()) return 0;
+  const Vector information =
+      Eigen::SelfAdjointEigenSolver<Matrix>(scaled).eigenvalues().cwiseMax(0);
+  return information.cwiseQuotient((information.array() + 1).matrix()).sum();
+}
+
+}  // namespace polyest

@@ -1,0 +1,43 @@
+#pragma once
+
+// Learning the noise from the residuals at the minimum of the cost on the present expansion: its
+// scale where that is unknown, the time constant of its correlation, and where to look for outliers
+// from. The answer is what to weigh the record with next; taking the sums anew with it changes the
+// minimum, so that the caller repeats until nothing is left to revise.
+//
+//   scale        s² ← s² (χ² − D)/(N − D − p), D what the expansion's own error takes of χ², p the
+//                channel's share of the parameters fitted, Σ λ/(1 + λ) over all; within a factor 4
+//                of s² at a time downwards, 16 upwards
+//   correlation  a ← a + 0.6 r for a = exp(−Δt/τ) at the mean interval Δt, r the lag-1 correlation
+//                that the whitened residuals still have (freed of its bias −p/N), while it is
+//                significant; from white noise a ← r
+//
+// A scale is not learned before there are kLeastSamples + 4 n samples, nor a correlation.
+
+#include <absl/status/statusor.h>
+
+#include <optional>
+
+#include "core/common/stop.h"
+#include "core/estimator/record_summary.h"
+#include "core/estimator/regional_expansion.h"
+
+namespace polyest {
+
+inline constexpr int kLeastSamplesForNoise = 10;
+
+// A noise to begin with: unknown scales are not learned, correlations those given.
+LearnedNoise NoiseToBeginWith(const Problem& problem);
+
+// Whether anything of the problem's noise is learned from the record.
+bool LearnsNoise(const Problem& problem);
+
+// nullopt when the present noise will do.
+std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
+                                        const RegionalExpansion& expansion,
+                                        const RecordSummary& record, const Stop& stop);
+
+// Σ λ/(1 + λ): how many parameters the data have fitted, 0 … n. mismatch_hessian: in the germ.
+double FittedParameters(const ConstMatrixRef& mismatch_hessian, const Prior& prior);
+
+}  // namespace polyest

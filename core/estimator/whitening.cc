@@ -1,0 +1,56 @@
+#include "core/estimator/whitening.h"
+
+#include <cmath>
+
+namespace polyest {
+
+Whitening::Whitening(const std::vector<ChannelNoise>& noise, Eigen::Index trajectories) {
+  for (const ChannelNoise& of_channel : noise) {
+    Channel channel;
+    channel.scale = of_channel.scale;
+    channel.time_constant_s = of_channel.time_constant_s;
+    channel.output.resize(trajectories);
+    channel.scratch.resize(trajectories);
+    channels_.push_back(std::move(channel));
+  }
+}
+
+void Whitening::BeginRun() {
+  for (Channel& channel : channels_) channel.has_previous = false;
+}
+
+void Whitening::Apply(int first, int count, RowBlock& block, MatrixRef outputs) {
+  const size_t width = block.values.size() / block.rows.size();
+  const size_t m = channels_.size();
+  const auto begin = static_cast<size_t>(first);
+  for (size_t k = begin; k < begin + static_cast<size_t>(count); ++k) {
+    for (size_t c = 0; c < m; ++c) {
+      double& noise = block.noise[k * m + c];
+      if (noise <= 0) continue;  // no sample
+      noise *= channels_[c].scale;
+      if (channels_[c].time_constant_s <= 0) continue;
+      Whiten(channels_[c], block.rows[k].time_s, block.values[k * width + c], noise,
+             outputs.col(static_cast<Eigen::Index>((k - begin) * m + c)));
+    }
+  }
+}
+
+void Whitening::Whiten(Channel& channel, double time_s, double& value, double& noise,
+                       VectorRef output) {
+  const double raw_value = value, raw_noise = noise;
+  channel.scratch = output;
+  if (channel.has_previous) {
+    const double decay = (time_s - channel.time_s) / channel.time_constant_s;
+    const double g = std::exp(-decay) * noise / channel.noise;
+    value -= g * channel.value;
+    output -= g * channel.output;
+    noise *= std::sqrt(-std::expm1(-2 * decay));  // σ √(1 − a²)
+  }
+  channel.has_previous = true;
+  channel.time_s = time_s;
+  channel.value = raw_value;
+  channel.noise = raw_noise;
+  channel.output.swap(channel.scratch);
+}
+
+}  // namespace polyest
