@@ -209,7 +209,9 @@ class Assessment {
     if (summary.samples == 0) return;
     const auto samples = static_cast<double>(summary.samples);
     // With N the degrees of freedom, χ² ÷ N of a working noise of the right size is 1 in the mean.
-    const double mean_square = sums.scale_unknown ? MeanChiSquared(cost, sums) / sums.Degrees() : 1;
+    const double mean_square =
+        sums.scale_unknown ? std::max(kLeastMeanSquare, MeanChiSquared(cost, sums) / sums.Degrees())
+                           : 1;
     channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
     channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
     const double share = fitted_ / static_cast<double>(request_.record->samples());

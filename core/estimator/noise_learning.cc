@@ -15,16 +15,28 @@ constexpr double kMostFall = 0.5;  // of a scale at a time: the expansion must f
 constexpr double kMostRise = 4;
 // Where the expansion's own error makes up more than this of χ², the scale cannot be seen.
 constexpr double kMostDiscount = 0.8;
-constexpr double kSignificance = 2;  // standard deviations of a lag-1 correlation, 1/√N each
+constexpr double kSignificance = 2;  // standard deviations, for white noise to be given up
 constexpr double kLeastCorrelation = 0.02;
 constexpr double kMostCorrelation = 0.9999;
-// Of the correlation left. The whole of it is right for noise of the kind assumed, but goes back and
-// forth for other noise.
+// Of the change asked for. The whole of it is right for noise of the kind assumed, but goes back
+// and forth for other noise.
 constexpr double kCorrelationStep = 0.6;
 // The posterior's centre has moved when by this many of its standard deviations; its spread, when
 // by this factor.
 constexpr double kMoved = 0.2;
 constexpr double kSpread = 1.3;
+
+// The correlation x of noise that has the lag-1 correlation r left when whitened with a:
+//   r = (x − a)(1 − a x)/(1 − 2 a x + a²),
+// a quadratic equation in x, whose root is a for r = 0. What has no root is not such noise; then
+// a + r, which it is to first order.
+double CorrelationBehind(double r, double a) {
+  if (a <= 0) return std::clamp(r, -kMostCorrelation, kMostCorrelation);
+  const double b = 1 + a * a + 2 * r * a;
+  const double discriminant = b * b - 4 * a * (a + r * (1 + a * a));
+  const double x = discriminant < 0 ? a + r : (b - std::sqrt(discriminant)) / (2 * a);
+  return std::clamp(x, -kMostCorrelation, kMostCorrelation);
+}
 
 class Revision {
  public:
@@ -90,11 +102,15 @@ class Revision {
   void ReviseCorrelation(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const auto samples = static_cast<double>(sums.samples.count());
+    if (channel.intervals == 0) return;
     const double left = sums.Lag1Correlation(d_) + share / samples;
-    if (channel.intervals == 0 || std::abs(left) * std::sqrt(samples) < kSignificance) return;
     const double present = channel.Correlation(noise);
+    const double asked = CorrelationBehind(left, present);
+    // A correlation a is known to √((1 − a²)/N).
+    const double significance = present > 0 ? 1 : kSignificance;
+    if (std::abs(asked - present) * std::sqrt(samples / (1 - asked * asked)) < significance) return;
     const double step = present > 0 ? kCorrelationStep : 1;
-    const double revised = std::min(kMostCorrelation, present + step * left);
+    const double revised = std::min(kMostCorrelation, present + step * (asked - present));
     // Noise that alternates is not of this kind: white is the nearest.
     const double time_constant_s =
         revised > kLeastCorrelation ? -channel.MeanInterval() / std::log(revised) : 0;

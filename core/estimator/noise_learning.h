@@ -8,9 +8,10 @@
 //   scale        s² ← s² (χ² − D)/(N − D − p), D what the expansion's own error takes of χ², p the
 //                channel's share of the parameters fitted, Σ λ/(1 + λ) over all; within a factor 4
 //                of s² at a time downwards, 16 upwards
-//   correlation  a ← a + 0.6 r for a = exp(−Δt/τ) at the mean interval Δt, r the lag-1 correlation
-//                that the whitened residuals still have (freed of its bias −p/N), while it is
-//                significant; from white noise a ← r
+//   correlation  a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval Δt, x the correlation
+//                behind the lag-1 correlation r that the whitened residuals still have (freed of
+//                its bias −p/N), r = (x − a)(1 − a x)/(1 − 2 a x + a²), while x − a is significant;
+//                from white noise a ← r
 //
 // A scale is not learned before there are kLeastSamples + 4 n samples, nor a correlation.
 
