@@ -87,6 +87,11 @@ void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
   }
   out << '\n';
   table.Print(out);
+  for (const v1::TradeOff& t : estimate.trade_offs()) {
+    out << absl::StrCat(t.combination(), " is known to ",
+                        FormatNumber(100 * t.relative_std_dev(), 2), " %, ", t.first(), " and ",
+                        t.second(), " separately are not\n");
+  }
 }
 
 void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {

@@ -134,6 +134,22 @@ class Assessment {
       DescribePosterior(i, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
+    DescribeTradeOffs();
+  }
+
+  void DescribeTradeOffs() {
+    std::vector<std::string> names;
+    std::vector<Verdict> verdicts;
+    Matrix thetas(posterior_.scores.rows(), prior_.dimension());
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const ParameterEstimate& parameter = estimate_.parameters[static_cast<size_t>(i)];
+      names.push_back(parameter.name);
+      verdicts.push_back(parameter.verdict);
+    }
+    if (std::ranges::count(verdicts, Verdict::kIdentified) + 2 > prior_.dimension()) return;
+    for (int i = 0; i < prior_.dimension(); ++i) thetas.col(i) = posterior_.Parameter(prior_, i);
+    estimate_.trade_offs =
+        FindTradeOffs(thetas, posterior_.weights, names, problem_.units(), verdicts);
   }
 
   // Covariance and standard deviations: never above the prior's. Where the map of a parameter is

@@ -37,11 +37,15 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
     if (parameter.verdict == Verdict::kNotIdentified) names.push_back(parameter.name);
   }
   if (names.empty()) return;
-  diagnostics.push_back(
-      {DiagnosticCode::kNotIdentified,
-       absl::StrFormat("the data say less than the prior about %s; what is reported there is the "
-                       "prior's",
-                       absl::StrJoin(names, ", "))});
+  std::string message = absl::StrFormat(
+      "the data say less than the prior about %s; what is reported there is the prior's",
+      absl::StrJoin(names, ", "));
+  for (const TradeOff& trade_off : estimate.trade_offs) {
+    absl::StrAppendFormat(&message, "; %s is known to %.2g %%, %s and %s separately are not",
+                          trade_off.combination, 100 * trade_off.relative_std_dev,
+                          Name(findings, trade_off.first), Name(findings, trade_off.second));
+  }
+  diagnostics.push_back({DiagnosticCode::kNotIdentified, std::move(message)});
   for (int i = 0; i < findings.problem->dimension(); ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     if (parameter.verdict != Verdict::kNotIdentified) continue;

@@ -9,6 +9,7 @@
 #include "core/bayes/cost.h"
 #include "core/bayes/identifiability.h"
 #include "core/common/types.h"
+#include "core/estimator/trade_off.h"
 
 namespace polyest {
 
@@ -79,6 +80,7 @@ struct Estimate {
   double regularization = 1;  // α² used
   std::vector<ChannelEstimate> channels;
   std::vector<Direction> directions;
+  std::vector<TradeOff> trade_offs;  // of parameters not identified, what is known of two together
   ExpansionSummary expansion;
   std::vector<Diagnostic> diagnostics;
   double time_s = 0;    // of the last sample

@@ -80,6 +80,16 @@ void ToProto(const ExpansionSummary& expansion, v1::ExpansionSummary& proto) {
   proto.set_trajectories(expansion.trajectories);
 }
 
+void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
+  for (const TradeOff& trade_off : estimate.trade_offs) {
+    v1::TradeOff& added = *proto.add_trade_offs();
+    added.set_first(estimate.parameters[static_cast<size_t>(trade_off.first)].name);
+    added.set_second(estimate.parameters[static_cast<size_t>(trade_off.second)].name);
+    added.set_combination(trade_off.combination);
+    added.set_relative_std_dev(trade_off.relative_std_dev);
+  }
+}
+
 // A direction's coefficients are over the estimate's parameters, by name.
 void AddDirections(const Estimate& estimate, v1::Estimate& proto) {
   for (const Direction& direction : estimate.directions) {
@@ -115,6 +125,7 @@ v1::Estimate ToProto(const Estimate& estimate) {
   proto.mutable_cost()->set_prior(estimate.cost.prior);
   for (const auto& channel : estimate.channels) ToProto(channel, *proto.add_channels());
   AddDirections(estimate, proto);
+  AddTradeOffs(estimate, proto);
   ToProto(estimate.expansion, *proto.mutable_expansion());
   for (const auto& diagnostic : estimate.diagnostics) {
     *proto.add_diagnostics() = ToProto(diagnostic);

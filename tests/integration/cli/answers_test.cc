@@ -145,6 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
     Examples, ExampleRecords,
     testing::Values(
         ExampleRecord{"roll_plane_4dof", {{"m_a", 185}, {"d", 0.48}}},
+        ExampleRecord{"rough_sensor", {{"k", 41.3}, {"c", 0.23}}},
         ExampleRecord{"quarter_car", {{"ks", 15800}, {"cs", 1180}, {"kt", 204000}}},
         ExampleRecord{"bicycle", {{"Iz", 2410}, {"Cf", 76500}, {"Cr", 93800}, {"mu", 0.87}}},
         ExampleRecord{

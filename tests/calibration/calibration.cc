@@ -1,0 +1,133 @@
+// Whether what polyest says of its uncertainty is true: campaigns with a truth drawn from the
+// prior, each estimated without knowing it. Over many campaigns
+//   - 95 % intervals must hold the truth 95 times in 100,
+//   - (truth − posterior mean)/posterior standard deviation must have standard deviation 1,
+//   - the truth's rank among draws of the posterior must be uniform (Talts et al. 2018), by
+//     Kolmogorov's test.
+//
+//   calibration [CAMPAIGNS] [--no-limits]
+//
+// A thousand unless told; they are dealt out evenly over rigs, lengths and noises. Prints a table
+// and exits with 1 when the whole is off: by more than 2 % in coverage and 0.05 in standard
+// deviation for a thousand, by three standard errors where that is more, or ranks with p < 0.01.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "core/common/check.h"
+#include "core/estimator/estimator.h"
+#include "tests/calibration/campaigns.h"
+
+namespace polyest::calibration {
+namespace {
+
+// One value a parameter and campaign.
+struct Outcomes {
+  std::vector<double> errors;  // (truth − mean)/standard deviation
+  std::vector<double> ranks;   // in [0, 1]
+  int covered = 0;
+
+  void Add(const Outcomes& other) {
+    errors.insert(errors.end(), other.errors.begin(), other.errors.end());
+    ranks.insert(ranks.end(), other.ranks.begin(), other.ranks.end());
+    covered += other.covered;
+  }
+  double Count() const { return static_cast<double>(errors.size()); }
+  double Coverage() const { return covered / Count(); }
+  double StandardDeviation() const {
+    double sum = 0;
+    for (const double error : errors) sum += error * error;
+    return std::sqrt(sum / Count());
+  }
+};
+
+// P(D > d) of Kolmogorov's distribution with Stephens' correction for finite samples.
+double KolmogorovProbability(std::vector<double> ranks) {
+  std::ranges::sort(ranks);
+  const auto n = static_cast<double>(ranks.size());
+  double largest = 0;
+  for (size_t i = 0; i < ranks.size(); ++i) {
+    const auto k = static_cast<double>(i);
+    largest = std::max({largest, (k + 1) / n - ranks[i], ranks[i] - k / n});
+  }
+  const double x = (std::sqrt(n) + 0.12 + 0.11 / std::sqrt(n)) * largest;
+  double p = 0;
+  for (int j = 1; j <= 100; ++j) p += 2 * (j % 2 == 1 ? 1 : -1) * std::exp(-2.0 * j * j * x * x);
+  return std::clamp(p, 0.0, 1.0);
+}
+
+Outcomes Estimate(const Campaign& campaign) {
+  const auto estimator = Estimator::Make(ResolvedProblem::Make(campaign.problem).value()).value();
+  POLYEST_CHECK(estimator->Append(campaign.record).ok() && estimator->Process().ok());
+  PosteriorOptions options;
+  options.probabilities = {0.025, 0.975};
+  options.density_bins = 0;
+  options.samples = 1'000;
+  const Posterior posterior = estimator->CurrentPosterior(options).value();
+  Outcomes outcomes;
+  for (Eigen::Index i = 0; i < campaign.truth.size(); ++i) {
+    const PosteriorMarginal& marginal = posterior.marginals[static_cast<size_t>(i)];
+    const double truth = campaign.truth[i];
+    outcomes.errors.push_back((truth - marginal.mean) / marginal.std_dev);
+    outcomes.covered += marginal.quantiles[0] <= truth && truth <= marginal.quantiles[1] ? 1 : 0;
+    const auto below = static_cast<double>((posterior.samples.col(i).array() < truth).count());
+    outcomes.ranks.push_back((below + 0.5) / (options.samples + 1.0));
+  }
+  return outcomes;
+}
+
+void Print(const std::string& rig, const char* length, const char* noise, int campaigns,
+           const Outcomes& outcomes) {
+  std::printf("| %-11s | %-5s | %-14s | %4d | %5.1f %% | %5.2f | %6.3f |\n", rig.c_str(), length,
+              noise, campaigns, 100 * outcomes.Coverage(), outcomes.StandardDeviation(),
+              KolmogorovProbability(outcomes.ranks));
+  std::fflush(stdout);
+}
+
+// Parameters of one campaign are not independent: standard errors count campaigns.
+bool WithinLimits(const Outcomes& all, double campaigns) {
+  const double coverage = std::max(0.02, 3 * std::sqrt(0.95 * 0.05 / campaigns));
+  const double deviation = std::max(0.05, 3 / std::sqrt(2 * campaigns));
+  return std::abs(all.Coverage() - 0.95) <= coverage &&
+         std::abs(all.StandardDeviation() - 1) <= deviation &&
+         KolmogorovProbability(all.ranks) > 0.01;
+}
+
+int Run(int campaigns, bool limits) {
+  const std::vector<Rig> rigs = Rigs();
+  const int kinds = static_cast<int>(rigs.size()) * 2 * static_cast<int>(std::size(kNoises));
+  const int each = (campaigns + kinds - 1) / kinds;
+  std::printf(
+      "| rig         | record | noise        | runs | covered | sd    | p      |\n"
+      "|---|---|---|---|---|---|---|\n");
+  Outcomes all;
+  uint64_t seed = 0;
+  for (const Rig& rig : rigs) {
+    for (const bool is_long : {false, true}) {
+      for (const Noise noise : kNoises) {
+        Outcomes outcomes;
+        for (int i = 0; i < each; ++i) {
+          outcomes.Add(
+              Estimate(MakeCampaign(rig, is_long ? rig.long_rows : rig.short_rows, noise, ++seed)));
+        }
+        Print(rig.name, is_long ? "long" : "short", NameOf(noise), each, outcomes);
+        all.Add(outcomes);
+      }
+    }
+  }
+  Print("all", "", "", each * kinds, all);
+  return !limits || WithinLimits(all, each * kinds) ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+}  // namespace
+}  // namespace polyest::calibration
+
+int main(int argc, char** argv) {
+  const bool limits = argc < 2 || std::string(argv[argc - 1]) != "--no-limits";
+  const int campaigns = argc > 1 ? std::atoi(argv[1]) : 1'000;
+  return polyest::calibration::Run(campaigns > 0 ? campaigns : 1'000, limits);
+}

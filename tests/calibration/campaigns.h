@@ -1,0 +1,37 @@
+#pragma once
+
+// Synthetic test campaigns: a truth drawn from the prior, a record simulated with it, noise added.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/estimator/problem.h"
+#include "core/estimator/samples.h"
+
+namespace polyest::calibration {
+
+enum class Noise { kWhite, kUnknown, kCorrelated };
+inline constexpr Noise kNoises[] = {Noise::kWhite, Noise::kUnknown, Noise::kCorrelated};
+const char* NameOf(Noise noise);
+
+// A rig: what is estimated and from which rows. The problem's noise is white and known.
+struct Rig {
+  std::string name;
+  Problem problem;
+  double interval_s = 0;  // from row to row
+  int short_rows = 0, long_rows = 0;
+};
+std::vector<Rig> Rigs();
+
+struct Campaign {
+  Problem problem;
+  Vector truth;  // of the uncertain parameters
+  Samples record;
+};
+
+// A function of its arguments alone. Correlated noise is of unknown size and time constant, the
+// latter three intervals.
+Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed);
+
+}  // namespace polyest::calibration
