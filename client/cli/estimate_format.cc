@@ -88,9 +88,10 @@ void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
   out << '\n';
   table.Print(out);
   for (const v1::TradeOff& t : estimate.trade_offs()) {
-    out << absl::StrCat(t.combination(), " is known to ",
-                        FormatNumber(100 * t.relative_std_dev(), 2), " %, ", t.first(), " and ",
-                        t.second(), " separately are not\n");
+    out << absl::StrFormat(
+        "%s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%\n",
+        t.combination(), 100 * t.relative_std_dev(), t.first(), t.second(), 100 * t.first_alone(),
+        100 * t.second_alone());
   }
 }
 

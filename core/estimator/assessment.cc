@@ -146,7 +146,7 @@ class Assessment {
       names.push_back(parameter.name);
       verdicts.push_back(parameter.verdict);
     }
-    if (std::ranges::count(verdicts, Verdict::kIdentified) + 2 > prior_.dimension()) return;
+    if (std::ranges::count(verdicts, Verdict::kIdentified) == prior_.dimension()) return;
     for (int i = 0; i < prior_.dimension(); ++i) thetas.col(i) = posterior_.Parameter(prior_, i);
     estimate_.trade_offs =
         FindTradeOffs(thetas, posterior_.weights, names, problem_.units(), verdicts);

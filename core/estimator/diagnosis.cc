@@ -41,9 +41,11 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
       "the data say less than the prior about %s; what is reported there is the prior's",
       absl::StrJoin(names, ", "));
   for (const TradeOff& trade_off : estimate.trade_offs) {
-    absl::StrAppendFormat(&message, "; %s is known to %.2g %%, %s and %s separately are not",
-                          trade_off.combination, 100 * trade_off.relative_std_dev,
-                          Name(findings, trade_off.first), Name(findings, trade_off.second));
+    absl::StrAppendFormat(
+        &message, "; %s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%",
+        trade_off.combination, 100 * trade_off.relative_std_dev, Name(findings, trade_off.first),
+        Name(findings, trade_off.second), 100 * trade_off.first_alone,
+        100 * trade_off.second_alone);
   }
   diagnostics.push_back({DiagnosticCode::kNotIdentified, std::move(message)});
   for (int i = 0; i < findings.problem->dimension(); ++i) {

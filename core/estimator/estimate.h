@@ -80,7 +80,7 @@ struct Estimate {
   double regularization = 1;  // α² used
   std::vector<ChannelEstimate> channels;
   std::vector<Direction> directions;
-  std::vector<TradeOff> trade_offs;  // of parameters not identified, what is known of two together
+  std::vector<TradeOff> trade_offs;  // pairs known together, not alone
   ExpansionSummary expansion;
   std::vector<Diagnostic> diagnostics;
   double time_s = 0;    // of the last sample

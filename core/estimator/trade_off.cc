@@ -14,6 +14,7 @@ constexpr double kTold = 0.1;  // of the standard deviation of either alone
 struct Moments {
   double mean = 0;
   double std_dev = 0;
+  double Relative() const { return std_dev / std::abs(mean); }
 };
 
 Moments MomentsOf(const Eigen::ArrayXd& values, const Vector& weights) {
@@ -46,8 +47,11 @@ class Search {
 
   Candidate BestOf(int i, int j) const {
     Candidate best;
-    best.trade_off = {i, j, "", 0};
     const Eigen::ArrayXd a = thetas_.col(i), b = thetas_.col(j);
+    best.trade_off.first = i;
+    best.trade_off.second = j;
+    best.trade_off.first_alone = MomentsOf(a, weights_).Relative();
+    best.trade_off.second_alone = MomentsOf(b, weights_).Relative();
     if ((a > 0).all() && (b > 0).all()) {
       const Eigen::ArrayXd log_a = a.log(), log_b = b.log();
       const double alone_a = MomentsOf(log_a, weights_).std_dev;
@@ -69,7 +73,7 @@ class Search {
       if (known.std_dev / alone >= best.ratio) continue;
       best.ratio = known.std_dev / alone;
       best.trade_off.combination = absl::StrCat(Name(i), sign > 0 ? " + " : " − ", Name(j));
-      best.trade_off.relative_std_dev = known.std_dev / std::abs(known.mean);
+      best.trade_off.relative_std_dev = known.Relative();
     }
     return best;
   }
@@ -93,7 +97,7 @@ std::vector<TradeOff> FindTradeOffs(const Matrix& thetas, const Vector& weights,
   std::vector<Candidate> candidates;
   for (int i = 0; i < thetas.cols(); ++i) {
     for (int j = i + 1; j < thetas.cols(); ++j) {
-      if (verdicts[static_cast<size_t>(i)] == Verdict::kIdentified ||
+      if (verdicts[static_cast<size_t>(i)] == Verdict::kIdentified &&
           verdicts[static_cast<size_t>(j)] == Verdict::kIdentified) {
         continue;
       }

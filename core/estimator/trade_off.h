@@ -1,7 +1,7 @@
 #pragma once
 
-// Parameters that the data cannot tell apart, in words an engineer uses: of two that are not
-// identified, the combination that is known all the same, k/m or k1 + k2.
+// Parameters that the data cannot tell apart, in words an engineer uses: of two of which at least
+// one is not identified, the combination that is known far better, k/m or k1 + k2.
 //
 // For positive parameters θ_i θ_j^q with q = ±½, ±1, ±2, by the posterior's standard deviation of
 // log θ_i + q log θ_j; for any of the same unit θ_i ± θ_j. A combination is told when it is known
@@ -16,9 +16,11 @@
 namespace polyest {
 
 struct TradeOff {
-  int first = 0, second = 0;    // of the uncertain parameters
-  std::string combination;      // "k/m"
-  double relative_std_dev = 0;  // of the combination: standard deviation ÷ |mean|
+  int first = 0, second = 0;  // of the uncertain parameters
+  std::string combination;    // "k/m"
+  // Posterior standard deviation ÷ |mean|, of the combination and of either alone.
+  double relative_std_dev = 0;
+  double first_alone = 0, second_alone = 0;
 };
 
 // thetas: draws of the posterior × n, with weights (Σ = 1). Each parameter occurs once at most, in

@@ -87,6 +87,8 @@ void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
     added.set_second(estimate.parameters[static_cast<size_t>(trade_off.second)].name);
     added.set_combination(trade_off.combination);
     added.set_relative_std_dev(trade_off.relative_std_dev);
+    added.set_first_alone(trade_off.first_alone);
+    added.set_second_alone(trade_off.second_alone);
   }
 }
 
