@@ -136,7 +136,7 @@ TEST(ToJson, HasTheContractsNames) {
   EXPECT_THAT(json, HasSubstr(R"("parameters":[{"name":"k","unit":"N/m","map":40.661234,)"
                               R"("stdDev":0.0052,"mean":40.6613,"lower95":40.6511,)"
                               R"("upper95":40.6715,"priorMean":39.48,"priorStdDev":4.56,)"
-                              R"("contraction":0.00114,"verdict":"IDENTIFIED"})"));
+                              R"("contraction":0.00114,"verdict":"IDENTIFIED")"));
   EXPECT_THAT(json, HasSubstr(R"("chiSquared":198.4,"noiseStdDev":0.01)"));
   EXPECT_THAT(json, HasSubstr(R"("diagnostics":[{"code":"UNDERSAMPLED")"));
   EXPECT_THAT(json, HasSubstr(R"("time":10,"samples":"200","sequence":"7")"));
