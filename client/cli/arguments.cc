@@ -43,6 +43,7 @@ class Parser {
     place_.threads = std::clamp(cores, 1, 256);
     paper_.threads = place_.threads;
     AddEstimate();
+    AddExplain();
     AddStream();
     AddPropagate();
     AddCost();
@@ -62,6 +63,7 @@ class Parser {
   Command Result() {
     const std::string name = app_.get_subcommands().front()->get_name();
     if (name == "estimate") return Placed(estimate_);
+    if (name == "explain") return Placed(explain_);
     if (name == "stream") return Placed(stream_);
     if (name == "propagate") return Placed(propagate_);
     if (name == "cost") return Placed(cost_);
@@ -137,6 +139,14 @@ class Parser {
     command.add_option("data", estimate_.data_file, "The measurements, a CSV file")->required();
     AddPlace(command);
     AddFormat(command, estimate_.format, {"table", "json"});
+  }
+
+  void AddExplain() {
+    CLI::App& command = *app_.add_subcommand(
+        "explain", "Say in words what the data tell, what they do not, and what would help");
+    AddProblem(command, explain_.problem_file);
+    command.add_option("data", explain_.data_file, "The measurements, a CSV file")->required();
+    AddPlace(command);
   }
 
   void AddStream() {
@@ -307,6 +317,7 @@ class Parser {
   Place place_;
   bool local_ = false;
   EstimateArguments estimate_;
+  ExplainArguments explain_;
   StreamArguments stream_;
   PropagateArguments propagate_;
   CostArguments cost_;

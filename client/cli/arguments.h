@@ -28,6 +28,12 @@ struct EstimateArguments {
   Format format = Format::kTable;
 };
 
+struct ExplainArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+};
+
 struct StreamArguments {
   Place place;
   std::string problem_file;
@@ -121,7 +127,7 @@ struct ProfileArguments {
 using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
                              ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
                              SensitivityArguments, DesignArguments, PosteriorArguments,
-                             ProfileArguments, PaperOptions>;
+                             ProfileArguments, ExplainArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

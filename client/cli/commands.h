@@ -19,6 +19,7 @@ int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& 
 int RunCommand(const SchemaArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
 

@@ -87,12 +87,7 @@ void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
   }
   out << '\n';
   table.Print(out);
-  for (const v1::TradeOff& t : estimate.trade_offs()) {
-    out << absl::StrFormat(
-        "%s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%\n",
-        t.combination(), 100 * t.relative_std_dev(), t.first(), t.second(), 100 * t.first_alone(),
-        100 * t.second_alone());
-  }
+  PrintTradeOffs(estimate, out);
 }
 
 void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
@@ -151,6 +146,15 @@ void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
   PrintDirections(estimate, out);
   PrintSummary(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);
+}
+
+void PrintTradeOffs(const v1::Estimate& estimate, std::ostream& out) {
+  for (const v1::TradeOff& t : estimate.trade_offs()) {
+    out << absl::StrFormat(
+        "%s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%\n",
+        t.combination(), 100 * t.relative_std_dev(), t.first(), t.second(), 100 * t.first_alone(),
+        100 * t.second_alone());
+  }
 }
 
 std::string EstimateLine(const v1::Estimate& estimate) {

@@ -230,8 +230,9 @@ class Assessment {
                            : 1;
     channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
     channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
-    const double share = fitted_ / static_cast<double>(request_.record->samples());
-    channel.lag1_correlation = std::clamp(sums.Lag1Correlation(d) + share, -1.0, 1.0);
+    const double share = fitted_ * samples / static_cast<double>(request_.record->samples());
+    channel.lag1_correlation =
+        std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
     channel.noise_time_constant_s = noise.time_constant_s;
     channel.outliers = request_.expansion->Outliers(c);
     // That of the noise before whitening.

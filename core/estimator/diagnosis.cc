@@ -125,7 +125,7 @@ void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
                        std::vector<Diagnostic>& diagnostics) {
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     if (!findings.problem->problem().measured[c].noise.unknown ||
-        findings.expansion->noise().channels[c].learned) {
+        findings.expansion->noise().channels[c].learned || estimate.channels[c].samples == 0) {
       continue;
     }
     diagnostics.push_back(

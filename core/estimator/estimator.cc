@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/common/status.h"
@@ -217,22 +218,19 @@ absl::StatusOr<bool> Estimator::Implementation::SettleIfInaccurate(const Stop& s
 absl::StatusOr<bool> Estimator::Implementation::RaiseUnlearnedScales(const RowBlock& block, int row,
                                                                      const Stop& stop) {
   if (!learns_noise()) return false;
-  LearnedNoise noise = expansion_->noise();
-  bool raised = false;
-  const size_t m = noise.channels.size();
+  std::optional<LearnedNoise> raised;  // made only when needed: this is done for every sample
+  const std::vector<ChannelNoise>& present = expansion_->noise().channels;
   const size_t width = block.values.size() / block.rows.size();
-  for (size_t c = 0; c < m; ++c) {
-    const double shape = block.noise[static_cast<size_t>(row) * m + c];
-    if (!problem_.problem().measured[c].noise.unknown || noise.channels[c].learned || shape <= 0) {
-      continue;
-    }
+  for (size_t c = 0; c < present.size(); ++c) {
+    const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
+    if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;
     const double size = std::abs(block.values[static_cast<size_t>(row) * width + c]) / shape;
-    if (size <= noise.channels[c].scale) continue;
-    noise.channels[c].scale = kAboveSignal * size;
-    raised = true;
+    if (size <= present[c].scale) continue;
+    if (!raised) raised = expansion_->noise();
+    raised->channels[c].scale = kAboveSignal * size;
   }
   if (!raised) return false;
-  POLYEST_RETURN_IF_ERROR(TakeAnew(std::move(noise), stop));
+  POLYEST_RETURN_IF_ERROR(TakeAnew(*std::move(raised), stop));
   return true;
 }
 

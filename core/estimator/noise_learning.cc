@@ -103,7 +103,7 @@ class Revision {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const auto samples = static_cast<double>(sums.samples.count());
     if (channel.intervals == 0) return;
-    const double left = sums.Lag1Correlation(d_) + share / samples;
+    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share, samples);
     const double present = channel.Correlation(noise);
     const double asked = CorrelationBehind(left, present);
     // A correlation a is known to √((1 − a²)/N).

@@ -10,7 +10,7 @@
 //                of s² at a time downwards, 16 upwards
 //   correlation  a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval Δt, x the correlation
 //                behind the lag-1 correlation r that the whitened residuals still have (freed of
-//                its bias −p/N), r = (x − a)(1 − a x)/(1 − 2 a x + a²), while x − a is significant;
+//                its bias), r = (x − a)(1 − a x)/(1 − 2 a x + a²), while x − a is significant;
 //                from white noise a ← r
 //
 // A scale is not learned before there are kLeastSamples + 4 n samples, nor a correlation.
@@ -37,6 +37,11 @@ bool LearnsNoise(const Problem& problem);
 std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
                                         const RegionalExpansion& expansion,
                                         const RecordSummary& record, const Stop& stop);
+
+// What to add to the lag-1 correlation of N residuals, of which a fit has used up `share`: the fit
+// makes it too small by share/N; that the sums do not know which sample is the last, too large by
+// ½/N.
+inline double Lag1Correction(double share, double samples) { return (share - 0.5) / samples; }
 
 // Σ λ/(1 + λ): how many parameters the data have fitted, 0 … n. mismatch_hessian: in the germ.
 double FittedParameters(const ConstMatrixRef& mismatch_hessian, const Prior& prior);

@@ -1,0 +1,147 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cpp/data_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+using Design = v1::DesignExperimentResponse;
+
+// A remedy counts when it is expected to leave less than this of the prior's standard deviation.
+constexpr double kHelps = 0.5;
+constexpr int kMostTimes = 400;
+
+// In words what the data say of one parameter.
+std::string Describe(const v1::ParameterEstimate& p) {
+  const std::string unit = p.unit().empty() || p.unit() == "1" ? "" : " " + p.unit();
+  const std::string value = FormatUncertain(p.map(), p.std_dev()) + unit;
+  switch (p.verdict()) {
+    case v1::Identifiability::IDENTIFIED:
+      return absl::StrFormat("%s is identified: %s, %.*f times narrower than your prior.", p.name(),
+                             value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
+    case v1::Identifiability::WEAK:
+      return absl::StrFormat(
+          "%s is weakly identified: %s; the data say little more than your prior, %s%s.", p.name(),
+          value, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+    default:
+      return absl::StrFormat(
+          "%s is not identified: the data say less than your prior, and %s%s is what you said.",
+          p.name(), FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+  }
+}
+
+// The same experiment with every output of the model measured, and driven by each input alone.
+v1::DesignExperimentRequest Alternatives(const v1::Problem& problem, const v1::Estimate& estimate,
+                                         const v1::Measurements& measurements) {
+  v1::DesignExperimentRequest request;
+  *request.mutable_problem() = problem;
+  request.set_until(estimate.time());
+  const int times = std::clamp(measurements.time_size(), 1, kMostTimes);
+  request.set_step(estimate.time() / times);
+  request.set_samples(1);
+  request.add_candidates()->mutable_inputs()->CopyFrom(problem.inputs());
+  if (problem.inputs_size() < 2) return request;
+  for (const v1::Input& input : problem.inputs()) {
+    auto& candidate = *request.add_candidates();
+    candidate.set_name(absl::StrCat("only ", input.name()));
+    *candidate.add_inputs() = input;
+  }
+  return request;
+}
+
+// What would tell the i-th parameter, or that nothing looked at would.
+std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) {
+  const auto helps = [&](double sd) { return sd < kHelps * p.prior_std_dev(); };
+  std::string best;
+  double least = kHelps * p.prior_std_dev();
+  const auto consider = [&](double sd, const std::string& what) {
+    if (sd >= least) return;
+    least = sd;
+    best = absl::StrFormat("%s would know %s to ±%s", what, p.name(), FormatNumber(sd, 2));
+  };
+  for (const Design::Candidate& candidate : design.candidates()) {
+    if (!candidate.name().empty()) continue;
+    if (helps(candidate.gain().std_dev(i))) {
+      return absl::StrCat("The experiment should tell ", p.name(),
+                          " by the prior; look at the noise and at the model.");
+    }
+    for (const Design::Output& output : candidate.outputs()) {
+      if (output.measured()) continue;
+      consider(output.together().std_dev(i),
+               absl::StrCat("Measuring ", output.name(), " as well (noise ",
+                            FormatNumber(output.noise_std_dev(), 2), ")"));
+    }
+  }
+  if (!best.empty()) return best + ".";
+  for (const Design::Candidate& candidate : design.candidates()) {
+    if (candidate.name().empty()) continue;
+    consider(candidate.gain().std_dev(i),
+             absl::StrCat("Another excitation, ", candidate.name(), ","));
+  }
+  if (!best.empty()) return best + ".";
+  return absl::StrCat(
+      "No other output of the model would tell ", p.name(), " from this experiment",
+      design.candidates_size() > 1 ? ", nor would any of its inputs alone" : "",
+      ". Try another excitation: an input that is 0 now, other frequencies; or fix ", p.name(),
+      ", or tie it to others by \"derived\".");
+}
+
+bool HasStreamedInput(const v1::Problem& problem) {
+  return std::any_of(problem.inputs().begin(), problem.inputs().end(),
+                     [](const v1::Input& input) { return input.has_streamed(); });
+}
+
+absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
+  v1::EstimateRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  const auto backend = MakeBackend(arguments.place);
+  const auto response = backend->Estimate(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  const v1::Estimate& estimate = response->estimate();
+  std::vector<int> open;
+  for (int i = 0; i < estimate.parameters_size(); ++i) {
+    out << Describe(estimate.parameters(i)) << '\n';
+    if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
+  }
+  PrintTradeOffs(estimate, out);
+  PrintDiagnostics(estimate.diagnostics(), out);
+  if (open.empty()) return absl::OkStatus();
+  if (HasStreamedInput(request.problem())) {
+    out << "What else could be measured is not looked for: an input is streamed.\n";
+    return absl::OkStatus();
+  }
+  const auto design =
+      backend->DesignExperiment(Alternatives(request.problem(), estimate, request.measurements()));
+  if (!design.ok()) return InFile(design.status(), arguments.problem_file, "");
+  for (const int i : open) {
+    out << Remedy(*design, i, estimate.parameters(i)) << '\n';
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostream& err) {
+  const absl::Status status = Explain(arguments, out);
+  return status.ok() ? kExitOk : Report(status, arguments.place.server, err);
+}
+
+}  // namespace polyest

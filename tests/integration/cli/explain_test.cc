@@ -1,0 +1,90 @@
+// What `polyest explain` says of the three cases that the paper has for it: sections 3.4 to 3.6.
+// The records are the means of what the priors predict: without noise, and near to the truth at the
+// priors' centres.
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+
+#include "polyest/v1/estimation_service.pb.h"
+#include "tests/integration/cli/command_test.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class ExplainTest : public CommandTest {
+ protected:
+  // The explanation of a record of `outputs`, as the problem predicts them.
+  std::string Explain(const std::string& problem, const std::vector<std::string>& outputs) {
+    const std::string file = File("problem.json", problem);
+    const Finished predicted =
+        Run({"propagate", file, "--until", "2", "--step", "0.02", "--format", "json"});
+    EXPECT_EQ(predicted.exit_status, 0) << predicted.err;
+    v1::PropagateResponse response;
+    EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(predicted.out, &response).ok());
+    std::string record = "t";
+    for (const std::string& output : outputs) absl::StrAppend(&record, ",", output);
+    for (int k = 1; k < response.time_size(); ++k) {
+      absl::StrAppend(&record, "\n", response.time(k));
+      for (const auto& output : response.outputs()) {
+        absl::StrAppend(&record, ",", output.mean(k));
+      }
+    }
+    const Finished run = Run({"explain", file, File("data.csv", record + "\n")});
+    EXPECT_EQ(run.exit_status, 0) << run.err;
+    return run.out;
+  }
+};
+
+TEST_F(ExplainTest, NamesTheRatioThatFreeVibrationTells) {
+  EXPECT_THAT(Explain(R"({
+    "model": {"builtin": "mass_spring_damper"}, "fixed": {"x0": 1},
+    "uncertain": [{"name": "k", "normal": {"mean": 39.5, "stdDev": 2}},
+                  {"name": "m", "normal": {"mean": 1, "stdDev": 0.05}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}]
+  })",
+                      {"x"}),
+              AllOf(HasSubstr("k is weakly identified"), HasSubstr("k/m is known to "),
+                    HasSubstr("No other output of the model would tell m from this experiment")));
+}
+
+TEST_F(ExplainTest, NamesTheOutputToAdd) {
+  EXPECT_THAT(Explain(R"({
+    "model": {"builtin": "linear_two_state"},
+    "uncertain": [{"name": "theta", "normal": {"mean": 1, "stdDev": 0.2}}],
+    "inputs": [{"name": "u1", "step": {"amplitude": 1}}],
+    "measured": [{"output": "x1_minus_x2", "noise": {"absolute": 0.01}}]
+  })",
+                      {"x1_minus_x2"}),
+              AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
+                    HasSubstr(" would know theta to ±")));
+}
+
+TEST_F(ExplainTest, NamesTheExcitationToChange) {
+  EXPECT_THAT(Explain(R"({
+    "model": {"builtin": "roll_plane_2dof"},
+    "uncertain": [{"name": "M", "beta": {"alpha": 2, "beta": 2, "lower": 500, "upper": 700}},
+                  {"name": "I", "beta": {"alpha": 2, "beta": 2, "lower": 55, "upper": 80}}],
+    "inputs": [
+      {"name": "u1", "halfSineBump": {"amplitude": 0.05, "startS": 0.1, "durationS": 0.2}},
+      {"name": "u2", "halfSineBump": {"amplitude": 0.05, "startS": 0.1, "durationS": 0.2}}],
+    "measured": [{"output": "x1", "noise": {"absolute": 0.002}},
+                 {"output": "x2", "noise": {"absolute": 0.002}}]
+  })",
+                      {"x1", "x2"}),
+              AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
+                    HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
+}
+
+TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
+  const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
+                             Not(HasSubstr("excitation"))));
+}
+
+}  // namespace
+}  // namespace polyest
