@@ -38,7 +38,7 @@ std::string Describe(const v1::ParameterEstimate& p) {
           value, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
     default:
       return absl::StrFormat(
-          "%s is not identified: the data say less than your prior, and %s%s is what you said.",
+          "%s is not identified: the data say less than your prior, %s%s, which is what stands.",
           p.name(), FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
   }
 }
