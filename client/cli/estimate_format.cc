@@ -65,7 +65,7 @@ void PrintChannels(const v1::Estimate& estimate, std::ostream& out) {
                   any ? FormatNumber(c.chi_squared() / static_cast<double>(c.samples()), 3) : "-",
                   any ? FormatNumber(c.noise_std_dev(), 3) : "-",
                   any ? FormatNumber(c.lag1_correlation(), 2) : "-",
-                  any ? FormatNumber(c.effective_samples(), 3) : "-"});
+                  any ? absl::StrFormat("%.0f", c.effective_samples()) : "-"});
   }
   out << '\n';
   table.Print(out);
