@@ -12,8 +12,8 @@ namespace polyest {
 struct ChannelNoise {
   double scale = 1;            // σ in units of NoiseModel::StandardDeviation
   double time_constant_s = 0;  // of the correlation; 0: white
-  // Whether `scale` has been learned. Until then it is as large as the signal, and taken as known:
-  // that errs on the side of too much uncertainty.
+  // Whether what is unknown of it has been learned. Until then an unknown scale is as large as the
+  // signal, and taken as known: that errs on the side of too much uncertainty.
   bool learned = false;
 };
 

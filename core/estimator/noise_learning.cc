@@ -52,9 +52,10 @@ class Revision {
     if (record_.samples() == 0) return std::nullopt;
     Minimize(stop);
     for (int c = 0; c < problem_.channels(); ++c) {
+      const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+      if (!model.unknown && model.correlation != NoiseCorrelation::kUnknown) continue;
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
       if (sums.samples.count() < kLeastSamplesForNoise + 4 * problem_.dimension()) continue;
-      const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
       // Of the parameters fitted.
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());

@@ -13,7 +13,7 @@
 //                its bias), r = (x − a)(1 − a x)/(1 − 2 a x + a²), while x − a is significant;
 //                from white noise a ← r
 //
-// A scale is not learned before there are kLeastSamples + 4 n samples, nor a correlation.
+// A scale is not learned before there are kLeastSamplesForNoise + 4 n samples, nor a correlation.
 
 #include <absl/status/statusor.h>
 

@@ -79,7 +79,8 @@ struct CostGrid {
 };
 
 // J_mismatch, J_apriori and J_total (25), (56) on a grid, from runs of the model itself and not of
-// an expansion: what is drawn is the cost as it is. α² is the problem's fixed one.
+// an expansion: what is drawn is the cost as it is. α² is the problem's fixed one. Noise of unknown
+// size or correlation is marginalized (bayes/mismatch.h); outliers are not looked for.
 // INVALID_ARGUMENT names the field (or row and column), the value and the rule.
 absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
                                           const CostGridOptions& options, const Stop& stop);
