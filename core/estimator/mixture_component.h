@@ -1,0 +1,70 @@
+#pragma once
+
+// One component of the posterior's mixture on its way along the record: an expansion over a region
+// of its own, and the windows, settlements, noise and tolerance that go with it. What it does is a
+// function of the rows taken, never of how they came.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <memory>
+
+#include "core/estimator/assessment.h"
+#include "core/estimator/record_summary.h"
+#include "core/estimator/regional_expansion.h"
+
+namespace polyest {
+
+class MixtureComponent {
+ public:
+  // The whole prior. FAILED_PRECONDITION when its expansion cannot be factored. `store` must
+  // outlive the component.
+  static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(const ResolvedProblem& problem,
+                                                                   const SampleStore* store,
+                                                                   int threads);
+
+  // Takes rows of the store up to the first `rows`. On a stop request returns its status; what was
+  // taken stays, the next call goes on from there.
+  absl::Status TakeUpTo(int64_t rows, const Stop& stop);
+  int64_t rows_taken() const { return taken_; }
+
+  const RegionalExpansion& expansion() const { return *expansion_; }
+  // Refers to the component.
+  AssessmentRequest RequestAssessment() const;
+
+ private:
+  MixtureComponent(const ResolvedProblem& problem, const SampleStore* store, int threads);
+
+  bool adaptive() const { return problem_.problem().expansion.adaptive; }
+  bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
+  absl::Status Recover(const Stop& stop);
+  absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
+  absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
+  absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
+  absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
+  absl::StatusOr<bool> LearnNoise(const Stop& stop);
+  absl::StatusOr<bool> TightenTolerance(const Stop& stop);
+  absl::StatusOr<bool> Settle(const Stop& stop);
+  absl::Status TakeAnew(LearnedNoise noise, const Stop& stop);
+  void Adopt(std::unique_ptr<RegionalExpansion> expansion);
+
+  ResolvedProblem problem_;  // of its own: the tolerance follows the noise
+  const SampleStore* store_;
+  int threads_;
+  bool learns_noise_;
+  std::unique_ptr<RegionalExpansion> expansion_;
+  bool broken_ = false;  // a stop left the expansion between two rows
+  Matrix particles_;     // of the last settlement, germ coordinates
+  int64_t taken_ = 0;
+  int64_t window_end_ = 2;
+  int64_t patient_until_ = 0;  // rows before this one are taken whatever their residual
+  int64_t settled_row_ = -1;
+  int settlements_at_row_ = 0;
+  uint64_t settlements_ = 0;
+  int reexpansions_ = 0;
+  int64_t abandoned_rows_ = 0;  // propagated by expansions given up since
+  RecordSummary summary_;
+};
+
+}  // namespace polyest
