@@ -56,6 +56,7 @@ class Parser {
     AddPaper();
     AddPosterior();
     AddProfile();
+    AddRegularization();
   }
 
   CLI::App& app() { return app_; }
@@ -75,6 +76,7 @@ class Parser {
     if (name == "design") return Placed(design_);
     if (name == "posterior") return Placed(posterior_);
     if (name == "profile") return Placed(profile_);
+    if (name == "regularization") return Placed(regularization_);
     return paper_;
   }
 
@@ -313,6 +315,26 @@ class Parser {
     AddFormat(command, profile_.format, {"table", "json", "csv"});
   }
 
+  void AddRegularization() {
+    CLI::App& command = *app_.add_subcommand(
+        "regularization", "The estimate over the weight α² of the prior, and which α² to choose");
+    AddProblem(command, regularization_.problem_file);
+    command.add_option("data", regularization_.data_file, "The measurements, a CSV file")
+        ->required();
+    command.add_option("--lowest", regularization_.lowest, "The least α² (default 1e-4)")
+        ->check(CLI::Range(1e-8, 1e8));
+    command.add_option("--highest", regularization_.highest, "The greatest α² (default 1e4)")
+        ->check(CLI::Range(1e-8, 1e8));
+    command.add_option("--points", regularization_.points, "Values of α² (default 33)")
+        ->check(CLI::Range(2, 1'001));
+    command.add_option("--plot", regularization_.plot_file, "Draw the sweep into this SVG file");
+    command.footer(
+        "On the expansion where the posterior of α² = 1 is: an α² that pulls the estimate out of "
+        "the region in which it is trusted is left out. The rules choose from 1e-4 … 1e4.");
+    AddPlace(command);
+    AddFormat(command, regularization_.format, {"table", "json", "csv"});
+  }
+
   CLI::App app_;
   Place place_;
   bool local_ = false;
@@ -329,6 +351,7 @@ class Parser {
   PaperOptions paper_;
   PosteriorArguments posterior_;
   ProfileArguments profile_;
+  RegularizationArguments regularization_;
 };
 
 }  // namespace

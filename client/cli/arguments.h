@@ -124,10 +124,22 @@ struct ProfileArguments {
   Format format = Format::kTable;
 };
 
-using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                             SensitivityArguments, DesignArguments, PosteriorArguments,
-                             ProfileArguments, ExplainArguments, PaperOptions>;
+struct RegularizationArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  double lowest = 0;   // 0: the default
+  double highest = 0;  // 0: the default
+  int points = 0;      // 0: the default
+  std::string plot_file;
+  Format format = Format::kTable;
+};
+
+using Command =
+    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                 SensitivityArguments, DesignArguments, PosteriorArguments, ProfileArguments,
+                 RegularizationArguments, ExplainArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

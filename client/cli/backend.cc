@@ -62,6 +62,11 @@ class LocalBackend : public Backend {
     POLYEST_RETURN_IF_ERROR(models_.status());
     return RunProfileCost(request, threads_, stop_, *models_);
   }
+  absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
+      const v1::SweepRegularizationRequest& request) override {
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return RunSweepRegularization(request, threads_, stop_, *models_);
+  }
 
  private:
   int threads_;
@@ -109,6 +114,10 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
       const v1::ProfileCostRequest& request) override {
     return client_.ProfileCost(request);
+  }
+  absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
+      const v1::SweepRegularizationRequest& request) override {
+    return client_.SweepRegularization(request);
   }
 
  private:

@@ -31,6 +31,8 @@ class Backend {
       const v1::GetPosteriorRequest& request) = 0;
   virtual absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
       const v1::ProfileCostRequest& request) = 0;
+  virtual absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
+      const v1::SweepRegularizationRequest& request) = 0;
 };
 
 ClientOptions ToClientOptions(const Place& place);

@@ -22,5 +22,6 @@ int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream
 int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

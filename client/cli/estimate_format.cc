@@ -38,6 +38,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "correlated residuals";
     case v1::Diagnostic::NOISE_NOT_LEARNED:
       return "noise not learned";
+    case v1::Diagnostic::REGULARIZATION_NOT_DETERMINED:
+      return "regularization not determined";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }
@@ -53,6 +55,19 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
                   FormatUncertain(p.prior_mean(), p.prior_std_dev()),
                   FormatNumber(p.contraction(), 2), VerdictText(p.verdict())});
   }
+  table.Print(out);
+}
+
+// What α² ≠ 1 has moved the estimates by.
+void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.regularization() == 1) return;
+  TextTable table({"parameter", "bias", "unit", "bias/sd"});
+  for (const v1::ParameterEstimate& p : estimate.parameters()) {
+    table.AddRow({p.name(), FormatNumber(p.bias(), 3), UnitText(p.unit()),
+                  FormatNumber(p.bias() / p.std_dev(), 2)});
+  }
+  out << "\nmoved by α² = " << FormatNumber(estimate.regularization(), 3)
+      << " from the estimate with α² = 1\n";
   table.Print(out);
 }
 
@@ -142,6 +157,7 @@ void PrintDiagnostics(const google::protobuf::RepeatedPtrField<v1::Diagnostic>& 
 void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
   out << absl::StrFormat("%d samples up to t = %.6g s\n\n", estimate.samples(), estimate.time());
   PrintParameters(estimate, out);
+  PrintBias(estimate, out);
   PrintChannels(estimate, out);
   PrintDirections(estimate, out);
   PrintSummary(estimate, out);

@@ -118,6 +118,11 @@ absl::StatusOr<v1::ProfileCostResponse> Client::ProfileCost(const v1::ProfileCos
   return Call(&Stub::ProfileCost, request);
 }
 
+absl::StatusOr<v1::SweepRegularizationResponse> Client::SweepRegularization(
+    const v1::SweepRegularizationRequest& request) {
+  return Call(&Stub::SweepRegularization, request);
+}
+
 absl::Status Client::WatchSession(
     const v1::WatchSessionRequest& request,
     const std::function<bool(const v1::EstimateResponse&)>& estimate) {

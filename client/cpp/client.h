@@ -54,6 +54,8 @@ class Client {
   absl::StatusOr<v1::EstimateResponse> GetEstimate(const v1::GetEstimateRequest& request);
   absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(const v1::GetPosteriorRequest& request);
   absl::StatusOr<v1::ProfileCostResponse> ProfileCost(const v1::ProfileCostRequest& request);
+  absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
+      const v1::SweepRegularizationRequest& request);
   // Calls `estimate` with each one until it returns false (then OK) or the daemon ends the stream.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::EstimateResponse&)>& estimate);

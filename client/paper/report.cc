@@ -49,6 +49,8 @@ const char* NameOf(DiagnosticCode code) {
       return "CORRELATED_RESIDUALS";
     case DiagnosticCode::kNoiseNotLearned:
       return "NOISE_NOT_LEARNED";
+    case DiagnosticCode::kRegularizationNotDetermined:
+      return "REGULARIZATION_NOT_DETERMINED";
   }
   return "";
 }

@@ -7,8 +7,6 @@
 namespace polyest {
 namespace {
 
-constexpr int kPointsPerDecade = 4;
-constexpr int kDecades = 4;  // on either side of α² = 1
 // Below this part of the largest one a term is what rounding left of it.
 constexpr double kResolved = 1e-10;
 // Each leg of the L must be as long as a doubling.
@@ -29,10 +27,11 @@ double PriorAtModes(const Prior& prior) {
   return prior.NegativeLogDensity(modes);
 }
 
-std::vector<LogPoint> ResolvedPoints(const std::vector<LCurvePoint>& points, double least_prior) {
+std::vector<LogPoint> ResolvedPoints(const std::vector<RegularizedMinimum>& points,
+                                     double least_prior) {
   double largest_mismatch = 0;
   double largest_prior = 0;
-  for (const LCurvePoint& point : points) {
+  for (const RegularizedMinimum& point : points) {
     if (!std::isfinite(point.cost.mismatch) || !std::isfinite(point.cost.prior)) continue;
     largest_mismatch = std::max(largest_mismatch, point.cost.mismatch);
     largest_prior = std::max(largest_prior, point.cost.prior - least_prior);
@@ -71,17 +70,10 @@ double BendAt(const LogPoint& a, const LogPoint& b, const LogPoint& c) {
 
 }  // namespace
 
-LCurve ChooseByLCurve(const std::function<CostValue(double regularization)>& minimum,
-                      const Prior& prior) {
-  LCurve curve;
-  // From the most weight down: each minimum is near the one before, the first near the prior's.
-  for (int i = kDecades * kPointsPerDecade; i >= -kDecades * kPointsPerDecade; --i) {
-    const double regularization = std::pow(10.0, static_cast<double>(i) / kPointsPerDecade);
-    curve.points.push_back({regularization, minimum(regularization)});
-  }
-  std::reverse(curve.points.begin(), curve.points.end());
-
-  const std::vector<LogPoint> points = ResolvedPoints(curve.points, PriorAtModes(prior));
+RegularizationChoice ChooseByLCurve(const std::vector<RegularizedMinimum>& minima,
+                                    const Prior& prior) {
+  const std::vector<LogPoint> points = ResolvedPoints(minima, PriorAtModes(prior));
+  RegularizationChoice choice;
   double sharpest = 0;
   for (size_t i = 1; i + 1 < points.size(); ++i) {
     const double upright = points.front().prior - points[i].prior;
@@ -90,10 +82,14 @@ LCurve ChooseByLCurve(const std::function<CostValue(double regularization)>& min
     const double bend = BendAt(points[i - 1], points[i], points[i + 1]);
     if (!(bend > sharpest)) continue;
     sharpest = bend;
-    curve.regularization = curve.points[points[i].index].regularization;
-    curve.corner_found = true;
+    choice = {true, minima[points[i].index].regularization, ""};
   }
-  return curve;
+  if (!choice.determined) {
+    choice.reason =
+        "the L-curve has no corner: no α² below which the prior term, and above which "
+        "the mismatch, doubles";
+  }
+  return choice;
 }
 
 }  // namespace polyest

@@ -5,14 +5,14 @@
 #include <cmath>
 
 #include "core/bayes/curvature.h"
-#include "core/bayes/l_curve.h"
 #include "core/bayes/minimizer.h"
+#include "core/bayes/regularization_bias.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/diagnosis.h"
 #include "core/estimator/noise_learning.h"
 #include "core/estimator/reexpansion.h"
-#include "core/estimator/search_domain.h"
+#include "core/estimator/regularization_sweep.h"
 
 namespace polyest {
 namespace {
@@ -34,8 +34,11 @@ class Assessment {
 
   absl::StatusOr<Assessed> Run(const Stop& stop) {
     regularization_ = problem_.problem().regularization;
-    if (problem_.problem().regularization_mode == RegularizationMode::kLCurve) {
-      POLYEST_RETURN_IF_ERROR(ChooseRegularization(stop));
+    if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
+      POLYEST_ASSIGN_OR_RETURN(const RegularizationChoice choice,
+                               ChooseRegularization(problem_, *request_.expansion, stop));
+      regularization_ = choice.regularization;
+      findings_.regularization_not_determined = choice.reason;
     }
     const Cost cost = request_.expansion->MakeCost(regularization_);
     POLYEST_ASSIGN_OR_RETURN(
@@ -53,26 +56,13 @@ class Assessment {
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     DescribeParameters(cost, eta);
+    DescribeBias(cost, eta, stop);
     DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
     return Assessed{std::move(estimate_), std::move(posterior_)};
   }
 
  private:
-  // α² at the corner of the L-curve, each point of which is a minimum of its own.
-  absl::Status ChooseRegularization(const Stop& stop) {
-    Matrix starts = design_.reference.transpose();
-    const auto minimum = [&](double regularization) {
-      const Cost cost = request_.expansion->MakeCost(regularization);
-      const Minimum best =
-          FindMinima(SearchOf(cost, design_), starts, MinimizerOptions(), stop).front();
-      starts = best.point.transpose();
-      return cost.Evaluate(best.point);
-    };
-    regularization_ = ChooseByLCurve(minimum, prior_).regularization;
-    return stop.Check();
-  }
-
   // J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
   Matrix ToGermHessian(const Matrix& hessian) const {
     const Matrix inverse = design_.region.axes().inverse();
@@ -135,6 +125,13 @@ class Assessment {
       estimate_.parameters.push_back(std::move(parameter));
     }
     DescribeTradeOffs();
+  }
+
+  void DescribeBias(const Cost& cost, const Vector& eta, const Stop& stop) {
+    const Vector bias = RegularizationBias(cost, eta, stop);
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      estimate_.parameters[static_cast<size_t>(i)].bias = bias[i];
+    }
   }
 
   void DescribeTradeOffs() {

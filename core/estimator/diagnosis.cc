@@ -222,6 +222,14 @@ void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   }
 }
 
+void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (findings.regularization_not_determined.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kRegularizationNotDetermined,
+       absl::StrFormat("α² is 1, as Bayes' rule has it, for the rule asked for does not choose: %s",
+                       findings.regularization_not_determined)});
+}
+
 }  // namespace
 
 std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
@@ -243,6 +251,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddBounds(findings, estimate, diagnostics);
   AddNonGaussian(estimate, diagnostics);
   AddMinima(findings, diagnostics);
+  AddRegularization(findings, diagnostics);
   AddFailures(findings, diagnostics);
   return diagnostics;
 }

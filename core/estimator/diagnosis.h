@@ -24,6 +24,8 @@ struct Findings {
   std::string minimizer_reason;
   std::vector<Vector> other_minima;  // θ of other minima of comparable cost
   double shift = 0;                  // bound on the error of a mean, in standard deviations
+  // Why the rule asked for has not chosen α²; empty where it has, or none was asked for.
+  std::string regularization_not_determined;
 };
 
 // Reads what `estimate` holds already; the result goes into its diagnostics.

@@ -25,6 +25,7 @@ enum class DiagnosticCode {
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
   kCorrelatedResiduals,  // residuals are not white, and the noise is taken to be
   kNoiseNotLearned,      // a noise of unknown size, of which there are too few samples
+  kRegularizationNotDetermined,  // the rule asked for does not choose an α²; 1 stands instead
 };
 
 struct Diagnostic {
@@ -44,6 +45,7 @@ struct ParameterEstimate {
   double prior_mean = 0;
   double prior_std_dev = 0;
   double contraction = 0;  // std_dev ÷ prior_std_dev
+  double bias = 0;  // brought by α² ≠ 1: map less that of α² = 1 (regularization_bias.h)
   Verdict verdict = Verdict::kNotIdentified;
 };
 

@@ -39,6 +39,8 @@ class Estimator::Implementation {
                                              const Stop& stop) const;
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
                                                const Stop& stop) const;
+  absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
+      const RegularizationOptions& options, const Stop& stop) const;
 
  private:
   int64_t SettledRows() const;
@@ -86,6 +88,13 @@ absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
   return ProfileCost(assessed, cost, component_->expansion().design(), options, stop);
 }
 
+absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegularizationSweep(
+    const RegularizationOptions& options, const Stop& stop) const {
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(RequestAssessment(), stop));
+  return SweepRegularization(problem_, *expansion_, assessed, options, stop);
+}
+
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 Estimator::~Estimator() = default;
@@ -122,6 +131,10 @@ absl::StatusOr<Posterior> Estimator::CurrentPosterior(const PosteriorOptions& op
 absl::StatusOr<CostProfiles> Estimator::CurrentProfiles(const ProfileOptions& options,
                                                         const Stop& stop) const {
   return implementation_->CurrentProfiles(options, stop);
+}
+absl::StatusOr<RegularizationSweep> Estimator::CurrentRegularizationSweep(
+    const RegularizationOptions& options, const Stop& stop) const {
+  return implementation_->CurrentRegularizationSweep(options, stop);
 }
 int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }

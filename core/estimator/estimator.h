@@ -12,6 +12,7 @@
 #include "core/estimator/estimate.h"
 #include "core/estimator/posterior_study.h"
 #include "core/estimator/problem.h"
+#include "core/estimator/regularization_sweep.h"
 #include "core/estimator/samples.h"
 
 namespace polyest {
@@ -53,6 +54,11 @@ class Estimator {
   // The profiles of the cost of the same samples. INVALID_ARGUMENT as ProfileOptions::Validate.
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
                                                const Stop& stop = {}) const;
+
+  // The minima of the same samples' cost over α². INVALID_ARGUMENT as
+  // RegularizationOptions::Validate.
+  absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
+      const RegularizationOptions& options, const Stop& stop = {}) const;
 
   int64_t rows_appended() const;
   int64_t rows_processed() const;

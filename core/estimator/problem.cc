@@ -13,6 +13,7 @@
 #include "core/chaos/multi_index.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/estimator/validate_regularization.h"
 
 namespace polyest {
 namespace {
@@ -113,10 +114,7 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
   if (problem.uncertain.empty()) {
     add(absl::InvalidArgumentError("uncertain: at least one parameter must be uncertain"));
   }
-  if (!std::isfinite(problem.regularization) || problem.regularization < 0) {
-    add(absl::InvalidArgumentError(
-        absl::StrFormat("regularization: %g must be a finite number ≥ 0", problem.regularization)));
-  }
+  add(ValidateRegularization(problem));
   if (!problem.uncertain.empty()) {
     add(ValidateExpansion(problem.expansion, static_cast<int>(problem.uncertain.size())));
     const absl::StatusOr<Prior> prior = Prior::Make(problem.uncertain, problem.correlations);

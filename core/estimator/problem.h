@@ -40,7 +40,8 @@ struct ExpansionOptions {
   bool adaptive = true;  // re-expand where the posterior is; false is the paper's fixed expansion
 };
 
-enum class RegularizationMode { kFixed, kLCurve };
+// How α² is chosen (bayes/regularization.h); where a rule has no answer, 1.
+enum class RegularizationMode { kFixed, kLCurve, kDiscrepancy, kEvidence };
 
 struct Problem {
   std::shared_ptr<const Model> model;

@@ -41,6 +41,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::CORRELATED_RESIDUALS;
     case DiagnosticCode::kNoiseNotLearned:
       return v1::Diagnostic::NOISE_NOT_LEARNED;
+    case DiagnosticCode::kRegularizationNotDetermined:
+      return v1::Diagnostic::REGULARIZATION_NOT_DETERMINED;
   }
   POLYEST_CHECK(false);
 }
@@ -58,6 +60,7 @@ void ToProto(const ParameterEstimate& parameter, v1::ParameterEstimate& proto) {
   proto.set_contraction(parameter.contraction);
   proto.set_verdict(ToProto(parameter.verdict));
   proto.set_posterior_std_dev(parameter.posterior_std_dev);
+  proto.set_bias(parameter.bias);
 }
 
 void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {

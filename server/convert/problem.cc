@@ -346,6 +346,10 @@ absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::Regularizat
       return RegularizationMode::kFixed;
     case v1::Problem::L_CURVE:
       return RegularizationMode::kLCurve;
+    case v1::Problem::DISCREPANCY:
+      return RegularizationMode::kDiscrepancy;
+    case v1::Problem::EVIDENCE:
+      return RegularizationMode::kEvidence;
     default:
       return UnknownEnumerator("regularizationMode", mode);
   }

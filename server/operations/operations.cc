@@ -17,6 +17,7 @@
 #include "server/convert/model.h"
 #include "server/convert/posterior.h"
 #include "server/convert/problem.h"
+#include "server/convert/regularization.h"
 #include "server/convert/studies.h"
 #include "server/operations/names.h"
 #include "server/operations/pages.h"
@@ -155,6 +156,18 @@ absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequ
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator->CurrentProfiles(options, stop));
   return ToProto(profiles);
+}
+
+absl::StatusOr<v1::SweepRegularizationResponse> RunSweepRegularization(
+    const v1::SweepRegularizationRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+  const RegularizationOptions options = ToRegularizationOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
+                           estimator->CurrentRegularizationSweep(options, stop));
+  return ToProto(sweep);
 }
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,

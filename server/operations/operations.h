@@ -33,6 +33,9 @@ absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorR
 absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequest& request,
                                                        int threads, const Stop& stop,
                                                        const ModelLibrary& models = {});
+absl::StatusOr<v1::SweepRegularizationResponse> RunSweepRegularization(
+    const v1::SweepRegularizationRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models = {});
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
                                                   const ModelLibrary& models = {});

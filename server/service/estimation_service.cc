@@ -99,6 +99,8 @@ class EstimationService final : public v1::EstimationService::CallbackService {
                       v1::GetPosteriorResponse* response) override;
   Unary* ProfileCost(Context* context, const v1::ProfileCostRequest* request,
                      v1::ProfileCostResponse* response) override;
+  Unary* SweepRegularization(Context* context, const v1::SweepRegularizationRequest* request,
+                             v1::SweepRegularizationResponse* response) override;
 
  private:
   using Work = std::function<absl::Status(const Stop&)>;
@@ -297,6 +299,24 @@ EstimationService::Unary* EstimationService::ProfileCost(Context* context,
   return OnStrand(context, "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) {
                     return Deliver(session->CurrentProfiles(*request, stop), response);
+                  });
+}
+
+EstimationService::Unary* EstimationService::SweepRegularization(
+    Context* context, const v1::SweepRegularizationRequest* request,
+    v1::SweepRegularizationResponse* response) {
+  if (request->session().empty()) {
+    return OnExecutor(context, [=, this](const Stop& stop) {
+      return Deliver(RunSweepRegularization(*request, kThreadsPerCall, stop, context_.models),
+                     response);
+    });
+  }
+  if (request->has_problem() || request->has_measurements()) {
+    return FinishAtOnce(context, SessionAndProblem(request->session()));
+  }
+  return OnStrand(context, "session", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
+                    return Deliver(session->CurrentRegularizationSweep(*request, stop), response);
                   });
 }
 

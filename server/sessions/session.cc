@@ -10,6 +10,7 @@
 #include "server/convert/measurements.h"
 #include "server/convert/posterior.h"
 #include "server/convert/problem.h"
+#include "server/convert/regularization.h"
 
 namespace polyest {
 
@@ -158,6 +159,19 @@ absl::StatusOr<v1::ProfileCostResponse> Session::CurrentProfiles(
   POLYEST_RETURN_IF_ERROR(Process(stop));
   POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator_->CurrentProfiles(options, stop));
   v1::ProfileCostResponse response = ToProto(profiles);
+  response.set_sequence(sequence_.last());
+  return response;
+}
+
+absl::StatusOr<v1::SweepRegularizationResponse> Session::CurrentRegularizationSweep(
+    const v1::SweepRegularizationRequest& request, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  const RegularizationOptions options = ToRegularizationOptions(request);
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
+                           estimator_->CurrentRegularizationSweep(options, stop));
+  v1::SweepRegularizationResponse response = ToProto(sweep);
   response.set_sequence(sequence_.last());
   return response;
 }

@@ -66,6 +66,8 @@ class Session {
                                                             const Stop& stop);
   absl::StatusOr<v1::ProfileCostResponse> CurrentProfiles(const v1::ProfileCostRequest& request,
                                                           const Stop& stop);
+  absl::StatusOr<v1::SweepRegularizationResponse> CurrentRegularizationSweep(
+      const v1::SweepRegularizationRequest& request, const Stop& stop);
   // Passes on the present estimate, if there are samples, and every new one from here on.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   void Unobserve(const SessionObserver* observer);

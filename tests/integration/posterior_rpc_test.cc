@@ -1,4 +1,5 @@
-// GetPosterior and ProfileCost: of a session, and from measurements that are all there.
+// GetPosterior, ProfileCost and SweepRegularization: of a session, and from measurements that are
+// all there.
 
 #include "tests/integration/daemon_fixture.h"
 
@@ -25,6 +26,12 @@ class PosteriorRpcTest : public DaemonTest {
   grpc::Status Profile(const v1::ProfileCostRequest& request, v1::ProfileCostResponse* response) {
     grpc::ClientContext context;
     return stub_->ProfileCost(&context, request, response);
+  }
+
+  grpc::Status Sweep(const v1::SweepRegularizationRequest& request,
+                     v1::SweepRegularizationResponse* response) {
+    grpc::ClientContext context;
+    return stub_->SweepRegularization(&context, request, response);
   }
 
   // A session that has taken rows [0, 60).
@@ -80,6 +87,30 @@ TEST_F(PosteriorRpcTest, ProfilesAreTheSameOfASessionAndFromTheMeasurementsAtOnc
   }
 }
 
+TEST_F(PosteriorRpcTest, SweepsAreTheSameOfASessionAndFromTheMeasurementsAtOnce) {
+  FeedSession();
+  auto one_shot = OneShot<v1::SweepRegularizationRequest>(60);
+  v1::SweepRegularizationRequest of_session;
+  of_session.set_session("sessions/rig");
+  v1::SweepRegularizationResponse whole, session;
+  ASSERT_TRUE(Sweep(one_shot, &whole).ok());
+  ASSERT_TRUE(Sweep(of_session, &session).ok());
+  EXPECT_EQ(session.sequence(), 1);
+  session.clear_sequence();
+  EXPECT_EQ(whole.SerializeAsString(), session.SerializeAsString());
+  EXPECT_EQ(whole.parameters_size(), 2);
+  EXPECT_EQ(whole.regularization(), 1);
+  ASSERT_GT(whole.points_size(), 10);
+  for (int k = 1; k < whole.points_size(); ++k) {
+    EXPECT_GT(whole.points(k).regularization(), whole.points(k - 1).regularization());
+    // More weight never meets the data better, nor strays farther from the prior.
+    EXPECT_GE(whole.points(k).cost().mismatch(), whole.points(k - 1).cost().mismatch() - 1e-6);
+    EXPECT_LE(whole.points(k).cost().prior(), whole.points(k - 1).cost().prior() + 1e-6);
+    EXPECT_EQ(whole.points(k).map_size(), 2);
+    EXPECT_EQ(whole.points(k).std_dev_size(), 2);
+  }
+}
+
 TEST_F(PosteriorRpcTest, RefusesBadRequestsByTheirFields) {
   v1::GetPosteriorResponse response;
   auto request = OneShot<v1::GetPosteriorRequest>(20);
@@ -103,6 +134,15 @@ TEST_F(PosteriorRpcTest, RefusesBadRequestsByTheirFields) {
   status = Profile(profile_request, &profile);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(status.error_message(), "points: 2 must be from 3 to 1001");
+  v1::SweepRegularizationResponse sweep;
+  auto sweep_request = OneShot<v1::SweepRegularizationRequest>(20);
+  sweep_request.set_lowest(-1);
+  status = Sweep(sweep_request, &sweep);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(), "lowest: -1 must be from 1e-08 to 1e+08");
+  sweep_request.set_session("sessions/rig");
+  status = Sweep(sweep_request, &sweep);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 }  // namespace

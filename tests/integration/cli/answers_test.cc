@@ -92,6 +92,14 @@ TEST_F(AnswersTest, ProfilesAgreeToTheLastDigit) {
   }
 }
 
+TEST_F(AnswersTest, RegularizationsAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(100));
+  for (const char* const format : {"table", "json", "csv"}) {
+    ExpectSameAnswer(
+        {"regularization", Example("oscillator.json"), data, "--points", "9", "--format", format});
+  }
+}
+
 TEST_F(AnswersTest, ModelsAgree) {
   ExpectSameAnswer({"models"});
   ExpectSameAnswer({"models", "--format", "json"});
@@ -343,6 +351,27 @@ TEST_F(CommandTest, PrintsOneCsvRowAValueOfAProfile) {
   EXPECT_THAT(lines[3], StartsWith("c,0.230"));  // the middle one, the minimum
 }
 
+TEST_F(CommandTest, PrintsOneCsvRowAWeightOfARegularizationAndDrawsIt) {
+  const std::string plot = folder_ / "sweep.svg";
+  const Finished run =
+      Run({"regularization", Example("oscillator.json"), Example("oscillator.csv"), "--lowest",
+           "0.1", "--highest", "10", "--points", "3", "--format", "csv", "--plot", plot});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const auto lines = Lines(run.out);
+  ASSERT_THAT(lines, SizeIs(4));
+  EXPECT_EQ(lines[0],
+            "regularization,mismatch,prior,effectiveParameters,logEvidence,k,k_stdDev,c,c_stdDev");
+  EXPECT_THAT(lines[2], StartsWith("1,"));
+  EXPECT_TRUE(std::filesystem::file_size(plot) > 1000);
+}
+
+TEST_F(CommandTest, RefusesARangeOfWeightsThatIsNone) {
+  const Finished run = Run({"regularization", Example("oscillator.json"), Example("oscillator.csv"),
+                            "--lowest", "2", "--highest", "1"});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("lowest: 2 must be below highest, 1"));
+}
+
 TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
   const std::string plot = folder_ / "figure.svg";
   const Finished run = Run({"paper", "5", "--plot", plot});
@@ -354,8 +383,9 @@ TEST_F(CommandTest, RunsAnExperimentOfThePaper) {
 TEST_F(CommandTest, ExplainsItself) {
   const Finished help = Run({"--help"});
   EXPECT_EQ(help.exit_status, 0);
-  for (const char* const command : {"estimate", "stream", "propagate", "cost", "models", "paper",
-                                    "sensitivity", "design", "posterior", "profile"}) {
+  for (const char* const command :
+       {"estimate", "stream", "propagate", "cost", "models", "paper", "sensitivity", "design",
+        "posterior", "profile", "regularization"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     EXPECT_EQ(Run({command, "--help"}).exit_status, 0);
   }

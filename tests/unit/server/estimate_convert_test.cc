@@ -18,6 +18,7 @@ Estimate TwoParameters() {
                           .prior_mean = 6,
                           .prior_std_dev = 7,
                           .contraction = 0.5,
+                          .bias = -0.5,
                           .verdict = Verdict::kIdentified},
                          {.name = "c", .unit = "N s/m", .verdict = Verdict::kWeak}};
   estimate.covariance = (Matrix(2, 2) << 1, 2, 3, 4).finished();
@@ -53,6 +54,7 @@ TEST(EstimateToProto, CarriesParametersAndCovarianceRowMajor) {
   EXPECT_EQ(k.prior_mean(), 6);
   EXPECT_EQ(k.prior_std_dev(), 7);
   EXPECT_EQ(k.contraction(), 0.5);
+  EXPECT_EQ(k.bias(), -0.5);
   EXPECT_EQ(k.verdict(), v1::Identifiability::IDENTIFIED);
   EXPECT_EQ(proto.parameters(1).verdict(), v1::Identifiability::WEAK);
   ASSERT_EQ(proto.covariance_size(), 4);
@@ -96,7 +98,11 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kMultipleMinima, v1::Diagnostic::MULTIPLE_MINIMA},
       {DiagnosticCode::kNotConverged, v1::Diagnostic::NOT_CONVERGED},
       {DiagnosticCode::kPointsFailed, v1::Diagnostic::POINTS_FAILED},
-      {DiagnosticCode::kNonGaussian, v1::Diagnostic::NON_GAUSSIAN}};
+      {DiagnosticCode::kNonGaussian, v1::Diagnostic::NON_GAUSSIAN},
+      {DiagnosticCode::kCorrelatedResiduals, v1::Diagnostic::CORRELATED_RESIDUALS},
+      {DiagnosticCode::kNoiseNotLearned, v1::Diagnostic::NOISE_NOT_LEARNED},
+      {DiagnosticCode::kRegularizationNotDetermined,
+       v1::Diagnostic::REGULARIZATION_NOT_DETERMINED}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};

@@ -259,6 +259,19 @@ TEST(ToProblem, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(MessageWith(R"({"regularization": -2})"), StartsWith("regularization: -2"));
 }
 
+TEST(ToProblem, KnowsEveryRuleOfRegularization) {
+  for (const auto& [given, expected] :
+       {std::pair{v1::Problem::REGULARIZATION_MODE_UNSPECIFIED, RegularizationMode::kFixed},
+        {v1::Problem::FIXED, RegularizationMode::kFixed},
+        {v1::Problem::L_CURVE, RegularizationMode::kLCurve},
+        {v1::Problem::DISCREPANCY, RegularizationMode::kDiscrepancy},
+        {v1::Problem::EVIDENCE, RegularizationMode::kEvidence}}) {
+    v1::Problem problem = SmallProblem();
+    problem.set_regularization_mode(given);
+    EXPECT_EQ(ToProblem(problem)->problem().regularization_mode, expected);
+  }
+}
+
 TEST(ToProblem, RefusesNumbersThatAreNoEnumerators) {
   v1::Problem problem = SmallProblem();
   problem.mutable_expansion()->set_points(static_cast<v1::ExpansionOptions::Points>(17));

@@ -12,9 +12,8 @@ namespace {
 
 // Linear data z_i = s_i ξ_i with unit noise, unit normal priors and a residual χ² that no ξ
 // removes: the minimum for α² is ξ_i = s_i z_i/(s_i² + α²).
-std::function<CostValue(double)> LinearProblem(Eigen::Vector2d s, Eigen::Vector2d z,
-                                               double residual) {
-  return [=](double regularization) {
+MinimumAt LinearProblem(Eigen::Vector2d s, Eigen::Vector2d z, double residual) {
+  return [=](double regularization) -> std::optional<RegularizedMinimum> {
     CostValue cost;
     cost.mismatch = residual / 2;
     cost.prior = std::log(2 * M_PI);
@@ -24,8 +23,15 @@ std::function<CostValue(double)> LinearProblem(Eigen::Vector2d s, Eigen::Vector2
       cost.prior += xi * xi / 2;
     }
     cost.total = cost.mismatch + regularization * cost.prior;
-    return cost;
+    RegularizedMinimum minimum;
+    minimum.regularization = regularization;
+    minimum.cost = cost;
+    return minimum;
   };
+}
+
+std::vector<RegularizedMinimum> Sweep(const MinimumAt& minimum) {
+  return SweepRegularization(RangeOfChoice(), minimum);
 }
 
 Prior TwoNormals() {
@@ -35,52 +41,59 @@ Prior TwoNormals() {
 
 TEST(LCurve, FindsTheCornerOfAnIllPosedProblem) {
   // ξ_2 = 0.01/(10⁻⁴ + α²) runs away below α² = 0.02; ξ_1 = 0.5 costs mismatch above α² = 200.
-  const LCurve curve = ChooseByLCurve(LinearProblem({100, 0.01}, {50, 1}, 4), TwoNormals());
-  EXPECT_TRUE(curve.corner_found);
-  EXPECT_GT(curve.regularization, 0.01);
-  EXPECT_LT(curve.regularization, 400);
+  const RegularizationChoice choice =
+      ChooseByLCurve(Sweep(LinearProblem({100, 0.01}, {50, 1}, 4)), TwoNormals());
+  EXPECT_TRUE(choice.determined);
+  EXPECT_EQ(choice.reason, "");
+  EXPECT_GT(choice.regularization, 0.01);
+  EXPECT_LT(choice.regularization, 400);
 }
 
-TEST(LCurve, SweepsFourDecadesOnEitherSideOfOne) {
-  const LCurve curve = ChooseByLCurve(LinearProblem({100, 0.01}, {50, 1}, 4), TwoNormals());
-  ASSERT_EQ(curve.points.size(), 33u);
-  EXPECT_DOUBLE_EQ(curve.points.front().regularization, 1e-4);
-  EXPECT_EQ(curve.points[16].regularization, 1);
-  EXPECT_DOUBLE_EQ(curve.points.back().regularization, 1e4);
-  for (size_t i = 1; i < curve.points.size(); ++i) {
-    EXPECT_GE(curve.points[i].cost.mismatch, curve.points[i - 1].cost.mismatch);
-    EXPECT_LE(curve.points[i].cost.prior, curve.points[i - 1].cost.prior);
+TEST(LCurve, IsLookedForFourDecadesOnEitherSideOfOne) {
+  const auto points = Sweep(LinearProblem({100, 0.01}, {50, 1}, 4));
+  ASSERT_EQ(points.size(), 33u);
+  EXPECT_DOUBLE_EQ(points.front().regularization, 1e-4);
+  EXPECT_EQ(points[16].regularization, 1);
+  EXPECT_DOUBLE_EQ(points.back().regularization, 1e4);
+  for (size_t i = 1; i < points.size(); ++i) {
+    EXPECT_GE(points[i].cost.mismatch, points[i - 1].cost.mismatch);
+    EXPECT_LE(points[i].cost.prior, points[i - 1].cost.prior);
   }
 }
 
 TEST(LCurve, HasNoCornerWhereTheDataDetermineEverything) {
-  const LCurve curve = ChooseByLCurve(LinearProblem({100, 80}, {50, -40}, 30), TwoNormals());
-  EXPECT_FALSE(curve.corner_found);
-  EXPECT_EQ(curve.regularization, 1);
+  const RegularizationChoice choice =
+      ChooseByLCurve(Sweep(LinearProblem({100, 80}, {50, -40}, 30)), TwoNormals());
+  EXPECT_FALSE(choice.determined);
+  EXPECT_EQ(choice.regularization, 1);
+  EXPECT_NE(choice.reason, "");
 }
 
 TEST(LCurve, OfTheFrequencyExampleHasNoCornerBecauseItsDatumIsMetExactly) {
-  const auto minimum = [](double regularization) {
+  const auto points = Sweep([](double regularization) {
     const Cost cost = FrequencyCost(0.0628, regularization);
-    return cost.Evaluate(FrequencyMinimum(cost).point);
-  };
-  const LCurve curve = ChooseByLCurve(minimum, FrequencyCost(1, 1).prior());
-  EXPECT_FALSE(curve.corner_found);
-  EXPECT_EQ(curve.regularization, 1);
-  EXPECT_LT(curve.points.front().cost.mismatch, 1e-8);
-  EXPECT_GT(curve.points.back().cost.mismatch, 1);
+    return DescribeMinimum(cost, FrequencyMinimum(cost).point);
+  });
+  const RegularizationChoice choice = ChooseByLCurve(points, FrequencyCost(1, 1).prior());
+  EXPECT_FALSE(choice.determined);
+  EXPECT_EQ(choice.regularization, 1);
+  EXPECT_LT(points.front().cost.mismatch, 1e-8);
+  EXPECT_GT(points.back().cost.mismatch, 1);
 }
 
 TEST(LCurve, SurvivesDegenerateCosts) {
   for (const double mismatch : {0.0, 1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    const LCurve curve = ChooseByLCurve(
-        [=](double) {
-          return CostValue{mismatch, std::numeric_limits<double>::infinity(), mismatch};
-        },
-        TwoNormals());
-    EXPECT_FALSE(curve.corner_found);
-    EXPECT_EQ(curve.regularization, 1);
+    const auto points = Sweep([=](double regularization) {
+      RegularizedMinimum minimum;
+      minimum.regularization = regularization;
+      minimum.cost = {mismatch, std::numeric_limits<double>::infinity(), mismatch};
+      return std::optional(minimum);
+    });
+    const RegularizationChoice choice = ChooseByLCurve(points, TwoNormals());
+    EXPECT_FALSE(choice.determined);
+    EXPECT_EQ(choice.regularization, 1);
   }
+  EXPECT_FALSE(ChooseByLCurve({}, TwoNormals()).determined);
 }
 
 }  // namespace

@@ -1,0 +1,132 @@
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <fstream>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/json_format.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/regularization_plot.h"
+#include "client/cli/text_table.h"
+#include "client/cpp/data_file.h"
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+using Sweep = v1::SweepRegularizationResponse;
+
+constexpr int kTablePoints = 17;
+
+absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
+  v1::SweepRegularizationRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+                           ReadCheckedProblem(arguments.problem_file, arguments.place));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
+                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  request.set_lowest(arguments.lowest);
+  request.set_highest(arguments.highest);
+  request.set_points(arguments.points);
+  // A person reads fewer rows than a plot takes.
+  if (arguments.format == Format::kTable && arguments.points == 0 && arguments.plot_file.empty()) {
+    request.set_points(kTablePoints);
+  }
+  auto response = MakeBackend(arguments.place)->SweepRegularization(request);
+  if (!response.ok()) {
+    return InFile(response.status(), arguments.problem_file, arguments.data_file);
+  }
+  return response;
+}
+
+std::string WithUnit(const std::string& name, const std::string& unit) {
+  return unit == "1" ? name : absl::StrCat(name, " (", unit, ")");
+}
+
+// Without the minus sign of a rounding error.
+std::string FormatLogEvidence(double value) {
+  return absl::StrFormat("%.2f", value > -5e-3 ? 0 : value);
+}
+
+void PrintChoice(const char* rule, const Sweep::Choice& choice, std::ostream& out) {
+  out << rule << ": ";
+  if (choice.determined()) {
+    out << "α² = " << FormatNumber(choice.regularization(), 3) << '\n';
+  } else {
+    out << "does not choose: " << choice.reason() << '\n';
+  }
+}
+
+void PrintTable(const Sweep& sweep, std::ostream& out) {
+  std::vector<std::string> header = {"α²", "mismatch", "prior", "fitted", "log evidence"};
+  for (int i = 0; i < sweep.parameters_size(); ++i) {
+    header.push_back(WithUnit(sweep.parameters(i), sweep.units(i)));
+  }
+  TextTable table(std::move(header), TextTable::Align::kRight);
+  for (const Sweep::Point& point : sweep.points()) {
+    std::vector<std::string> row = {FormatNumber(point.regularization(), 3),
+                                    FormatNumber(point.cost().mismatch(), 6),
+                                    FormatNumber(point.cost().prior(), 4),
+                                    absl::StrFormat("%.2f", point.effective_parameters()),
+                                    FormatLogEvidence(point.log_evidence())};
+    for (int i = 0; i < point.map_size(); ++i) {
+      row.push_back(FormatUncertain(point.map(i), point.std_dev(i)));
+    }
+    table.AddRow(std::move(row));
+  }
+  table.Print(out);
+  out << '\n';
+  PrintChoice("L-curve", sweep.l_curve(), out);
+  PrintChoice("discrepancy", sweep.discrepancy(), out);
+  PrintChoice("evidence", sweep.evidence(), out);
+  PrintDiagnostics(sweep.diagnostics(), out);
+}
+
+// One row a weight; then the estimates and their standard deviations.
+void PrintCsv(const Sweep& sweep, std::ostream& out) {
+  out << "regularization,mismatch,prior,effectiveParameters,logEvidence";
+  for (const std::string& name : sweep.parameters()) out << ',' << name << ',' << name << "_stdDev";
+  out << '\n';
+  for (const Sweep::Point& point : sweep.points()) {
+    out << FormatExact(point.regularization()) << ',' << FormatExact(point.cost().mismatch()) << ','
+        << FormatExact(point.cost().prior()) << ',' << FormatExact(point.effective_parameters())
+        << ',' << FormatExact(point.log_evidence());
+    for (int i = 0; i < point.map_size(); ++i) {
+      out << ',' << FormatExact(point.map(i)) << ',' << FormatExact(point.std_dev(i));
+    }
+    out << '\n';
+  }
+}
+
+absl::Status WritePlot(const Sweep& sweep, const std::string& file) {
+  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+  stream << RenderSvg(MakePlot(sweep));
+  stream.close();
+  if (!stream) return absl::UnknownError(absl::StrCat("--plot: cannot write ", file));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err) {
+  const auto sweep = SweepRegularization(arguments);
+  if (!sweep.ok()) return Report(sweep.status(), arguments.place.server, err);
+  if (!arguments.plot_file.empty()) {
+    const absl::Status written = WritePlot(*sweep, arguments.plot_file);
+    if (!written.ok()) return Report(written, "", err);
+  }
+  if (arguments.format == Format::kJson) {
+    out << ToJson(*sweep, /*several_lines=*/true) << '\n';
+  } else if (arguments.format == Format::kCsv) {
+    PrintCsv(*sweep, out);
+  } else {
+    PrintTable(*sweep, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest

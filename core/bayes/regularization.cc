@@ -1,0 +1,154 @@
+#include "core/bayes/regularization.h"
+
+#include <absl/strings/str_format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "core/bayes/regularization_prior.h"
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+constexpr double kLowest = 1e-4, kHighest = 1e4;
+constexpr int kValues = 33;
+constexpr double kPrecision = 1e-4;  // of log α²
+// The evidence must fall by this much to either end of the range.
+constexpr double kLeastFall = 0.5;
+
+RegularizationChoice Undetermined(std::string reason) { return {false, 1, std::move(reason)}; }
+
+RegularizationChoice Determined(double regularization) { return {true, regularization, ""}; }
+
+// J of the data against what the noise allows, 2 J_mismatch − (N − γ).
+double Discrepancy(const RegularizedMinimum& minimum, double degrees) {
+  return 2 * minimum.cost.mismatch - (degrees - minimum.effective_parameters);
+}
+
+}  // namespace
+
+std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstVectorRef& eta) {
+  POLYEST_CHECK(cost.regularization() > 0);
+  const Prior& prior = cost.prior();
+  const double alpha_squared = cost.regularization();
+  const int n = cost.dimension();
+  Vector deviation(n);  // of the prior of weight α²
+  double log_normalization = 0;
+  for (int i = 0; i < n; ++i) {
+    const Germ& germ = prior.germs()[static_cast<size_t>(i)];
+    deviation[i] = std::sqrt(WeightedVariance(germ, alpha_squared));
+    log_normalization += LogNormalization(germ, alpha_squared);
+  }
+  const Matrix unscale = cost.region().axes().inverse() * deviation.asDiagonal();
+  const Matrix mismatch = unscale.transpose() * cost.MismatchHessian(eta) * unscale;
+  const Matrix total = unscale.transpose() * cost.Hessian(eta) * unscale;
+  RegularizedMinimum minimum;
+  minimum.regularization = alpha_squared;
+  minimum.point = eta;
+  minimum.cost = cost.Evaluate(eta);
+  if (!total.allFinite() || !std::isfinite(minimum.cost.total)) return std::nullopt;
+  using Solver = Eigen::SelfAdjointEigenSolver<Matrix>;
+  const Vector information = Solver(mismatch, Eigen::EigenvaluesOnly).eigenvalues().cwiseMax(0);
+  const Vector curvature = Solver(total, Eigen::EigenvaluesOnly).eigenvalues().cwiseMax(1);
+  // γ = Σ λ/(1 + λ)
+  minimum.effective_parameters = (information.array() / (1 + information.array())).sum();
+  // log p = −J − log Z + (n/2) log 2π − ½ log det H, H = D⁻¹ (curvature) D⁻¹
+  minimum.log_evidence = -minimum.cost.total - log_normalization +
+                         0.5 * n * std::log(2 * std::numbers::pi) -
+                         0.5 * curvature.array().log().sum() + deviation.array().log().sum();
+  return minimum;
+}
+
+std::vector<RegularizedMinimum> SweepRegularization(const Vector& values,
+                                                    const MinimumAt& minimum) {
+  std::vector<RegularizedMinimum> points;
+  for (Eigen::Index i = values.size() - 1; i >= 0; --i) {
+    if (auto point = minimum(values[i])) points.push_back(*std::move(point));
+  }
+  std::reverse(points.begin(), points.end());
+  return points;
+}
+
+Vector LogarithmicRange(double lowest, double highest, int count) {
+  POLYEST_CHECK(0 < lowest && lowest <= highest && count >= 1);
+  Vector values = Vector::LinSpaced(count, std::log10(lowest), std::log10(highest));
+  for (double& value : values) value = std::pow(10.0, value);
+  return values;
+}
+
+Vector RangeOfChoice() { return LogarithmicRange(kLowest, kHighest, kValues); }
+
+RegularizationChoice ChooseByDiscrepancy(const std::vector<RegularizedMinimum>& points,
+                                         const MinimumAt& minimum, double degrees) {
+  if (points.empty()) return Undetermined("the cost has no minimum to be trusted for any α²");
+  size_t last = points.size();  // the largest α² that the noise explains, and 1
+  while (last > 0 && Discrepancy(points[last - 1], degrees) > 0) --last;
+  if (last == 0) {
+    return Undetermined(absl::StrFormat(
+        "the mismatch is larger than the noise explains even with α² = %.3g (χ² = %.4g, %.4g "
+        "degrees of freedom)",
+        points.front().regularization, 2 * points.front().cost.mismatch,
+        degrees - points.front().effective_parameters));
+  }
+  if (last == points.size()) {
+    return Undetermined(
+        absl::StrFormat("the noise explains the mismatch up to α² = %.3g, the "
+                        "largest that could be tried",
+                        points.back().regularization));
+  }
+  double lower = std::log(points[last - 1].regularization);
+  double upper = std::log(points[last].regularization);
+  while (upper - lower > kPrecision) {
+    const double middle = 0.5 * (lower + upper);
+    const auto point = minimum(std::exp(middle));
+    (point && Discrepancy(*point, degrees) <= 0 ? lower : upper) = middle;
+  }
+  return Determined(std::exp(lower));
+}
+
+RegularizationChoice ChooseByEvidence(const std::vector<RegularizedMinimum>& points,
+                                      const MinimumAt& minimum) {
+  if (points.empty()) return Undetermined("the cost has no minimum to be trusted for any α²");
+  const auto less = [](const RegularizedMinimum& a, const RegularizedMinimum& b) {
+    return a.log_evidence < b.log_evidence;
+  };
+  const auto best = std::max_element(points.begin(), points.end(), less);
+  const double ends = std::max(points.front().log_evidence, points.back().log_evidence);
+  if (!(best->log_evidence - ends >= kLeastFall)) {
+    return Undetermined(absl::StrFormat(
+        "the data are about as probable with α² = %.3g as with any other (its log evidence is "
+        "%.3g below the greatest)",
+        (points.front().log_evidence > points.back().log_evidence ? points.front() : points.back())
+            .regularization,
+        best->log_evidence - ends));
+  }
+  // Golden section between the neighbours of the best value.
+  const auto evidence = [&](double tau) {
+    const auto point = minimum(std::exp(tau));
+    return point ? point->log_evidence : -std::numeric_limits<double>::infinity();
+  };
+  const double section = 1 / std::numbers::phi;
+  double lower = std::log(std::prev(best)->regularization);
+  double upper = std::log(std::next(best)->regularization);
+  double left = upper - section * (upper - lower), right = lower + section * (upper - lower);
+  double at_left = evidence(left), at_right = evidence(right);
+  while (upper - lower > kPrecision) {
+    if (at_left >= at_right) {
+      upper = std::exchange(right, left);
+      at_right = at_left;
+      at_left = evidence(left = upper - section * (upper - lower));
+    } else {
+      lower = std::exchange(left, right);
+      at_left = at_right;
+      at_right = evidence(right = lower + section * (upper - lower));
+    }
+  }
+  return Determined(std::exp(0.5 * (lower + upper)));
+}
+
+}  // namespace polyest

@@ -1,0 +1,87 @@
+#include "core/bayes/regularization_prior.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/chaos/beta_gamma.h"
+#include "core/chaos/truncated_normal.h"
+#include "core/common/check.h"
+
+namespace polyest {
+namespace {
+
+const double kLogTwoPi = std::log(2 * std::numbers::pi);
+
+// From here on the probability is found from Mills' ratio, since it may be too small a number.
+constexpr double kTail = 30;
+
+// M(x) = ∫_x^∞ φ ÷ φ(x) = 1/(x + 1/(x + 2/(x + 3/(x + …)))), to rounding for x ≥ kTail.
+double MillsRatio(double x) {
+  if (std::isinf(x)) return 0;
+  double denominator = x;
+  for (int k = 12; k >= 1; --k) denominator = x + k / denominator;
+  return 1 / denominator;
+}
+
+// log ∫_a^b φ, also where the integral itself is too small a number.
+double LogNormalProbability(double a, double b) {
+  if (b <= -kTail) return LogNormalProbability(-b, -a);
+  if (a < kTail) return std::log(NormalProbability(a, b));
+  // φ(a) (M(a) − e^{−(b² − a²)/2} M(b))
+  const double beyond = std::isinf(b) ? 0 : std::exp(-0.5 * (b - a) * (b + a)) * MillsRatio(b);
+  return -0.5 * (a * a + kLogTwoPi) + std::log(MillsRatio(a) - beyond);
+}
+
+// −log of the constant factor of the beta density on [−1, 1]: log (2^{a+b−1} B(a, b)).
+double LogBetaIntegral(double a, double b) {
+  return (a + b - 1) * std::numbers::ln2 + LogBeta(a, b);
+}
+
+}  // namespace
+
+double LogNormalization(const Germ& germ, double regularization) {
+  POLYEST_CHECK(regularization > 0);
+  const double r = regularization, a = germ.first_shape(), b = germ.second_shape();
+  switch (germ.family()) {
+    case GermFamily::kNormal:
+      return 0.5 * ((1 - r) * kLogTwoPi - std::log(r));
+    case GermFamily::kUniform:
+      return (1 - r) * std::numbers::ln2;
+    case GermFamily::kBeta:
+      return LogBetaIntegral(1 + r * (a - 1), 1 + r * (b - 1)) - r * LogBetaIntegral(a, b);
+    case GermFamily::kGamma: {
+      const double shape = 1 + r * (a - 1);
+      return LogGamma(shape) - shape * std::log(r) - r * LogGamma(a);
+    }
+    case GermFamily::kTruncatedNormal: {
+      const double root = std::sqrt(r);
+      return 0.5 * ((1 - r) * kLogTwoPi - std::log(r)) + LogNormalProbability(root * a, root * b) -
+             r * LogNormalProbability(a, b);
+    }
+  }
+  POLYEST_CHECK(false);
+}
+
+double WeightedVariance(const Germ& germ, double regularization) {
+  POLYEST_CHECK(regularization > 0);
+  const double r = regularization, a = germ.first_shape(), b = germ.second_shape();
+  const double width = germ.Upper() - germ.Lower();
+  switch (germ.family()) {
+    case GermFamily::kNormal:
+      return 1 / r;
+    case GermFamily::kUniform:
+      return 1.0 / 3;
+    case GermFamily::kBeta: {
+      const double deviation = Germ::Beta(1 + r * (a - 1), 1 + r * (b - 1)).StandardDeviation();
+      return deviation * deviation;
+    }
+    case GermFamily::kGamma:  // s'/α⁴
+      return (1 + r * (a - 1)) / (r * r);
+    case GermFamily::kTruncatedNormal:
+      return std::min(1 / r, width * width / 12);
+  }
+  POLYEST_CHECK(false);
+}
+
+}  // namespace polyest
