@@ -91,8 +91,8 @@ absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
 absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate());
-  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(RequestAssessment(), stop));
-  return SweepRegularization(problem_, *expansion_, assessed, options, stop);
+  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(component_->RequestAssessment(), stop));
+  return SweepRegularization(problem_, component_->expansion(), assessed, options, stop);
 }
 
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)
