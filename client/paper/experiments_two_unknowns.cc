@@ -93,10 +93,14 @@ absl::StatusOr<Experiment> Figure14() {
   for (double alpha_squared : {1e-4, 1.0, 10.0, 100.0, 1000.0}) {
     experiment.variants.push_back(FrequencyVariant(problem, kFrequencyNoise, alpha_squared));
   }
-  ExperimentVariant chosen = FrequencyVariant(problem, kFrequencyNoise, 1);
-  chosen.name = absl::StrCat("ρ = ", kFrequencyNoise, ", α² by L-curve");
-  chosen.problem.regularization_mode = RegularizationMode::kLCurve;
-  experiment.variants.push_back(std::move(chosen));
+  for (const auto& [rule, name] : {std::pair{RegularizationMode::kDiscrepancy, "discrepancy"},
+                                   {RegularizationMode::kEvidence, "evidence"},
+                                   {RegularizationMode::kLCurve, "L-curve"}}) {
+    ExperimentVariant chosen = FrequencyVariant(problem, kFrequencyNoise, 1);
+    chosen.name = absl::StrCat("ρ = ", kFrequencyNoise, ", α² by ", name);
+    chosen.problem.regularization_mode = rule;
+    experiment.variants.push_back(std::move(chosen));
+  }
   return experiment;
 }
 

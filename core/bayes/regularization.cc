@@ -34,15 +34,12 @@ double Discrepancy(const RegularizedMinimum& minimum, double degrees) {
 
 std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstVectorRef& eta) {
   POLYEST_CHECK(cost.regularization() > 0);
-  const Prior& prior = cost.prior();
   const double alpha_squared = cost.regularization();
+  const std::vector<Germ>& germs = cost.prior().germs();
   const int n = cost.dimension();
   Vector deviation(n);  // of the prior of weight α²
-  double log_normalization = 0;
   for (int i = 0; i < n; ++i) {
-    const Germ& germ = prior.germs()[static_cast<size_t>(i)];
-    deviation[i] = std::sqrt(WeightedVariance(germ, alpha_squared));
-    log_normalization += LogNormalization(germ, alpha_squared);
+    deviation[i] = std::sqrt(WeightedVariance(germs[static_cast<size_t>(i)], alpha_squared));
   }
   const Matrix unscale = cost.region().axes().inverse() * deviation.asDiagonal();
   const Matrix mismatch = unscale.transpose() * cost.MismatchHessian(eta) * unscale;
@@ -52,15 +49,24 @@ std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstV
   minimum.point = eta;
   minimum.cost = cost.Evaluate(eta);
   if (!total.allFinite() || !std::isfinite(minimum.cost.total)) return std::nullopt;
-  using Solver = Eigen::SelfAdjointEigenSolver<Matrix>;
-  const Vector information = Solver(mismatch, Eigen::EigenvaluesOnly).eigenvalues().cwiseMax(0);
-  const Vector curvature = Solver(total, Eigen::EigenvaluesOnly).eigenvalues().cwiseMax(1);
-  // γ = Σ λ/(1 + λ)
-  minimum.effective_parameters = (information.array() / (1 + information.array())).sum();
-  // log p = −J − log Z + (n/2) log 2π − ½ log det H, H = D⁻¹ (curvature) D⁻¹
-  minimum.log_evidence = -minimum.cost.total - log_normalization +
-                         0.5 * n * std::log(2 * std::numbers::pi) -
-                         0.5 * curvature.array().log().sum() + deviation.array().log().sum();
+  // γ_i = Σ_k V_ik² λ_k/(1 + λ_k)
+  const Eigen::SelfAdjointEigenSolver<Matrix> data(mismatch);
+  const Vector information = data.eigenvalues().cwiseMax(0);
+  const Vector fitted = data.eigenvectors().cwiseAbs2() *
+                        information.cwiseQuotient((information.array() + 1).matrix());
+  minimum.effective_parameters = fitted.sum();
+  minimum.log_evidence = -minimum.cost.total;
+  const Vector curvature = Eigen::SelfAdjointEigenSolver<Matrix>(total, Eigen::EigenvaluesOnly)
+                               .eigenvalues()
+                               .cwiseMax(1);
+  // log p = −J − log Z + (n/2) log 2π − ½ log det H,  H = D⁻¹ V diag(curvature) Vᵀ D⁻¹
+  for (int i = 0; i < n; ++i) {
+    const Germ& germ = germs[static_cast<size_t>(i)];
+    const double log_z = fitted[i] * LogNormalization(germ, alpha_squared) +
+                         (1 - fitted[i]) * LogLaplaceNormalization(germ, alpha_squared);
+    minimum.log_evidence += 0.5 * (std::log(2 * std::numbers::pi) - std::log(curvature[i])) +
+                            std::log(deviation[i]) - log_z;
+  }
   return minimum;
 }
 

@@ -20,6 +20,9 @@
 //                   log p = −J(ξ̂) − log Z + (n/2) log 2π − ½ log det H(ξ̂),
 //                 H the second derivative of J, in each direction at least the inverse of the
 //                 variance of the prior of weight α²: a flat direction is not wider than the prior.
+//                 Where a parameter i is left to the prior the approximation errs as it does of Z_i
+//                 itself: by the share 1 − γ_i of it that the data do not fit, log Z_i is taken by
+//                 the same approximation, so that data that say nothing prefer no α².
 //                 Exact for linear outputs and normal priors. An answer is a maximum inside of the
 //                 range from which log p falls by ½ to either end (one standard deviation of log
 //                 α²). Uniform priors have no weight: with no others the evidence is flat.

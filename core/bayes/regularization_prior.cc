@@ -84,4 +84,15 @@ double WeightedVariance(const Germ& germ, double regularization) {
   POLYEST_CHECK(false);
 }
 
+double LogLaplaceNormalization(const Germ& germ, double regularization) {
+  const double mode = germ.Mode();
+  const double variance = WeightedVariance(germ, regularization);
+  // 0/0 where a density that ends in a corner has its mode in it.
+  const double second = germ.LogDensitySecondDerivative(mode);
+  const double curvature = std::isfinite(second) ? -regularization * second : 0;
+  // ρ(mode)^{α²} √(2π ÷ curvature)
+  return regularization * germ.LogDensity(mode) +
+         0.5 * (kLogTwoPi - std::log(std::max(curvature, 1 / variance)));
+}
+
 }  // namespace polyest

@@ -25,4 +25,8 @@ double LogNormalization(const Germ& germ, double regularization);
 // the uniform's between its bounds. α² > 0.
 double WeightedVariance(const Germ& germ, double regularization);
 
+// log Z_i as Laplace's approximation about the germ's mode has it, with a curvature of at least the
+// inverse of WeightedVariance: exact for the normal one. α² > 0.
+double LogLaplaceNormalization(const Germ& germ, double regularization);
+
 }  // namespace polyest

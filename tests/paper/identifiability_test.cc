@@ -100,6 +100,24 @@ TEST(Figure14, NamesTheWeightThatTheLCurveChooses) {
   ExpectGerm(chosen, 0.0951, -0.4032);
 }
 
+TEST(Figure14, DiscrepancyAndEvidenceAskForTheWeightOfTheClosedForm) {
+  const ExperimentResult& result = Rerun("14");
+  const size_t count = result.variants.size();
+  for (const auto& [v, mode] : {std::pair{count - 3, RegularizationMode::kDiscrepancy},
+                                {count - 2, RegularizationMode::kEvidence}}) {
+    ASSERT_EQ(result.experiment.variants[v].problem.regularization_mode, mode);
+    // Of one datum z (in units of its noise, from the prior's mode) and the information λ both
+    // choose α² = λ/(z² − 1) where ω is linear; λ is 47.3 at the mode and 50 at the estimate.
+    const double z = (6.098601 - 2 * M_PI) / 0.0628;
+    const Estimate& estimate = result.variants[v].estimate;
+    EXPECT_NEAR(estimate.regularization, 48.7 / (z * z - 1), 0.5);
+    // Some 40 N/m towards the prior's 7895.68, to the curvature of √ over as much.
+    EXPECT_NEAR(estimate.parameters[1].bias,
+                estimate.parameters[1].map - 200 * 4 * M_PI * M_PI + 1052.8 * 0.4032, 1);
+    EXPECT_GT(estimate.parameters[1].bias, 30);
+  }
+}
+
 TEST(Section35, ThetaIsNotSeenInTheDifference) {
   const VariantResult& variant = Rerun("3.5").variants[0];
   const ParameterEstimate& theta = variant.estimate.parameters[0];

@@ -154,6 +154,45 @@ TEST(RegularizedMinimum, OfALinearProblemHasItsEvidenceAndEffectiveParameters) {
   }
 }
 
+// A cost of two parameters, of which data z = ξ_1 with unit noise ÷ s know the first.
+Cost FirstOfTwo(const UncertainParameter& second, double s, double z, double regularization) {
+  const Prior prior({Normal("a"), second});
+  const auto basis = std::make_shared<const Basis>(prior.germs(), 1);
+  Vector phi_0(3), phi(3);
+  basis->Evaluate(Vector::Zero(2), phi_0);
+  basis->Evaluate(Vector::Unit(2, 0), phi);
+  MismatchSums sums(3);
+  sums.Add(s * (phi - phi_0), s * z, 1);
+  return Cost(basis, Region::WholePrior(2), Vector::Zero(2), sums, prior, regularization);
+}
+
+TEST(RegularizedMinimum, HasNoEvidenceFromAParameterThatTheDataLeaveToThePrior) {
+  const double s = 10, z = 1.5;
+  for (const UncertainParameter& second :
+       {Normal("b"), UncertainParameter::Uniform("b", 0, 1).value(),
+        UncertainParameter::Beta("b", 2, 2, 0, 1).value(),
+        UncertainParameter::Gamma("b", 4, 1, 0).value(),
+        UncertainParameter::Gamma("b", 1, 1, 0).value(),
+        UncertainParameter::Beta("b", 3, 1, 0, 1).value(),
+        UncertainParameter::TruncatedNormal("b", 0, 1, -1, 3).value()}) {
+    const auto log_evidence = [&](double r) {
+      // Off the bounds, as a minimizer keeps.
+      const double mode =
+          std::clamp(second.germ.Mode(), second.germ.Lower() + 1e-9, second.germ.Upper() - 1e-9);
+      const Vector at = Eigen::Vector2d(s * s * z / (s * s + r), mode);
+      return DescribeMinimum(FirstOfTwo(second, s, z, r), at)->log_evidence;
+    };
+    const auto of_first = [&](double r) {
+      const double variance = 1 / (s * s) + 1 / r;
+      return -0.5 * (std::log(variance) + z * z / variance);
+    };
+    for (const double r : {0.01, 0.3, 20.0}) {
+      EXPECT_NEAR(log_evidence(r) - log_evidence(1), of_first(r) - of_first(1), 1e-5)
+          << static_cast<int>(second.germ.family()) << ", α² " << r;
+    }
+  }
+}
+
 TEST(Evidence, OfOneParameterIsGreatestWhereThePriorIsAsWideAsWhatIsSeen) {
   // N(z; 0, 1 + s²/α²) is greatest for z² = 1 + s²/α².
   const LinearProblem problem = Problem({10}, {30}, 5);
@@ -245,6 +284,34 @@ Cost OneParameter(const UncertainParameter& parameter, double z, double regulari
   MismatchSums sums(2);
   sums.Add(c, z, 0.01);
   return Cost(basis, Region::WholePrior(1), Vector::Zero(1), sums, prior, regularization);
+}
+
+// Against quadrature of ∫ e^{−J_mismatch} ρ^{α²} ÷ Z. Laplace's error is O(the posterior's variance
+// × the prior term's third and fourth derivatives): here 0.01 α².
+TEST(Evidence, OfASkewedPriorIsThatOfQuadrature) {
+  const auto log_evidence = [](const UncertainParameter& parameter, double z, double r) {
+    const Germ& germ = parameter.germ;
+    const double top = std::min(germ.Upper(), 200.0);
+    double sum = 0, weight = 0, best = 1e300, at = 0;
+    constexpr int kSteps = 200'000;
+    for (int i = 0; i < kSteps; ++i) {
+      const double xi = germ.Lower() + (top - germ.Lower()) * (i + 0.5) / kSteps;
+      const double prior = r * germ.LogDensity(xi), mismatch = 50 * (xi - z) * (xi - z);
+      weight += std::exp(prior);
+      sum += std::exp(prior - mismatch);
+      if (mismatch - prior < best) best = mismatch - prior, at = xi;
+    }
+    const auto minimum = DescribeMinimum(OneParameter(parameter, z, r), Vector::Constant(1, at));
+    return std::pair(minimum->log_evidence, std::log(sum / weight));
+  };
+  for (const UncertainParameter& parameter : {UncertainParameter::Beta("a", 2, 2, 0, 1).value(),
+                                              UncertainParameter::Gamma("a", 4, 1, 0).value()}) {
+    const double z = parameter.germ.Upper() == 1 ? 0.4 : 2;
+    for (const double r : {0.1, 1.0, 3.0}) {
+      const auto [laplace, exact] = log_evidence(parameter, z, r);
+      EXPECT_NEAR(laplace, exact, 0.01 * std::max(r, 1.0) + 0.02);
+    }
+  }
 }
 
 TEST(RegularizationBias, OfAUniformPriorIsNone) {
