@@ -30,6 +30,41 @@ double Discrepancy(const RegularizedMinimum& minimum, double degrees) {
   return 2 * minimum.cost.mismatch - (degrees - minimum.effective_parameters);
 }
 
+// Where a function of one maximum in [lower, upper] has it, by golden section.
+double Maximize(const std::function<double(double)>& function, double lower, double upper) {
+  const double section = 1 / std::numbers::phi;
+  double left = upper - section * (upper - lower), right = lower + section * (upper - lower);
+  double at_left = function(left), at_right = function(right);
+  while (upper - lower > kPrecision) {
+    if (at_left >= at_right) {
+      upper = std::exchange(right, left);
+      at_right = at_left;
+      at_left = function(left = upper - section * (upper - lower));
+    } else {
+      lower = std::exchange(left, right);
+      at_left = at_right;
+      at_right = function(right = lower + section * (upper - lower));
+    }
+  }
+  return 0.5 * (lower + upper);
+}
+
+// Laplace's log p(z | α²) but for −J: −log Z + (n/2) log 2π − ½ log det H, with H's eigenvalues in
+// units of the deviations of the prior of weight α², and the share of each parameter that the data
+// fit.
+double LogVolume(const Cost& cost, const Vector& deviation, const Vector& curvature,
+                 const Vector& fitted) {
+  double sum = 0;
+  for (int i = 0; i < cost.dimension(); ++i) {
+    const Germ& germ = cost.prior().germs()[static_cast<size_t>(i)];
+    const double log_z = fitted[i] * LogNormalization(germ, cost.regularization()) +
+                         (1 - fitted[i]) * LogLaplaceNormalization(germ, cost.regularization());
+    sum += 0.5 * (std::log(2 * std::numbers::pi) - std::log(curvature[i])) +
+           std::log(deviation[i]) - log_z;
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstVectorRef& eta) {
@@ -55,18 +90,10 @@ std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstV
   const Vector fitted = data.eigenvectors().cwiseAbs2() *
                         information.cwiseQuotient((information.array() + 1).matrix());
   minimum.effective_parameters = fitted.sum();
-  minimum.log_evidence = -minimum.cost.total;
   const Vector curvature = Eigen::SelfAdjointEigenSolver<Matrix>(total, Eigen::EigenvaluesOnly)
                                .eigenvalues()
                                .cwiseMax(1);
-  // log p = −J − log Z + (n/2) log 2π − ½ log det H,  H = D⁻¹ V diag(curvature) Vᵀ D⁻¹
-  for (int i = 0; i < n; ++i) {
-    const Germ& germ = germs[static_cast<size_t>(i)];
-    const double log_z = fitted[i] * LogNormalization(germ, alpha_squared) +
-                         (1 - fitted[i]) * LogLaplaceNormalization(germ, alpha_squared);
-    minimum.log_evidence += 0.5 * (std::log(2 * std::numbers::pi) - std::log(curvature[i])) +
-                            std::log(deviation[i]) - log_z;
-  }
+  minimum.log_evidence = -minimum.cost.total + LogVolume(cost, deviation, curvature, fitted);
   return minimum;
 }
 
@@ -133,28 +160,12 @@ RegularizationChoice ChooseByEvidence(const std::vector<RegularizedMinimum>& poi
             .regularization,
         best->log_evidence - ends));
   }
-  // Golden section between the neighbours of the best value.
   const auto evidence = [&](double tau) {
     const auto point = minimum(std::exp(tau));
     return point ? point->log_evidence : -std::numeric_limits<double>::infinity();
   };
-  const double section = 1 / std::numbers::phi;
-  double lower = std::log(std::prev(best)->regularization);
-  double upper = std::log(std::next(best)->regularization);
-  double left = upper - section * (upper - lower), right = lower + section * (upper - lower);
-  double at_left = evidence(left), at_right = evidence(right);
-  while (upper - lower > kPrecision) {
-    if (at_left >= at_right) {
-      upper = std::exchange(right, left);
-      at_right = at_left;
-      at_left = evidence(left = upper - section * (upper - lower));
-    } else {
-      lower = std::exchange(left, right);
-      at_left = at_right;
-      at_right = evidence(right = lower + section * (upper - lower));
-    }
-  }
-  return Determined(std::exp(0.5 * (lower + upper)));
+  return Determined(std::exp(Maximize(evidence, std::log(std::prev(best)->regularization),
+                                      std::log(std::next(best)->regularization))));
 }
 
 }  // namespace polyest

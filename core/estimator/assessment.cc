@@ -57,6 +57,7 @@ class Assessment {
     spent_ = fitted_ + 2;
     DescribeParameters(cost, eta);
     DescribeBias(cost, eta, stop);
+    POLYEST_RETURN_IF_ERROR(stop.Check());
     DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
     return Assessed{std::move(estimate_), std::move(posterior_)};

@@ -31,6 +31,7 @@ class Minima {
   }
 
   std::optional<RegularizedMinimum> At(double regularization) {
+    if (!stop_.Check().ok()) return std::nullopt;  // and the caller will see to it
     const Cost cost = expansion_.MakeCost(regularization);
     const MinimizationProblem search = SearchOf(cost, expansion_.design());
     const Minimum best = FindMinima(search, starts_, MinimizerOptions(), stop_).front();

@@ -127,6 +127,17 @@ TEST(RegularizationSweep, KnowsNoDiscrepancyWithANoiseOfUnknownSize) {
   EXPECT_EQ(sweep.discrepancy.reason, "the noise of output y is of unknown size");
 }
 
+TEST(RegularizationSweep, StopsWhenAsked) {
+  Problem problem = Fixed(TextProblem("a", {Normal("a")}, 0.1));
+  problem.regularization_mode = RegularizationMode::kEvidence;
+  const auto estimator = Processed(problem, {1});
+  std::stop_source source;
+  source.request_stop();
+  const Stop stop(source.get_token());
+  EXPECT_TRUE(absl::IsCancelled(estimator->CurrentRegularizationSweep({}, stop).status()));
+  EXPECT_TRUE(absl::IsCancelled(estimator->CurrentEstimate(stop).status()));
+}
+
 TEST(RegularizationOptions, NameFieldValueAndRule) {
   RegularizationOptions options;
   EXPECT_TRUE(options.Validate().ok());
