@@ -4,7 +4,6 @@
 #include <map>
 #include <utility>
 
-#include "core/chaos/multi_index.h"
 #include "core/common/check.h"
 
 namespace polyest {
@@ -15,14 +14,16 @@ constexpr Eigen::Index kPointsAtATime = 128;
 
 }  // namespace
 
-Basis::Basis(std::vector<Germ> germs, int order) : germs_(std::move(germs)), order_(order) {
-  POLYEST_CHECK(!germs_.empty() && order_ >= 0);
+Basis::Basis(std::vector<Germ> germs, Truncation truncation)
+    : germs_(std::move(germs)), truncation_(truncation) {
+  POLYEST_CHECK(!germs_.empty());
   const int n = dimension();
-  indices_ = TotalDegreeIndices(n, order_);
-  a_.resize(order_ + 1, n);
-  sqrt_b_.resize(order_ + 1, n);
+  indices_ = MultiIndices(n, truncation_);
+  a_.resize(order() + 1, n);
+  sqrt_b_.resize(order() + 1, n);
   for (int k = 0; k < n; ++k) {
-    const RecurrenceCoefficients recurrence = germs_[static_cast<size_t>(k)].Recurrence(order_ + 1);
+    const RecurrenceCoefficients recurrence =
+        germs_[static_cast<size_t>(k)].Recurrence(order() + 1);
     a_.col(k) = recurrence.a;
     sqrt_b_.col(k) = recurrence.b.cwiseSqrt();
   }

@@ -1,6 +1,7 @@
 #pragma once
 
-// The orthonormal polynomial basis (2) of total degree p in n independent germs,
+// The orthonormal polynomial basis (2) in n independent germs, of total degree p or of less by a
+// hyperbolic truncation (multi_index.h),
 //   φ_s(ξ) = Π_k P^(k)_{j_sk}(ξ_k),   ∫ φ_s φ_r ρ dξ = δ_sr,   φ_0 = 1.
 //
 // The orthonormal polynomials of one germ follow from its monic recurrence, a_j and b_j, by
@@ -10,20 +11,25 @@
 //   φ_s = φ_parent(s) · P^(k)_{j_sk}(ξ_k),   parent(s) = s without its variable k,
 // so that all S values cost one multiplication each and need no memory beside the result.
 
+#include <utility>
 #include <vector>
 
 #include "core/chaos/germ.h"
+#include "core/chaos/multi_index.h"
 #include "core/common/types.h"
 
 namespace polyest {
 
 class Basis {
  public:
-  // order ≥ 0; germs not empty.
-  Basis(std::vector<Germ> germs, int order);
+  // germs not empty.
+  Basis(std::vector<Germ> germs, Truncation truncation);
+  // Of total degree `order` ≥ 0.
+  Basis(std::vector<Germ> germs, int order) : Basis(std::move(germs), Truncation{order, 1}) {}
 
   int dimension() const { return static_cast<int>(germs_.size()); }
-  int order() const { return order_; }
+  int order() const { return truncation_.order; }
+  const Truncation& truncation() const { return truncation_; }
   int size() const { return static_cast<int>(indices_.rows()); }
   const std::vector<Germ>& germs() const { return germs_; }
   const Eigen::ArrayXXi& indices() const { return indices_; }
@@ -52,7 +58,7 @@ class Basis {
   void FindTerms();
 
   std::vector<Germ> germs_;
-  int order_;
+  Truncation truncation_;
   Eigen::ArrayXXi indices_;
   std::vector<Term> terms_;  // of terms 1 … S − 1
   Matrix a_;                 // a_j of germ k, (p + 1) × n

@@ -1,12 +1,57 @@
 #include "core/chaos/multi_index.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 #include "core/common/check.h"
 
 namespace polyest {
+namespace {
+
+// The set's members in descending lexicographic order.
+class HyperbolicSet {
+ public:
+  HyperbolicSet(int dimension, const Truncation& truncation)
+      : exponent_(truncation.exponent), index_(Eigen::ArrayXi::Zero(dimension)) {
+    POLYEST_CHECK(dimension >= 1 && truncation.order >= 0);
+    POLYEST_CHECK(exponent_ > 0 && exponent_ <= 1);
+    for (int degree = 0; degree <= truncation.order; ++degree) {
+      powers_.push_back(std::pow(degree, exponent_));
+    }
+  }
+
+  // Calls visit(member) until it returns false.
+  template <typename Visitor>
+  bool Visit(const Visitor& visit) {
+    return VisitFrom(0, powers_.back(), visit);
+  }
+
+ private:
+  static constexpr double kRounding = 1e-9;
+
+  // Variables from k on share what is left of p^q.
+  template <typename Visitor>
+  bool VisitFrom(Eigen::Index k, double left, const Visitor& visit) {
+    if (k == index_.size()) return visit(index_);
+    auto degree = static_cast<int>(std::ssize(powers_)) - 1;
+    for (; degree >= 0; --degree) {
+      const double power = powers_[static_cast<size_t>(degree)];
+      if (power > left + kRounding) continue;
+      index_[k] = degree;
+      if (!VisitFrom(k + 1, left - power, visit)) return false;
+    }
+    return true;
+  }
+
+  double exponent_;
+  Eigen::ArrayXi index_;
+  std::vector<double> powers_;  // j^q
+};
+
+}  // namespace
 
 int64_t TotalDegreeTermCount(int dimension, int order) {
   POLYEST_CHECK(dimension >= 0 && order >= 0);
@@ -25,31 +70,28 @@ int64_t TotalDegreeTermCount(int dimension, int order) {
   return count;
 }
 
-Eigen::ArrayXXi TotalDegreeIndices(int dimension, int order) {
-  POLYEST_CHECK(dimension >= 1);
-  const int64_t count = TotalDegreeTermCount(dimension, order);
-  POLYEST_CHECK(count <= std::numeric_limits<int>::max() / dimension);
-  Eigen::ArrayXXi indices(count, dimension);
-  Eigen::ArrayXi current = Eigen::ArrayXi::Zero(dimension);
-  Eigen::Index row = 0;
-  const int last = dimension - 1;
-  for (int degree = 0; degree <= order; ++degree) {
-    current.setZero();
-    current[0] = degree;
-    indices.row(row++) = current;
-    // Next in descending lexicographic order: one unit moves right from the last nonzero variable
-    // before the final one, and all of the final one's units follow it.
-    while (current[last] < degree) {
-      int k = last - 1;
-      while (current[k] == 0) --k;
-      const int moved = current[last] + 1;
-      current[last] = 0;
-      --current[k];
-      current[k + 1] = moved;
-      indices.row(row++) = current;
-    }
+int64_t TermCount(int dimension, const Truncation& truncation, int64_t most) {
+  if (truncation.exponent == 1) {
+    return std::min(TotalDegreeTermCount(dimension, truncation.order), most + 1);
   }
-  POLYEST_CHECK(row == indices.rows());
+  int64_t count = 0;
+  HyperbolicSet(dimension, truncation).Visit([&](const Eigen::ArrayXi&) {
+    return ++count <= most;
+  });
+  return count;
+}
+
+Eigen::ArrayXXi MultiIndices(int dimension, const Truncation& truncation) {
+  std::vector<Eigen::ArrayXi> members;
+  HyperbolicSet(dimension, truncation).Visit([&](const Eigen::ArrayXi& index) {
+    members.push_back(index);
+    return true;
+  });
+  std::ranges::stable_sort(members, {}, [](const Eigen::ArrayXi& index) { return index.sum(); });
+  Eigen::ArrayXXi indices(std::ssize(members), dimension);
+  for (size_t s = 0; s < members.size(); ++s) {
+    indices.row(static_cast<Eigen::Index>(s)) = members[s].transpose();
+  }
   return indices;
 }
 

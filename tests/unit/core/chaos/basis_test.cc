@@ -51,6 +51,26 @@ TEST(Basis, TermsAreProductsOfOneDimensionalPolynomials) {
   }
 }
 
+TEST(Basis, AHyperbolicBasisHasTheSameTermsWhereItHasThem) {
+  const Basis whole(FourFamilies(), 5);
+  const Basis hyperbolic(FourFamilies(), Truncation{5, 0.6});
+  const Vector xi = InsideAllSupports();
+  const Vector all = Values(whole, xi), some = Values(hyperbolic, xi);
+  Matrix all_slopes(whole.size(), 4), some_slopes(hyperbolic.size(), 4);
+  Vector phi(whole.size()), fewer(hyperbolic.size());
+  whole.EvaluateWithGradient(xi, phi, all_slopes);
+  hyperbolic.EvaluateWithGradient(xi, fewer, some_slopes);
+  ASSERT_LT(hyperbolic.size(), whole.size());
+  int s = 0;
+  for (int r = 0; r < whole.size() && s < hyperbolic.size(); ++r) {
+    if ((whole.indices().row(r) != hyperbolic.indices().row(s)).any()) continue;
+    EXPECT_EQ(some[s], all[r]) << r;
+    EXPECT_EQ(some_slopes.row(s), all_slopes.row(r)) << r;
+    ++s;
+  }
+  EXPECT_EQ(s, hyperbolic.size());
+}
+
 TEST(Basis, IsOrthonormalUnderGaussQuadrature) {
   const std::vector<Germ> germs = {Germ::Normal(), Germ::Beta(2, 2), Germ::Gamma(3)};
   const Basis basis(germs, 3);
