@@ -55,15 +55,16 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   const int n = problem.dimension();
   ExpansionDesign design;
   design.region = Region::WholePrior(n);
-  design.basis = std::make_shared<Basis>(prior.germs(), options.order);
+  design.basis = std::make_shared<Basis>(prior.germs(), FirstTruncation(options, n));
+  const int order = design.basis->order();
   const int count = PointCount(problem, *design.basis);
   POLYEST_ASSIGN_OR_RETURN(design.points,
-                           CollocationPoints(options.points, prior.germs(), options.order, count,
+                           CollocationPoints(options.points, prior.germs(), order, count,
                                              static_cast<int>(kMostPoints)));
   // Points of the same sequence after the collocation points: draws of the prior.
   POLYEST_ASSIGN_OR_RETURN(
       const Matrix sequence,
-      CollocationPoints(PointSet::kHalton, prior.germs(), options.order, count + CheckCount(n),
+      CollocationPoints(PointSet::kHalton, prior.germs(), order, count + CheckCount(n),
                         2 * static_cast<int>(kMostPoints)));
   design.check_points = sequence.bottomRows(CheckCount(n));
   design.check_costs.resize(design.check_points.rows());
@@ -82,13 +83,13 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   return design;
 }
 
-ExpansionDesign DesignForRegion(const ResolvedProblem& problem, Region region,
-                                const Vector& inside) {
+ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
+                                Region region, const Vector& inside) {
   const ExpansionOptions& options = problem.problem().expansion;
   const int n = problem.dimension();
   ExpansionDesign design;
   design.basis = std::make_shared<Basis>(std::vector<Germ>(static_cast<size_t>(n), Germ::Uniform()),
-                                         options.order);
+                                         truncation);
   const PointSet set = options.points == PointSet::kHammersley ? options.points : PointSet::kHalton;
   design.points = 2 * UnitCubePoints(set, n, PointCount(problem, *design.basis)).array() - 1;
   for (Eigen::Index q = 0; q < design.points.rows(); ++q) {

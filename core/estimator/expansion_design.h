@@ -40,8 +40,8 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 
 // An expansion over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are drawn towards
 // `inside` (a point of Ω in germ coordinates) until they lie in it.
-ExpansionDesign DesignForRegion(const ResolvedProblem& problem, Region region,
-                                const Vector& inside);
+ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
+                                Region region, const Vector& inside);
 
 // The box that holds the particles (germ coordinates, W × n) along their principal axes, widened
 // by a margin of about a third.

@@ -113,10 +113,11 @@ absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const Resol
   POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
   const ExpansionOptions& design = problem.problem().expansion;
   const std::vector<Germ>& germs = problem.prior().germs();
-  auto basis = std::make_shared<const Basis>(germs, design.order);
+  auto basis = std::make_shared<const Basis>(
+      germs, FirstTruncation(design, problem.dimension()));
   const int count = static_cast<int>(std::ceil(design.points_per_term * basis->size()));
   POLYEST_ASSIGN_OR_RETURN(Matrix points,
-                           CollocationPoints(design.points, germs, design.order, count));
+                           CollocationPoints(design.points, germs, basis->order(), count));
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix, CollocationMatrix::Factor(*basis, points));
   return std::unique_ptr<PriorExpansion>(new PriorExpansion(problem, std::move(outputs),
                                                             std::move(basis), std::move(points),

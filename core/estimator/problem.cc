@@ -25,23 +25,34 @@ absl::Status UnknownName(std::string_view field, std::string_view name, std::str
                                                     known.empty() ? "none" : known));
 }
 
+constexpr int kFirstOrder = 3;
+constexpr int kLastOrder = 9;
+constexpr int64_t kAffordableTerms = 500;
+// An expansion that may yet grow should begin well below what is affordable.
+constexpr int64_t kAffordableAtFirst = 250;
+
 absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
-  if (options.order < 1) {
+  if (options.order && *options.order < 1) {
     return absl::InvalidArgumentError(
-        absl::StrFormat("expansion.order: %d must be at least 1", options.order));
+        absl::StrFormat("expansion.order: %d must be at least 1", *options.order));
+  }
+  if (!(options.hyperbolic_exponent > 0 && options.hyperbolic_exponent <= 1)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "expansion.hyperbolicExponent: %g must be in (0, 1]", options.hyperbolic_exponent));
   }
   if (!std::isfinite(options.points_per_term) || options.points_per_term < 1) {
     return absl::InvalidArgumentError(
         absl::StrFormat("expansion.pointsPerTerm: %g must be at least 1", options.points_per_term));
   }
-  const int64_t terms = TotalDegreeTermCount(dimension, options.order);
+  const Truncation truncation = FirstTruncation(options, dimension);
+  const int64_t terms = TermCount(dimension, truncation, kMostTerms);
   if (terms > kMostTerms) {
     return absl::ResourceExhaustedError(absl::StrFormat(
-        "expansion.order: order %d of %d uncertain parameters needs %d terms; the limit is %d",
-        options.order, dimension, terms, kMostTerms));
+        "expansion.order: order %d of %d uncertain parameters needs more than %d terms, the limit",
+        truncation.order, dimension, kMostTerms));
   }
   const double points = options.points == PointSet::kGaussTensor
-                            ? std::pow(options.order + 1, dimension)
+                            ? std::pow(truncation.order + 1, dimension)
                             : std::ceil(options.points_per_term * static_cast<double>(terms));
   if (points > static_cast<double>(kMostPoints)) {
     return absl::ResourceExhaustedError(absl::StrFormat(
@@ -62,10 +73,10 @@ absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
 absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) {
   for (int i = 0; i < prior.dimension(); ++i) {
     if (prior.germs()[static_cast<size_t>(i)].family() != GermFamily::kTruncatedNormal) continue;
-    if (options.order <= Germ::kMostTruncatedNormalOrder) return absl::OkStatus();
+    const int order = FirstTruncation(options, prior.dimension()).order;
+    if (order <= Germ::kMostTruncatedNormalOrder) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrFormat(
-        "expansion.order: %d must be at most %d with the truncated normal prior of %s",
-        options.order, Germ::kMostTruncatedNormalOrder,
+        "expansion.order: %d must be at most %d with the truncated normal prior of %s", order, Germ::kMostTruncatedNormalOrder,
         prior.parameters()[static_cast<size_t>(i)].name));
   }
   return absl::OkStatus();
@@ -133,6 +144,24 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
 }
 
 }  // namespace
+
+Truncation FirstTruncation(const ExpansionOptions& options, int dimension) {
+  if (options.order) return {*options.order, options.hyperbolic_exponent};
+  Truncation truncation{kFirstOrder, options.hyperbolic_exponent};
+  while (truncation.order > 1 &&
+         TermCount(dimension, truncation, kAffordableAtFirst) > kAffordableAtFirst) {
+    --truncation.order;
+  }
+  return truncation;
+}
+
+std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
+                                         const Truncation& present) {
+  const Truncation next{present.order + 1, present.exponent};
+  if (options.order || next.order > kLastOrder) return std::nullopt;
+  if (TermCount(dimension, next, kAffordableTerms) > kAffordableTerms) return std::nullopt;
+  return next;
+}
 
 // Finds every name of a problem in its model, and collects what is wrong.
 class ResolvedProblem::Resolver {

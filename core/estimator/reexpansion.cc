@@ -32,14 +32,17 @@ class Settler {
           LeaningAxes(design, request_.problem->prior(), particles_.etas);
       if (!leaning.empty()) {
         POLYEST_ASSIGN_OR_RETURN(const bool moved,
-                                 Move(WidenedRegion(design, particles_.etas, leaning)));
+                                 Move(WidenedRegion(design, particles_.etas, leaning), present()));
         if (!moved) break;
         continue;
       }
       if (!may_move) break;
       const Region region = RegionOfParticles(result_.particles);
-      if (region.Volume() >= kPays * TrustedRegion(design).Volume()) break;
-      POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region));
+      if (region.Volume() >= kPays * TrustedRegion(design).Volume()) {
+        if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(region));
+        break;
+      }
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, OneOrderLess()));
       if (!moved) break;
       may_move = false;
     }
@@ -49,6 +52,21 @@ class Settler {
  private:
   const RegionalExpansion& expansion() const {
     return result_.expansion ? *result_.expansion : present_;
+  }
+
+  const ExpansionOptions& options() const { return request_.problem->problem().expansion; }
+  const Truncation& present() const { return expansion().design().basis->truncation(); }
+
+  Truncation OneOrderLess() const {
+    Truncation truncation = FirstTruncation(options(), request_.problem->dimension());
+    truncation.order = std::max(truncation.order, present().order - 1);
+    return truncation;
+  }
+
+  absl::Status RaiseOrder(const Region& region) {
+    if (!request_.may_raise_order) return absl::OkStatus();
+    const auto next = NextTruncation(options(), request_.problem->dimension(), present());
+    return next ? Move(region, *next).status() : absl::OkStatus();
   }
 
   // False when the sampler finds nowhere to start.
@@ -69,9 +87,9 @@ class Settler {
   }
 
   // False when the expansion there cannot be built; the present one then stays.
-  absl::StatusOr<bool> Move(Region region) {
+  absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
     const Vector inside = result_.particles.colwise().mean().transpose();
-    ExpansionDesign design = DesignForRegion(*request_.problem, std::move(region), inside);
+    ExpansionDesign design = DesignForRegion(*request_.problem, truncation, std::move(region), inside);
     const Eigen::Index checks =
         std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));

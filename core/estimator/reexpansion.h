@@ -6,7 +6,8 @@
 // One settlement: sample the posterior on the present expansion; where the particles lean on an
 // edge of the region that is not Ω's, widen that axis and propagate the record again; where the
 // region of the particles is less than half of the present one, move there and propagate again;
-// repeat until neither is needed. The region comes from particles and never from a minimum and its
+// repeat until neither is needed. Where nothing is gained by moving, an expansion of automatic order
+// stays and gets one order more; with every move it gives one back. The region comes from particles and never from a minimum and its
 // Hessian: in a direction not yet informed the minimum sits anywhere.
 
 #include <absl/status/statusor.h>
@@ -24,6 +25,7 @@ struct SettleRequest {
   Matrix guesses;    // particles of the settlement before, germ coordinates (may be none)
   uint64_t seed = 1;
   int threads = 1;
+  bool may_raise_order = true;  // where the order is automatic
 };
 
 struct Settlement {
