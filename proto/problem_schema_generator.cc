@@ -27,6 +27,7 @@ namespace {
 
 using google::protobuf::Descriptor;
 using google::protobuf::EnumDescriptor;
+using google::protobuf::EnumValueDescriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::OneofDescriptor;
 using google::protobuf::Struct;
@@ -183,9 +184,18 @@ class Generator {
     }
   }
 
-  // Without its zero, which stands for a field that is left out.
+  // Without its zero, which stands for a field that is left out. One that has a name for its zero
+  // is of numbers, of which only some have names.
   static void AddEnumeration(const EnumDescriptor& enumeration, Struct& schema) {
     Describe(enumeration, schema);
+    const EnumValueDescriptor& zero = *enumeration.FindValueByNumber(0);
+    if (!zero.name().ends_with("_UNSPECIFIED")) {
+      SetText(AddObject(schema, "anyOf"), "type", "integer");
+      for (int i = 0; i < enumeration.value_count(); ++i) {
+        SetText(AddObject(schema, "anyOf"), "const", enumeration.value(i)->name());
+      }
+      return;
+    }
     for (int i = 0; i < enumeration.value_count(); ++i) {
       if (enumeration.value(i)->number() == 0) continue;
       AddText(schema, "enum", enumeration.value(i)->name());

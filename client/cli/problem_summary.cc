@@ -162,8 +162,10 @@ absl::Status PrintProblem(const v1::Problem& problem, const ResolvedProblem& res
   std::vector<std::pair<std::string, std::string>> rows;
   for (int i = 0; i < problem.uncertain_size(); ++i) {
     const auto& parameter = problem.uncertain(i);
-    rows.emplace_back(parameter.name(),
-                      DescribePrior(parameter, resolved.units()[static_cast<size_t>(i)]));
+    rows.emplace_back(
+        parameter.name(),
+        absl::StrCat(DescribePrior(parameter, resolved.units()[static_cast<size_t>(i)]),
+                     parameter.per_run() ? ", each run its own" : ""));
   }
   AddRows(table, "unknowns", rows);
   rows.clear();
@@ -188,7 +190,9 @@ absl::Status PrintProblem(const v1::Problem& problem, const ResolvedProblem& res
   }
   AddRows(table, "measured", rows);
   const ExpansionOptions& expansion = resolved.problem().expansion;
-  table.AddRow({"expansion", absl::StrCat("order ", expansion.order),
+  const bool may_rise = expansion.adaptive && !expansion.order;
+  table.AddRow({"expansion",
+                absl::StrCat("order ", design.basis->order(), may_rise ? " at first" : ""),
                 absl::StrFormat("%d terms, %d collocation points, %s", design.basis->size(),
                                 design.points.rows(), expansion.adaptive ? "adaptive" : "fixed")});
   table.Print(out);

@@ -140,7 +140,7 @@ std::string StartingProblem(const ModelDescription& model, const char* source) {
   const auto input = [&index](const Quantity& quantity) { return Input(quantity, index++); };
   add("inputs", "[", Each(model.inputs, input), "]");
   add("measured", "[", Each(model.outputs, Measured), "]");
-  members.emplace_back(R"("expansion": {"order": 3, "pointsPerTerm": 2})");
+  members.emplace_back(R"("expansion": {"order": "AUTO", "pointsPerTerm": 2})");
   return absl::StrCat("{\n  ", absl::StrJoin(members, ",\n  "), "\n}\n");
 }
 
@@ -175,7 +175,7 @@ const char kStartingEquations[] = R"({
   "measured": [
     {"output": "x", "noise": {"absolute": 0.001}}
   ],
-  "expansion": {"order": 3, "pointsPerTerm": 2}
+  "expansion": {"order": "AUTO", "pointsPerTerm": 2}
 }
 )";
 

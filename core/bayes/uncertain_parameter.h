@@ -26,6 +26,7 @@ struct UncertainParameter {
   double location = 0;  // θ, or log θ, at ξ = 0
   double scale = 1;     // dθ/dξ, or d log θ/dξ, > 0
   ParameterMap map = ParameterMap::kAffine;
+  bool per_run = false;  // each run of the record has a value of its own, all with this prior
 
   // INVALID_ARGUMENT names the parameter, the value and the rule.
   static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);

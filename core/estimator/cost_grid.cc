@@ -155,8 +155,9 @@ class ModelMismatch {
       }
     }
     for (const int input : problem_.streamed_inputs()) inputs[static_cast<size_t>(input)].Finish();
-    EnsemblePropagator ensemble(problem_.MakeEnsemble(thetas, problem_.outputs(), threads_),
-                                &inputs);
+    EnsemblePropagator ensemble(
+        problem_.MakeEnsemble(thetas, problem_.outputs(), threads_, record_.rows[first].run),
+        &inputs);
     std::vector<ChannelNoise> noise = NoiseToBeginWith(problem_.problem()).channels;
     for (ChannelNoise& channel : noise) channel.scale = 1;
     Whitening whitening(noise, thetas.rows());
@@ -261,10 +262,14 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
     return absl::InvalidArgumentError(
         absl::StrFormat("threads: %d must be at least 1", options.threads));
   }
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
+  if (problem.per_run() && record.after.run >= problem.runs()) {
+    POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem.WithRuns(record.after.run + 1));
+    return EvaluateCostGrid(grown, samples, options, stop);
+  }
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> axes, ChooseAxes(prior, options));
   POLYEST_ASSIGN_OR_RETURN(const Eigen::Index points, ChoosePoints(options, axes.size()));
   POLYEST_ASSIGN_OR_RETURN(const Vector held, HeldScores(prior, options, axes));
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
 
   CostGrid grid;
   const Eigen::Index second = axes.size() == 2 ? points : 1;

@@ -222,6 +222,12 @@ void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   }
 }
 
+std::string_view RemedyForInaccuracy(const ExpansionOptions& expansion) {
+  if (!expansion.adaptive) return "raise expansion.order or let it be adaptive";
+  if (expansion.order) return "raise expansion.order or leave it to \"AUTO\"";
+  return "narrower priors or more informative data would let the expansion hold";
+}
+
 void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (findings.regularization_not_determined.empty()) return;
   diagnostics.push_back(
@@ -241,9 +247,9 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
          absl::StrFormat(
              "the expansion of order %d differs from the model by %.3g times the noise; "
              "estimates may be off by %.3g standard deviations of the fit, by which the "
-             "uncertainty has been widened; raise expansion.order%s",
+             "uncertainty has been widened; %s",
              estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
-             findings.problem->problem().expansion.adaptive ? "" : " or let it be adaptive")});
+             RemedyForInaccuracy(findings.problem->problem().expansion))});
   }
   AddMisfit(findings, estimate, diagnostics);
   AddCorrelation(findings, estimate, diagnostics);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <limits>
 
 #include "core/common/check.h"
@@ -37,17 +38,23 @@ void TakeNoise(const Estimate& estimate, std::vector<MeasuredOutput>& measured) 
 
 absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& problem,
                                                     const Estimate& estimate) {
-  const int n = problem.dimension();
-  POLYEST_CHECK(estimate.covariance.rows() == n);
+  const auto n = static_cast<int>(problem.problem().uncertain.size());
+  POLYEST_CHECK(estimate.covariance.rows() >= n);  // those of the first run come first
   const Vector std_dev = estimate.covariance.diagonal().cwiseSqrt();
   Problem next = problem.problem();
-  next.correlations.clear();
+  std::erase_if(next.correlations, [&](const Correlation& correlation) {
+    return std::ranges::any_of(next.uncertain, [&](const UncertainParameter& parameter) {
+      return parameter.name == correlation.first && !parameter.per_run;
+    });
+  });
   for (int i = 0; i < n; ++i) {
     const auto index = static_cast<size_t>(i);
+    if (next.uncertain[index].per_run) continue;  // the next run has its own
     POLYEST_ASSIGN_OR_RETURN(
         next.uncertain[index],
         PriorAfter(next.uncertain[index], estimate.parameters[index], std_dev[i]));
     for (int j = 0; j < i; ++j) {
+      if (next.uncertain[static_cast<size_t>(j)].per_run) continue;
       const double correlation = estimate.covariance(i, j) / (std_dev[i] * std_dev[j]);
       if (correlation == 0) continue;
       next.correlations.push_back({next.uncertain[static_cast<size_t>(j)].name,

@@ -55,6 +55,9 @@ class Estimator::Implementation {
 absl::Status Estimator::Implementation::Append(const Samples& samples) {
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
   POLYEST_RETURN_IF_ERROR(store_->Append(checked));
+  if (problem_.per_run() && checked.after.run >= problem_.runs()) {
+    POLYEST_ASSIGN_OR_RETURN(problem_, problem_.WithRuns(checked.after.run + 1));
+  }
   checks_.Accept(checked);
   return absl::OkStatus();
 }

@@ -31,6 +31,7 @@ class Estimator {
                                                          EstimatorOptions options = {});
   ~Estimator();
 
+  // For the runs appended.
   const ResolvedProblem& problem() const;
 
   // Checks the whole of `samples` and stores all of it or, when anything is wrong, nothing.

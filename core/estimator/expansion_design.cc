@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
@@ -19,8 +20,6 @@ constexpr double kGoesOnFraction = 0.2;  // of the particles at an edge
 constexpr double kWiden = 1.5;
 constexpr int kChecksPastDimension = 3;
 constexpr double kJustInside = 1 - 1e-12;  // so that rounding does not put a point outside Ω
-
-int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
 
 int PointCount(const ResolvedProblem& problem, const Basis& basis) {
   return static_cast<int>(std::ceil(problem.problem().expansion.points_per_term * basis.size()));
@@ -49,6 +48,15 @@ Matrix InBoxUnits(const ExpansionDesign& design, const Matrix& etas) {
 
 }  // namespace
 
+int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
+
+std::pair<double, double> TrustedRange(const Germ& germ) {
+  double lower = germ.Lower(), upper = germ.Upper();
+  if (!std::isfinite(lower)) lower = germ.Quantile(kTrustedProbability);
+  if (!std::isfinite(upper)) upper = germ.Quantile(1 - kTrustedProbability);
+  return {lower, upper};
+}
+
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   const Prior& prior = problem.prior();
   const ExpansionOptions& options = problem.problem().expansion;
@@ -58,9 +66,8 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   design.basis = std::make_shared<Basis>(prior.germs(), FirstTruncation(options, n));
   const int order = design.basis->order();
   const int count = PointCount(problem, *design.basis);
-  POLYEST_ASSIGN_OR_RETURN(design.points,
-                           CollocationPoints(options.points, prior.germs(), order, count,
-                                             static_cast<int>(kMostPoints)));
+  POLYEST_ASSIGN_OR_RETURN(design.points, CollocationPoints(options.points, prior.germs(), order,
+                                                            count, static_cast<int>(kMostPoints)));
   // Points of the same sequence after the collocation points: draws of the prior.
   POLYEST_ASSIGN_OR_RETURN(
       const Matrix sequence,
@@ -72,13 +79,12 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
     design.check_costs[i] = prior.NegativeLogDensity(design.check_points.row(i).transpose());
   }
   design.reference.resize(n);
-  design.lower = prior.lower();
-  design.upper = prior.upper();
+  design.lower.resize(n);
+  design.upper.resize(n);
   for (int j = 0; j < n; ++j) {
     const Germ& germ = prior.germs()[static_cast<size_t>(j)];
     design.reference[j] = germ.Mean();
-    if (!std::isfinite(design.lower[j])) design.lower[j] = germ.Quantile(kTrustedProbability);
-    if (!std::isfinite(design.upper[j])) design.upper[j] = germ.Quantile(1 - kTrustedProbability);
+    std::tie(design.lower[j], design.upper[j]) = TrustedRange(germ);
   }
   return design;
 }

@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <utility>
 
 #include "core/bayes/posterior.h"
 #include "core/bayes/region.h"
@@ -34,8 +35,13 @@ struct ExpansionDesign {
 inline constexpr double kEdge = 0.97;
 inline constexpr double kOvershoot = 1.15;
 
-// The paper's expansion: germs' polynomials, points through the germs' quantile functions. Trusted
-// between the bounds of Ω; where a germ has none, between its 0.1 % and 99.9 % quantiles.
+// As many as there are parameters and some more.
+int CheckCount(int dimension);
+// Where an expansion in this germ is trusted: between its bounds; where it has none, between its
+// 0.1 % and 99.9 % quantiles.
+std::pair<double, double> TrustedRange(const Germ& germ);
+
+// The paper's expansion: germs' polynomials, points through the germs' quantile functions.
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 
 // An expansion over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are drawn towards

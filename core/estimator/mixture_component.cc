@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/new_runs.h"
 #include "core/estimator/noise_learning.h"
 #include "core/estimator/reexpansion.h"
 
@@ -62,14 +63,49 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   RowBlock block;
   while (taken_ < rows) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    const int64_t count = std::min(kBlockRows, rows - taken_);
-    POLYEST_RETURN_IF_ERROR(
-        ReadWithRowsAhead(*store_, taken_, count, problem_.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(ReadBlock(rows, block, stop));
     broken_ = true;
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
     if (through) broken_ = false;
   }
+  return absl::OkStatus();
+}
+
+// The next rows, up to the first `rows` of the store, for which there are parameters.
+absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const Stop& stop) {
+  const int64_t count = std::min(kBlockRows, rows - taken_);
+  const auto read = [&](int64_t some) {
+    return ReadWithRowsAhead(*store_, taken_, some, problem_.knots_ahead(), block);
+  };
+  POLYEST_RETURN_IF_ERROR(read(count));
+  if (!problem_.per_run()) return absl::OkStatus();
+  if (block.rows.front().run >= problem_.runs()) {
+    POLYEST_RETURN_IF_ERROR(BeginRun(block.rows.front().run, stop));
+  }
+  int64_t known = 0;
+  while (known < count && block.rows[static_cast<size_t>(known)].run < problem_.runs()) ++known;
+  return known < count ? read(known) : absl::OkStatus();
+}
+
+// The record so far, with the parameters that the run brings: as unknown as their prior.
+absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
+  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
+  LearnedNoise noise = expansion_->noise();
+  noise.posterior = SummaryForNewRuns(grown, noise.posterior);
+  Matrix particles = ParticlesForNewRuns(grown, particles_);
+  std::swap(problem_, grown);  // in its place, since expansions refer to it
+  auto replayed =
+      Replay(problem_, std::move(design), std::move(noise), *store_, taken_, threads_, stop);
+  if (!replayed.ok()) {
+    std::swap(problem_, grown);
+    return replayed.status();
+  }
+  Adopt(*std::move(replayed));
+  particles_ = std::move(particles);
+  windows_from_ = patient_until_ = taken_;
+  window_end_ = taken_ + 2;
   return absl::OkStatus();
 }
 
@@ -111,12 +147,12 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, 
   if (settled_row_ != taken_) settlements_at_row_ = 0;
   settled_row_ = taken_;
   if (adaptive() && taken_ > 0 && settlements_at_row_ < kMostSettlementsAtRow) {
-    POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, !short_of_trajectories));
     ++settlements_at_row_;
     if (moved) return true;
   }
   if (short_of_trajectories) return expansion_->shortage();
-  patient_until_ = taken_ + 1 + taken_ / kPatience;
+  patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
   return false;
 }
 
@@ -130,16 +166,24 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
     moved = moved || tightened || settled;
   }
-  window_end_ = std::max(
-      taken_ + 2, static_cast<int64_t>(std::ceil(kWindowGrowth * static_cast<double>(taken_))));
+  const auto window = static_cast<double>(taken_ - windows_from_);
+  window_end_ =
+      std::max(taken_ + 2, windows_from_ + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
   return moved;
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
-  const Agreement agreement =
-      AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
-  if (agreement.shift <= kMostShift) return false;
-  return Settle(stop);
+  bool moved = false;
+  // Each settlement may raise the order by one.
+  for (int i = 0; i < (automatic_order() ? kMostSettlementsAtRow : 1); ++i) {
+    const Agreement agreement =
+        AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
+    if (agreement.shift <= kMostShift) break;
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));
+    if (!settled) break;
+    moved = true;
+  }
+  return moved;
 }
 
 // Scales that are not learned yet follow the signal, so that the first samples weigh little however
@@ -208,8 +252,9 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
 }
 
 // True when the expansion moved.
-absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order) {
   SettleRequest request;
+  request.may_raise_order = may_raise_order;
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;

@@ -36,8 +36,11 @@ class MixtureComponent {
   MixtureComponent(const ResolvedProblem& problem, const SampleStore* store, int threads);
 
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
+  bool automatic_order() const { return !problem_.problem().expansion.order; }
   bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
   absl::Status Recover(const Stop& stop);
+  absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
+  absl::Status BeginRun(int run, const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
@@ -45,7 +48,7 @@ class MixtureComponent {
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
-  absl::StatusOr<bool> Settle(const Stop& stop);
+  absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
   absl::Status TakeAnew(LearnedNoise noise, const Stop& stop);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
@@ -57,6 +60,7 @@ class MixtureComponent {
   bool broken_ = false;  // a stop left the expansion between two rows
   Matrix particles_;     // of the last settlement, germ coordinates
   int64_t taken_ = 0;
+  int64_t windows_from_ = 0;  // the row that the present windows count from
   int64_t window_end_ = 2;
   int64_t patient_until_ = 0;  // rows before this one are taken whatever their residual
   int64_t settled_row_ = -1;

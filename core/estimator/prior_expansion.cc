@@ -113,8 +113,7 @@ absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const Resol
   POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
   const ExpansionOptions& design = problem.problem().expansion;
   const std::vector<Germ>& germs = problem.prior().germs();
-  auto basis = std::make_shared<const Basis>(
-      germs, FirstTruncation(design, problem.dimension()));
+  auto basis = std::make_shared<const Basis>(germs, FirstTruncation(design, problem.dimension()));
   const int count = static_cast<int>(std::ceil(design.points_per_term * basis->size()));
   POLYEST_ASSIGN_OR_RETURN(Matrix points,
                            CollocationPoints(design.points, germs, basis->order(), count));

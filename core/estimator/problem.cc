@@ -10,9 +10,9 @@
 #include <optional>
 #include <set>
 
-#include "core/chaos/multi_index.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/estimator/parameters_of_runs.h"
 #include "core/estimator/validate_regularization.h"
 
 namespace polyest {
@@ -25,59 +25,14 @@ absl::Status UnknownName(std::string_view field, std::string_view name, std::str
                                                     known.empty() ? "none" : known));
 }
 
-constexpr int kFirstOrder = 3;
-constexpr int kLastOrder = 9;
-constexpr int64_t kAffordableTerms = 500;
-// An expansion that may yet grow should begin well below what is affordable.
-constexpr int64_t kAffordableAtFirst = 250;
-
-absl::Status ValidateExpansion(const ExpansionOptions& options, int dimension) {
-  if (options.order && *options.order < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("expansion.order: %d must be at least 1", *options.order));
-  }
-  if (!(options.hyperbolic_exponent > 0 && options.hyperbolic_exponent <= 1)) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "expansion.hyperbolicExponent: %g must be in (0, 1]", options.hyperbolic_exponent));
-  }
-  if (!std::isfinite(options.points_per_term) || options.points_per_term < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("expansion.pointsPerTerm: %g must be at least 1", options.points_per_term));
-  }
-  const Truncation truncation = FirstTruncation(options, dimension);
-  const int64_t terms = TermCount(dimension, truncation, kMostTerms);
-  if (terms > kMostTerms) {
-    return absl::ResourceExhaustedError(absl::StrFormat(
-        "expansion.order: order %d of %d uncertain parameters needs more than %d terms, the limit",
-        truncation.order, dimension, kMostTerms));
-  }
-  const double points = options.points == PointSet::kGaussTensor
-                            ? std::pow(truncation.order + 1, dimension)
-                            : std::ceil(options.points_per_term * static_cast<double>(terms));
-  if (points > static_cast<double>(kMostPoints)) {
-    return absl::ResourceExhaustedError(absl::StrFormat(
-        "expansion: %.0f collocation points are needed; the limit is %d", points, kMostPoints));
-  }
-  // A tensor grid is of the prior alone; a moved expansion has points_per_term points a term.
-  const double moved = std::ceil(options.points_per_term * static_cast<double>(terms));
-  const double fewest = std::min(points, moved);
-  if (options.adaptive && fewest <= static_cast<double>(terms)) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "expansion.pointsPerTerm: %g gives %.0f points for %d terms; an adaptive expansion needs "
-        "more points than terms to see its own error",
-        options.points_per_term, fewest, terms));
-  }
-  return absl::OkStatus();
-}
-
 absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) {
   for (int i = 0; i < prior.dimension(); ++i) {
     if (prior.germs()[static_cast<size_t>(i)].family() != GermFamily::kTruncatedNormal) continue;
     const int order = FirstTruncation(options, prior.dimension()).order;
     if (order <= Germ::kMostTruncatedNormalOrder) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrFormat(
-        "expansion.order: %d must be at most %d with the truncated normal prior of %s", order, Germ::kMostTruncatedNormalOrder,
-        prior.parameters()[static_cast<size_t>(i)].name));
+        "expansion.order: %d must be at most %d with the truncated normal prior of %s", order,
+        Germ::kMostTruncatedNormalOrder, prior.parameters()[static_cast<size_t>(i)].name));
   }
   return absl::OkStatus();
 }
@@ -116,7 +71,7 @@ absl::Status ValidateSignal(int index, const NamedInput& input) {
 }
 
 // What can be said without looking into the model.
-std::vector<absl::Status> CheckOptions(const Problem& problem) {
+std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
   std::vector<absl::Status> refusals;
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));
@@ -127,8 +82,9 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
   }
   add(ValidateRegularization(problem));
   if (!problem.uncertain.empty()) {
-    add(ValidateExpansion(problem.expansion, static_cast<int>(problem.uncertain.size())));
-    const absl::StatusOr<Prior> prior = Prior::Make(problem.uncertain, problem.correlations);
+    const auto parameters = ParametersOfRuns(problem.uncertain, runs);
+    add(problem.expansion.Validate(static_cast<int>(parameters.size())));
+    const absl::StatusOr<Prior> prior = PriorOfRuns(problem.uncertain, problem.correlations, runs);
     add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
   }
   if (const absl::Status status = problem.integration.Validate(); !status.ok()) {
@@ -144,24 +100,6 @@ std::vector<absl::Status> CheckOptions(const Problem& problem) {
 }
 
 }  // namespace
-
-Truncation FirstTruncation(const ExpansionOptions& options, int dimension) {
-  if (options.order) return {*options.order, options.hyperbolic_exponent};
-  Truncation truncation{kFirstOrder, options.hyperbolic_exponent};
-  while (truncation.order > 1 &&
-         TermCount(dimension, truncation, kAffordableAtFirst) > kAffordableAtFirst) {
-    --truncation.order;
-  }
-  return truncation;
-}
-
-std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
-                                         const Truncation& present) {
-  const Truncation next{present.order + 1, present.exponent};
-  if (options.order || next.order > kLastOrder) return std::nullopt;
-  if (TermCount(dimension, next, kAffordableTerms) > kAffordableTerms) return std::nullopt;
-  return next;
-}
 
 // Finds every name of a problem in its model, and collects what is wrong.
 class ResolvedProblem::Resolver {
@@ -299,6 +237,7 @@ void ResolvedProblem::Resolver::ResolveFixed() {
 
 void ResolvedProblem::Resolver::ResolveUncertain() {
   std::set<std::string> seen;
+  std::vector<std::optional<int>> found(problem_.uncertain.size());
   for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
     const UncertainParameter& parameter = problem_.uncertain[i];
     const std::string field = absl::StrFormat("uncertain[%d]", i);
@@ -311,8 +250,17 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
       Refuse("%s: %s is both fixed and uncertain", field, parameter.name);
     }
     CheckDelay(field, settable_[*index], parameter.ToParameter(parameter.germ.Lower()));
-    resolved_.targets_.push_back(*index);
-    resolved_.units_.push_back(settable_[*index].unit);
+    found[i] = *index;
+  }
+  for (int run = 0; run < resolved_.runs_; ++run) {
+    for (size_t i = 0; i < found.size(); ++i) {
+      const bool per_run = problem_.uncertain[i].per_run;
+      if (!found[i] || (run > 0 && !per_run)) continue;
+      resolved_.targets_.push_back(*found[i]);
+      resolved_.target_run_.push_back(per_run ? run : -1);
+      resolved_.units_.push_back(settable_[*found[i]].unit);
+      if (per_run && run == 0) ++resolved_.parameters_per_run_;
+    }
   }
 }
 
@@ -356,25 +304,37 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
   }
 }
 
-absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem) {
-  std::vector<absl::Status> refusals = CheckOptions(problem);
+absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs) {
+  POLYEST_CHECK(runs >= 1);
+  std::vector<absl::Status> refusals = CheckOptions(problem, runs);
   if (!refusals.empty()) return refusals.front();
-  POLYEST_ASSIGN_OR_RETURN(Prior prior, Prior::Make(problem.uncertain, problem.correlations));
-  ResolvedProblem resolved(std::move(problem), std::move(prior));
+  POLYEST_ASSIGN_OR_RETURN(Prior prior, PriorOfRuns(problem.uncertain, problem.correlations, runs));
+  ResolvedProblem resolved(std::move(problem), std::move(prior), runs);
   refusals = Resolver(resolved).Run();
   if (!refusals.empty()) return refusals.front();
   return resolved;
 }
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
-  std::vector<absl::Status> refusals = CheckOptions(problem);
+  std::vector<absl::Status> refusals = CheckOptions(problem, 1);
   if (problem.model == nullptr) return refusals;
   // For its names, as the correlations may be wrong. It needs a parameter: if there is none, then
   // one that no name refers to.
   Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);
-  ResolvedProblem resolved(std::move(problem), std::move(prior));
+  ResolvedProblem resolved(std::move(problem), std::move(prior), 1);
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
   return refusals;
+}
+
+int ResolvedProblem::most_runs() const {
+  if (!per_run()) return std::numeric_limits<int>::max();
+  const int of_one_run = dimension() - (runs_ - 1) * parameters_per_run_;
+  int most = 1 + std::max(0, kMostParametersOfRuns - of_one_run) / parameters_per_run_;
+  const auto too_many = [&] {
+    return !problem_.expansion.Validate(of_one_run + (most - 1) * parameters_per_run_).ok();
+  };
+  while (most > 1 && too_many()) --most;
+  return most;
 }
 
 InputSignals ResolvedProblem::MakeInputs() const {
@@ -393,10 +353,12 @@ InputSignals ResolvedProblem::MakeInputs() const {
 }
 
 EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas,
-                                                    std::vector<int> outputs, int threads) const {
-  POLYEST_CHECK(thetas.cols() == dimension());
+                                                    std::vector<int> outputs, int threads,
+                                                    int run) const {
+  POLYEST_CHECK(thetas.cols() == dimension() && (run < runs_ || !per_run()));
   Matrix values = base_.transpose().replicate(thetas.rows(), 1);
   for (size_t i = 0; i < targets_.size(); ++i) {
+    if (target_run_[i] >= 0 && target_run_[i] != run) continue;
     values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
   }
   if (derived_ != nullptr) Derive(values);

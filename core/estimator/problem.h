@@ -14,8 +14,7 @@
 
 #include "core/bayes/noise.h"
 #include "core/bayes/prior.h"
-#include "core/chaos/collocation_points.h"
-#include "core/chaos/multi_index.h"
+#include "core/estimator/expansion_options.h"
 #include "core/estimator/settable_quantities.h"
 #include "core/model/equations/expressions.h"
 #include "core/model/input_signal.h"
@@ -34,18 +33,6 @@ struct MeasuredOutput {
   NoiseModel noise;
 };
 
-struct ExpansionOptions {
-  // p ≥ 1 of the truncation. Without it an adaptive expansion begins at 3, or less for so many
-  // uncertain parameters that 3 is not affordable, and goes up while it is not accurate where the
-  // posterior is, as far as that is affordable; any other has the order it would begin with.
-  std::optional<int> order;
-  double hyperbolic_exponent = 1;  // q in (0, 1] of the truncation; 1 is the total degree
-  double points_per_term = 2;      // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise
-  PointSet points = PointSet::kHalton;
-  bool adaptive = true;  // re-expand where the posterior is; false is the paper's fixed expansion
-};
-
-// How α² is chosen (bayes/regularization.h); where a rule has no answer, 1.
 enum class RegularizationMode { kFixed, kLCurve, kDiscrepancy, kEvidence };
 
 struct Problem {
@@ -69,27 +56,30 @@ struct Problem {
   bool tolerance_follows_noise = true;
 };
 
-// The truncation an expansion in n uncertain parameters begins with.
-Truncation FirstTruncation(const ExpansionOptions& options, int dimension);
-// Of one order more; nothing when the order is given or more is not affordable: past 500 terms or
-// order 9, beyond which two points a term no longer determine the terms well.
-std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
-                                         const Truncation& present);
+// Uncertain parameters of a record whose runs have parameters of their own.
+inline constexpr int kMostParametersOfRuns = 12;
 
-// Limits that keep one problem from taking a machine: past them RESOURCE_EXHAUSTED.
-inline constexpr int64_t kMostTerms = 2'000;    // S
-inline constexpr int64_t kMostPoints = 20'000;  // Q
-
-// A problem whose every name has been found in its model.
+// A problem whose every name has been found in its model, for a record of so many runs. Its
+// uncertain parameters are the problem's, one that is per run under the name "x_0[0]" for run 0,
+// and after them those that are per run for run 1, "x_0[1]", for run 2, …
 class ResolvedProblem {
  public:
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED name the field, the value and the rule; an unknown name
   // is answered with the names there are. `measured` may be empty (a propagation needs none).
-  static absl::StatusOr<ResolvedProblem> Make(Problem problem);
+  // runs ≥ 1.
+  static absl::StatusOr<ResolvedProblem> Make(Problem problem, int runs = 1);
   // All that Make has to say against it, not only the first.
   static std::vector<absl::Status> Check(Problem problem);
 
   const Problem& problem() const { return problem_; }
+  int runs() const { return runs_; }
+  // Whether runs have parameters of their own, so that each new one adds to the dimension.
+  bool per_run() const { return parameters_per_run_ > 0; }
+  // The same problem for a record of so many runs; as Make.
+  absl::StatusOr<ResolvedProblem> WithRuns(int runs) const { return Make(problem_, runs); }
+  // The most runs there may be: as many as keep to kMostParametersOfRuns; any number without
+  // parameters of their own.
+  int most_runs() const;
   // 0 < tolerance, within IntegrationOptions' limits; for ensembles made from then on.
   void set_relative_tolerance(double tolerance) {
     problem_.integration.relative_tolerance = tolerance;
@@ -109,16 +99,18 @@ class ResolvedProblem {
   int knots_ahead() const { return knots_ahead_; }
 
   // An ensemble with one trajectory for each row of thetas (Q × n, the uncertain parameters'
-  // values), reading `outputs` of the model.
+  // values), reading `outputs` of the model. 0 ≤ run < runs() where runs have parameters of their
+  // own.
   EnsembleSpecification MakeEnsemble(const ConstMatrixRef& thetas, std::vector<int> outputs,
-                                     int threads) const;
+                                     int threads, int run = 0) const;
 
  private:
   class Resolver;
 
-  ResolvedProblem(Problem problem, Prior prior)
+  ResolvedProblem(Problem problem, Prior prior, int runs)
       : problem_(std::move(problem)),
         prior_(std::move(prior)),
+        runs_(runs),
         settable_(problem_.model->description()),
         base_(settable_.Defaults()) {}
 
@@ -126,9 +118,12 @@ class ResolvedProblem {
 
   Problem problem_;
   Prior prior_;
+  int runs_;
+  int parameters_per_run_ = 0;
   SettableQuantities settable_;
-  Vector base_;               // values of the settable quantities that are not uncertain
-  std::vector<int> targets_;  // the settable quantity of each uncertain parameter
+  Vector base_;                  // values of the settable quantities that are not uncertain
+  std::vector<int> targets_;     // the settable quantity of each uncertain parameter,
+  std::vector<int> target_run_;  // and the run it is of; −1: of all
   std::vector<int> derived_targets_;
   std::vector<int> derived_variables_;
   std::shared_ptr<const Expressions> derived_;  // over all settable quantities; null without any

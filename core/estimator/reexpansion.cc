@@ -89,7 +89,8 @@ class Settler {
   // False when the expansion there cannot be built; the present one then stays.
   absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
     const Vector inside = result_.particles.colwise().mean().transpose();
-    ExpansionDesign design = DesignForRegion(*request_.problem, truncation, std::move(region), inside);
+    ExpansionDesign design =
+        DesignForRegion(*request_.problem, truncation, std::move(region), inside);
     const Eigen::Index checks =
         std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));

@@ -93,7 +93,7 @@ void RegionalExpansion::StartRun(int run) {
   propagator_.reset();
   inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
   propagator_ = std::make_unique<EnsemblePropagator>(
-      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_), inputs_.get());
+      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), inputs_.get());
 }
 
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {

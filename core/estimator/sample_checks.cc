@@ -23,7 +23,8 @@ bool Missing(const SampleColumn& column, size_t row) {
 
 }  // namespace
 
-SampleChecks::SampleChecks(const ResolvedProblem& problem) : problem_(problem) {
+SampleChecks::SampleChecks(const ResolvedProblem& problem)
+    : problem_(problem), most_runs_(problem.most_runs()) {
   for (const MeasuredOutput& measured : problem.problem().measured) {
     names_.push_back(measured.output);
   }
@@ -124,6 +125,12 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
   for (size_t k = 0; k < samples.rows(); ++k) {
     const double time_s = samples.time_s[k];
     const int run = samples.run.empty() ? 0 : samples.run[k];
+    if (run >= most_runs_) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
+          "runs would have too many of them",
+          k, run, most_runs_));
+    }
     if (!std::isfinite(time_s) || time_s < 0) {
       return absl::InvalidArgumentError(
           absl::StrFormat("row %d, column t: %g must be a finite time ≥ 0", k, time_s));

@@ -45,6 +45,7 @@ class SampleChecks {
   absl::Status CheckValues(const Samples& samples) const;
 
   const ResolvedProblem& problem_;
+  int most_runs_;
   std::vector<std::string> names_;  // the channels, then the streamed inputs
   RecordPosition position_;
 };

@@ -157,6 +157,7 @@ std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals
     if (!parameter.ok()) parameter = AtPlace(i, family, name, parameter.status());
     // Half a line, which suits every quantity.
     uncertain.push_back(ValueOr(std::move(parameter), {name, Germ::Gamma(1)}, refusals));
+    uncertain.back().per_run = problem.uncertain(i).per_run();
   }
   return uncertain;
 }
@@ -299,7 +300,8 @@ std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem, Refusals& ref
 
 absl::StatusOr<ExpansionOptions> ToExpansion(const v1::ExpansionOptions& given) {
   ExpansionOptions options;
-  if (given.order() != 0) options.order = given.order();
+  if (given.order() != v1::ExpansionOptions::AUTO) options.order = given.order();
+  if (given.has_hyperbolic_exponent()) options.hyperbolic_exponent = given.hyperbolic_exponent();
   if (given.points_per_term() != 0) options.points_per_term = given.points_per_term();
   if (given.has_adaptive()) options.adaptive = given.adaptive();
   switch (given.points()) {

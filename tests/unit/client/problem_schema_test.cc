@@ -60,7 +60,9 @@ class Validator {
     if (keyword == "$ref") return Check(Definition(rule.string_value()), value, path);
     if (keyword == "type") return CheckType(rule, value, path);
     if (keyword == "enum") return CheckEnum(rule, value, path);
-    if (keyword == "const") return rule.string_value() == value.string_value() ? "" : path;
+    if (keyword == "const") {
+      return value.has_string_value() && rule.string_value() == value.string_value() ? "" : path;
+    }
     if (keyword == "required") return CheckRequired(rule, value, path);
     if (keyword == "properties") return "";  // with additionalProperties
     if (keyword == "additionalProperties") return CheckMembers(rule, schema, value, path);
@@ -192,7 +194,10 @@ TEST(ProblemSchema, SeesMistakes) {
   EXPECT_EQ(with(R"("regularization_mode": "FIXED")"), "problem.regularization_mode: is unknown");
   EXPECT_EQ(with(R"("regularizationMode": "L_CURV")"),
             "problem.regularizationMode: not one of the names");
-  EXPECT_EQ(with(R"("expansion": {"order": 2.5})"), "problem.expansion.order: wrong type");
+  EXPECT_EQ(with(R"("expansion": {"order": 2.5})"), "problem.expansion.order");
+  EXPECT_EQ(with(R"("expansion": {"order": "auto"})"), "problem.expansion.order");
+  EXPECT_EQ(with(R"("expansion": {"order": "AUTO"})"), "");
+  EXPECT_EQ(with(R"("expansion": {"order": 7})"), "");
   EXPECT_EQ(with(R"("measured": [{"output": "x"}])"), "problem.measured[]: noise is missing");
   EXPECT_EQ(with(R"("uncertain": [{"name": "k"}])"), "problem.uncertain[]: 0 of oneOf");
   EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {}, "normal": {}}])"),

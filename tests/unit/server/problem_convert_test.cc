@@ -35,7 +35,8 @@ TEST(ToProblem, FillsInTheDefaultsOfTheContract) {
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   const Problem& problem = resolved->problem();
   EXPECT_EQ(problem.model->description().name, "mass_spring_damper");
-  EXPECT_EQ(problem.expansion.order, 3);
+  EXPECT_EQ(problem.expansion.order, std::nullopt);
+  EXPECT_EQ(problem.expansion.hyperbolic_exponent, 1);
   EXPECT_EQ(problem.expansion.points_per_term, 2);
   EXPECT_EQ(problem.expansion.points, PointSet::kHalton);
   EXPECT_TRUE(problem.expansion.adaptive);
@@ -49,7 +50,8 @@ TEST(ToProblem, FillsInTheDefaultsOfTheContract) {
 TEST(ToProblem, TakesEveryOptionThatIsGiven) {
   v1::Problem given = SmallProblem();
   given.MergeFrom(ProblemFromJson(R"({
-    "expansion": {"order": 5, "pointsPerTerm": 3, "points": "HAMMERSLEY", "adaptive": false},
+    "expansion": {"order": 5, "pointsPerTerm": 3, "points": "HAMMERSLEY", "adaptive": false,
+                  "hyperbolicExponent": 0.8},
     "regularization": 0,
     "regularizationMode": "L_CURVE",
     "integration": {"method": "STIFF", "relativeTolerance": 1e-9, "maxSteps": 77}
@@ -59,6 +61,7 @@ TEST(ToProblem, TakesEveryOptionThatIsGiven) {
   const Problem& problem = resolved->problem();
   EXPECT_EQ(problem.fixed.at("k"), 39.478);
   EXPECT_EQ(problem.expansion.order, 5);
+  EXPECT_EQ(problem.expansion.hyperbolic_exponent, 0.8);
   EXPECT_EQ(problem.expansion.points_per_term, 3);
   EXPECT_EQ(problem.expansion.points, PointSet::kHammersley);
   EXPECT_FALSE(problem.expansion.adaptive);
@@ -286,7 +289,7 @@ TEST(ToProblem, RefusesNumbersThatAreNoEnumerators) {
 
 TEST(ToProblem, RefusesAnExpansionThatIsTooLarge) {
   v1::Problem problem = SmallProblem();
-  problem.mutable_expansion()->set_order(1'000'000);
+  problem.mutable_expansion()->set_order(static_cast<v1::ExpansionOptions::Order>(1'000'000));
   EXPECT_EQ(ToProblem(problem).status().code(), absl::StatusCode::kResourceExhausted);
 }
 

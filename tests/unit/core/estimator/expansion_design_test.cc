@@ -35,7 +35,7 @@ ResolvedProblem TwoUniforms() {
 ExpansionDesign AtTheBound(const ResolvedProblem& problem) {
   const Vector centre = Eigen::Vector2d(0.8, 0);
   const Matrix axes = Eigen::Vector2d(0.2, 0.3).asDiagonal();
-  return DesignForRegion(problem, Region(centre, axes), centre);
+  return DesignForRegion(problem, {3, 1}, Region(centre, axes), centre);
 }
 
 // 1,000 particles about the middle, `at_edge` of them moved to `edge`.
@@ -90,7 +90,7 @@ TEST(DesignForRegion, IsTheCubesOwnPointsWhereTheRegionLiesInside) {
   const ResolvedProblem problem = TwoUniforms();
   const Vector centre = Vector::Zero(2);
   const ExpansionDesign design =
-      DesignForRegion(problem, Region(centre, 0.1 * Matrix::Identity(2, 2)), centre);
+      DesignForRegion(problem, {3, 1}, Region(centre, 0.1 * Matrix::Identity(2, 2)), centre);
   EXPECT_EQ(design.points.rows(), 20);
   EXPECT_EQ(design.points, Matrix(2 * UnitCubePoints(PointSet::kHalton, 2, 20).array() - 1));
   EXPECT_FALSE(design.whole_prior);
@@ -103,7 +103,7 @@ TEST(DesignForRegion, DrawsPointsIntoThePrior) {
   axes << 0.3, 0.2, -0.2, 0.3;
   const Region region(centre, axes);
   const Vector inside = Eigen::Vector2d(0.8, -0.8);
-  const ExpansionDesign design = DesignForRegion(problem, region, inside);
+  const ExpansionDesign design = DesignForRegion(problem, {3, 1}, region, inside);
   const Matrix xis = region.ManyToGerm(design.points);
   EXPECT_LE(xis.cwiseAbs().maxCoeff(), 1.0);
   const Matrix plain = region.ManyToGerm(2 * UnitCubePoints(PointSet::kHalton, 2, 20).array() - 1);

@@ -125,8 +125,24 @@ TEST(ResolvedProblem, NeedsNoMeasuredOutput) {
 TEST(ResolvedProblem, LimitsTheNumberOfTerms) {
   EXPECT_EQ(
       Refusal([](Problem& p) { p.expansion.order = 100; }, absl::StatusCode::kResourceExhausted),
-      "expansion.order: order 100 of 2 uncertain parameters needs 5151 terms; the limit is "
-      "2000");
+      "expansion.order: order 100 of 2 uncertain parameters needs more than 2000 terms, the "
+      "limit");
+}
+
+TEST(ResolvedProblem, AnAutomaticOrderBeginsWithWhatIsAffordable) {
+  EXPECT_EQ(FirstTruncation({}, 2).order, 3);
+  EXPECT_EQ(FirstTruncation({}, 9).order, 3);                              // 220 terms
+  EXPECT_EQ(FirstTruncation({}, 10).order, 2);                             // 286 of order 3
+  EXPECT_EQ(FirstTruncation({.hyperbolic_exponent = 0.75}, 12).order, 3);  // 103 terms
+  EXPECT_EQ(FirstTruncation({.order = 3}, 12).order, 3);
+}
+
+TEST(ResolvedProblem, AnAutomaticOrderRisesAsFarAsThatIsAffordable) {
+  EXPECT_EQ(NextTruncation({}, 1, {3, 1})->order, 4);
+  EXPECT_FALSE(NextTruncation({}, 1, {9, 1}));
+  EXPECT_EQ(NextTruncation({}, 12, {2, 1})->order, 3);  // 455 terms
+  EXPECT_FALSE(NextTruncation({}, 12, {3, 1}));         // 1820 of order 4
+  EXPECT_FALSE(NextTruncation({.order = 3}, 1, {3, 1}));
 }
 
 TEST(ResolvedProblem, LimitsTheNumberOfPoints) {
@@ -140,6 +156,10 @@ TEST(ResolvedProblem, LimitsTheNumberOfPoints) {
 }
 
 TEST(ResolvedProblem, RefusesExpansionsThatAreNone) {
+  for (const double bad : {0.0, -0.5, 1.1, kNan}) {
+    EXPECT_THAT(Refusal([&](Problem& p) { p.expansion.hyperbolic_exponent = bad; }),
+                StartsWith("expansion.hyperbolicExponent: "));
+  }
   EXPECT_EQ(Refusal([](Problem& p) { p.expansion.order = 0; }),
             "expansion.order: 0 must be at least 1");
   for (const double bad : {0.5, kNan, kInfinity}) {
