@@ -1,7 +1,7 @@
 // Writes a demonstration record to the standard output, by its only argument: oscillator,
-// rough_sensor, roll_plane, roll_plane_4dof, quarter_car, bicycle or damper_rig. Closed forms, or
-// the equations of motion written down again and integrated in small fixed steps, with noise; the
-// same bytes every time.
+// rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle or damper_rig. Closed
+// forms, or the equations of motion written down again and integrated in small fixed steps, with
+// noise; the same bytes every time.
 
 #include <algorithm>
 #include <array>
@@ -67,6 +67,27 @@ void WriteRoughSensor() {
     const bool nonsense = generator() % 100 < 3;
     std::printf("%.2f,%.5f\n", t, nonsense ? 0.5 * StandardNormal(generator) : x + noise_m * e);
     e = a * e + std::sqrt(1 - a * a) * StandardNormal(generator);
+  }
+}
+
+// The oscillator let go three times by hand, from elsewhere and with another push each time.
+void WriteReleases() {
+  constexpr double k_n_per_m = 41.3;
+  constexpr double c_n_s_per_m = 0.23;
+  constexpr double noise_m = 0.01;
+  constexpr double displacement_m[] = {0.83, -0.42, 1.17};
+  constexpr double velocity_m_per_s[] = {0.6, -1.3, 0.2};
+  const double delta = 0.5 * c_n_s_per_m;
+  const double omega = std::sqrt(k_n_per_m - delta * delta);
+  std::mt19937_64 generator(20'061'121);
+  std::puts("t,run,x");
+  for (int run = 0; run < 3; ++run) {
+    const double x0 = displacement_m[run], b = (velocity_m_per_s[run] + delta * x0) / omega;
+    for (int i = 1; i <= 100; ++i) {
+      const double t = 0.04 * i;
+      const double x = std::exp(-delta * t) * (x0 * std::cos(omega * t) + b * std::sin(omega * t));
+      std::printf("%.2f,%d,%.5f\n", t, run, x + noise_m * StandardNormal(generator));
+    }
   }
 }
 
@@ -353,6 +374,8 @@ int main(int argc, char** argv) {
     WriteOscillator();
   } else if (record == "rough_sensor") {
     WriteRoughSensor();
+  } else if (record == "releases") {
+    WriteReleases();
   } else if (record == "roll_plane") {
     WriteRollPlane();
   } else if (record == "roll_plane_4dof") {
@@ -366,7 +389,8 @@ int main(int argc, char** argv) {
   } else {
     std::fputs(
         "usage: generate_demo "
-        "oscillator|rough_sensor|roll_plane|roll_plane_4dof|quarter_car|bicycle|damper_rig\n",
+        "oscillator|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|bicycle|"
+        "damper_rig\n",
         stderr);
     return 2;
   }

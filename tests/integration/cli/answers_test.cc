@@ -154,6 +154,15 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         ExampleRecord{"roll_plane_4dof", {{"m_a", 185}, {"d", 0.48}}},
         ExampleRecord{"rough_sensor", {{"k", 41.3}, {"c", 0.23}}},
+        ExampleRecord{"releases",
+                      {{"k", 41.3},
+                       {"c", 0.23},
+                       {"x0[0]", 0.83},
+                       {"v0[0]", 0.6},
+                       {"x0[1]", -0.42},
+                       {"v0[1]", -1.3},
+                       {"x0[2]", 1.17},
+                       {"v0[2]", 0.2}}},
         ExampleRecord{"quarter_car", {{"ks", 15800}, {"cs", 1180}, {"kt", 204000}}},
         ExampleRecord{"bicycle", {{"Iz", 2410}, {"Cf", 76500}, {"Cr", 93800}, {"mu", 0.87}}},
         ExampleRecord{

@@ -1,0 +1,189 @@
+// Parameters that each run has for itself. The oracle is linear: y = a t + b, a shared and b of
+// each run, normal priors and noise, where the posterior is that of least squares with the prior
+// as further rows.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "core/estimator/experiment_design.h"
+#include "core/estimator/studies.h"
+#include "tests/unit/core/estimator/text_problem.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double kNoise = 0.2;
+
+UncertainParameter PerRun(UncertainParameter parameter) {
+  parameter.per_run = true;
+  return parameter;
+}
+
+Problem LineProblem() {
+  return TextProblem("a*t + b",
+                     {PerRun(UncertainParameter::Normal("b", 1, 3).value()),
+                      UncertainParameter::Normal("a", 0, 2).value()},
+                     kNoise);
+}
+
+// Lines of slope 0.7 with offsets 2, −3 and 4.
+Samples ThreeLines() {
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal(0, kNoise);
+  const double offsets[] = {2, -3, 4};
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  for (int run = 0; run < 3; ++run) {
+    for (int k = 0; k < 9 - 2 * run; ++k) {
+      samples.run.push_back(run);
+      samples.time_s.push_back(0.5 * k);
+      samples.columns[0].value.push_back(0.7 * samples.time_s.back() + offsets[run] +
+                                         normal(generator));
+    }
+  }
+  return samples;
+}
+
+struct Exact {
+  Vector mean;
+  Matrix covariance;
+};
+
+// Of b[0], a, b[1], b[2].
+Exact LeastSquaresWithPrior(const Samples& samples) {
+  const int place[] = {0, 2, 3};
+  Matrix information = Vector{{1.0 / 9, 1.0 / 4, 1.0 / 9, 1.0 / 9}}.asDiagonal();
+  Vector right = Vector{{1.0 / 9, 0, 1.0 / 9, 1.0 / 9}};
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    Vector row = Vector::Zero(4);
+    row[1] = samples.time_s[k];
+    row[place[samples.run[k]]] = 1;
+    information += row * row.transpose() / (kNoise * kNoise);
+    right += row * samples.columns[0].value[k] / (kNoise * kNoise);
+  }
+  const Eigen::LLT<Matrix> factor(information);
+  return {factor.solve(right), factor.solve(Matrix::Identity(4, 4))};
+}
+
+std::vector<std::string> NamesOf(const Estimate& estimate) {
+  std::vector<std::string> names;
+  for (const ParameterEstimate& parameter : estimate.parameters) names.push_back(parameter.name);
+  return names;
+}
+
+TEST(PerRun, AgreesWithLeastSquaresOverAllRuns) {
+  const Samples samples = ThreeLines();
+  const Exact exact = LeastSquaresWithPrior(samples);
+  const Estimate estimate = EstimateOf(LineProblem(), samples);
+  ASSERT_THAT(NamesOf(estimate), ElementsAre("b[0]", "a", "b[1]", "b[2]"));
+  for (int i = 0; i < 4; ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    SCOPED_TRACE(parameter.name);
+    const double std_dev = std::sqrt(exact.covariance(i, i));
+    // The expansion of a linear output is exact up to the rounding of its fit, which its residual
+    // adds to the noise.
+    EXPECT_NEAR(parameter.map, exact.mean[i], 1e-4 * std_dev);
+    EXPECT_NEAR(parameter.std_dev, std_dev, 1e-4 * std_dev);
+    EXPECT_NEAR(parameter.mean, exact.mean[i], 0.03 * std_dev);
+    EXPECT_EQ(parameter.prior_mean, parameter.name == "a" ? 0 : 1);
+  }
+  EXPECT_NEAR(estimate.covariance(2, 3), exact.covariance(2, 3), 1e-4 * exact.covariance(2, 2));
+}
+
+TEST(PerRun, HowARecordIsCutIntoBatchesDoesNotMatter) {
+  const Samples all = ThreeLines();
+  const Estimate whole = EstimateOf(LineProblem(), all);
+  const auto estimator = MakeEstimator(LineProblem());
+  for (size_t k = 0; k < all.rows(); ++k) {
+    Samples row;
+    row.time_s = {all.time_s[k]};
+    row.run = {all.run[k]};
+    row.columns = {{"y", {all.columns[0].value[k]}, {}}};
+    ASSERT_TRUE(estimator->Append(row).ok());
+    ASSERT_TRUE(estimator->Process().ok());
+    const Estimate estimate = estimator->CurrentEstimate().value();
+    ASSERT_EQ(estimate.parameters.size(), static_cast<size_t>(2 + all.run[k]));
+  }
+  ExpectSame(estimator->CurrentEstimate().value(), whole);
+}
+
+TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
+  const auto estimator = MakeEstimator(LineProblem());
+  EXPECT_EQ(estimator->problem().most_runs(), 11);  // a and 11 of b are 12
+  Samples samples;
+  samples.time_s = {0, 0};
+  samples.run = {0, 11};
+  samples.columns = {{"y", {1, 1}, {}}};
+  const absl::Status refused = estimator->Append(samples);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("row 1, column run: 11 must be below 11"));
+  EXPECT_EQ(estimator->rows_appended(), 0);
+  samples.run = {0, 10};
+  EXPECT_TRUE(estimator->Append(samples).ok());
+  EXPECT_EQ(estimator->problem().dimension(), 12);
+}
+
+TEST(PerRun, WithoutThemRunsAreUnlimited) {
+  Problem problem = LineProblem();
+  problem.uncertain[0].per_run = false;
+  EXPECT_GT(ResolvedProblem::Make(problem)->most_runs(), 1'000'000);
+}
+
+TEST(PerRun, ACorrelationIsOfParametersOfOneKind) {
+  Problem problem = LineProblem();
+  problem.correlations = {{"a", "b", 0.5}};
+  const auto refused = ResolvedProblem::Make(problem);
+  EXPECT_THAT(std::string(refused.status().message()),
+              HasSubstr("correlations[0]: only one of a and b is per run"));
+  problem.uncertain[1].per_run = true;
+  const ResolvedProblem both = ResolvedProblem::Make(problem, 2).value();
+  // Rows of F F^T: b[0], a[0], b[1], a[1].
+  const Matrix correlation = both.prior().factor() * both.prior().factor().transpose();
+  EXPECT_NEAR(correlation(0, 1), 0.5, 1e-12);
+  EXPECT_NEAR(correlation(2, 3), 0.5, 1e-12);
+  EXPECT_NEAR(correlation(0, 3), 0, 1e-12);
+}
+
+TEST(PerRun, ThePosteriorOfALaterRunCanBeAskedFor) {
+  const auto estimator = MakeEstimator(LineProblem());
+  ASSERT_TRUE(estimator->Append(ThreeLines()).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  const auto profiles = estimator->CurrentProfiles({.parameters = {"b[2]"}});
+  ASSERT_TRUE(profiles.ok()) << profiles.status();
+  const auto unknown = estimator->CurrentProfiles({.parameters = {"b"}});
+  EXPECT_EQ(unknown.status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(PerRun, TheNextExperimentKnowsOnlyWhatIsShared) {
+  const Samples samples = ThreeLines();
+  const ResolvedProblem problem = ResolvedProblem::Make(LineProblem()).value();
+  const ResolvedProblem next =
+      WithEstimateAsPrior(problem, EstimateOf(LineProblem(), samples)).value();
+  const Exact exact = LeastSquaresWithPrior(samples);
+  EXPECT_NEAR(next.prior().StandardDeviation()[0], 3, 1e-12);  // b
+  EXPECT_NEAR(next.prior().StandardDeviation()[1], std::sqrt(exact.covariance(1, 1)), 1e-4);
+}
+
+// −log of the posterior density is a parabola along any line, with the curvature 1/σ² of the
+// conditional density.
+TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
+  const Samples samples = ThreeLines();
+  CostGridOptions options;
+  options.parameters = {"b[2]"};
+  options.points = 11;
+  const auto grid =
+      EvaluateCostGrid(ResolvedProblem::Make(LineProblem()).value(), samples, options, {});
+  ASSERT_TRUE(grid.ok()) << grid.status();
+  const double step = grid->axes[0][6] - grid->axes[0][5];
+  const double information = 1.0 / 9 + 5 / (kNoise * kNoise);  // run 2 has five samples
+  EXPECT_NEAR(grid->total(4, 0) - 2 * grid->total(5, 0) + grid->total(6, 0),
+              information * step * step, 1e-6 * information * step * step);
+}
+
+}  // namespace
+}  // namespace polyest
