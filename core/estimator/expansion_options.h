@@ -20,7 +20,7 @@ struct ExpansionOptions {
   // p ≥ 1 of the truncation. Without it an adaptive expansion begins at 3, or less for so many
   // uncertain parameters that 3 is not affordable, and goes up while it is not accurate where the
   // posterior is, as far as that is affordable; any other has the order it would begin with.
-  std::optional<int> order;
+  std::optional<int> order = std::nullopt;
   double hyperbolic_exponent = 1;  // q in (0, 1] of the truncation; 1 is the total degree
   double points_per_term = 2;  // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise
   PointSet points = PointSet::kHalton;
