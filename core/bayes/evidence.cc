@@ -1,0 +1,76 @@
+#include "core/bayes/evidence.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "core/bayes/weighted_samples.h"
+#include "core/chaos/collocation_points.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kPoints = 8192;  // of each density
+constexpr double kWider = 1.2;
+constexpr int kMostIterations = 200;
+constexpr double kSettled = 1e-10;  // of log Z
+
+// N(mean, factor factorᵀ)
+struct Gaussian {
+  Vector mean;
+  Matrix factor;
+
+  Vector LogDensityAt(const Matrix& points) const {
+    const auto n = static_cast<double>(mean.size());
+    const Matrix scaled = factor.triangularView<Eigen::Lower>().solve(
+        (points.rowwise() - mean.transpose()).transpose());
+    const double constant =
+        -0.5 * n * std::log(2 * std::numbers::pi) - factor.diagonal().array().log().sum();
+    return constant - 0.5 * scaled.colwise().squaredNorm().transpose().array();
+  }
+
+  Matrix Draw(int count) const {
+    const std::vector<Germ> germs(static_cast<size_t>(mean.size()), Germ::Normal());
+    const Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, count).value();
+    return (normal * factor.transpose()).rowwise() + mean.transpose();
+  }
+};
+
+// log Z from log(p/g) at points of p and at points of g.
+double Bridge(const Vector& at_draws, const Vector& at_points) {
+  double log_z = at_draws.mean();
+  for (int i = 0; i < kMostIterations; ++i) {
+    // With l = p/(g Z): Z ← Z · mean_g[l/(l + 1)] / mean_p[1/(l + 1)], neither of which overflows.
+    const auto logistic = [&](double log_l) { return 1 / (1 + std::exp(log_z - log_l)); };
+    const double of_points = at_points.unaryExpr(logistic).mean();
+    const double of_draws = 1 - at_draws.unaryExpr(logistic).mean();
+    if (!(of_points > 0) || !(of_draws > 0)) return at_draws.mean();
+    const double step = std::log(of_points) - std::log(of_draws);
+    log_z += step;
+    if (std::abs(step) < kSettled) break;
+  }
+  return log_z;
+}
+
+}  // namespace
+
+double LogEvidence(const LogDensity& density, const Matrix& draws, const Vector& weights) {
+  const Matrix chosen = draws(EquallyWeighted(weights, kPoints), Eigen::all);
+  Gaussian gaussian;
+  gaussian.mean = chosen.colwise().mean().transpose();
+  const Matrix centred = chosen.rowwise() - gaussian.mean.transpose();
+  const Eigen::LLT<Matrix> cholesky(kWider * kWider / kPoints * (centred.transpose() * centred));
+  if (cholesky.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+  gaussian.factor = cholesky.matrixL();
+  const Matrix points = gaussian.Draw(kPoints);
+  Vector at_draws, at_points;
+  density(chosen, at_draws);
+  density(points, at_points);
+  return Bridge(at_draws - gaussian.LogDensityAt(chosen),
+                at_points - gaussian.LogDensityAt(points));
+}
+
+}  // namespace polyest
