@@ -90,6 +90,21 @@ struct NoiseModel {
     return 1;
   }
 
+  // What ½ Weight(u) u² lacks of −log of the density behind the weight, at u and up to a constant:
+  // of the t density ½ (ν + 1) log(1 + u²/ν), of Huber's k |u| − ½ k² where |u| > k and ½ u² else.
+  double LackOfWeight(double u) const {
+    switch (outliers) {
+      case OutlierHandling::kNone:
+        return 0;
+      case OutlierHandling::kStudentT:
+        return 0.5 * (kDegreesOfFreedom + 1) * std::log1p(u * u / kDegreesOfFreedom) -
+               0.5 * Weight(u) * u * u;
+      case OutlierHandling::kHuber:
+        return 0.5 * kHuberThreshold * std::max(0.0, std::abs(u) - kHuberThreshold);
+    }
+    return 0;
+  }
+
   // Whether anything of it is to be learned from the record.
   bool Learns() const {
     return unknown || correlation == NoiseCorrelation::kUnknown ||

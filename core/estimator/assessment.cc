@@ -34,7 +34,9 @@ class Assessment {
 
   absl::StatusOr<Assessed> Run(const Stop& stop) {
     regularization_ = problem_.problem().regularization;
-    if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
+    if (request_.regularization) {
+      regularization_ = *request_.regularization;
+    } else if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
       POLYEST_ASSIGN_OR_RETURN(const RegularizationChoice choice,
                                ChooseRegularization(problem_, *request_.expansion, stop));
       regularization_ = choice.regularization;
@@ -43,6 +45,11 @@ class Assessment {
     const Cost cost = request_.expansion->MakeCost(regularization_);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
+    MixtureShare share;
+    if (request_.partition != nullptr) {
+      share =
+          TakeShare(*request_.partition, request_.component, *request_.expansion, cost, posterior_);
+    }
     const std::vector<Minimum>& minima = posterior_.minima;
     const Vector eta = minima.front().point;
     findings_.problem = &problem_;
@@ -60,7 +67,7 @@ class Assessment {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
-    return Assessed{std::move(estimate_), std::move(posterior_)};
+    return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share};
   }
 
  private:
@@ -122,7 +129,7 @@ class Assessment {
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation_[i] / prior_deviation[i];
       parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
-      DescribePosterior(i, parameter);
+      DescribeMarginal(posterior_, prior_, i, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
     DescribeTradeOffs();
@@ -196,15 +203,6 @@ class Assessment {
     }
   }
 
-  void DescribePosterior(int i, ParameterEstimate& parameter) const {
-    const Vector theta = posterior_.Parameter(prior_, i);
-    const WeightedQuantiles quantile(theta, posterior_.weights);
-    parameter.mean = WeightedMean(theta, posterior_.weights);
-    parameter.posterior_std_dev = WeightedStandardDeviation(theta, posterior_.weights);
-    parameter.lower95 = quantile(0.025);
-    parameter.upper95 = quantile(0.975);
-  }
-
   void DescribeChannels(const Cost& cost, const Vector& eta) {
     const Vector d = cost.BasisDifference(eta);
     for (int c = 0; c < problem_.channels(); ++c) {
@@ -267,6 +265,16 @@ class Assessment {
 };
 
 }  // namespace
+
+void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
+                      ParameterEstimate& parameter) {
+  const Vector theta = posterior.Parameter(prior, i);
+  const WeightedQuantiles quantile(theta, posterior.weights);
+  parameter.mean = WeightedMean(theta, posterior.weights);
+  parameter.posterior_std_dev = WeightedStandardDeviation(theta, posterior.weights);
+  parameter.lower95 = quantile(0.025);
+  parameter.upper95 = quantile(0.975);
+}
 
 absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop) {
   return Assessment(request).Run(stop);

@@ -6,8 +6,12 @@
 
 #include <absl/status/statusor.h>
 
+#include <optional>
+
 #include "core/common/stop.h"
+#include "core/estimator/diagnosis.h"
 #include "core/estimator/estimate.h"
+#include "core/estimator/mixture_share.h"
 #include "core/estimator/posterior_draws.h"
 #include "core/estimator/record_summary.h"
 #include "core/estimator/regional_expansion.h"
@@ -22,12 +26,23 @@ struct AssessmentRequest {
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // trajectories × rows
   PosteriorEffort effort;
+  std::optional<double> regularization;  // α² when it has been chosen already
+  // Of a mixture's component: what is its own, and its weight when that was last looked at.
+  const MixturePartition* partition = nullptr;
+  size_t component = 0;
+  double last_weight = 1;
 };
 
 struct Assessed {
   Estimate estimate;
   PosteriorDraws posterior;  // that it sums up
+  Findings findings;         // that its diagnostics are of; refers to what the request does
+  MixtureShare share;        // of a mixture's component
 };
+
+// mean, posterior_std_dev and limits of parameter i.
+void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
+                      ParameterEstimate& parameter);
 
 // Only a stop request makes it not OK.
 absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop);

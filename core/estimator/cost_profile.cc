@@ -3,14 +3,15 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
+#include "core/estimator/cost_slice.h"
 #include "core/estimator/search_domain.h"
 
 namespace polyest {
@@ -24,87 +25,6 @@ std::vector<std::string> Names(const Prior& prior) {
   for (const UncertainParameter& parameter : prior.parameters()) names.push_back(parameter.name);
   return names;
 }
-
-// J over the points of one hyperplane aᵀη = b of the search, η = base + N v with N an orthonormal
-// basis of the directions in it and base its point nearest to where the last one was solved.
-class Slice {
- public:
-  Slice(const MinimizationProblem& search, const Vector& normal) : search_(search), a_(normal) {
-    const Eigen::HouseholderQR<Matrix> factors{Matrix(normal)};
-    const Eigen::Index n = normal.size();
-    const Matrix q = factors.householderQ() * Matrix::Identity(n, n);
-    n_ = q.rightCols(n - 1);
-    // −η ≤ −lower, η ≤ upper and the search's own rows, all in v
-    const Eigen::Index rows = search.constraint.rows();
-    rows_.resize(2 * n + rows, n);
-    rows_ << -Matrix::Identity(n, n), Matrix::Identity(n, n), search.constraint;
-    bounds_.resize(2 * n + rows);
-    bounds_ << -search.lower, search.upper, search.bound;
-    KeepRowsThatCross();
-  }
-
-  // The least of J on aᵀη = b from several starts η; none where it is nowhere finite.
-  std::optional<Minimum> Minimize(double b, const std::vector<Vector>& starts,
-                                  const Stop& stop) const {
-    const Vector base = ToSlice(starts.front(), b);
-    if (n_.cols() == 0) {
-      Minimum only;
-      only.value = search_.function(base, nullptr);
-      only.converged = true;
-      return At(base, std::move(only));
-    }
-    MinimizationProblem problem;
-    problem.function = [&](const Vector& v, Vector* gradient) {
-      if (gradient == nullptr) return search_.function(base + n_ * v, nullptr);
-      Vector slope(a_.size());
-      const double value = search_.function(base + n_ * v, &slope);
-      *gradient = n_.transpose() * slope;
-      return value;
-    };
-    const double extent = (search_.upper - search_.lower).norm();
-    problem.lower = Vector::Constant(n_.cols(), -extent);
-    problem.upper = -problem.lower;
-    problem.constraint = rows_ * n_;
-    problem.bound = bounds_ - rows_ * base;
-    Matrix points(static_cast<Eigen::Index>(starts.size()), n_.cols());
-    for (size_t i = 0; i < starts.size(); ++i) {
-      points.row(static_cast<Eigen::Index>(i)) = n_.transpose() * (ToSlice(starts[i], b) - base);
-    }
-    Minimum minimum = FindMinima(problem, points, MinimizerOptions(), stop).front();
-    return At(base + n_ * minimum.point, minimum);
-  }
-
- private:
-  // Those parallel to the hyperplane say nothing in it; rounding would make up a direction of them.
-  void KeepRowsThatCross() {
-    constexpr double kParallel = 1e-9;
-    Eigen::Index kept = 0;
-    for (Eigen::Index i = 0; i < rows_.rows(); ++i) {
-      if (!((rows_.row(i) * n_).norm() > kParallel * rows_.row(i).norm())) continue;
-      rows_.row(kept) = rows_.row(i).eval();
-      bounds_[kept++] = bounds_[i];
-    }
-    rows_.conservativeResize(kept, rows_.cols());
-    bounds_.conservativeResize(kept);
-  }
-
-  // The nearest point of the hyperplane.
-  Vector ToSlice(const Vector& eta, double b) const {
-    return eta + a_ * ((b - a_.dot(eta)) / a_.squaredNorm());
-  }
-
-  static std::optional<Minimum> At(const Vector& eta, Minimum minimum) {
-    if (!std::isfinite(minimum.value)) return std::nullopt;
-    minimum.point = eta;
-    return minimum;
-  }
-
-  const MinimizationProblem& search_;
-  Vector a_;
-  Matrix n_;
-  Matrix rows_;
-  Vector bounds_;
-};
 
 class Profiler {
  public:
@@ -124,7 +44,7 @@ class Profiler {
 
   absl::StatusOr<CostProfile> Run(int i) const {
     const Vector scores = Scores(i);
-    const Slice slice(search_, to_scores_.row(i).transpose());
+    const CostSlice slice(search_, to_scores_.row(i).transpose());
     const std::vector<Minimum>& minima = assessed_.posterior.minima;
     const double map_score = at_centre_[i] + to_scores_.row(i).dot(minima.front().point);
     const Eigen::Index middle =
@@ -202,6 +122,83 @@ class Profiler {
 };
 
 }  // namespace
+
+namespace {
+
+// Where a profile goes on at a value between its points; +∞ elsewhere.
+double TotalAt(const CostProfile& profile, double value) {
+  const double* const first = profile.value.data();
+  const double* const last = first + profile.value.size();
+  const Eigen::Index above = std::lower_bound(first, last, value) - first;
+  if (above == profile.value.size()) return std::numeric_limits<double>::infinity();
+  if (profile.value[above] == value) return profile.total[above];
+  if (above == 0) return std::numeric_limits<double>::infinity();
+  const double part =
+      (value - profile.value[above - 1]) / (profile.value[above] - profile.value[above - 1]);
+  return (1 - part) * profile.total[above - 1] + part * profile.total[above];
+}
+
+// The points of all profiles at which none of the others is lower.
+CostProfile LowestOf(const std::vector<CostProfile>& profiles) {
+  struct Point {
+    size_t profile;
+    Eigen::Index row;
+  };
+  std::vector<Point> points;
+  for (size_t k = 0; k < profiles.size(); ++k) {
+    for (Eigen::Index row = 0; row < profiles[k].value.size(); ++row) {
+      const bool lowest = std::ranges::all_of(profiles, [&](const CostProfile& other) {
+        return TotalAt(other, profiles[k].value[row]) >= profiles[k].total[row];
+      });
+      if (lowest) points.push_back({k, row});
+    }
+  }
+  std::ranges::stable_sort(
+      points, {}, [&](const Point& point) { return profiles[point.profile].value[point.row]; });
+  CostProfile lowest = profiles.front();
+  const auto count = static_cast<Eigen::Index>(points.size());
+  for (Vector* column : {&lowest.value, &lowest.total, &lowest.mismatch, &lowest.prior}) {
+    column->resize(count);
+  }
+  lowest.at.resize(count, profiles.front().at.cols());
+  lowest.converged.clear();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto [k, row] = points[static_cast<size_t>(i)];
+    const CostProfile& from = profiles[k];
+    lowest.value[i] = from.value[row];
+    lowest.total[i] = from.total[row];
+    lowest.mismatch[i] = from.mismatch[row];
+    lowest.prior[i] = from.prior[row];
+    lowest.at.row(i) = from.at.row(row);
+    lowest.converged.push_back(from.converged[static_cast<size_t>(row)]);
+  }
+  return lowest;
+}
+
+}  // namespace
+
+CostProfiles LowestOf(const std::vector<CostProfiles>& components,
+                      const std::vector<double>& heights) {
+  CostProfiles result = components.front();
+  for (size_t i = 0; i < result.profiles.size(); ++i) {
+    std::vector<CostProfile> profiles;
+    for (size_t k = 0; k < components.size(); ++k) {
+      profiles.push_back(components[k].profiles[i]);
+      profiles.back().total.array() += heights[k] - heights.front();
+      profiles.back().mismatch.array() += heights[k] - heights.front();
+    }
+    result.profiles[i] = LowestOf(profiles);
+  }
+  for (size_t k = 1; k < components.size(); ++k) {
+    CostValue least = components[k].least;
+    least.total += heights[k] - heights.front();
+    least.mismatch += heights[k] - heights.front();
+    if (least.total >= result.least.total) continue;
+    result.least = least;
+    result.map = components[k].map;
+  }
+  return result;
+}
 
 absl::Status ProfileOptions::Validate(const Prior& prior) const {
   const std::vector<std::string> names = Names(prior);

@@ -29,8 +29,8 @@ struct ProfileOptions {
 struct CostProfile {
   std::string parameter;
   std::string unit;
-  // Ascending; over four posterior standard deviations to each side of the minimum, as far as Ω and
-  // the region in which the expansion is trusted go.
+  // Ascending; of each piece of a posterior in several, over four posterior standard deviations to
+  // each side of the minimum, as far as Ω and the region in which the expansion is trusted go.
   Vector value;
   // J_p at each, and its parts (25).
   Vector total, mismatch, prior;
@@ -46,6 +46,12 @@ struct CostProfiles {
   Vector map;                           // θ there
   std::vector<Diagnostic> diagnostics;  // those of an estimate
 };
+
+// Those of the components of a mixture as one: at every value that any of them has, the lowest. A
+// component's costs count from its own height (MixtureShare::height), the first's is kept. At least
+// one component, as many heights.
+CostProfiles LowestOf(const std::vector<CostProfiles>& components,
+                      const std::vector<double>& heights);
 
 // options have been validated. `cost` is that of the assessment, on the design. Only a stop request
 // makes it not OK.

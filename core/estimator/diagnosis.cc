@@ -201,6 +201,28 @@ void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics)
   diagnostics.push_back({DiagnosticCode::kPointsFailed, message});
 }
 
+// The pieces of a mixture, with their weights.
+void AddComponents(const Findings& findings, const Estimate& estimate,
+                   std::vector<Diagnostic>& diagnostics) {
+  if (estimate.components.empty()) return;
+  std::vector<std::string> pieces;
+  for (const ComponentEstimate& component : estimate.components) {
+    std::vector<std::string> values;
+    for (const ParameterEstimate& parameter : component.parameters) {
+      values.push_back(absl::StrFormat("%s = %.6g", parameter.name, parameter.map));
+    }
+    pieces.push_back(
+        absl::StrFormat("%.3g %% at %s", 100 * component.weight, absl::StrJoin(values, ", ")));
+  }
+  std::string message = absl::StrFormat("the posterior is in %d separated pieces: %s",
+                                        pieces.size(), absl::StrJoin(pieces, "; "));
+  if (findings.left_out > 0) {
+    absl::StrAppendFormat(&message, "; there were more, left out with %.2g %%",
+                          100 * findings.left_out);
+  }
+  diagnostics.push_back({DiagnosticCode::kMultipleMinima, std::move(message)});
+}
+
 void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (!findings.other_minima.empty()) {
     std::vector<std::string> places;
@@ -256,6 +278,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddUnlearnedNoise(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
   AddNonGaussian(estimate, diagnostics);
+  AddComponents(findings, estimate, diagnostics);
   AddMinima(findings, diagnostics);
   AddRegularization(findings, diagnostics);
   AddFailures(findings, diagnostics);

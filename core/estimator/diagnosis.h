@@ -23,6 +23,7 @@ struct Findings {
   bool converged = true;
   std::string minimizer_reason;
   std::vector<Vector> other_minima;  // θ of other minima of comparable cost
+  double left_out = 0;               // share of a mixture's components there was no room for
   double shift = 0;                  // bound on the error of a mean, in standard deviations
   // Why the rule asked for has not chosen α²; empty where it has, or none was asked for.
   std::string regularization_not_determined;

@@ -19,7 +19,7 @@ enum class DiagnosticCode {
   kExpansionInaccurate,  // the expansion differs from the model by too much; uncertainty widened
   kModelMisfit,          // residuals far larger than the noise
   kAtPriorBound,         // the estimate lies on a bound of the prior
-  kMultipleMinima,       // other minima of comparable cost
+  kMultipleMinima,       // other minima of comparable cost, or a posterior in several pieces
   kNotConverged,         // the minimizer gave up, or the posterior's chains have not mixed
   kPointsFailed,         // trajectories that could not be integrated were left out
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
@@ -49,6 +49,13 @@ struct ParameterEstimate {
   Verdict verdict = Verdict::kNotIdentified;
 };
 
+// One of the separated pieces of a posterior.
+struct ComponentEstimate {
+  double weight = 0;  // the posterior's probability of it
+  // Of this piece alone: the minimum and the curvature there, mean, standard deviation and limits.
+  std::vector<ParameterEstimate> parameters;
+};
+
 struct ChannelEstimate {
   std::string output;
   int64_t samples = 0;
@@ -75,11 +82,15 @@ struct ExpansionSummary {
   int64_t trajectories = 0;
 };
 
+// Of a posterior in several pieces: map, std_dev, covariance, cost, channels and directions are
+// those of the heaviest; mean, posterior_std_dev and limits of all. A parameter that each piece
+// identifies, but not which of them it is, is WEAK.
 struct Estimate {
   std::vector<ParameterEstimate> parameters;
-  Matrix covariance;          // of the parameters, from the curvature
-  CostValue cost;             // at map
-  double regularization = 1;  // α² used
+  std::vector<ComponentEstimate> components;  // heaviest first; none when there is one piece
+  Matrix covariance;                          // of the parameters, from the curvature
+  CostValue cost;                             // at map
+  double regularization = 1;                  // α² used
   std::vector<ChannelEstimate> channels;
   std::vector<Direction> directions;
   std::vector<TradeOff> trade_offs;  // pairs known together, not alone

@@ -41,6 +41,9 @@ absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& probl
   const auto n = static_cast<int>(problem.problem().uncertain.size());
   POLYEST_CHECK(estimate.covariance.rows() >= n);  // those of the first run come first
   const Vector std_dev = estimate.covariance.diagonal().cwiseSqrt();
+  // Of a posterior in several pieces the heaviest, whose covariance it is.
+  const std::vector<ParameterEstimate>& parameters =
+      estimate.components.empty() ? estimate.parameters : estimate.components.front().parameters;
   Problem next = problem.problem();
   std::erase_if(next.correlations, [&](const Correlation& correlation) {
     return std::ranges::any_of(next.uncertain, [&](const UncertainParameter& parameter) {
@@ -50,9 +53,8 @@ absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& probl
   for (int i = 0; i < n; ++i) {
     const auto index = static_cast<size_t>(i);
     if (next.uncertain[index].per_run) continue;  // the next run has its own
-    POLYEST_ASSIGN_OR_RETURN(
-        next.uncertain[index],
-        PriorAfter(next.uncertain[index], estimate.parameters[index], std_dev[i]));
+    POLYEST_ASSIGN_OR_RETURN(next.uncertain[index],
+                             PriorAfter(next.uncertain[index], parameters[index], std_dev[i]));
     for (int j = 0; j < i; ++j) {
       if (next.uncertain[static_cast<size_t>(j)].per_run) continue;
       const double correlation = estimate.covariance(i, j) / (std_dev[i] * std_dev[j]);

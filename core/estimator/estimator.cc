@@ -3,17 +3,22 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "core/common/status.h"
 #include "core/estimator/assessment.h"
 #include "core/estimator/memory_store.h"
 #include "core/estimator/mixture_component.h"
+#include "core/estimator/posterior_mixture.h"
 #include "core/estimator/sample_checks.h"
 
 namespace polyest {
 
-// Owns the record; what is made of it is the component's.
+// Owns the record and the components of the posterior's mixture: one at first, and as long as one
+// expansion serves. Which there are is decided at rows that are a function of the record alone, all
+// components being at the same row: where one is divided only its own parts are weighed, all of
+// them only where a window of the mixture ends.
 class Estimator::Implementation {
  public:
   Implementation(ResolvedProblem problem, EstimatorOptions options)
@@ -23,17 +28,18 @@ class Estimator::Implementation {
         checks_(problem_) {}
 
   absl::Status Begin() {
-    POLYEST_ASSIGN_OR_RETURN(component_,
+    POLYEST_ASSIGN_OR_RETURN(auto component,
                              MixtureComponent::OfPrior(problem_, store_.get(), threads_));
+    components_.push_back(std::move(component));
     return absl::OkStatus();
   }
 
   const ResolvedProblem& problem() const { return problem_; }
   int64_t rows_appended() const { return store_->rows(); }
-  int64_t rows_processed() const { return component_->rows_taken(); }
+  int64_t rows_processed() const;
 
   absl::Status Append(const Samples& samples);
-  absl::Status Process(const Stop& stop) { return component_->TakeUpTo(SettledRows(), stop); }
+  absl::Status Process(const Stop& stop);
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop) const;
@@ -43,13 +49,25 @@ class Estimator::Implementation {
       const RegularizationOptions& options, const Stop& stop) const;
 
  private:
+  using Components = std::vector<std::unique_ptr<MixtureComponent>>;
+
   int64_t SettledRows() const;
+  absl::StatusOr<bool> TakeUpTo(int64_t rows, const Stop& stop);
+  absl::Status Divide(size_t component, const Stop& stop);
+  absl::Status Weigh(const Stop& stop);
+  absl::Status KeepHeaviest(Components& components, double weight, const Stop& stop);
+  static std::vector<AssessmentRequest> Requests(const Components& components);
+  absl::StatusOr<AssessedMixture> AssessAll(const PosteriorEffort& effort, const Stop& stop) const;
 
   ResolvedProblem problem_;
   int threads_;
   std::shared_ptr<SampleStore> store_;
   SampleChecks checks_;
-  std::unique_ptr<MixtureComponent> component_;
+  Components components_;
+  int64_t weighing_row_ = 0;  // of several components: where they are weighed next
+  double left_out_ = 0;       // largest share of components for which there was no room
+  int reexpansions_ = 0;      // of components there were
+  int64_t propagated_rows_ = 0;
 };
 
 absl::Status Estimator::Implementation::Append(const Samples& samples) {
@@ -69,33 +87,133 @@ int64_t Estimator::Implementation::SettledRows() const {
   return last.rows - std::min<int64_t>(problem_.knots_ahead(), last.rows_in_run);
 }
 
+int64_t Estimator::Implementation::rows_processed() const {
+  int64_t rows = components_.front()->rows_taken();
+  for (const auto& component : components_) rows = std::min(rows, component->rows_taken());
+  return rows;
+}
+
+absl::Status Estimator::Implementation::Process(const Stop& stop) {
+  const int64_t settled = SettledRows();
+  while (true) {
+    const int64_t rows = components_.size() > 1 ? std::min(settled, weighing_row_) : settled;
+    POLYEST_ASSIGN_OR_RETURN(const bool divided, TakeUpTo(rows, stop));
+    if (divided) continue;
+    if (components_.size() == 1 || rows < weighing_row_) return absl::OkStatus();
+    POLYEST_RETURN_IF_ERROR(Weigh(stop));
+  }
+}
+
+// True when one of the components has been divided, or could not be; then not all have got there.
+absl::StatusOr<bool> Estimator::Implementation::TakeUpTo(int64_t rows, const Stop& stop) {
+  for (size_t k = 0; k < components_.size(); ++k) {
+    POLYEST_RETURN_IF_ERROR(components_[k]->TakeUpTo(rows, stop));
+    if (!components_[k]->torn()) continue;
+    POLYEST_RETURN_IF_ERROR(Divide(k, stop));
+    return true;
+  }
+  return false;
+}
+
+absl::Status Estimator::Implementation::Divide(size_t component, const Stop& stop) {
+  MixtureComponent& whole = *components_[component];
+  POLYEST_ASSIGN_OR_RETURN(Components parts, whole.Divide(stop));
+  if (parts.empty()) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(KeepHeaviest(parts, whole.weight(), stop));
+  reexpansions_ += whole.reexpansions();
+  propagated_rows_ += whole.propagated_rows();
+  if (components_.size() == 1) weighing_row_ = NextWindow(whole.rows_taken());
+  const auto place =
+      components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
+  components_.insert(place, std::make_move_iterator(parts.begin()),
+                     std::make_move_iterator(parts.end()));
+  return absl::OkStatus();
+}
+
+absl::Status Estimator::Implementation::Weigh(const Stop& stop) {
+  for (const auto& component : components_) {
+    POLYEST_RETURN_IF_ERROR(component->MakeComparable(stop));
+  }
+  POLYEST_RETURN_IF_ERROR(KeepHeaviest(components_, 1, stop));
+  weighing_row_ = NextWindow(weighing_row_);
+  return absl::OkStatus();
+}
+
+// weight: of all of them together.
+absl::Status Estimator::Implementation::KeepHeaviest(Components& components, double weight,
+                                                     const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const MixtureWeighing weighing,
+                           WeighMixture(Requests(components), stop));
+  Components kept;
+  for (size_t i = 0; i < weighing.kept.size(); ++i) {
+    kept.push_back(std::move(components[weighing.kept[i]]));
+    kept.back()->set_weight(weight * weighing.weights[i]);
+  }
+  for (const auto& component : components) {
+    if (!component) continue;
+    reexpansions_ += component->reexpansions();
+    propagated_rows_ += component->propagated_rows();
+  }
+  left_out_ = std::max(left_out_, weight * weighing.left_out);
+  components = std::move(kept);
+  return absl::OkStatus();
+}
+
+std::vector<AssessmentRequest> Estimator::Implementation::Requests(const Components& components) {
+  std::vector<AssessmentRequest> requests;
+  for (const auto& component : components) requests.push_back(component->RequestAssessment());
+  return requests;
+}
+
+absl::StatusOr<AssessedMixture> Estimator::Implementation::AssessAll(const PosteriorEffort& effort,
+                                                                     const Stop& stop) const {
+  std::vector<AssessmentRequest> requests = Requests(components_);
+  for (AssessmentRequest& request : requests) request.effort = effort;
+  requests.front().reexpansions += reexpansions_;
+  requests.front().propagated_rows += propagated_rows_;
+  return AssessMixture(std::move(requests), left_out_, stop);
+}
+
 absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
-  POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(component_->RequestAssessment(), stop));
-  return std::move(assessed.estimate);
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, AssessAll(PosteriorEffort(), stop));
+  return std::move(assessed.whole.estimate);
 }
 
 absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
     const PosteriorOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
-  AssessmentRequest request = component_->RequestAssessment();
-  request.effort = options.Effort();
-  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(request, stop));
-  return DescribePosterior(assessed, problem_.prior(), options);
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(options.Effort(), stop));
+  return DescribePosterior(assessed.whole, problem_.prior(), options);
 }
 
 absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
     const ProfileOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
-  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(component_->RequestAssessment(), stop));
-  const Cost cost = component_->expansion().MakeCost(assessed.estimate.regularization);
-  return ProfileCost(assessed, cost, component_->expansion().design(), options, stop);
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(PosteriorEffort(), stop));
+  const auto profile = [&](const Assessed& one, size_t component) {
+    const RegionalExpansion& expansion = components_[component]->expansion();
+    return ProfileCost(one, expansion.MakeCost(one.estimate.regularization), expansion.design(),
+                       options, stop);
+  };
+  if (assessed.components.empty()) return profile(assessed.whole, assessed.order.front());
+  std::vector<CostProfiles> profiles;
+  std::vector<double> heights;
+  for (size_t k = 0; k < assessed.components.size(); ++k) {
+    POLYEST_ASSIGN_OR_RETURN(CostProfiles one, profile(assessed.components[k], assessed.order[k]));
+    profiles.push_back(std::move(one));
+    heights.push_back(assessed.components[k].share.height);
+  }
+  CostProfiles lowest = LowestOf(profiles, heights);
+  lowest.diagnostics = assessed.whole.estimate.diagnostics;
+  return lowest;
 }
 
 absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate());
-  POLYEST_ASSIGN_OR_RETURN(const Assessed assessed, Assess(component_->RequestAssessment(), stop));
-  return SweepRegularization(problem_, component_->expansion(), assessed, options, stop);
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(PosteriorEffort(), stop));
+  const RegionalExpansion& expansion = components_[assessed.order.front()]->expansion();
+  return SweepRegularization(problem_, expansion, assessed.whole, options, stop);
 }
 
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)

@@ -9,6 +9,7 @@
 #include "core/common/status.h"
 #include "core/estimator/new_runs.h"
 #include "core/estimator/noise_learning.h"
+#include "core/estimator/posterior_pieces.h"
 #include "core/estimator/reexpansion.h"
 
 namespace polyest {
@@ -20,6 +21,9 @@ constexpr double kResidualToNoise = 0.1;
 // Where a window ends the expansion is compared with the model: it is settled anew when the
 // posterior's means may be off by this many of its standard deviations.
 constexpr double kMostShift = 0.1;
+// Pieces are believed of an expansion that is too coarse for more samples, but not so coarse that
+// it may have made them up, or left others out: ΔJ over them is no more than this.
+constexpr double kMostShiftInPieces = 1;
 constexpr double kWindowGrowth = 1.3;
 // The integration error must stay so far below the noise that it does not add up over a long
 // record to a share of the posterior's standard deviation: relative tolerance ≤ this × noise ÷
@@ -37,6 +41,11 @@ constexpr int kMostRevisions = 24;
 constexpr double kAboveSignal = 2;
 
 }  // namespace
+
+int64_t NextWindow(int64_t rows, int64_t from) {
+  const auto window = static_cast<double>(rows - from);
+  return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
+}
 
 MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleStore* store,
                                    int threads)
@@ -57,11 +66,12 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
 }
 
 absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
+  if (torn()) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   // A window's end that an earlier stop left open.
   if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
   RowBlock block;
-  while (taken_ < rows) {
+  while (taken_ < rows && !torn()) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(ReadBlock(rows, block, stop));
     broken_ = true;
@@ -151,6 +161,7 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, 
     ++settlements_at_row_;
     if (moved) return true;
   }
+  if (LookForPieces()) return true;
   if (short_of_trajectories) return expansion_->shortage();
   patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
   return false;
@@ -166,24 +177,85 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
     moved = moved || tightened || settled;
   }
-  const auto window = static_cast<double>(taken_ - windows_from_);
-  window_end_ =
-      std::max(taken_ + 2, windows_from_ + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
+  window_end_ = NextWindow(taken_, windows_from_);
   return moved;
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
+  const auto accurate = [&] {
+    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+    return AgreementWithModel(*expansion_, cost).shift <= kMostShift;
+  };
   bool moved = false;
   // Each settlement may raise the order by one.
   for (int i = 0; i < (automatic_order() ? kMostSettlementsAtRow : 1); ++i) {
-    const Agreement agreement =
-        AgreementWithModel(*expansion_, expansion_->MakeCost(problem_.problem().regularization));
-    if (agreement.shift <= kMostShift) break;
+    if (accurate()) return moved;
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));
     if (!settled) break;
     moved = true;
   }
-  return moved;
+  return (!accurate() && LookForPieces()) || moved;
+}
+
+// True when the posterior on the present expansion, which no move makes accurate, is in pieces. A
+// noise not learned yet makes no pieces: it would be what decides between them.
+bool MixtureComponent::LookForPieces() {
+  if (!adaptive() || taken_ < whole_until_) return false;
+  for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
+    const bool unknown = problem_.problem().measured[c].noise.unknown;
+    if (unknown && !expansion_->noise().channels[c].learned) return false;
+  }
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  if (AgreementWithModel(*expansion_, cost).shift > kMostShiftInPieces) return false;
+  std::vector<Matrix> pieces = FindPieces(cost, expansion_->design(), particles_);
+  if (pieces.size() > 1) pieces_ = std::move(pieces);
+  return torn();
+}
+
+absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
+    const Stop& stop) {
+  std::vector<std::unique_ptr<MixtureComponent>> parts;
+  for (const Matrix& piece : pieces_) {
+    std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
+    const absl::Status begun = part->BeginOn(*this, piece, stop);
+    if (absl::IsFailedPrecondition(begun)) {
+      pieces_.clear();
+      whole_until_ = NextWindow(taken_, windows_from_);
+      parts.clear();
+      return parts;
+    }
+    POLYEST_RETURN_IF_ERROR(begun);
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+// At the parent's row, over a region around one of its pieces.
+absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Matrix& piece,
+                                       const Stop& stop) {
+  taken_ = window_end_ = parent.taken_;
+  windows_from_ = parent.windows_from_;
+  summary_ = parent.summary_;
+  settlements_ = parent.settlements_;
+  whole_until_ = NextWindow(taken_, windows_from_);
+  particles_ = piece;
+  const ExpansionDesign& before = parent.expansion_->design();
+  ExpansionDesign design =
+      DesignForRegion(problem_, before.basis->truncation(), RegionOfParticles(piece),
+                      piece.colwise().mean().transpose());
+  const Matrix checks = piece.topRows(std::min(before.check_points.rows(), piece.rows()));
+  design.check_points = design.region.ManyToLocal(checks);
+  parent.expansion_->MakeCost(problem_.problem().regularization)
+      .EvaluateMany(before.region.ManyToLocal(checks), design.check_costs);
+  POLYEST_ASSIGN_OR_RETURN(
+      expansion_, Replay(problem_, std::move(design), parent.expansion_->noise(), *store_, taken_,
+                         threads_, stop));
+  ++reexpansions_;
+  bool moved = true;
+  for (int i = 0; moved && i < kMostSettlementsAtRow; ++i) {
+    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
+  }
+  return absl::OkStatus();
 }
 
 // Scales that are not learned yet follow the signal, so that the first samples weigh little however
@@ -271,6 +343,17 @@ absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_o
   return true;
 }
 
+absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
+  if (comparable_row_ == taken_) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(Recover(stop));
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  if (!AgreementWithModel(*expansion_, cost).mean_difference) {
+    POLYEST_RETURN_IF_ERROR(Settle(stop, /*may_raise_order=*/false).status());
+  }
+  comparable_row_ = taken_;
+  return absl::OkStatus();
+}
+
 // The present expansion is given up for another one that has taken the same rows.
 void MixtureComponent::Adopt(std::unique_ptr<RegionalExpansion> expansion) {
   abandoned_rows_ += expansion_->propagated_rows();
@@ -285,7 +368,8 @@ AssessmentRequest MixtureComponent::RequestAssessment() const {
   request.record = &summary_;
   request.guesses = &particles_;
   request.reexpansions = reexpansions_;
-  request.propagated_rows = abandoned_rows_ + expansion_->propagated_rows();
+  request.propagated_rows = propagated_rows();
+  request.last_weight = weight_;
   return request;
 }
 

@@ -8,12 +8,16 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <vector>
 
 #include "core/estimator/assessment.h"
 #include "core/estimator/record_summary.h"
 #include "core/estimator/regional_expansion.h"
 
 namespace polyest {
+
+// Where a window that begins after so many rows ends, windows being counted from a row on.
+int64_t NextWindow(int64_t rows, int64_t from = 0);
 
 class MixtureComponent {
  public:
@@ -28,7 +32,22 @@ class MixtureComponent {
   absl::Status TakeUpTo(int64_t rows, const Stop& stop);
   int64_t rows_taken() const { return taken_; }
 
+  // Whether the posterior lies in separated pieces that one expansion does not serve. No more rows
+  // are taken before it has been divided.
+  bool torn() const { return !pieces_.empty(); }
+  // A component for each piece, at the same row. None, and this one goes on whole, where one of
+  // them could not be expanded.
+  absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> Divide(const Stop& stop);
+
+  // Before it is weighed: settled anew, once at a row, where the posterior has become so narrow
+  // that the check points no longer tell its cost's height (mixture_share.h).
+  absl::Status MakeComparable(const Stop& stop);
+  // The posterior's probability of it when that was last looked at.
+  double weight() const { return weight_; }
+  void set_weight(double weight) { weight_ = weight; }
   const RegionalExpansion& expansion() const { return *expansion_; }
+  int reexpansions() const { return reexpansions_; }
+  int64_t propagated_rows() const { return abandoned_rows_ + expansion_->propagated_rows(); }
   // Refers to the component.
   AssessmentRequest RequestAssessment() const;
 
@@ -49,6 +68,8 @@ class MixtureComponent {
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
+  bool LookForPieces();
+  absl::Status BeginOn(const MixtureComponent& parent, const Matrix& piece, const Stop& stop);
   absl::Status TakeAnew(LearnedNoise noise, const Stop& stop);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
@@ -57,14 +78,18 @@ class MixtureComponent {
   int threads_;
   bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
-  bool broken_ = false;  // a stop left the expansion between two rows
-  Matrix particles_;     // of the last settlement, germ coordinates
+  bool broken_ = false;         // a stop left the expansion between two rows
+  Matrix particles_;            // of the last settlement, germ coordinates
+  std::vector<Matrix> pieces_;  // of them, where there are several
+  double weight_ = 1;
   int64_t taken_ = 0;
   int64_t windows_from_ = 0;  // the row that the present windows count from
   int64_t window_end_ = 2;
   int64_t patient_until_ = 0;  // rows before this one are taken whatever their residual
+  int64_t whole_until_ = 0;    // no pieces are looked for before this one
   int64_t settled_row_ = -1;
   int settlements_at_row_ = 0;
+  int64_t comparable_row_ = -1;
   uint64_t settlements_ = 0;
   int reexpansions_ = 0;
   int64_t abandoned_rows_ = 0;  // propagated by expansions given up since

@@ -13,6 +13,7 @@ constexpr int kMostAttempts = 15;
 constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
 constexpr int64_t kReplayRows = 256;
 constexpr double kLeastEffectiveChecks = 2;  // for a spread over them to be seen
+constexpr double kMostSpread = 0.25;         // of ΔJ, for its mean to be known
 constexpr double kNegligibleWeight = 1e-3;   // of a check point, relative to the heaviest
 
 // Loop of one settlement; holds what changes from attempt to attempt.
@@ -193,6 +194,7 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   agreement.shift = worst * std::sqrt(static_cast<double>(check.samples));
   if (sum * sum / sum_of_squares >= kLeastEffectiveChecks) {
     agreement.shift = std::min(agreement.shift, std::sqrt(variance));
+    if (std::sqrt(variance) <= kMostSpread) agreement.mean_difference = mean;
   }
   return agreement;
 }

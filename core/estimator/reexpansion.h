@@ -14,6 +14,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <optional>
 
 #include "core/estimator/regional_expansion.h"
 
@@ -57,7 +58,10 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
 // both by the Cauchy–Schwarz inequality, over particles and over samples. The first is the sharper
 // but needs check points where the posterior is; the second holds wherever they are.
 struct Agreement {
-  double shift = 0;              // the smaller bound that may be used; ≥ 0
+  double shift = 0;  // the smaller bound that may be used; ≥ 0
+  // Mean of ΔJ over the posterior, where the check points tell it to 0.25: what the expansion's own
+  // error, the discount included, has made of the cost's height.
+  std::optional<double> mean_difference;
   double residual_to_noise = 0;  // worst root mean square over the check points that still matter
 };
 

@@ -247,9 +247,10 @@ void RegionalExpansion::Absorb(int row) {
     const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
     const int column = row * channels_ + c;
     const auto coefficients = coefficients_.col(column);
-    const double weight =
-        OutlierWeight(c, coefficients, z, sigma * sigma + residual_variance_[column]);
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    const double deviation =
+        DeviationFromCentre(c, coefficients, z, sigma * sigma + residual_variance_[column]);
+    const double weight = model.Weight(deviation);
     // e = z − cᵀφ_0,  R = σ²/w + the residual's variance ρ
     const double noise = model.VarianceFactor() * sigma * sigma / weight;
     const double variance = noise + residual_variance_[column];
@@ -257,6 +258,8 @@ void RegionalExpansion::Absorb(int row) {
     sums_[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
     AddDifference(c, coefficients, error, variance);
     discount_[c] += residual_variance_[column] / variance;
+    Normalize(model.VarianceFactor() * sigma * sigma, residual_variance_[column],
+              model.LackOfWeight(deviation));
     if (weight < 0.5) ++outliers_[static_cast<size_t>(c)];
     Compare(column, z, noise);
     ++absorbed_samples_;
@@ -265,14 +268,21 @@ void RegionalExpansion::Absorb(int row) {
   propagated_rows_ += thetas_.rows();
 }
 
-// variance: of the sample about the expansion.
-double RegionalExpansion::OutlierWeight(int channel, const ConstVectorRef& coefficients, double z,
-                                        double variance) const {
+// In units of what the sample may be off by there; variance: of the sample about the expansion.
+// 0 where nobody looks for outliers.
+double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,
+                                              double z, double variance) const {
   const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
-  if (model.outliers == OutlierHandling::kNone) return 1;
+  if (model.outliers == OutlierHandling::kNone) return 0;
   const double error = z - coefficients.dot(centre_phi_);
   const double open = (spread_.transpose() * coefficients).squaredNorm();
-  return model.Weight(error / std::sqrt(variance + open));
+  return error / std::sqrt(variance + open);
+}
+
+// noise: σ²; own_error: the residual's variance ρ; lack: of the outlier's weight.
+void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
+  log_noise_ += 0.5 * std::log(noise) + lack;
+  log_variance_ += 0.5 * std::log(noise + own_error) + lack;
 }
 
 // u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.

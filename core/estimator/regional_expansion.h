@@ -69,6 +69,12 @@ class RegionalExpansion {
   double Discount(int channel) const { return discount_[channel]; }
   // Samples of a channel with less than half their weight.
   int64_t Outliers(int channel) const { return outliers_[static_cast<size_t>(channel)]; }
+  // What makes the costs of different expansions of the same record comparable, each with its own
+  // noise and weights of outliers: Σ ½ log R_k, and what reweighting leaves out of the likelihood.
+  // R with the expansion's own error, which belongs to the sums, or without.
+  double LogNormalization(bool with_own_error) const {
+    return with_own_error ? log_variance_ : log_noise_;
+  }
   // The cost on this expansion with α² = regularization.
   Cost MakeCost(double regularization) const;
 
@@ -94,10 +100,11 @@ class RegionalExpansion {
   absl::Status DropFailed(int row);
   void NoteFailures(int row);
   void LookFromPosterior();
-  double OutlierWeight(int channel, const ConstVectorRef& coefficients, double z,
-                       double variance) const;
+  double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
+                             double variance) const;
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                      double variance);
+  void Normalize(double noise, double own_error, double lack);
   void Compare(int column, double z, double variance);
 
   const ResolvedProblem& problem_;
@@ -135,6 +142,8 @@ class RegionalExpansion {
 
   std::vector<ChannelSums> sums_;  // by channel
   Vector discount_;
+  double log_noise_ = 0;     // Σ ½ log σ² + what outliers' weights lack
+  double log_variance_ = 0;  // the same with R in place of σ²
   std::vector<int64_t> outliers_;
   // By channel, the sample before in units of its noise; a zero where a run begins.
   int summed_run_ = -1;
