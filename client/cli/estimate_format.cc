@@ -71,6 +71,26 @@ void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   table.Print(out);
 }
 
+// The pieces of a posterior in several; what is above is of the heaviest or of all.
+void PrintComponents(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.components().empty()) return;
+  TextTable table({"piece", "weight", "parameter", "estimate", "sd", "unit", "mean"});
+  int piece = 0;
+  for (const v1::MixtureComponent& component : estimate.components()) {
+    const std::string weight = absl::StrCat(FormatNumber(100 * component.weight(), 3), " %");
+    ++piece;
+    bool first = true;
+    for (const v1::ParameterEstimate& p : component.parameters()) {
+      table.AddRow({first ? absl::StrCat(piece) : "", first ? weight : "", p.name(),
+                    FormatNumber(p.map()), FormatNumber(p.std_dev(), 3), UnitText(p.unit()),
+                    FormatNumber(p.mean())});
+      first = false;
+    }
+  }
+  out << "\nthe posterior is in several pieces\n";
+  table.Print(out);
+}
+
 void PrintChannels(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.channels().empty()) return;
   TextTable table({"channel", "samples", "χ²", "χ²/samples", "noise sd", "lag-1", "effective"});
@@ -158,6 +178,7 @@ void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
   out << absl::StrFormat("%d samples up to t = %.6g s\n\n", estimate.samples(), estimate.time());
   PrintParameters(estimate, out);
   PrintBias(estimate, out);
+  PrintComponents(estimate, out);
   PrintChannels(estimate, out);
   PrintDirections(estimate, out);
   PrintSummary(estimate, out);

@@ -83,6 +83,14 @@ void ToProto(const ExpansionSummary& expansion, v1::ExpansionSummary& proto) {
   proto.set_trajectories(expansion.trajectories);
 }
 
+void AddComponents(const Estimate& estimate, v1::Estimate& proto) {
+  for (const ComponentEstimate& component : estimate.components) {
+    v1::MixtureComponent& added = *proto.add_components();
+    added.set_weight(component.weight);
+    for (const auto& parameter : component.parameters) ToProto(parameter, *added.add_parameters());
+  }
+}
+
 void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
   for (const TradeOff& trade_off : estimate.trade_offs) {
     v1::TradeOff& added = *proto.add_trade_offs();
@@ -131,6 +139,7 @@ v1::Estimate ToProto(const Estimate& estimate) {
   for (const auto& channel : estimate.channels) ToProto(channel, *proto.add_channels());
   AddDirections(estimate, proto);
   AddTradeOffs(estimate, proto);
+  AddComponents(estimate, proto);
   ToProto(estimate.expansion, *proto.mutable_expansion());
   for (const auto& diagnostic : estimate.diagnostics) {
     *proto.add_diagnostics() = ToProto(diagnostic);
