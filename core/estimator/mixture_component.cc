@@ -1,5 +1,6 @@
 #include "core/estimator/mixture_component.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -39,6 +40,17 @@ constexpr int kMostSettlementsAtRow = 4;
 constexpr int kMostRevisions = 24;
 // By how much a scale not learned yet exceeds the largest sample.
 constexpr double kAboveSignal = 2;
+
+// Where outliers are looked for from once the posterior is there.
+PosteriorSummary SummaryOf(const Matrix& particles) {
+  PosteriorSummary summary;
+  summary.centre = particles.colwise().mean().transpose();
+  const Matrix centred = particles.rowwise() - summary.centre.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(centred.transpose() * centred /
+                                                    static_cast<double>(particles.rows()));
+  summary.factor = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  return summary;
+}
 
 }  // namespace
 
@@ -247,9 +259,10 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Mat
   design.check_points = design.region.ManyToLocal(checks);
   parent.expansion_->MakeCost(problem_.problem().regularization)
       .EvaluateMany(before.region.ManyToLocal(checks), design.check_costs);
-  POLYEST_ASSIGN_OR_RETURN(
-      expansion_, Replay(problem_, std::move(design), parent.expansion_->noise(), *store_, taken_,
-                         threads_, stop));
+  LearnedNoise noise = parent.expansion_->noise();
+  if (noise.posterior.centre.size() > 0) noise.posterior = SummaryOf(piece);
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, std::move(design), std::move(noise),
+                                              *store_, taken_, threads_, stop));
   ++reexpansions_;
   bool moved = true;
   for (int i = 0; moved && i < kMostSettlementsAtRow; ++i) {

@@ -39,6 +39,21 @@ Estimate TwoParameters() {
   return estimate;
 }
 
+TEST(EstimateToProto, CarriesThePiecesOfAPosterior) {
+  Estimate estimate = TwoParameters();
+  EXPECT_EQ(ToProto(estimate).components_size(), 0);
+  estimate.components = {{.weight = 0.75, .parameters = estimate.parameters},
+                         {.weight = 0.25, .parameters = estimate.parameters}};
+  estimate.components[1].parameters[0].map = -1;
+  const v1::Estimate proto = ToProto(estimate);
+  ASSERT_EQ(proto.components_size(), 2);
+  EXPECT_EQ(proto.components(0).weight(), 0.75);
+  EXPECT_EQ(proto.components(1).weight(), 0.25);
+  ASSERT_EQ(proto.components(1).parameters_size(), 2);
+  EXPECT_EQ(proto.components(1).parameters(0).name(), "k");
+  EXPECT_EQ(proto.components(1).parameters(0).map(), -1);
+}
+
 TEST(EstimateToProto, CarriesParametersAndCovarianceRowMajor) {
   const v1::Estimate proto = ToProto(TwoParameters());
   ASSERT_EQ(proto.parameters_size(), 2);

@@ -256,6 +256,25 @@ TEST(Mixture, IsDrawnFromByItsWeights) {
   EXPECT_NEAR(posterior.marginals[0].mean, estimate.parameters[0].mean, 0.01);
 }
 
+// Both signs fit the record alike, whatever is thought of the noise: the weights are those of the
+// prior at ±0.8, e^{0.8·0.15·2/0.7²} to one.
+TEST(Mixture, WeighsItsPiecesAlikeWhateverIsUnknownOfTheNoise) {
+  for (const NoiseModel& noise :
+       {NoiseModel{.absolute = 1, .unknown = true},
+        NoiseModel{.absolute = kNoise, .correlation = NoiseCorrelation::kUnknown},
+        NoiseModel{.absolute = kNoise, .outliers = OutlierHandling::kStudentT},
+        NoiseModel{.absolute = 1, .unknown = true, .outliers = OutlierHandling::kHuber}}) {
+    Case one = OfASign("", 0.15, 400);
+    one.problem.measured[0].noise = noise;
+    const Estimate estimate = EstimateOf(one.problem, one.samples);
+    ASSERT_THAT(estimate.components, SizeIs(2));
+    EXPECT_GT(estimate.components[0].parameters[0].map, 0);
+    const double ratio = std::exp(2 * 0.8 * 0.15 / (0.7 * 0.7));
+    EXPECT_NEAR(estimate.components[0].weight, ratio / (1 + ratio), 0.02);
+    EXPECT_NEAR(estimate.channels[0].noise_std_dev, kNoise, 0.15 * kNoise);
+  }
+}
+
 TEST(Mixture, HasTheLowestOfItsPiecesProfiles) {
   const Case one = OfASign("", 0.15, 400);
   const auto estimator = MakeEstimator(one.problem);
