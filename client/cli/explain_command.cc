@@ -43,6 +43,31 @@ std::string Describe(const v1::ParameterEstimate& p) {
   }
 }
 
+// The inputs that the data carry, as the first run has them, become tables: a design has no data.
+v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& measurements) {
+  int rows = measurements.time_size();
+  for (int k = 0; k < measurements.run_size() && k < rows; ++k) {
+    if (measurements.run(k) != measurements.run(0)) rows = k;
+  }
+  for (v1::Input& input : *problem.mutable_inputs()) {
+    if (!input.has_streamed()) continue;
+    const v1::Input::Streamed streamed = input.streamed();
+    v1::Input::Table& table = *input.mutable_table();
+    table.set_hold(streamed.hold());
+    if (streamed.has_amplitude()) table.set_amplitude(streamed.amplitude());
+    const bool preset = streamed.interpolation() == v1::Input::INTERPOLATION_UNSPECIFIED;
+    if (!streamed.hold()) {
+      table.set_interpolation(preset ? v1::Input::CUBIC : streamed.interpolation());
+    }
+    table.mutable_time_s()->Add(measurements.time().begin(), measurements.time().begin() + rows);
+    for (const v1::Measurements::Channel& channel : measurements.channels()) {
+      if (channel.name() != input.name()) continue;
+      table.mutable_value()->Add(channel.values().begin(), channel.values().begin() + rows);
+    }
+  }
+  return problem;
+}
+
 // The same experiment with every output of the model measured, and driven by each input alone.
 v1::DesignExperimentRequest Alternatives(const v1::Problem& problem, const v1::Estimate& estimate,
                                          const v1::Measurements& measurements) {
@@ -99,11 +124,6 @@ std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) 
       ", or tie it to others by \"derived\".");
 }
 
-bool HasStreamedInput(const v1::Problem& problem) {
-  return std::any_of(problem.inputs().begin(), problem.inputs().end(),
-                     [](const v1::Input& input) { return input.has_streamed(); });
-}
-
 absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   v1::EstimateRequest request;
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
@@ -119,17 +139,16 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   std::vector<int> open;
   for (int i = 0; i < estimate.parameters_size(); ++i) {
     out << Describe(estimate.parameters(i)) << '\n';
+    // What would help the first run would help the others.
+    if (i >= request.problem().uncertain_size()) continue;
     if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
   }
   PrintTradeOffs(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);
   if (open.empty()) return absl::OkStatus();
-  if (HasStreamedInput(request.problem())) {
-    out << "What else could be measured is not looked for: an input is streamed.\n";
-    return absl::OkStatus();
-  }
+  const v1::Problem problem = WithoutStreamedInputs(request.problem(), request.measurements());
   const auto design =
-      backend->DesignExperiment(Alternatives(request.problem(), estimate, request.measurements()));
+      backend->DesignExperiment(Alternatives(problem, estimate, request.measurements()));
   if (!design.ok()) return InFile(design.status(), arguments.problem_file, "");
   for (const int i : open) {
     out << Remedy(*design, i, estimate.parameters(i)) << '\n';

@@ -17,8 +17,10 @@ using ::testing::Not;
 
 class ExplainTest : public CommandTest {
  protected:
-  // The explanation of a record of `outputs`, as the problem predicts them.
-  std::string Explain(const std::string& problem, const std::vector<std::string>& outputs) {
+  // The explanation of a record of `outputs`, as the problem predicts them; by that of `as`, if it
+  // is given, for which the record has a column of ones too.
+  std::string Explain(const std::string& problem, const std::vector<std::string>& outputs,
+                      const std::string& as = "", const std::string& ones = "") {
     const std::string file = File("problem.json", problem);
     const Finished predicted =
         Run({"propagate", file, "--until", "2", "--step", "0.02", "--format", "json"});
@@ -27,13 +29,16 @@ class ExplainTest : public CommandTest {
     EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(predicted.out, &response).ok());
     std::string record = "t";
     for (const std::string& output : outputs) absl::StrAppend(&record, ",", output);
+    if (!ones.empty()) absl::StrAppend(&record, ",", ones);
     for (int k = 1; k < response.time_size(); ++k) {
       absl::StrAppend(&record, "\n", response.time(k));
       for (const auto& output : response.outputs()) {
         absl::StrAppend(&record, ",", output.mean(k));
       }
+      if (!ones.empty()) absl::StrAppend(&record, ",1");
     }
-    const Finished run = Run({"explain", file, File("data.csv", record + "\n")});
+    const std::string explained = as.empty() ? file : File("as.json", as);
+    const Finished run = Run({"explain", explained, File("data.csv", record + "\n")});
     EXPECT_EQ(run.exit_status, 0) << run.err;
     return run.out;
   }
@@ -63,8 +68,36 @@ TEST_F(ExplainTest, NamesTheOutputToAdd) {
                     HasSubstr(" would know theta to ±")));
 }
 
+TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
+  const std::string before = R"({
+    "model": {"builtin": "linear_two_state"},
+    "uncertain": [{"name": "theta", "normal": {"mean": 1, "stdDev": 0.2}}],
+    "measured": [{"output": "x1_minus_x2", "noise": {"absolute": 0.01}}],
+    "inputs": [{"name": "u1", )";
+  EXPECT_THAT(Explain(before + R"("step": {"amplitude": 1}}]})", {"x1_minus_x2"},
+                      before + R"("streamed": {"hold": true}}]})", "u1"),
+              AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
+                    HasSubstr(" would know theta to ±")));
+}
+
+TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
+  const std::string problem = File("problem.json", R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "uncertain": [{"name": "v0", "uniform": {"lower": 0.9, "upper": 1.1}, "perRun": true}],
+    "measured": [{"output": "x", "noise": {"absolute": 1}}]
+  })");
+  const Finished run =
+      Run({"explain", problem, File("data.csv", "t,run,x
+0.5,0,0.1
+0.5,1,0.1
+")});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("v0[0] is not identified"),
+                             HasSubstr("v0[1] is not identified"), HasSubstr("would tell v0[0]")));
+}
+
 TEST_F(ExplainTest, NamesTheExcitationToChange) {
-  EXPECT_THAT(Explain(R"({
+    EXPECT_THAT(Explain(R"({
     "model": {"builtin": "roll_plane_2dof"},
     "uncertain": [{"name": "M", "beta": {"alpha": 2, "beta": 2, "lower": 500, "upper": 700}},
                   {"name": "I", "beta": {"alpha": 2, "beta": 2, "lower": 55, "upper": 80}}],
@@ -74,16 +107,16 @@ TEST_F(ExplainTest, NamesTheExcitationToChange) {
     "measured": [{"output": "x1", "noise": {"absolute": 0.002}},
                  {"output": "x2", "noise": {"absolute": 0.002}}]
   })",
-                      {"x1", "x2"}),
-              AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
-                    HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
+                        {"x1", "x2"}),
+                AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
+                      HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
 }
 
 TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
-  const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
-  EXPECT_EQ(run.exit_status, 0);
-  EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
-                             Not(HasSubstr("excitation"))));
+    const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
+    EXPECT_EQ(run.exit_status, 0);
+    EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
+                               Not(HasSubstr("excitation"))));
 }
 
 }  // namespace
