@@ -87,17 +87,15 @@ TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
     "measured": [{"output": "x", "noise": {"absolute": 1}}]
   })");
   const Finished run =
-      Run({"explain", problem, File("data.csv", "t,run,x
-0.5,0,0.1
-0.5,1,0.1
-")});
+      Run({"explain", problem, File("data.csv", "t,run,x\n0.5,0,0.1\n0.5,1,0.1\n")});
   ASSERT_EQ(run.exit_status, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("v0[0] is not identified"),
-                             HasSubstr("v0[1] is not identified"), HasSubstr("would tell v0[0]")));
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("v0[0] is not identified"), HasSubstr("v0[1] is not identified"),
+                    HasSubstr("would know v0[0] to ±")));
 }
 
 TEST_F(ExplainTest, NamesTheExcitationToChange) {
-    EXPECT_THAT(Explain(R"({
+  EXPECT_THAT(Explain(R"({
     "model": {"builtin": "roll_plane_2dof"},
     "uncertain": [{"name": "M", "beta": {"alpha": 2, "beta": 2, "lower": 500, "upper": 700}},
                   {"name": "I", "beta": {"alpha": 2, "beta": 2, "lower": 55, "upper": 80}}],
@@ -107,16 +105,16 @@ TEST_F(ExplainTest, NamesTheExcitationToChange) {
     "measured": [{"output": "x1", "noise": {"absolute": 0.002}},
                  {"output": "x2", "noise": {"absolute": 0.002}}]
   })",
-                        {"x1", "x2"}),
-                AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
-                      HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
+                      {"x1", "x2"}),
+              AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
+                    HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
 }
 
 TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
-    const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
-    EXPECT_EQ(run.exit_status, 0);
-    EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
-                               Not(HasSubstr("excitation"))));
+  const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
+                             Not(HasSubstr("excitation"))));
 }
 
 }  // namespace
