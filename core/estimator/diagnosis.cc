@@ -79,6 +79,18 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
                            "prior is wrong, and the uncertainty reported is too small",
                            channel.output, std::sqrt(channel.chi_squared / samples))});
     }
+    // What the expansion's own error takes from a sample's weight it takes from χ².
+    const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
+    if (channel.chi_squared < expected / kMisfitRatio &&
+        channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat(
+               "output %s: residuals are only %.3g times the noise assumed, which makes "
+               "the uncertainty reported too large; give the noise its own size or let "
+               "it be unknown",
+               channel.output, std::sqrt(channel.chi_squared / samples))});
+    }
   }
 }
 

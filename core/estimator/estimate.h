@@ -17,7 +17,7 @@ enum class DiagnosticCode {
   kNotIdentified,        // a parameter or direction on which the data say less than the prior
   kUndersampled,         // the samples taken do not see what an uncertain parameter changes
   kExpansionInaccurate,  // the expansion differs from the model by too much; uncertainty widened
-  kModelMisfit,          // residuals far larger than the noise
+  kModelMisfit,          // residuals far from what the noise would leave
   kAtPriorBound,         // the estimate lies on a bound of the prior
   kMultipleMinima,       // other minima of comparable cost, or a posterior in several pieces
   kNotConverged,         // the minimizer gave up, or the posterior's chains have not mixed

@@ -1,5 +1,5 @@
-// Thirty days of measurements from a rig that repeats a test every minute, ten samples a second or
-// as many as the argument says: what memory and estimates cost as the record grows. The store keeps
+// Thirty days of measurements from a rig that repeats a test every minute, a sample a second or as
+// many as the argument says: what memory and estimates cost as the record grows. The store keeps
 // no rows but makes them again when they are asked for, so that what is measured is the estimator
 // alone.
 //
@@ -170,7 +170,7 @@ void Run(int rate_hz) {
 }  // namespace polyest
 
 int main(int argc, char** argv) {
-  const int rate_hz = argc > 1 ? std::atoi(argv[1]) : 10;
+  const int rate_hz = argc > 1 ? std::atoi(argv[1]) : 1;
   if (rate_hz < 1 || rate_hz > 1000 || argc > 2) {
     std::fprintf(stderr, "usage: month_benchmark [SAMPLES A SECOND, 1 to 1000]\n");
     return EXIT_FAILURE;

@@ -58,6 +58,19 @@ TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarAboveTheNoise) {
                    DiagnosticCode::kModelMisfit));
 }
 
+// Of 200 residuals at a fifth of the noise χ² is 8, to be told from 200 ± 20.
+TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarBelowTheNoise) {
+  std::vector<double> times;
+  for (int k = 1; k <= 200; ++k) times.push_back(0.073 * k);
+  const Samples samples = InitialVelocityRecord(times, 1.1, 0.02);
+  const Estimate estimate = EstimateOf(InitialVelocityProblem(Velocity(0, 2), 0.1), samples);
+  EXPECT_THAT(Message(estimate, DiagnosticCode::kModelMisfit),
+              HasSubstr("output x: residuals are only 0.2"));
+  const Samples few = InitialVelocityRecord(Times(), 1.1, 0.0);
+  EXPECT_FALSE(Has(EstimateOf(InitialVelocityProblem(Velocity(0, 2), 0.02), few),
+                   DiagnosticCode::kModelMisfit));
+}
+
 // y = a².
 struct Square {
   static constexpr int kStates = 0;

@@ -169,6 +169,40 @@ TEST(PerRun, TheNextExperimentKnowsOnlyWhatIsShared) {
   EXPECT_NEAR(next.prior().StandardDeviation()[1], std::sqrt(exact.covariance(1, 1)), 1e-4);
 }
 
+// The sign of a does not show, and no expansion over both signs follows exp(−a² t) within so little
+// noise: each has an expansion of its own, which then takes the runs that follow.
+TEST(PerRun, ThePiecesOfAPosteriorTakeNewRunsEach) {
+  Problem problem = TextProblem("exp(-a^2*t) + b",
+                                {UncertainParameter::Uniform("a", -2, 2).value(),
+                                 PerRun(UncertainParameter::Normal("b", 0, 1).value())},
+                                0.002);
+  const double offsets[] = {0.3, -0.4, 1.1};
+  std::mt19937_64 generator(11);
+  std::normal_distribution<double> normal(0, 0.002);
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  for (int run = 0; run < 3; ++run) {
+    for (int k = 1; k <= 20; ++k) {
+      samples.run.push_back(run);
+      samples.time_s.push_back(0.1 * k);
+      samples.columns[0].value.push_back(std::exp(-0.81 * samples.time_s.back()) + offsets[run] +
+                                         normal(generator));
+    }
+  }
+  const Estimate estimate = EstimateOf(problem, samples);
+  ASSERT_EQ(estimate.components.size(), 2);
+  for (const ComponentEstimate& piece : estimate.components) {
+    EXPECT_NEAR(piece.weight, 0.5, 0.02);
+    ASSERT_EQ(piece.parameters.size(), 4);
+    EXPECT_NEAR(std::abs(piece.parameters[0].map), 0.9, 4 * piece.parameters[0].std_dev);
+    for (int run = 0; run < 3; ++run) {
+      const ParameterEstimate& b = piece.parameters[static_cast<size_t>(1 + run)];
+      EXPECT_NEAR(b.map, offsets[run], 4 * b.std_dev) << b.name;
+      EXPECT_LT(b.contraction, 0.01) << b.name;
+    }
+  }
+}
+
 // −log of the posterior density is a parabola along any line, with the curvature 1/σ² of the
 // conditional density.
 TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
