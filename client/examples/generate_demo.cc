@@ -1,7 +1,7 @@
 // Writes a demonstration record to the standard output, by its only argument: oscillator,
-// rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle or damper_rig. Closed
-// forms, or the equations of motion written down again and integrated in small fixed steps, with
-// noise; the same bytes every time.
+// rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle, damper_rig or chain.
+// Closed forms, or the equations of motion written down again and integrated in small fixed steps,
+// with noise; the same bytes every time.
 
 #include <algorithm>
 #include <array>
@@ -366,6 +366,44 @@ void WriteDamperRig() {
   }
 }
 
+// Four masses in a row on springs and dampers between a wall and a shaker, whose force sweeps
+// through all four modes.
+void WriteChain() {
+  // The truth, which chain.json does not know.
+  constexpr std::array<double, 4> mass_kg = {0.91, 1.12, 1.05, 0.88};
+  constexpr std::array<double, 4> k_n_per_m = {112, 87, 104, 95};
+  constexpr std::array<double, 4> c_n_s_per_m = {0.6, 1.0, 0.7, 0.9};
+  constexpr double noise_m = 0.002;
+  constexpr double force_n = 5, start_hz = 0.3, end_hz = 5;
+  constexpr int samples_per_second = 20, seconds = 20;
+  const auto rates = [&](double t, const std::array<double, 8>& x) {
+    const double cycles = (start_hz + 0.5 * (end_hz - start_hz) / seconds * t) * t;
+    std::array<double, 8> rate{};
+    double pull = t <= seconds ? force_n * std::sin(2 * pi * cycles) : 0;  // on the mass from above
+    for (size_t i = 4; i-- > 0;) {
+      const double stretch = x[i] - (i > 0 ? x[i - 1] : 0);
+      const double speed = x[4 + i] - (i > 0 ? x[3 + i] : 0);
+      const double link = k_n_per_m[i] * stretch + c_n_s_per_m[i] * speed;
+      rate[i] = x[4 + i];
+      rate[4 + i] = (pull - link) / mass_kg[i];
+      pull = link;
+    }
+    return rate;
+  };
+  std::array<double, 8> x{};
+  std::mt19937_64 generator(20'061'151);
+  std::puts("t,x1,x2,x3,x4");
+  for (int i = 1; i <= seconds * samples_per_second; ++i) {
+    const double t = static_cast<double>(i) / samples_per_second;
+    Advance(x, t - 1.0 / samples_per_second, 1.0 / samples_per_second, rates);
+    std::printf("%.2f", t);
+    for (size_t j = 0; j < 4; ++j) {
+      std::printf(",%.5f", x[j] + noise_m * StandardNormal(generator));
+    }
+    std::puts("");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -386,11 +424,13 @@ int main(int argc, char** argv) {
     WriteBicycle();
   } else if (record == "damper_rig") {
     WriteDamperRig();
+  } else if (record == "chain") {
+    WriteChain();
   } else {
     std::fputs(
         "usage: generate_demo "
         "oscillator|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|bicycle|"
-        "damper_rig\n",
+        "damper_rig|chain\n",
         stderr);
     return 2;
   }
