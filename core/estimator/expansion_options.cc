@@ -67,10 +67,14 @@ Truncation FirstTruncation(const ExpansionOptions& options, int dimension) {
 
 std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
                                          const Truncation& present) {
-  const Truncation next{present.order + 1, present.exponent};
-  if (options.order || next.order > kLastOrder) return std::nullopt;
-  if (TermCount(dimension, next, kAffordableTerms) > kAffordableTerms) return std::nullopt;
-  return next;
+  if (options.order) return std::nullopt;
+  // One order alone would bring nothing to even or odd functions.
+  for (const int more : {2, 1}) {
+    const Truncation next{present.order + more, present.exponent};
+    if (next.order > kLastOrder) continue;
+    if (TermCount(dimension, next, kAffordableTerms) <= kAffordableTerms) return next;
+  }
+  return std::nullopt;
 }
 
 }  // namespace polyest

@@ -34,8 +34,8 @@ struct ExpansionOptions {
 // How α² is chosen (bayes/regularization.h); where a rule has no answer, 1.
 // The truncation an expansion in n uncertain parameters begins with.
 Truncation FirstTruncation(const ExpansionOptions& options, int dimension);
-// Of one order more; nothing when the order is given or more is not affordable: past 500 terms or
-// order 9, beyond which two points a term no longer determine the terms well.
+// Of two orders more, or one; nothing when the order is given or more is not affordable: past 500
+// terms or order 9, beyond which two points a term no longer determine the terms well.
 std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
                                          const Truncation& present);
 

@@ -199,7 +199,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     return AgreementWithModel(*expansion_, cost).shift <= kMostShift;
   };
   bool moved = false;
-  // Each settlement may raise the order by one.
+  // Each settlement may raise the order.
   for (int i = 0; i < (automatic_order() ? kMostSettlementsAtRow : 1); ++i) {
     if (accurate()) return moved;
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));

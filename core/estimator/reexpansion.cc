@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/common/status.h"
@@ -11,6 +12,9 @@ namespace {
 
 constexpr int kMostAttempts = 15;
 constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
+// Mean square of the expansion's error, in units of the noise's. A higher order that leaves more
+// does not follow the model, and its ripples would be taken for pieces of the posterior.
+constexpr double kMostErrorOfRaised = 0.05;
 constexpr int64_t kReplayRows = 256;
 constexpr double kLeastEffectiveChecks = 2;  // for a spread over them to be seen
 constexpr double kMostSpread = 0.25;         // of ΔJ, for its mean to be known
@@ -40,7 +44,7 @@ class Settler {
       if (!may_move) break;
       const Region region = RegionOfParticles(result_.particles);
       if (region.Volume() >= kPays * TrustedRegion(design).Volume()) {
-        if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(region));
+        if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
         break;
       }
       POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, OneOrderLess()));
@@ -64,10 +68,29 @@ class Settler {
     return truncation;
   }
 
+  // To the first order that follows the model; the present one stays when none does.
   absl::Status RaiseOrder(const Region& region) {
     if (!request_.may_raise_order) return absl::OkStatus();
-    const auto next = NextTruncation(options(), request_.problem->dimension(), present());
-    return next ? Move(region, *next).status() : absl::OkStatus();
+    auto next = NextTruncation(options(), request_.problem->dimension(), present());
+    for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
+      POLYEST_ASSIGN_OR_RETURN(const bool raised, Move(region, *next));
+      if (!raised) break;
+      if (ErrorOf(*result_.expansion) <= kMostErrorOfRaised) return absl::OkStatus();
+    }
+    if (!result_.expansion) return absl::OkStatus();
+    result_.propagated_rows += result_.expansion->propagated_rows();
+    result_.expansion.reset();
+    return absl::OkStatus();
+  }
+
+  // ρ/σ² of the samples taken, in the mean, with all of them alike: D/(N − D), D = Σ ρ_k/R_k.
+  static double ErrorOf(const RegionalExpansion& expansion) {
+    double discount = 0, samples = 0;
+    for (size_t c = 0; c < expansion.sums().size(); ++c) {
+      discount += expansion.Discount(static_cast<int>(c));
+      samples += expansion.sums()[c].Degrees();
+    }
+    return discount / std::max(samples - discount, std::numeric_limits<double>::min());
   }
 
   // False when the sampler finds nowhere to start.

@@ -7,9 +7,9 @@
 // edge of the region that is not Ω's, widen that axis and propagate the record again; where the
 // region of the particles is less than half of the present one, move there and propagate again;
 // repeat until neither is needed. Where nothing is gained by moving, an expansion of automatic
-// order stays and gets one order more; with every move it gives one back. The region comes from
-// particles and never from a minimum and its Hessian: in a direction not yet informed the minimum
-// sits anywhere.
+// order stays and gets as many orders more as follow the model there, if any do; with every move it
+// gives one back. The region comes from particles and never from a minimum and its Hessian: in a
+// direction not yet informed the minimum sits anywhere.
 
 #include <absl/status/statusor.h>
 

@@ -138,7 +138,8 @@ TEST(ResolvedProblem, AnAutomaticOrderBeginsWithWhatIsAffordable) {
 }
 
 TEST(ResolvedProblem, AnAutomaticOrderRisesAsFarAsThatIsAffordable) {
-  EXPECT_EQ(NextTruncation({}, 1, {3, 1})->order, 4);
+  EXPECT_EQ(NextTruncation({}, 1, {3, 1})->order, 5);
+  EXPECT_EQ(NextTruncation({}, 1, {8, 1})->order, 9);
   EXPECT_FALSE(NextTruncation({}, 1, {9, 1}));
   EXPECT_EQ(NextTruncation({}, 12, {2, 1})->order, 3);  // 455 terms
   EXPECT_FALSE(NextTruncation({}, 12, {3, 1}));         // 1820 of order 4
