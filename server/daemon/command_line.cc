@@ -1,6 +1,7 @@
 #include "server/daemon/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <iostream>
 
 namespace polyest {
@@ -20,6 +21,32 @@ CommandLine Refuse(const std::string& message) {
   return Done(kBadUsage);
 }
 
+void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std::string& meaning) {
+  app.add_option(name, limit, meaning)
+      ->check(CLI::Range(int64_t{1}, int64_t{1} << 60))
+      ->capture_default_str();
+}
+
+void AddLimits(CLI::App& app, DaemonOptions& daemon) {
+  SessionLimits& limits = daemon.limits;
+  AddLimit(app, "--max-sessions", limits.sessions, "Sessions of all tenants");
+  AddLimit(app, "--max-sessions-per-tenant", limits.sessions_per_tenant, "Sessions of a tenant");
+  AddLimit(app, "--max-batch-rows", limits.batch_rows, "Rows of a batch");
+  AddLimit(app, "--max-session-rows", limits.rows, "Rows of a session");
+}
+
+// Where a service of the user's keeps its state; systemd gives a service of the system its own.
+std::string DefaultDataDir() {
+  const auto variable = [](const char* name) -> std::string {
+    const char* value = std::getenv(name);
+    return value == nullptr ? "" : value;
+  };
+  if (const std::string state = variable("STATE_DIRECTORY"); !state.empty()) return state;
+  if (const std::string home = variable("XDG_STATE_HOME"); !home.empty()) return home + "/polyest";
+  const std::string home = variable("HOME");
+  return home.empty() ? "" : home + "/.local/state/polyest";
+}
+
 }  // namespace
 
 CommandLine ParseCommandLine(int argc, char** argv) {
@@ -28,19 +55,27 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   CommandLine command_line;
   DaemonOptions& daemon = command_line.daemon;
   std::string listen = daemon.listen.ToString();
-  std::string data_dir;
+  std::string durability = "disk";
   app.add_option("--listen", listen, "HOST:PORT to listen on; port 0 picks a free one")
       ->capture_default_str();
-  app.add_option("--data-dir", data_dir,
-                 "Accepted and not used yet: sessions live in memory and end with the daemon");
+  app.add_option("--data-dir", daemon.data_dir,
+                 "Folder in which sessions are kept; by default $STATE_DIRECTORY, or "
+                 "$XDG_STATE_HOME/polyest, or ~/.local/state/polyest");
+  app.add_option("--durability", durability,
+                 "disk: a batch is acknowledged when it is on disk; memory: sessions end with the "
+                 "daemon")
+      ->check(CLI::IsMember({"disk", "memory"}))
+      ->capture_default_str();
+  app.add_option("--max-disk-mb", daemon.most_disk_mb,
+                 "Largest size of the sessions on disk, MiB; 0: the disk's")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
+      ->capture_default_str();
   app.add_option("--fmu-dir", daemon.fmu_dir,
                  "Folder of the FMUs that problems may name; put in it only what you would run");
   app.add_option("--threads", daemon.threads, "Threads of the numerics; 0: one a core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  app.add_option("--max-sessions", daemon.most_sessions, "Sessions at a time")
-      ->check(CLI::Range(1, 1'000'000))
-      ->capture_default_str();
+  AddLimits(app, daemon);
   app.add_option("--max-message-mb", daemon.most_message_mb, "Largest message taken, MiB")
       ->check(CLI::Range(1, 2047))
       ->capture_default_str();
@@ -54,6 +89,14 @@ CommandLine ParseCommandLine(int argc, char** argv) {
     return Done(app.exit(success));
   } catch (const CLI::ParseError& error) {
     return Refuse(error.what());
+  }
+  if (durability == "memory") {
+    daemon.data_dir.clear();
+  } else if (daemon.data_dir.empty()) {
+    daemon.data_dir = DefaultDataDir();
+    if (daemon.data_dir.empty()) {
+      return Refuse("--data-dir: say where sessions are kept; there is no home folder to choose");
+    }
   }
   auto address = ListenAddress::Parse(listen);
   if (!address.ok()) return Refuse(std::string(address.status().message()));

@@ -11,6 +11,8 @@
 
 #include "core/common/status.h"
 #include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/journal/memory_journal.h"
+#include "server/journal/sqlite_journal.h"
 #include "server/service/estimation_service.h"
 
 namespace polyest {
@@ -22,8 +24,11 @@ constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 // Streams of one connection.
 constexpr int kMostConcurrentStreams = 1'000;
-// Unary calls that may wait, beside one task for each session's stream.
-constexpr int kWaitingCalls = 1'000;
+// Tasks that may wait for a thread.
+constexpr int kWaitingTasks = 20'000;
+// Lanes of the executor that may be busy with long tasks before another lane has to wait: a tenant
+// has two, one for the streams of its sessions and one for all other calls.
+constexpr int kBusyLanes = 8;
 // What the last bytes of calls already ended may take.
 constexpr std::chrono::seconds kFlushTime{1};
 
@@ -42,6 +47,11 @@ google::protobuf::Timestamp Now() {
   return now;
 }
 
+absl::StatusOr<std::unique_ptr<SessionJournal>> OpenJournal(const DaemonOptions& options) {
+  if (options.data_dir.empty()) return std::make_unique<MemoryJournal>();
+  return SqliteJournal::Open({.folder = options.data_dir, .most_mb = options.most_disk_mb});
+}
+
 void SetKeepalive(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
@@ -52,13 +62,25 @@ void SetKeepalive(grpc::ServerBuilder& builder) {
 
 }  // namespace
 
-Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
+Daemon::Daemon(const DaemonOptions& options, ModelLibrary models,
+               std::unique_ptr<SessionJournal> journal)
     : options_(options),
       address_(options.listen),
       models_(std::move(models)),
-      executor_(Threads(options.threads), options.most_sessions + kWaitingCalls),
-      sessions_(executor_, static_cast<size_t>(options.most_sessions), Now, models_),
-      service_(MakeEstimationService({executor_, sessions_, calls_, stop_.get_token(), models_})) {}
+      journal_(std::move(journal)),
+      executor_({.threads_per_lane = Threads(options.threads),
+                 .threads = kBusyLanes * Threads(options.threads),
+                 .capacity = kWaitingTasks,
+                 .capacity_per_lane = kWaitingTasks / 2}) {}
+
+absl::Status Daemon::OpenSessions() {
+  const SessionServices services{executor_, *journal_, models_, options_.limits};
+  POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
+  housekeeper_ =
+      std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
+  service_ = MakeEstimationService({executor_, *sessions_, calls_, stop_.get_token(), models_});
+  return absl::OkStatus();
+}
 
 absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& options) {
   ModelLibrary models;
@@ -70,7 +92,9 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
     }
     models = ModelLibrary(*std::move(fmus));
   }
-  std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models)));
+  POLYEST_ASSIGN_OR_RETURN(auto journal, OpenJournal(options));
+  std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models), std::move(journal)));
+  POLYEST_RETURN_IF_ERROR(daemon->OpenSessions());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
 }
@@ -107,6 +131,9 @@ void Daemon::Stop() {
   server_ = nullptr;
 }
 
-Daemon::~Daemon() { Stop(); }
+Daemon::~Daemon() {
+  Stop();
+  housekeeper_ = nullptr;
+}
 
 }  // namespace polyest

@@ -15,14 +15,19 @@
 #include "server/daemon/listen_address.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
-#include "server/sessions/session_store.h"
+#include "server/sessions/housekeeper.h"
+#include "server/sessions/session_registry.h"
 
 namespace polyest {
 
 struct DaemonOptions {
   ListenAddress listen{"127.0.0.1", 50051};
   int threads = 0;  // of the numerics; 0: one a core
-  int most_sessions = 1'000;
+  // Where sessions are kept; empty: in memory, and they end with the daemon.
+  std::string data_dir{};
+  int64_t most_disk_mb = 0;  // of the data folder; 0: as large as the disk
+  SessionLimits limits{};
+  std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
   int most_message_mb = 64;
   std::string fmu_dir{};  // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
@@ -30,7 +35,8 @@ struct DaemonOptions {
 
 class Daemon {
  public:
-  // UNAVAILABLE when the address cannot be listened on, NOT_FOUND when there is no folder of FMUs.
+  // UNAVAILABLE when the address cannot be listened on, NOT_FOUND when there is no folder of FMUs;
+  // what SqliteJournal::Open says of the data folder.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
   // Drains first.
   ~Daemon();
@@ -43,7 +49,9 @@ class Daemon {
   void Stop();
 
  private:
-  Daemon(const DaemonOptions& options, ModelLibrary models);
+  Daemon(const DaemonOptions& options, ModelLibrary models,
+         std::unique_ptr<SessionJournal> journal);
+  absl::Status OpenSessions();
   absl::Status Listen();
 
   const DaemonOptions options_;
@@ -51,8 +59,12 @@ class Daemon {
   const ModelLibrary models_;
   std::stop_source stop_;
   OpenCalls calls_;
+  // In the order in which they need each other: the executor finishes its tasks, which use the
+  // journal, before the journal goes.
+  std::unique_ptr<SessionJournal> journal_;
   Executor executor_;
-  MemorySessionStore sessions_;
+  std::unique_ptr<SessionRegistry> sessions_;
+  std::unique_ptr<Housekeeper> housekeeper_;
   std::unique_ptr<grpc::Service> service_;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -9,49 +9,67 @@
 
 namespace polyest {
 
-Executor::Executor(int threads, int capacity) : capacity_(capacity) {
-  POLYEST_CHECK(threads >= 1 && capacity >= 1);
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Run(); });
+Executor::Executor(const ExecutorOptions& options) : options_(options) {
+  POLYEST_CHECK(options.threads_per_lane >= 1 && options.threads >= options.threads_per_lane &&
+                options.capacity >= 1 && options.capacity_per_lane >= 1);
+  for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { Run(); });
 }
 
 Executor::~Executor() {
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     ending_ = true;
   }
   ready_.notify_all();
 }
 
-absl::Status Executor::Submit(Task task) {
-  POLYEST_RETURN_IF_ERROR(Reserve());
-  Enqueue([this, task = std::move(task)] {
+absl::Status Executor::Submit(const std::string& lane, Task task) {
+  POLYEST_RETURN_IF_ERROR(Reserve(lane));
+  Enqueue(lane, [this, lane, task = std::move(task)] {
     task();
-    Release();
+    Release(lane);
   });
   return absl::OkStatus();
 }
 
-absl::Status Executor::Reserve() {
-  std::lock_guard lock(mutex_);
-  if (accepted_ >= capacity_) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the daemon is busy: its queue of ", capacity_, " tasks is full; try later"));
+int Executor::accepted() const {
+  const std::lock_guard lock(mutex_);
+  return accepted_;
+}
+
+absl::Status Executor::Reserve(const std::string& lane) {
+  const std::lock_guard lock(mutex_);
+  const auto found = lanes_.find(lane);
+  const bool lane_full =
+      found != lanes_.end() && found->second.accepted >= options_.capacity_per_lane;
+  if (accepted_ >= options_.capacity || lane_full) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the daemon is busy: its queue of ",
+        lane_full ? options_.capacity_per_lane : options_.capacity, " tasks is full; try later"));
   }
   ++accepted_;
+  ++lanes_[lane].accepted;
   return absl::OkStatus();
 }
 
-void Executor::Release() {
-  std::lock_guard lock(mutex_);
+void Executor::Release(const std::string& lane) {
+  const std::lock_guard lock(mutex_);
   --accepted_;
+  --lanes_[lane].accepted;
   if (ending_ && accepted_ == 0) ready_.notify_all();
 }
 
-void Executor::Enqueue(Task task) {
-  {
-    std::lock_guard lock(mutex_);
-    queue_.push_back(std::move(task));
-  }
+void Executor::Enqueue(const std::string& lane, Task task) {
+  const std::lock_guard lock(mutex_);
+  Lane& own = lanes_[lane];
+  own.queue.push_back(std::move(task));
+  GiveTurn(lane, own);
+}
+
+void Executor::GiveTurn(const std::string& name, Lane& lane) {
+  if (lane.in_turn || lane.queue.empty() || lane.running >= options_.threads_per_lane) return;
+  lane.in_turn = true;
+  turns_.push_back(name);
   ready_.notify_one();
 }
 
@@ -59,46 +77,55 @@ void Executor::Run() {
   std::unique_lock lock(mutex_);
   while (true) {
     // A strand's running task may bring its next one, so the end waits for all that was accepted.
-    ready_.wait(lock, [this] { return !queue_.empty() || (ending_ && accepted_ == 0); });
-    if (queue_.empty()) return;
-    Task task = std::move(queue_.front());
-    queue_.pop_front();
+    ready_.wait(lock, [this] { return !turns_.empty() || (ending_ && accepted_ == 0); });
+    if (turns_.empty()) return;
+    const std::string name = std::move(turns_.front());
+    turns_.pop_front();
+    Lane& lane = lanes_[name];  // stays while it has a task
+    lane.in_turn = false;
+    Task task = std::move(lane.queue.front());
+    lane.queue.pop_front();
+    ++lane.running;
+    GiveTurn(name, lane);
     lock.unlock();
     task();
     task = nullptr;
     lock.lock();
+    --lane.running;
+    GiveTurn(name, lane);
+    if (lane.accepted == 0 && lane.running == 0) lanes_.erase(name);
   }
 }
 
 absl::Status Strand::Submit(Task task) {
-  POLYEST_RETURN_IF_ERROR(executor_.Reserve());
+  POLYEST_RETURN_IF_ERROR(executor_.Reserve(lane_));
   bool idle = false;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     idle = tasks_.empty();
     tasks_.push_back(std::move(task));
   }
-  if (idle) executor_.Enqueue([self = shared_from_this()] { self->RunOne(); });
+  if (idle) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
   return absl::OkStatus();
 }
 
 void Strand::RunOne() {
   Task task;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     task = std::move(tasks_.front());
   }
   task();
   task = nullptr;
   bool more = false;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     tasks_.pop_front();
     more = !tasks_.empty();
   }
   // Back to the end of the queue: one busy strand does not keep others from their turn.
-  if (more) executor_.Enqueue([self = shared_from_this()] { self->RunOne(); });
-  executor_.Release();
+  if (more) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
+  executor_.Release(lane_);
 }
 
 }  // namespace polyest

@@ -1,15 +1,17 @@
 #pragma once
 
-// Where numerics run: a fixed number of threads behind a bounded queue, and strands, which run
-// their own tasks in order and one at a time whatever the number of threads.
+// Where numerics run: threads behind a bounded queue, shared fairly, and strands, which run their
+// own tasks in order and one at a time whatever the number of threads.
 
 #include <absl/status/status.h>
 
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -17,33 +19,53 @@ namespace polyest {
 
 using Task = std::function<void()>;
 
+struct ExecutorOptions {
+  int threads_per_lane = 1;   // ≥ 1
+  int threads = 1;            // in all, ≥ threads_per_lane
+  int capacity = 1;           // tasks that wait or run, those of strands among them, ≥ 1
+  int capacity_per_lane = 1;  // of these, one lane's, ≥ 1
+};
+
+// Every task belongs to a lane. Lanes take turns, and no lane runs on more than threads_per_lane
+// threads at a time: long tasks of one do not keep another from its turn, and the operating system
+// shares the cores between those that run.
 class Executor {
  public:
-  // threads, capacity ≥ 1. `capacity` bounds the tasks that wait or run, those of strands among
-  // them.
-  Executor(int threads, int capacity);
+  explicit Executor(const ExecutorOptions& options);
   // Runs everything accepted, then joins.
   ~Executor();
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
   // RESOURCE_EXHAUSTED when full; the task is then not run.
-  absl::Status Submit(Task task);
+  absl::Status Submit(const std::string& lane, Task task);
+  // Tasks that wait or run.
+  int accepted() const;
 
  private:
   friend class Strand;
 
-  // Room for one task, or RESOURCE_EXHAUSTED.
-  absl::Status Reserve();
-  void Release();
-  // A task that has its room already.
-  void Enqueue(Task task);
-  void Run();
+  struct Lane {
+    std::deque<Task> queue;
+    int accepted = 0;
+    int running = 0;
+    bool in_turn = false;
+  };
 
-  const int capacity_;
-  std::mutex mutex_;
+  // Room for one task, or RESOURCE_EXHAUSTED.
+  absl::Status Reserve(const std::string& lane);
+  void Release(const std::string& lane);
+  // A task that has its room already.
+  void Enqueue(const std::string& lane, Task task);
+  void Run();
+  // With the mutex held: puts the lane among those that take turns, if it may run a task.
+  void GiveTurn(const std::string& name, Lane& lane);
+
+  const ExecutorOptions options_;
+  mutable std::mutex mutex_;
   std::condition_variable ready_;
-  std::deque<Task> queue_;
+  std::map<std::string, Lane> lanes_;  // those with tasks
+  std::deque<std::string> turns_;
   int accepted_ = 0;
   bool ending_ = false;
   std::vector<std::jthread> threads_;
@@ -52,7 +74,7 @@ class Executor {
 // Owned by a shared_ptr: its tasks keep it alive. The executor must outlive it.
 class Strand : public std::enable_shared_from_this<Strand> {
  public:
-  explicit Strand(Executor& executor) : executor_(executor) {}
+  Strand(Executor& executor, std::string lane) : executor_(executor), lane_(std::move(lane)) {}
 
   // As Executor::Submit, after every task submitted to this strand before.
   absl::Status Submit(Task task);
@@ -61,6 +83,7 @@ class Strand : public std::enable_shared_from_this<Strand> {
   void RunOne();
 
   Executor& executor_;
+  const std::string lane_;
   std::mutex mutex_;
   std::deque<Task> tasks_;  // the first is running, or next
 };

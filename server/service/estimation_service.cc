@@ -20,14 +20,14 @@ namespace {
 // Propagations of one call run on the call's own thread: the executor's threads serve the calls.
 constexpr int kThreadsPerCall = 1;
 
-absl::StatusOr<std::shared_ptr<Session>> FindSession(const SessionStore& sessions,
+absl::StatusOr<std::shared_ptr<Session>> FindSession(const SessionRegistry& sessions,
                                                      const std::string& field,
                                                      const std::string& name) {
   POLYEST_RETURN_IF_ERROR(ResourceId(field, "sessions", name).status());
-  return sessions.Get(name);
+  return sessions.Get(kDefaultTenant, name);
 }
 
-absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionStore& sessions,
+absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& sessions,
                                                   const v1::ListSessionsRequest& request) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
   if (!request.page_token().empty() &&
@@ -35,7 +35,7 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionStore& sessions,
     return UnknownPageToken(request.page_token());
   }
   // One more than asked for tells whether there is another page.
-  auto page = sessions.List(request.page_token(), page_size + 1);
+  auto page = sessions.List(kDefaultTenant, request.page_token(), page_size + 1);
   v1::ListSessionsResponse response;
   if (page.size() > page_size) {
     page.pop_back();
@@ -43,7 +43,6 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionStore& sessions,
   }
   for (const auto& session : page) {
     *response.add_sessions() = session->Describe();
-    response.mutable_sessions()->rbegin()->clear_problem();
   }
   return response;
 }
@@ -104,11 +103,13 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 
  private:
   using Work = std::function<absl::Status(const Stop&)>;
+  using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
 
   Unary* OnExecutor(Context* context, Work work);
-  // The session is `field` of the request; its work runs on its strand.
+  // The session is `field` of the request; its work runs on its strand, and the call is finished
+  // when everything is kept that the work may have seen.
   Unary* OnStrand(Context* context, const std::string& field, const std::string& session,
-                  std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)> work);
+                  SessionWork work);
   // A new estimate for those who watch a session that is fed by unary calls.
   void EstimateForObservers(const std::shared_ptr<Session>& session);
 
@@ -118,18 +119,29 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 EstimationService::Unary* EstimationService::OnExecutor(Context* context, Work work) {
   return UnaryCall::Start(
       context_.calls, context,
-      [this](Task task) { return context_.executor.Submit(std::move(task)); }, std::move(work));
+      [this](Task task) {
+        return context_.executor.Submit(absl::StrCat(kDefaultTenant, "/calls"), std::move(task));
+      },
+      [work = std::move(work)](const Stop& stop, const UnaryCall::Finisher& finish) {
+        finish(work(stop));
+        return absl::OkStatus();
+      });
 }
 
-EstimationService::Unary* EstimationService::OnStrand(
-    Context* context, const std::string& field, const std::string& session,
-    std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)> work) {
+EstimationService::Unary* EstimationService::OnStrand(Context* context, const std::string& field,
+                                                      const std::string& session,
+                                                      SessionWork work) {
   auto found = FindSession(context_.sessions, field, session);
   if (!found.ok()) return FinishAtOnce(context, found.status());
   return UnaryCall::Start(
       context_.calls, context,
       [found = *found](Task task) { return found->strand().Submit(std::move(task)); },
-      [found = *found, work = std::move(work)](const Stop& stop) { return work(found, stop); });
+      [found = *found, work = std::move(work)](const Stop& stop,
+                                               UnaryCall::Finisher finish) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(work(found, stop));
+        found->WhenKept(found->taken().sequence, std::move(finish));
+        return absl::OkStatus();
+      });
 }
 
 EstimationService::Unary* EstimationService::ListModels(Context* context,
@@ -194,9 +206,11 @@ EstimationService::Unary* EstimationService::CreateSession(Context* context,
                                                            const v1::CreateSessionRequest* request,
                                                            v1::Session* response) {
   return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(const auto session,
-                             context_.sessions.Create(request->session_id(), request->problem()));
+    POLYEST_ASSIGN_OR_RETURN(
+        const auto session,
+        context_.sessions.Create(kDefaultTenant, request->session_id(), request->problem()));
     *response = session->Describe();
+    *response->mutable_problem() = request->problem();
     return absl::OkStatus();
   });
 }
@@ -204,9 +218,13 @@ EstimationService::Unary* EstimationService::CreateSession(Context* context,
 EstimationService::Unary* EstimationService::GetSession(Context* context,
                                                         const v1::GetSessionRequest* request,
                                                         v1::Session* response) {
-  const auto session = FindSession(context_.sessions, "name", request->name());
-  if (session.ok()) *response = (*session)->Describe();
-  return FinishAtOnce(context, session.status());
+  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
+    POLYEST_ASSIGN_OR_RETURN(const auto session,
+                             FindSession(context_.sessions, "name", request->name()));
+    *response = session->Describe();
+    POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
+    return absl::OkStatus();
+  });
 }
 
 EstimationService::Unary* EstimationService::ListSessions(Context* context,
@@ -218,9 +236,10 @@ EstimationService::Unary* EstimationService::ListSessions(Context* context,
 EstimationService::Unary* EstimationService::DeleteSession(Context* context,
                                                            const v1::DeleteSessionRequest* request,
                                                            google::protobuf::Empty*) {
-  absl::Status status = ResourceId("name", "sessions", request->name()).status();
-  if (status.ok()) status = context_.sessions.Delete(request->name());
-  return FinishAtOnce(context, status);
+  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
+    return context_.sessions.Delete(kDefaultTenant, request->name());
+  });
 }
 
 EstimationService::Unary* EstimationService::AddMeasurements(
@@ -230,7 +249,7 @@ EstimationService::Unary* EstimationService::AddMeasurements(
       context, "session", request->session(),
       [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
         POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
-                                 session->Add(request->sequence(), request->measurements()));
+                                 session->Add(request->sequence(), request->measurements(), stop));
         POLYEST_RETURN_IF_ERROR(session->Process(stop));
         EstimateForObservers(session);
         return absl::OkStatus();

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/common/status.h"
@@ -48,7 +49,7 @@ absl::Status MeasurementFlow::Attach(const v1::StreamMeasurementsRequest& reques
                                                       request.session(), session_->name()));
   }
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", request.session()).status());
-  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(request.session()));
+  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(kDefaultTenant, request.session()));
   POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this()));
   session_ = std::move(session);
   return absl::OkStatus();
@@ -98,9 +99,9 @@ void MeasurementFlow::Break(const absl::Status& status) {
 
 void MeasurementFlow::Advance() {
   if (finished_ || reactor_ == nullptr) return;
-  if (!writing_ && !outbox_.empty()) {
+  if (!writing_ && !outbox_.empty() && outbox_.front().sequence <= kept_) {
     writing_ = true;
-    reactor_->StartWrite(&outbox_.front());
+    reactor_->StartWrite(&outbox_.front().response);
   }
   StartWork();
   if (!reading_ && !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox &&
@@ -167,28 +168,44 @@ absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& reques
   }
   v1::StreamMeasurementsResponse response;
   POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
-                           session_->Add(request.sequence(), request.measurements()));
+                           session_->Add(request.sequence(), request.measurements(), stop_));
+  Send(std::move(response), request.sequence());
   POLYEST_RETURN_IF_ERROR(session_->Process(stop_));
-  Send(std::move(response));
   if (schedule_.Due(EstimateSchedule::Clock::now())) return SendEstimate();
   return absl::OkStatus();
 }
 
 absl::Status MeasurementFlow::AnswerLast() {
-  return session_->samples() > 0 ? SendEstimate() : absl::OkStatus();
+  return session_->taken().samples > 0 ? SendEstimate() : absl::OkStatus();
 }
 
 absl::Status MeasurementFlow::SendEstimate() {
   POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->CurrentEstimate(stop_));
   v1::StreamMeasurementsResponse response;
   *response.mutable_estimate() = *estimate;
-  Send(std::move(response));
+  Send(std::move(response), estimate->sequence());
   return absl::OkStatus();
 }
 
-void MeasurementFlow::Send(v1::StreamMeasurementsResponse response) {
+void MeasurementFlow::Send(v1::StreamMeasurementsResponse response, int64_t sequence) {
+  {
+    std::lock_guard lock(mutex_);
+    outbox_.push_back({std::move(response), sequence});
+  }
+  session_->WhenKept(sequence, [flow = shared_from_this(), sequence](const absl::Status& kept) {
+    flow->OnKept(sequence, kept);
+  });
+}
+
+void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
   std::lock_guard lock(mutex_);
-  outbox_.push_back(std::move(response));
+  if (kept.ok()) {
+    kept_ = std::max(kept_, sequence);
+  } else {
+    End(kept);
+    // What stands on batches that are lost is not to be told.
+    while (!outbox_.empty() && outbox_.back().sequence > kept_) outbox_.pop_back();
+  }
   Advance();
 }
 

@@ -3,8 +3,9 @@
 // StreamMeasurements: batches in, acknowledgements and estimates out.
 //
 // Reactions only move messages between gRPC and two bounded queues; the session's strand takes them
-// from the one and puts its answers into the other. The next message is read only while both have
-// room, so that HTTP/2's flow control holds back a client that is too fast, or too slow to read.
+// from the one and puts its answers into the other, where they wait for the journal. The next
+// message is read only while both have room, so that HTTP/2's flow control holds back a client that
+// is too fast for the numerics or the disk, or too slow to read.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -63,7 +64,9 @@ class MeasurementFlow final : public SessionObserver,
   absl::Status Answer(const v1::StreamMeasurementsRequest& request);
   absl::Status AnswerLast();
   absl::Status SendEstimate();
-  void Send(v1::StreamMeasurementsResponse response);
+  // Once everything up to batch `sequence` is kept.
+  void Send(v1::StreamMeasurementsResponse response, int64_t sequence);
+  void OnKept(int64_t sequence, const absl::Status& kept);
 
   ServiceContext& context_;
   std::stop_source stop_source_;
@@ -75,7 +78,12 @@ class MeasurementFlow final : public SessionObserver,
   std::shared_ptr<Session> session_;  // set once, before any work
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
-  std::deque<v1::StreamMeasurementsResponse> outbox_;  // the first is being written, or next
+  struct Answered {
+    v1::StreamMeasurementsResponse response;
+    int64_t sequence;  // of the batch that must be kept before
+  };
+  std::deque<Answered> outbox_;  // the first is being written, or next
+  int64_t kept_ = 0;
   bool reading_ = false;
   bool writing_ = false;
   bool working_ = false;

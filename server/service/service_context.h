@@ -5,14 +5,17 @@
 #include "core/fmu/model_library.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
-#include "server/sessions/session_store.h"
+#include "server/sessions/session_registry.h"
 
 namespace polyest {
+
+// Whose sessions are meant where nobody says who calls.
+inline constexpr char kDefaultTenant[] = "default";
 
 // What the service's calls share; outlives them all.
 struct ServiceContext {
   Executor& executor;
-  SessionStore& sessions;
+  SessionRegistry& sessions;
   OpenCalls& calls;
   // Asked for when the drain's time is over: ends work that no call waits for.
   std::stop_token stop;

@@ -26,7 +26,7 @@ void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
 
 absl::Status WatchFlow::Attach(const std::string& session) {
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", session).status());
-  POLYEST_ASSIGN_OR_RETURN(session_, context_.sessions.Get(session));
+  POLYEST_ASSIGN_OR_RETURN(session_, context_.sessions.Get(kDefaultTenant, session));
   registering_ = true;
   const absl::Status accepted =
       session_->strand().Submit([flow = shared_from_this()] { flow->Register(); });
@@ -45,8 +45,8 @@ void WatchFlow::Register() {
 
 void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
   std::lock_guard lock(mutex_);
-  if (end_) return;
-  pending_ = estimate;
+  if (end_ || estimate == last_) return;
+  pending_ = last_ = estimate;
   Advance();
 }
 

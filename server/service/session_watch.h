@@ -50,7 +50,7 @@ class WatchFlow final : public SessionObserver,
   std::mutex mutex_;
   WatchReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;
-  SharedEstimate pending_;
+  SharedEstimate pending_, last_;
   v1::EstimateResponse written_;  // gRPC's while writing_
   bool writing_ = false;
   bool registering_ = false;

@@ -17,8 +17,9 @@ grpc::ServerUnaryReactor* UnaryCall::Start(OpenCalls& calls, grpc::CallbackServe
   auto run = [state = call->state_, stop = CallStop(*context, call->state_->stop.get_token()),
               work = std::move(work)] {
     absl::Status status = stop.Check();
-    if (status.ok()) status = Guarded([&] { return work(stop); });
-    Finish(*state, status);
+    const auto finish = [state](const absl::Status& outcome) { Finish(*state, outcome); };
+    if (status.ok()) status = Guarded([&] { return work(stop, finish); });
+    if (!status.ok()) Finish(*state, status);
   };
   const absl::Status accepted = submit(std::move(run));
   if (!accepted.ok()) Finish(*call->state_, accepted);
@@ -26,7 +27,8 @@ grpc::ServerUnaryReactor* UnaryCall::Start(OpenCalls& calls, grpc::CallbackServe
 }
 
 void UnaryCall::Finish(State& state, const absl::Status& status) {
-  std::lock_guard lock(state.mutex);
+  const std::lock_guard lock(state.mutex);
+  if (std::exchange(state.finished, true)) return;
   state.reactor->grpc::ServerUnaryReactor::Finish(ToGrpc(status));
 }
 

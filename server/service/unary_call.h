@@ -21,7 +21,10 @@ namespace polyest {
 // request and the response of the call live, and the work may use them.
 class UnaryCall final : public grpc::ServerUnaryReactor {
  public:
-  using Work = std::function<absl::Status(const Stop&)>;
+  using Finisher = std::function<void(const absl::Status&)>;
+  // The call is finished with the answer when that is not OK; otherwise by the finisher, then or
+  // later, from any thread.
+  using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
 
   static grpc::ServerUnaryReactor* Start(OpenCalls& calls, grpc::CallbackServerContext* context,
@@ -35,6 +38,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   struct State {
     std::mutex mutex;
     UnaryCall* reactor = nullptr;
+    bool finished = false;
     std::stop_source stop;
   };
 

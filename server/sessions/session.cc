@@ -1,62 +1,83 @@
 #include "server/sessions/session.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/convert/estimate.h"
-#include "server/convert/measurements.h"
-#include "server/convert/posterior.h"
-#include "server/convert/problem.h"
-#include "server/convert/regularization.h"
+#include "server/journal/digest.h"
 
 namespace polyest {
 
-absl::StatusOr<std::shared_ptr<Session>> Session::Make(std::string name, v1::Problem problem,
-                                                       google::protobuf::Timestamp create_time,
-                                                       Executor& executor,
-                                                       const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models));
-  POLYEST_ASSIGN_OR_RETURN(auto estimator, Estimator::Make(std::move(resolved)));
-  return std::shared_ptr<Session>(new Session(
-      std::move(name), std::move(problem), std::move(create_time), std::move(estimator), executor));
-}
+class Session::Computing {
+ public:
+  explicit Computing(Session& session) : session_(session) {}
+  ~Computing() {
+    const std::chrono::duration<double> spent = Clock::now() - begin_;
+    const std::lock_guard lock(session_.mutex_);
+    session_.activity_.set_compute_time(session_.activity_.compute_time() + spent.count());
+    session_.computed_s_ += spent.count();
+    session_.measured_s_ = session_.loaded_->measured_s();
+    session_.last_use_ = Clock::now();
+  }
+  Computing(const Computing&) = delete;
+  Computing& operator=(const Computing&) = delete;
 
-Session::Session(std::string name, v1::Problem problem, google::protobuf::Timestamp create_time,
-                 std::unique_ptr<Estimator> estimator, Executor& executor)
-    : name_(std::move(name)),
-      problem_(std::move(problem)),
-      create_time_(std::move(create_time)),
-      strand_(std::make_shared<Strand>(executor)),
-      estimator_(std::move(estimator)) {
-  for (const v1::MeasuredOutput& output : problem_.measured()) measured_.insert(output.output());
+ private:
+  Session& session_;
+  const Clock::time_point begin_ = Clock::now();
+};
+
+Session::Session(const SessionServices& services, SessionHead head,
+                 std::unique_ptr<LoadedSession> loaded)
+    : services_(services),
+      head_(std::move(head)),
+      strand_(std::make_shared<Strand>(services.executor, head_.tenant + "/sessions")),
+      ledger_(head_.place),
+      loaded_(std::move(loaded)) {
+  activity_.set_loaded(loaded_ != nullptr);
 }
 
 v1::Session Session::Describe() const {
   v1::Session session;
-  session.set_name(name_);
-  *session.mutable_problem() = problem_;
-  *session.mutable_create_time() = create_time_;
-  std::lock_guard lock(mutex_);
-  session.set_last_sequence(sequence_.last());
-  session.set_samples(samples_);
-  session.set_last_time(last_row_.time_s);
-  session.set_last_run(last_row_.run);
+  session.set_name(name());
+  *session.mutable_create_time() = head_.create_time;
+  const SessionPlace place = ledger_.kept();
+  session.set_last_sequence(place.sequence);
+  session.set_samples(place.samples);
+  session.set_last_time(place.last_row.time_s);
+  session.set_last_run(place.last_row.run);
+  const std::lock_guard lock(mutex_);
+  v1::Session::Activity& activity = *session.mutable_activity();
+  activity = activity_;
+  activity.set_has_writer(writer_ != nullptr);
+  activity.set_watchers(static_cast<int32_t>(observers_.size()));
+  activity.set_batches(place.sequence - head_.place.sequence);
+  if (measured_s_ > 0) activity.set_real_time_factor(measured_s_ / computed_s_);
+  const std::chrono::duration<double> idle = Clock::now() - last_use_;
+  activity.set_idle_time(idle.count());
   return session;
 }
 
-int64_t Session::samples() const {
-  std::lock_guard lock(mutex_);
-  return samples_;
+bool Session::loaded() const {
+  const std::lock_guard lock(mutex_);
+  return activity_.loaded();
+}
+
+std::optional<Session::Clock::duration> Session::IdleTime() const {
+  if (!ledger_.all_kept()) return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  if (writer_ != nullptr || !observers_.empty()) return std::nullopt;
+  return Clock::now() - last_use_;
 }
 
 absl::Status Session::ClaimWriter(std::shared_ptr<SessionObserver> writer) {
-  std::lock_guard lock(mutex_);
-  if (closed_) return absl::NotFoundError(absl::StrCat(name_, " has been deleted"));
+  const std::lock_guard lock(mutex_);
+  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   if (writer_ != nullptr) {
-    return absl::AbortedError(absl::StrCat(name_, " has a writer already; one at a time"));
+    return absl::AbortedError(absl::StrCat(name(), " has a writer already; one at a time"));
   }
   writer_ = std::move(writer);
   return absl::OkStatus();
@@ -64,14 +85,15 @@ absl::Status Session::ClaimWriter(std::shared_ptr<SessionObserver> writer) {
 
 void Session::ReleaseWriter() {
   std::shared_ptr<SessionObserver> released;
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   released.swap(writer_);
+  last_use_ = Clock::now();
 }
 
 void Session::Close() {
   std::vector<std::shared_ptr<SessionObserver>> observers;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     closed_ = true;
     observers.swap(observers_);
     if (writer_ != nullptr) observers.push_back(writer_);
@@ -80,122 +102,159 @@ void Session::Close() {
 }
 
 absl::Status Session::CheckOpen() const {
-  std::lock_guard lock(mutex_);
-  if (closed_) return absl::NotFoundError(absl::StrCat(name_, " has been deleted"));
+  const std::lock_guard lock(mutex_);
+  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   return absl::OkStatus();
 }
 
-absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch) {
+absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
-  POLYEST_ASSIGN_OR_RETURN(const BatchSequence::Place place, sequence_.Check(sequence, batch));
-  if (place == BatchSequence::Place::kNext) {
-    POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch));
-    POLYEST_RETURN_IF_ERROR(estimator_->Append(samples));
-    std::lock_guard lock(mutex_);
-    sequence_.Accept(batch);
-    samples_ += CountValues(samples);
-    if (samples.rows() > 0) {
-      last_row_ = {samples.run.empty() ? 0 : samples.run.back(), samples.time_s.back()};
-    }
-  }
-  return Acknowledge();
+  const uint64_t losses = ledger_.losses();
+  if (loaded_ != nullptr && losses == losses_) return loaded_.get();
+  loaded_ = nullptr;
+  passed_on_ = nullptr;
+  // After a loss nothing is under way, and only this strand takes more.
+  POLYEST_ASSIGN_OR_RETURN(loaded_, LoadedSession::Load(services_.journal, number(), ledger_.kept(),
+                                                        services_.models, stop));
+  losses_ = losses;
+  const std::lock_guard lock(mutex_);
+  computed_s_ = 0;
+  activity_.set_loaded(true);
+  return loaded_.get();
 }
 
-// Values of measured outputs that are there: what an estimate counts as its samples.
-int64_t Session::CountValues(const Samples& samples) const {
-  int64_t values = 0;
-  for (const SampleColumn& column : samples.columns) {
-    if (!measured_.contains(column.name)) continue;
-    values += static_cast<int64_t>(column.value.size()) -
-              std::count(column.missing.begin(), column.missing.end(), true);
+absl::Status Session::CheckRoom(const SessionPlace& place, const v1::Measurements& batch) const {
+  const SessionLimits& limits = services_.limits;
+  const int64_t rows = batch.time_size();
+  if (rows > limits.batch_rows) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("measurements.time: %d rows are more than a batch may have, %d "
+                        "(--max-batch-rows)",
+                        rows, limits.batch_rows));
   }
-  return values;
+  if (place.rows + rows > limits.rows) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("measurements.time: %d rows beside the %d of the session are more than it "
+                        "may have, %d (--max-session-rows)",
+                        rows, place.rows, limits.rows));
+  }
+  return absl::OkStatus();
 }
 
-v1::Acknowledgement Session::Acknowledge() const {
+absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,
+                                                 const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  JournalEntry entry;
+  entry.session = number();
+  entry.measurements = DeterministicBytes(batch);
+  entry.digest = Digest(entry.measurements);
+  POLYEST_ASSIGN_OR_RETURN(const BatchLedger::Kind kind,
+                           ledger_.Check(sequence, entry.digest, [this](int64_t kept) {
+                             return services_.journal.ReadDigest(number(), kept);
+                           }));
+  if (kind == BatchLedger::Kind::kNext) {
+    POLYEST_RETURN_IF_ERROR(CheckRoom(loaded->place(), batch));
+    POLYEST_RETURN_IF_ERROR(loaded->Append(batch));
+    entry.place = loaded->place();
+    POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, losses_));
+    services_.journal.Append(std::move(entry), [self = shared_from_this(), losses = losses_,
+                                                sequence](const absl::Status& kept) {
+      self->ledger_.Settle(losses, sequence, kept);
+    });
+  }
   v1::Acknowledgement acknowledgement;
-  std::lock_guard lock(mutex_);
-  acknowledgement.set_sequence(sequence_.last());
-  acknowledgement.set_samples(samples_);
+  acknowledgement.set_sequence(sequence);
+  acknowledgement.set_samples(loaded->place().samples);
   return acknowledgement;
 }
 
-absl::Status Session::Process(const Stop& stop) { return estimator_->Process(stop); }
+absl::Status Session::Process(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  const Computing computing(*this);
+  return loaded->Process(stop);
+}
 
 absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  if (latest_ != nullptr && latest_->sequence() == sequence_.last()) return latest_;
-  POLYEST_RETURN_IF_ERROR(Process(stop));
-  POLYEST_ASSIGN_OR_RETURN(const Estimate estimate, estimator_->CurrentEstimate(stop));
-  auto latest = std::make_shared<v1::Estimate>(ToProto(estimate));
-  latest->set_sequence(sequence_.last());
-  latest_ = std::move(latest);
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  SharedEstimate latest;
+  {
+    const Computing computing(*this);
+    POLYEST_ASSIGN_OR_RETURN(latest, loaded->CurrentEstimate(stop));
+  }
+  if (latest == passed_on_) return latest;
+  passed_on_ = latest;
+  {
+    const std::lock_guard lock(mutex_);
+    activity_.set_estimates(activity_.estimates() + 1);
+    activity_.set_reexpansions(latest->expansion().reexpansions());
+  }
+  WhenKept(latest->sequence(), [self = shared_from_this(), latest](const absl::Status& kept) {
+    if (kept.ok()) self->PassOn(latest);
+  });
+  return latest;
+}
+
+void Session::PassOn(const SharedEstimate& estimate) {
   std::vector<std::shared_ptr<SessionObserver>> observers;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     observers = observers_;
   }
-  for (const auto& observer : observers) observer->OnEstimate(latest_);
-  return latest_;
+  for (const auto& observer : observers) observer->OnEstimate(estimate);
 }
 
 absl::StatusOr<v1::GetPosteriorResponse> Session::CurrentPosterior(
     const v1::GetPosteriorRequest& request, const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  const PosteriorOptions options = ToPosteriorOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(Process(stop));
-  POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator_->CurrentPosterior(options, stop));
-  v1::GetPosteriorResponse response = ToProto(posterior, options);
-  response.set_sequence(sequence_.last());
-  return response;
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  const Computing computing(*this);
+  return loaded->CurrentPosterior(request, stop);
 }
 
 absl::StatusOr<v1::ProfileCostResponse> Session::CurrentProfiles(
     const v1::ProfileCostRequest& request, const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  const ProfileOptions options = ToProfileOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(Process(stop));
-  POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator_->CurrentProfiles(options, stop));
-  v1::ProfileCostResponse response = ToProto(profiles);
-  response.set_sequence(sequence_.last());
-  return response;
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  const Computing computing(*this);
+  return loaded->CurrentProfiles(request, stop);
 }
 
 absl::StatusOr<v1::SweepRegularizationResponse> Session::CurrentRegularizationSweep(
     const v1::SweepRegularizationRequest& request, const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  const RegularizationOptions options = ToRegularizationOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate());
-  POLYEST_RETURN_IF_ERROR(Process(stop));
-  POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
-                           estimator_->CurrentRegularizationSweep(options, stop));
-  v1::SweepRegularizationResponse response = ToProto(sweep);
-  response.set_sequence(sequence_.last());
-  return response;
+  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  const Computing computing(*this);
+  return loaded->CurrentRegularizationSweep(request, stop);
 }
 
 absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
-  if (samples() > 0) {
+  if (ledger_.taken().samples > 0) {
     POLYEST_ASSIGN_OR_RETURN(const SharedEstimate present, CurrentEstimate(stop));
-    observer->OnEstimate(present);
+    WhenKept(present->sequence(), [observer, present](const absl::Status& kept) {
+      if (kept.ok()) observer->OnEstimate(present);
+    });
   }
-  std::lock_guard lock(mutex_);
-  if (closed_) return absl::NotFoundError(absl::StrCat(name_, " has been deleted"));
+  const std::lock_guard lock(mutex_);
+  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   observers_.push_back(std::move(observer));
   return absl::OkStatus();
 }
 
 void Session::Unobserve(const SessionObserver* observer) {
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   std::erase_if(observers_, [&](const auto& one) { return one.get() == observer; });
+  last_use_ = Clock::now();
 }
 
 bool Session::observed() const {
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   return !observers_.empty();
+}
+
+void Session::Unload() {
+  if (!IdleTime()) return;
+  loaded_ = nullptr;
+  passed_on_ = nullptr;
+  const std::lock_guard lock(mutex_);
+  activity_.set_loaded(false);
 }
 
 }  // namespace polyest

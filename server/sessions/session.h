@@ -1,29 +1,29 @@
 #pragma once
 
-// An estimator that lives between calls, the numbers of its batches, its latest estimate and those
-// who watch it.
+// A session: batches into the journal and the estimator, estimates to those who watch. Its
+// estimator is in memory while it is used, and otherwise made anew from the journal.
 
 #include <absl/status/statusor.h>
-#include <google/protobuf/timestamp.pb.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
-#include <set>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/common/stop.h"
-#include "core/estimator/estimator.h"
 #include "core/fmu/model_library.h"
 #include "polyest/v1/estimation_service.pb.h"
 #include "server/execution/executor.h"
-#include "server/sessions/batch_sequence.h"
+#include "server/journal/session_journal.h"
+#include "server/sessions/batch_ledger.h"
+#include "server/sessions/limits.h"
+#include "server/sessions/loaded_session.h"
 
 namespace polyest {
 
-using SharedEstimate = std::shared_ptr<const v1::Estimate>;
-
-// Called from the session's strand, or from whoever closes it; must not wait.
+// Called from the session's strand, from the journal, or from whoever closes it; must not wait.
 class SessionObserver {
  public:
   virtual ~SessionObserver() = default;
@@ -32,20 +32,43 @@ class SessionObserver {
   virtual void OnClosed() = 0;
 };
 
-class Session {
- public:
-  // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
-  static absl::StatusOr<std::shared_ptr<Session>> Make(std::string name, v1::Problem problem,
-                                                       google::protobuf::Timestamp create_time,
-                                                       Executor& executor,
-                                                       const ModelLibrary& models = {});
+// What all sessions need; outlives them.
+struct SessionServices {
+  Executor& executor;
+  SessionJournal& journal;
+  const ModelLibrary& models;
+  SessionLimits limits = {};
+};
 
-  const std::string& name() const { return name_; }
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // One that the journal keeps; `loaded` when it has just been made.
+  Session(const SessionServices& services, SessionHead head,
+          std::unique_ptr<LoadedSession> loaded = nullptr);
+
+  const std::string& tenant() const { return head_.tenant; }
+  const std::string& name() const { return head_.name; }
+  int64_t number() const { return head_.number; }
   Strand& strand() { return *strand_; }
 
   // From any thread.
+  // Without the problem.
   v1::Session Describe() const;
-  int64_t samples() const;
+  absl::StatusOr<v1::Problem> ReadProblem() const {
+    return services_.journal.ReadProblem(number());
+  }
+  absl::Status ReadBatches(const std::function<absl::Status(const JournalBatch&)>& take) const {
+    return services_.journal.ReadBatches(number(), 0, take);
+  }
+  // Batches acknowledged.
+  SessionPlace place() const { return ledger_.kept(); }
+  // Batches taken, acknowledged or about to be.
+  SessionPlace taken() const { return ledger_.taken(); }
+  bool loaded() const;
+  // Since it was last used; none while it is in use.
+  std::optional<Clock::duration> IdleTime() const;
 
   // One writer at a time: ABORTED while another has it. A writer hears of the closing only.
   absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer);
@@ -54,12 +77,22 @@ class Session {
   // Ends the session for everybody: calls on it are NOT_FOUND from here on.
   void Close();
 
-  // The following only on the strand.
+  // Calls `done` when every batch up to this one is kept, at once if it is; or will not be, and
+  // why.
+  void WhenKept(int64_t sequence, BatchLedger::Done done) {
+    ledger_.WhenKept(sequence, std::move(done));
+  }
 
-  // Takes the batch, all of it or nothing, and acknowledges it. No numerics: Process does them.
-  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch);
+  // The following only on the strand. Each brings the estimator back into memory if it is not
+  // there.
+
+  // Takes the batch, all of it or nothing. It may be acknowledged as the answer says WhenKept its
+  // sequence. No numerics: Process does them.
+  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch,
+                                          const Stop& stop);
   absl::Status Process(const Stop& stop);
-  // The estimate from everything added. A new one is passed on to the observers.
+  // The estimate from everything added; it may be told WhenKept its sequence. A new one is passed
+  // on to the observers then.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
   // The posterior in detail, from everything added.
   absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
@@ -72,33 +105,38 @@ class Session {
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   void Unobserve(const SessionObserver* observer);
   bool observed() const;
+  // Takes the estimator out of memory if the session is not in use.
+  void Unload();
 
  private:
-  Session(std::string name, v1::Problem problem, google::protobuf::Timestamp create_time,
-          std::unique_ptr<Estimator> estimator, Executor& executor);
+  // Times what is computed.
+  class Computing;
 
   absl::Status CheckOpen() const;
-  int64_t CountValues(const Samples& samples) const;
-  v1::Acknowledgement Acknowledge() const;
+  absl::Status CheckRoom(const SessionPlace& place, const v1::Measurements& batch) const;
+  // The estimator as it is after every batch taken.
+  absl::StatusOr<LoadedSession*> Loaded(const Stop& stop);
+  void PassOn(const SharedEstimate& estimate);
 
-  const std::string name_;
-  const v1::Problem problem_;
-  const google::protobuf::Timestamp create_time_;
+  const SessionServices services_;
+  const SessionHead head_;
   const std::shared_ptr<Strand> strand_;
-  std::set<std::string> measured_;
+  BatchLedger ledger_;
 
   // The strand's own.
-  std::unique_ptr<Estimator> estimator_;
-  SharedEstimate latest_;
+  std::unique_ptr<LoadedSession> loaded_;
+  uint64_t losses_ = 0;  // of batches that `loaded_` knows of
+  SharedEstimate passed_on_;
 
   mutable std::mutex mutex_;
-  // Changed on the strand only, under the mutex; read anywhere.
-  BatchSequence sequence_;
-  int64_t samples_ = 0;
-  SampleRow last_row_;
   bool closed_ = false;
   std::shared_ptr<SessionObserver> writer_;
   std::vector<std::shared_ptr<SessionObserver>> observers_;
+  Clock::time_point last_use_ = Clock::now();
+  v1::Session::Activity activity_;
+  // Seconds of measurements, and computed for them, since the estimator is in memory.
+  double measured_s_ = 0;
+  double computed_s_ = 0;
 };
 
 }  // namespace polyest

@@ -6,6 +6,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "core/common/check.h"
 
 namespace polyest {
@@ -19,6 +21,9 @@ DaemonProcess::DaemonProcess(std::vector<std::string> arguments) {
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, output[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, fileno(errors_), STDERR_FILENO);
+  if (std::find(arguments.begin(), arguments.end(), "--data-dir") == arguments.end()) {
+    arguments.insert(arguments.begin(), {"--data-dir", data_.path()});
+  }
   arguments.insert(arguments.begin(), POLYESTD);
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());

@@ -8,11 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/testing/test_folder.h"
+
 namespace polyest {
 
 class DaemonProcess {
  public:
-  // Starts it with these arguments; nothing is waited for.
+  // Starts it with these arguments, and with a data folder of its own unless they name one; nothing
+  // is waited for.
   explicit DaemonProcess(std::vector<std::string> arguments);
   // Kills it if it still runs.
   ~DaemonProcess();
@@ -30,6 +33,7 @@ class DaemonProcess {
   std::string Errors();
 
  private:
+  TestFolder data_;
   pid_t pid_ = -1;
   FILE* output_ = nullptr;
   FILE* errors_ = nullptr;

@@ -104,11 +104,11 @@ TEST_F(SessionRpcTest, AcknowledgesARepeatAndRefusesGaps) {
   ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 5), &acknowledgement).ok());
   EXPECT_EQ(acknowledgement.samples(), 5);
   grpc::Status status = Add("sessions/rig", 1, OscillatorRows(0, 6));
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::ALREADY_EXISTS);
   EXPECT_THAT(status.error_message(), testing::HasSubstr("the next batch must be 2"));
   status = Add("sessions/rig", 3, OscillatorRows(5, 6));
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.error_message(), testing::HasSubstr("3 must be 2"));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), testing::HasSubstr("3 leaves a gap; the next batch must be 2"));
   EXPECT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 6)).ok());
 }
 

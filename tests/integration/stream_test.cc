@@ -114,6 +114,7 @@ TEST_F(StreamTest, EndsOnABadBatchWithItsFieldAndLeavesTheSessionUsable) {
     int64_t sequence;
     v1::Measurements rows;
     std::string message;
+    grpc::StatusCode code = grpc::StatusCode::INVALID_ARGUMENT;
   };
   v1::Measurements unnamed = OscillatorRows(5, 6);
   unnamed.mutable_channels(0)->set_name("q");
@@ -122,15 +123,18 @@ TEST_F(StreamTest, EndsOnABadBatchWithItsFieldAndLeavesTheSessionUsable) {
   infinite.mutable_channels(0)->set_values(0, INFINITY);
   ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 5)).ok());
   for (const Case& bad :
-       {Case{3, OscillatorRows(5, 6), "sequence: 3 must be 2"}, Case{2, unnamed, "\"q\""},
-        Case{2, past, "times must increase"},
+       {Case{3, OscillatorRows(5, 6), "sequence: 3 leaves a gap; the next batch must be 2",
+             grpc::StatusCode::FAILED_PRECONDITION},
+        Case{1, OscillatorRows(5, 6), "sequence: 1 was taken with other measurements",
+             grpc::StatusCode::ALREADY_EXISTS},
+        Case{2, unnamed, "\"q\""}, Case{2, past, "times must increase"},
         Case{2, infinite, "measurements.channels[0].values[0]: inf of x must be finite"}}) {
     ClientStream stream(*stub_);
     ASSERT_TRUE(stream.Send("sessions/rig", bad.sequence, bad.rows));
     v1::StreamMeasurementsResponse response;
     EXPECT_FALSE(stream.Read(response));
     const grpc::Status status = stream.Finish();
-    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_EQ(status.error_code(), bad.code);
     EXPECT_THAT(status.error_message(), testing::HasSubstr(bad.message));
   }
   EXPECT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 6)).ok());

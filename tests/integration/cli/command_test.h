@@ -7,6 +7,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -17,15 +18,16 @@
 
 #include "polyest/v1/estimate.pb.h"
 #include "tests/integration/cli/process.h"
+#include "tests/testing/test_folder.h"
 
 namespace polyest {
 
-// A daemon on a port of its own choice.
+// A daemon on a port of its own choice, with a data folder of its own unless it is given one.
 class DaemonProcess {
  public:
   explicit DaemonProcess(const std::vector<std::string>& options = {},
                          const std::string& listen = "127.0.0.1:0")
-      : process_(Arguments(options, listen)) {
+      : process_(Arguments(options, listen, data_.path())) {
     const std::string line = process_.ReadLine();
     const std::string start = "listening on ";
     EXPECT_EQ(line.substr(0, start.size()), start) << process_.Errors();
@@ -39,11 +41,15 @@ class DaemonProcess {
 
  private:
   static std::vector<std::string> Arguments(std::vector<std::string> options,
-                                            const std::string& listen) {
+                                            const std::string& listen, const std::string& data) {
+    if (std::find(options.begin(), options.end(), "--data-dir") == options.end()) {
+      options.insert(options.end(), {"--data-dir", data});
+    }
     options.insert(options.begin(), {POLYESTD_PROGRAM, "--log-level", "off", "--listen", listen});
     return options;
   }
 
+  TestFolder data_;
   Process process_;
   std::string address_;
 };

@@ -136,6 +136,39 @@ TEST_F(StreamTest, StopsAtABadRowAndSaysWhich) {
   EXPECT_THAT(run.err, HasSubstr("standard input:37: the row has 3 cells, the header has 2"));
 }
 
+TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {
+  const TestFolder data;
+  auto daemon =
+      std::make_unique<DaemonProcess>(std::vector<std::string>{"--data-dir", data.path()});
+  const std::string address = daemon->address();
+  std::vector<std::string> arguments = {POLYEST_PROGRAM,
+                                        "stream",
+                                        Example("oscillator.json"),
+                                        "-",
+                                        "--server",
+                                        address,
+                                        "--batch",
+                                        "30",
+                                        "--format",
+                                        "jsonl"};
+  Process process(arguments);
+  process.Write(DemoRows(30));
+  EXPECT_THAT(process.ReadLine(), HasSubstr("\"sequence\":\"1\""));
+  daemon->Kill();
+  daemon =
+      std::make_unique<DaemonProcess>(std::vector<std::string>{"--data-dir", data.path()}, address);
+  const std::string all = DemoRows(90);
+  process.Write(all.substr(DemoRows(30).size()));
+  process.CloseInput();
+  std::string last;
+  for (std::string line = process.ReadLine(); !line.empty(); line = process.ReadLine()) last = line;
+  EXPECT_EQ(process.Wait(), 0) << process.Errors();
+  EXPECT_THAT(process.Errors(), AllOf(HasSubstr("connection lost"), HasSubstr("connected again")));
+  const Finished undisturbed =
+      Run(Command("-", {"--batch", "30", "--format", "jsonl"}), DemoRows(90));
+  EXPECT_EQ(last, Lines(undisturbed.out).back());
+}
+
 TEST_F(StreamTest, SaysThatARestartedDaemonHasLostTheSession) {
   std::vector<std::string> arguments = Command("-", {});
   arguments.insert(arguments.begin(), POLYEST_PROGRAM);

@@ -9,43 +9,101 @@
 namespace polyest {
 namespace {
 
+constexpr char kLane[] = "lane";
+
+ExecutorOptions OneLane(int threads, int capacity) {
+  return {.threads_per_lane = threads,
+          .threads = threads,
+          .capacity = capacity,
+          .capacity_per_lane = capacity};
+}
+
 TEST(Executor, RunsEverythingAcceptedBeforeItEnds) {
   std::atomic<int> ran{0};
   {
-    Executor executor(2, 100);
-    for (int i = 0; i < 100; ++i) ASSERT_TRUE(executor.Submit([&] { ++ran; }).ok());
+    Executor executor(OneLane(2, 100));
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(executor.Submit(kLane, [&] { ++ran; }).ok());
   }
   EXPECT_EQ(ran, 100);
 }
 
 TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
-  Executor executor(1, 2);
+  Executor executor(OneLane(1, 2));
   std::latch started(1), go_on(1);
   ASSERT_TRUE(executor
-                  .Submit([&] {
-                    started.count_down();
-                    go_on.wait();
-                  })
+                  .Submit(kLane,
+                          [&] {
+                            started.count_down();
+                            go_on.wait();
+                          })
                   .ok());
   started.wait();
   std::latch second_ran(1);
-  ASSERT_TRUE(executor.Submit([&] { second_ran.count_down(); }).ok());
-  const absl::Status refused = executor.Submit([] { FAIL() << "was refused"; });
+  ASSERT_TRUE(executor.Submit(kLane, [&] { second_ran.count_down(); }).ok());
+  const absl::Status refused = executor.Submit(kLane, [] { FAIL() << "was refused"; });
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused.message(), "the daemon is busy: its queue of 2 tasks is full; try later");
   // A strand shares the capacity.
-  EXPECT_FALSE(std::make_shared<Strand>(executor)->Submit([] {}).ok());
+  EXPECT_FALSE(std::make_shared<Strand>(executor, kLane)->Submit([] {}).ok());
   go_on.count_down();
   second_ran.wait();
   // The second task has run but may not have left yet; one place is free in any case.
-  EXPECT_TRUE(executor.Submit([] {}).ok());
+  EXPECT_TRUE(executor.Submit(kLane, [] {}).ok());
 }
 
 TEST(Executor, RunsTasksAtTheSameTimeOnItsThreads) {
-  Executor executor(2, 2);
+  Executor executor(OneLane(2, 2));
   std::latch both(2);  // opens only when two tasks run at once
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(executor.Submit([&] { both.arrive_and_wait(); }).ok());
+  for (int i = 0; i < 2; ++i)
+    ASSERT_TRUE(executor.Submit(kLane, [&] { both.arrive_and_wait(); }).ok());
   both.wait();
+}
+
+TEST(Executor, KeepsAThreadForOthersWhileOneLaneIsBusyWithLongTasks) {
+  Executor executor({.threads_per_lane = 1, .threads = 2, .capacity = 10, .capacity_per_lane = 10});
+  std::latch end(1), long_one_runs(1), other_ran(1);
+  const auto long_task = [&](bool first) {
+    if (first) long_one_runs.count_down();
+    end.wait();
+  };
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(executor.Submit("long", [&, i] { long_task(i == 0); }).ok());
+  }
+  long_one_runs.wait();
+  ASSERT_TRUE(executor.Submit("other", [&] { other_ran.count_down(); }).ok());
+  other_ran.wait();
+  end.count_down();
+}
+
+TEST(Executor, LetsLanesTakeTurns) {
+  std::vector<char> order;
+  {
+    Executor executor(OneLane(1, 10));
+    std::latch go_on(1), started(1);
+    const auto first = [&] {
+      started.count_down();
+      go_on.wait();
+    };
+    ASSERT_TRUE(executor.Submit("x", first).ok());
+    started.wait();
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(executor.Submit("a", [&] { order.push_back('a'); }).ok());
+    }
+    ASSERT_TRUE(executor.Submit("b", [&] { order.push_back('b'); }).ok());
+    go_on.count_down();
+  }
+  EXPECT_EQ(order, (std::vector<char>{'a', 'b', 'a', 'a'}));
+}
+
+TEST(Executor, KeepsRoomForOthersWhenOneLaneIsFull) {
+  Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 3, .capacity_per_lane = 2});
+  std::latch end(1);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(executor.Submit("a", [&] { end.wait(); }).ok());
+  EXPECT_EQ(executor.Submit("a", [] {}).message(),
+            "the daemon is busy: its queue of 2 tasks is full; try later");
+  EXPECT_TRUE(executor.Submit("b", [] {}).ok());
+  EXPECT_EQ(executor.accepted(), 3);
+  end.count_down();
 }
 
 TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
@@ -53,9 +111,9 @@ TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
   std::vector<std::vector<int>> order(kStrands);
   std::atomic<int> overlaps{0};
   {
-    Executor executor(4, kStrands * kTasks);
+    Executor executor(OneLane(4, kStrands * kTasks));
     for (auto& seen : order) {
-      auto strand = std::make_shared<Strand>(executor);
+      auto strand = std::make_shared<Strand>(executor, kLane);
       auto inside = std::make_shared<std::atomic<int>>(0);
       for (int task = 0; task < kTasks; ++task) {
         ASSERT_TRUE(strand
@@ -78,11 +136,11 @@ TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
 TEST(Strand, LetsOthersHaveTheirTurnBetweenItsTasks) {
   std::vector<char> order;
   {
-    Executor executor(1, 10);
+    Executor executor(OneLane(1, 10));
     std::latch go_on(1);
-    ASSERT_TRUE(executor.Submit([&] { go_on.wait(); }).ok());
-    auto a = std::make_shared<Strand>(executor);
-    auto b = std::make_shared<Strand>(executor);
+    ASSERT_TRUE(executor.Submit(kLane, [&] { go_on.wait(); }).ok());
+    auto a = std::make_shared<Strand>(executor, kLane);
+    auto b = std::make_shared<Strand>(executor, kLane);
     for (int i = 0; i < 2; ++i) ASSERT_TRUE(a->Submit([&] { order.push_back('a'); }).ok());
     for (int i = 0; i < 2; ++i) ASSERT_TRUE(b->Submit([&] { order.push_back('b'); }).ok());
     go_on.count_down();
@@ -93,8 +151,8 @@ TEST(Strand, LetsOthersHaveTheirTurnBetweenItsTasks) {
 TEST(Strand, TakesTasksFromItsOwnTasks) {
   int ran = 0;
   {
-    Executor executor(1, 10);
-    auto strand = std::make_shared<Strand>(executor);
+    Executor executor(OneLane(1, 10));
+    auto strand = std::make_shared<Strand>(executor, kLane);
     ASSERT_TRUE(strand
                     ->Submit([&ran, strand] {
                       ++ran;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "tests/testing/faulty_journal.h"
 #include "tests/unit/server/problem_json.h"
 
 namespace polyest {
@@ -32,24 +33,44 @@ struct Watcher : SessionObserver {
 class SessionTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto made = Session::Make("sessions/a", SmallProblem(), {}, executor_);
-    ASSERT_TRUE(made.ok()) << made.status();
-    session_ = *std::move(made);
+    SessionHead head;
+    head.name = "sessions/a";
+    const auto number = journal_.Create(head, SmallProblem(), /*hidden=*/false);
+    ASSERT_TRUE(number.ok()) << number.status();
+    Restart();
+  }
+  // As after the end of the daemon: what is left is the journal.
+  void Restart() {
+    session_ = std::make_shared<Session>(SessionServices{executor_, journal_, models_, limits_},
+                                         journal_.Heads()->front());
+  }
+  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch) {
+    return session_->Add(sequence, batch, {});
+  }
+  // What is known so far of whether the batch is kept.
+  std::shared_ptr<std::optional<absl::Status>> Kept(int64_t sequence) {
+    auto kept = std::make_shared<std::optional<absl::Status>>();
+    session_->WhenKept(sequence, [kept](const absl::Status& status) { *kept = status; });
+    return kept;
   }
 
   // The test's own thread is the strand here: nothing else touches the session.
-  Executor executor_{1, 10};
+  FaultyJournal journal_;
+  Executor executor_{
+      {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
+  ModelLibrary models_;
+  SessionLimits limits_{.batch_rows = 4, .rows = 6};
   std::shared_ptr<Session> session_;
 };
 
 TEST_F(SessionTest, AcknowledgesBatchesAndCountsTheirValues) {
   v1::Measurements batch = Batch({0.1, 0.2, 0.3});
   batch.mutable_channels(0)->add_missing(1);
-  const auto first = session_->Add(1, batch);
+  const auto first = Add(1, batch);
   ASSERT_TRUE(first.ok()) << first.status();
   EXPECT_EQ(first->sequence(), 1);
   EXPECT_EQ(first->samples(), 2);
-  const auto second = session_->Add(2, Batch({0.4}));
+  const auto second = Add(2, Batch({0.4}));
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ(second->sequence(), 2);
   EXPECT_EQ(second->samples(), 3);
@@ -58,29 +79,30 @@ TEST_F(SessionTest, AcknowledgesBatchesAndCountsTheirValues) {
 }
 
 TEST_F(SessionTest, CountsARepeatOnce) {
-  ASSERT_TRUE(session_->Add(1, Batch({0.1})).ok());
-  const auto repeat = session_->Add(1, Batch({0.1}));
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
+  const auto repeat = Add(1, Batch({0.1}));
   ASSERT_TRUE(repeat.ok()) << repeat.status();
   EXPECT_EQ(repeat->samples(), 1);
-  EXPECT_EQ(session_->Add(1, Batch({0.2})).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(Add(1, Batch({0.2})).status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_EQ(Add(3, Batch({0.2})).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
 TEST_F(SessionTest, KeepsNothingOfABadBatchAndGoesOn) {
   v1::Measurements bad = Batch({0.1, 0.2});
   bad.set_time(1, 0.1);
-  EXPECT_EQ(session_->Add(1, bad).status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(session_->samples(), 0);
-  EXPECT_TRUE(session_->Add(1, Batch({0.1})).ok());
+  EXPECT_EQ(Add(1, bad).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(session_->place().samples, 0);
+  EXPECT_TRUE(Add(1, Batch({0.1})).ok());
 }
 
 TEST_F(SessionTest, EstimatesOnceForAllWhoAskUntilThereIsMore) {
-  ASSERT_TRUE(session_->Add(1, Batch({0.1, 0.2})).ok());
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
   const auto first = session_->CurrentEstimate({});
   ASSERT_TRUE(first.ok()) << first.status();
   EXPECT_EQ((*first)->sequence(), 1);
   EXPECT_EQ((*first)->samples(), 2);
   EXPECT_EQ(*session_->CurrentEstimate({}), *first);
-  ASSERT_TRUE(session_->Add(2, Batch({0.3})).ok());
+  ASSERT_TRUE(Add(2, Batch({0.3})).ok());
   const auto second = session_->CurrentEstimate({});
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ((*second)->sequence(), 2);
@@ -91,12 +113,12 @@ TEST_F(SessionTest, PassesThePresentEstimateAndEveryNewOneToObservers) {
   auto late = std::make_shared<Watcher>();
   ASSERT_TRUE(session_->Observe(early, {}).ok());
   EXPECT_TRUE(early->estimates.empty());
-  ASSERT_TRUE(session_->Add(1, Batch({0.1})).ok());
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
   ASSERT_TRUE(session_->Observe(late, {}).ok());
   ASSERT_EQ(early->estimates.size(), 1u);
   EXPECT_EQ(late->estimates, early->estimates);
   session_->Unobserve(early.get());
-  ASSERT_TRUE(session_->Add(2, Batch({0.2})).ok());
+  ASSERT_TRUE(Add(2, Batch({0.2})).ok());
   ASSERT_TRUE(session_->CurrentEstimate({}).ok());
   EXPECT_EQ(early->estimates.size(), 1u);
   ASSERT_EQ(late->estimates.size(), 2u);
@@ -120,20 +142,99 @@ TEST_F(SessionTest, TellsWriterAndObserversOfItsEndAndIsThenNotFound) {
   session_->Close();
   EXPECT_EQ(writer->closed, 1);
   EXPECT_EQ(observer->closed, 1);
-  EXPECT_EQ(session_->Add(1, Batch({0.1})).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(Add(1, Batch({0.1})).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(session_->CurrentEstimate({}).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(session_->Observe(observer, {}).code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(session_->ClaimWriter(writer).code(), absl::StatusCode::kNotFound);
 }
 
 TEST_F(SessionTest, GoesOnAfterAStopWithNothingLost) {
-  ASSERT_TRUE(session_->Add(1, Batch({0.1, 0.2, 0.3})).ok());
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2, 0.3})).ok());
   std::stop_source source;
   source.request_stop();
   EXPECT_EQ(session_->Process(Stop(source.get_token())).code(), absl::StatusCode::kCancelled);
   const auto estimate = session_->CurrentEstimate({});
   ASSERT_TRUE(estimate.ok()) << estimate.status();
   EXPECT_EQ((*estimate)->samples(), 3);
+}
+
+TEST_F(SessionTest, GivesTheSameBitsAfterARestart) {
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
+  ASSERT_TRUE(Add(2, Batch({0.3})).ok());
+  const std::string before = (*session_->CurrentEstimate({}))->SerializeAsString();
+  Restart();
+  EXPECT_FALSE(session_->loaded());
+  EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
+  EXPECT_TRUE(session_->loaded());
+  EXPECT_EQ(Add(2, Batch({0.3}))->samples(), 3);
+  EXPECT_EQ(Add(1, Batch({0.3})).status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_TRUE(Add(3, Batch({0.4})).ok());
+}
+
+TEST_F(SessionTest, IsUnloadedWhenIdleAndComesBackOnUse) {
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
+  const std::string before = (*session_->CurrentEstimate({}))->SerializeAsString();
+  auto writer = std::make_shared<Watcher>();
+  ASSERT_TRUE(session_->ClaimWriter(writer).ok());
+  session_->Unload();
+  EXPECT_TRUE(session_->loaded());
+  session_->ReleaseWriter();
+  session_->Unload();
+  EXPECT_FALSE(session_->loaded());
+  EXPECT_EQ(session_->Describe().last_sequence(), 1);
+  EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
+}
+
+TEST_F(SessionTest, AcknowledgesABatchOnlyWhenItIsKept) {
+  journal_.Hold();
+  auto watcher = std::make_shared<Watcher>();
+  ASSERT_TRUE(session_->Observe(watcher, {}).ok());
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
+  ASSERT_TRUE(Add(2, Batch({0.2})).ok());
+  ASSERT_TRUE(session_->CurrentEstimate({}).ok());
+  const auto second = Kept(2), first = Kept(1);
+  EXPECT_FALSE(first->has_value() || second->has_value());
+  EXPECT_EQ(session_->Describe().last_sequence(), 0);
+  EXPECT_TRUE(watcher->estimates.empty());
+  // Neither is it out of use, nor a repeat answered early.
+  session_->Unload();
+  EXPECT_TRUE(session_->loaded());
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
+  EXPECT_EQ(Add(1, Batch({0.2})).status().code(), absl::StatusCode::kAlreadyExists);
+  journal_.Release();
+  EXPECT_TRUE((*first)->ok() && (*second)->ok());
+  EXPECT_EQ(session_->Describe().last_sequence(), 2);
+  EXPECT_EQ(watcher->estimates.size(), 1u);
+}
+
+TEST_F(SessionTest, ForgetsWhatAFullDiskCouldNotKeepAndGoesOnAfterIt) {
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
+  const std::string before = (*session_->CurrentEstimate({}))->SerializeAsString();
+  journal_.Hold();
+  ASSERT_TRUE(Add(2, Batch({0.2})).ok());
+  ASSERT_TRUE(Add(3, Batch({0.3})).ok());
+  const auto second = Kept(2), third = Kept(3);
+  journal_.Fail(absl::ResourceExhaustedError("full"));
+  journal_.Release();
+  EXPECT_EQ(second->value().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(third->value().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(Kept(3)->value().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(session_->Describe().last_sequence(), 1);
+  EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
+  journal_.Fail(absl::OkStatus());
+  ASSERT_TRUE(Add(2, Batch({0.25})).ok());
+  EXPECT_TRUE(Kept(2)->value().ok());
+  EXPECT_EQ((*session_->CurrentEstimate({}))->samples(), 2);
+}
+
+TEST_F(SessionTest, RefusesMoreRowsThanItMayHave) {
+  EXPECT_EQ(Add(1, Batch({0.1, 0.2, 0.3, 0.4, 0.5})).status().message(),
+            "measurements.time: 5 rows are more than a batch may have, 4 (--max-batch-rows)");
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2, 0.3, 0.4})).ok());
+  EXPECT_EQ(Add(2, Batch({0.5, 0.6, 0.7})).status().message(),
+            "measurements.time: 3 rows beside the 4 of the session are more than it may have, 6 "
+            "(--max-session-rows)");
+  EXPECT_TRUE(Add(2, Batch({0.5, 0.6})).ok());
 }
 
 }  // namespace

@@ -1,0 +1,76 @@
+#pragma once
+
+// Sessions on disk: one SQLite file in WAL mode, synced at every commit.
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/journal/commit_queue.h"
+#include "server/journal/session_journal.h"
+
+namespace polyest {
+
+struct SqliteJournalOptions {
+  // The journal is `folder`/journal.db. The folder is made if there is none.
+  std::string folder;
+  // Largest size of that file, MiB; 0: as large as the disk. Past it: RESOURCE_EXHAUSTED.
+  int64_t most_mb = 0;
+};
+
+class SqliteJournal final : public SessionJournal {
+ public:
+  // FAILED_PRECONDITION: another daemon has the folder, or the file is no journal or one of a later
+  // version; DATA_LOSS: the file is damaged. It is then as it was.
+  static absl::StatusOr<std::unique_ptr<SqliteJournal>> Open(const SqliteJournalOptions& options);
+  // Writes what was appended.
+  ~SqliteJournal() override;
+
+  bool durable() const override { return true; }
+  absl::StatusOr<std::vector<SessionHead>> Heads() const override;
+  absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
+                                 bool hidden) override;
+  absl::Status Show(int64_t session) override;
+  absl::Status Delete(int64_t session) override;
+  void Append(JournalEntry entry, Done done) override;
+  void SaveSnapshot(int64_t session, JournalSnapshot snapshot) override;
+  absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const override;
+  absl::Status ReadBatches(
+      int64_t session, int64_t after,
+      const std::function<absl::Status(const JournalBatch&)>& take) const override;
+  absl::StatusOr<std::string> ReadDigest(int64_t session, int64_t sequence) const override;
+  absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const override;
+
+ private:
+  // A connection to read with; given back when it goes.
+  class Reader;
+  // Exclusive use of the folder.
+  class FolderLock;
+
+  SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
+                std::unique_ptr<SqliteDatabase> writer, std::unique_ptr<SqliteDatabase> maintainer);
+  void Maintain(std::stop_token stop);
+  void Checkpoint();
+  absl::StatusOr<bool> RemoveSomeDeleted();
+  void WakeMaintenance();
+
+  const std::string file_;
+  const std::unique_ptr<FolderLock> lock_;
+  mutable std::mutex readers_mutex_;
+  mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
+
+  std::unique_ptr<SqliteDatabase> maintainer_;  // the maintenance thread's
+  std::mutex maintenance_mutex_;
+  std::condition_variable_any maintenance_;
+  std::atomic<int> log_pages_ = 0;  // of the write-ahead log
+  bool deleted_ = true;             // whether there may be batches to remove
+
+  std::unique_ptr<CommitQueue> queue_;
+  std::jthread maintenance_thread_;
+};
+
+}  // namespace polyest

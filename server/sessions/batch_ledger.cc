@@ -1,0 +1,106 @@
+#include "server/sessions/batch_ledger.h"
+
+#include <absl/strings/str_format.h>
+
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest {
+
+SessionPlace BatchLedger::kept() const {
+  const std::lock_guard lock(mutex_);
+  return kept_;
+}
+
+SessionPlace BatchLedger::taken() const {
+  const std::lock_guard lock(mutex_);
+  return taken_;
+}
+
+bool BatchLedger::all_kept() const {
+  const std::lock_guard lock(mutex_);
+  return under_way_.empty();
+}
+
+uint64_t BatchLedger::losses() const {
+  const std::lock_guard lock(mutex_);
+  return losses_;
+}
+
+absl::StatusOr<BatchLedger::Kind> BatchLedger::Check(
+    int64_t sequence, const std::string& digest,
+    const std::function<absl::StatusOr<std::string>(int64_t)>& kept_digest) const {
+  int64_t next = 0;
+  std::string known;
+  {
+    const std::lock_guard lock(mutex_);
+    next = taken_.sequence + 1;
+    if (sequence > kept_.sequence && sequence < next) {
+      known = under_way_[static_cast<size_t>(sequence - kept_.sequence - 1)].digest;
+    }
+  }
+  if (sequence == next) return Kind::kNext;
+  if (sequence < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("sequence: %d must be at least 1; the next batch is %d", sequence, next));
+  }
+  if (sequence > next) {
+    return absl::FailedPreconditionError(
+        absl::StrFormat("sequence: %d leaves a gap; the next batch must be %d", sequence, next));
+  }
+  if (known.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(known, kept_digest(sequence));
+  }
+  if (known == digest) return Kind::kRepeat;
+  return absl::AlreadyExistsError(absl::StrFormat(
+      "sequence: %d was taken with other measurements; the next batch must be %d", sequence, next));
+}
+
+absl::Status BatchLedger::Take(const SessionPlace& place, std::string digest, uint64_t losses) {
+  const std::lock_guard lock(mutex_);
+  if (losses != losses_) return absl::UnavailableError(last_loss_.message());
+  POLYEST_CHECK(place.sequence == taken_.sequence + 1);
+  taken_ = place;
+  under_way_.push_back({place, std::move(digest)});
+  return absl::OkStatus();
+}
+
+void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& kept) {
+  std::multimap<int64_t, Done> settled;
+  {
+    const std::lock_guard lock(mutex_);
+    if (losses != losses_) return;  // lost with one before it
+    POLYEST_CHECK(!under_way_.empty() && under_way_.front().place.sequence == sequence);
+    if (kept.ok()) {
+      kept_ = under_way_.front().place;
+      under_way_.pop_front();
+      const auto end = waiting_.upper_bound(sequence);
+      while (waiting_.begin() != end) settled.insert(waiting_.extract(waiting_.begin()));
+    } else {
+      ++losses_;
+      last_loss_ = kept;
+      taken_ = kept_;
+      under_way_.clear();
+      settled.swap(waiting_);
+    }
+  }
+  for (const auto& [waited_for, done] : settled) done(kept);
+}
+
+void BatchLedger::WhenKept(int64_t sequence, Done done) {
+  absl::Status now;
+  {
+    const std::lock_guard lock(mutex_);
+    if (sequence > taken_.sequence) {
+      now = last_loss_;
+    } else if (sequence > kept_.sequence) {
+      waiting_.emplace(sequence, std::move(done));
+      return;
+    }
+  }
+  done(now);
+}
+
+}  // namespace polyest

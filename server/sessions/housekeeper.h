@@ -1,0 +1,36 @@
+#pragma once
+
+// Takes the estimators of idle sessions out of memory.
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+
+#include "server/sessions/session_registry.h"
+
+namespace polyest {
+
+struct HousekeepingOptions {
+  // An estimator that was not used for so long is unloaded.
+  std::chrono::milliseconds idle{std::chrono::minutes(10)};
+};
+
+class Housekeeper {
+ public:
+  // Looks after the registry, which must outlive it, from a thread of its own.
+  Housekeeper(SessionRegistry& registry, const HousekeepingOptions& options);
+
+ private:
+  void Run(std::stop_token stop);
+  void UnloadIdle();
+
+  SessionRegistry& registry_;
+  const HousekeepingOptions options_;
+  std::mutex mutex_;
+  std::condition_variable_any stopping_;
+  std::jthread thread_;
+};
+
+}  // namespace polyest

@@ -1,0 +1,119 @@
+#include "server/sessions/session_import.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <future>
+#include <utility>
+
+#include "core/common/status.h"
+#include "server/journal/digest.h"
+
+namespace polyest {
+
+absl::Status ExportSession(const Session& session,
+                           const std::function<absl::Status(const v1::SessionRecord&)>& take) {
+  const v1::Session described = session.Describe();
+  v1::SessionRecord record;
+  v1::SessionRecord::Head& head = *record.mutable_head();
+  head.set_name(described.name());
+  *head.mutable_create_time() = described.create_time();
+  head.set_batches(described.last_sequence());
+  POLYEST_ASSIGN_OR_RETURN(*head.mutable_problem(), session.ReadProblem());
+  POLYEST_RETURN_IF_ERROR(take(record));
+  // Batches that come meanwhile are left to the next export.
+  const absl::Status end = absl::OutOfRangeError("all there were");
+  const absl::Status exported = session.ReadBatches([&](const JournalBatch& batch) -> absl::Status {
+    if (batch.sequence > described.last_sequence()) return end;
+    record.mutable_batch()->set_sequence(batch.sequence);
+    *record.mutable_batch()->mutable_measurements() = batch.measurements;
+    return take(record);
+  });
+  return exported == end ? absl::OkStatus() : exported;
+}
+
+SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : registry_(registry) {
+  head_.tenant = std::move(tenant);
+}
+
+SessionImport::~SessionImport() {
+  if (loaded_ != nullptr) registry_.services().journal.Delete(head_.number).IgnoreError();
+}
+
+absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
+  switch (request.record().record_case()) {
+    case v1::SessionRecord::kHead:
+      return Begin(request.session_id(), request.record().head());
+    case v1::SessionRecord::kBatch:
+      return Append(request.record().batch());
+    case v1::SessionRecord::RECORD_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError("record: must be a head or a batch");
+}
+
+absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head) {
+  if (loaded_ != nullptr) {
+    return absl::InvalidArgumentError("record.head: there is one already; batches follow it");
+  }
+  head_.name = id.empty() ? head.name() : absl::StrCat("sessions/", id);
+  const std::string prefix = "sessions/";
+  if (!head_.name.starts_with(prefix)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("record.head.name: \"%s\" must be sessions/{id}", head_.name));
+  }
+  POLYEST_RETURN_IF_ERROR(CheckSessionId(head_.name.substr(prefix.size())));
+  if (head.batches() < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("record.head.batches: %d must not be negative", head.batches()));
+  }
+  POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
+  head_.create_time = head.create_time();
+  promised_ = head.batches();
+  const SessionServices& services = registry_.services();
+  POLYEST_ASSIGN_OR_RETURN(auto loaded, LoadedSession::Make(head.problem(), services.models));
+  POLYEST_ASSIGN_OR_RETURN(head_.number,
+                           services.journal.Create(head_, head.problem(), /*hidden=*/true));
+  loaded_ = std::move(loaded);
+  return absl::OkStatus();
+}
+
+absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
+  if (loaded_ == nullptr) {
+    return absl::InvalidArgumentError("record: the first must be a session's head");
+  }
+  const int64_t next = loaded_->place().sequence + 1;
+  if (batch.sequence() != next || next > promised_) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("record.batch.sequence: %d must be %d, and the head promises %d batches",
+                        batch.sequence(), next, promised_));
+  }
+  POLYEST_RETURN_IF_ERROR(loaded_->Append(batch.measurements()));
+  JournalEntry entry;
+  entry.session = head_.number;
+  entry.measurements = DeterministicBytes(batch.measurements());
+  entry.digest = Digest(entry.measurements);
+  entry.place = loaded_->place();
+  std::promise<absl::Status> kept;
+  registry_.services().journal.Append(std::move(entry),
+                                      [&](const absl::Status& status) { kept.set_value(status); });
+  return kept.get_future().get();
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
+  const int64_t batches = loaded_ == nullptr ? 0 : loaded_->place().sequence;
+  if (loaded_ == nullptr || batches < promised_) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("record: the session breaks off after batch %d of %d", batches, promised_));
+  }
+  const absl::Status shown = registry_.services().journal.Show(head_.number);
+  if (absl::IsAlreadyExists(shown)) {
+    return absl::AlreadyExistsError(
+        absl::StrFormat("there is a session \"%s\" already", head_.name));
+  }
+  POLYEST_RETURN_IF_ERROR(shown);
+  head_.place = loaded_->place();
+  return registry_.Adopt(std::move(head_), std::move(loaded_));
+}
+
+}  // namespace polyest

@@ -1,0 +1,159 @@
+#include "server/sessions/session_registry.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+constexpr size_t kLongestId = 63;
+
+absl::Status NotFound(const std::string& name) {
+  return absl::NotFoundError(absl::StrFormat("there is no session \"%s\"", name));
+}
+
+}  // namespace
+
+absl::Status CheckSessionId(const std::string& id) {
+  const bool good = !id.empty() && id.size() <= kLongestId && absl::ascii_islower(id.front()) &&
+                    std::all_of(id.begin(), id.end(), [](unsigned char c) {
+                      return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-';
+                    });
+  if (good) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "sessionId: \"%s\" must be 1 to %d of a-z, 0-9 and -, first a letter", id, kLongestId));
+}
+
+SessionRegistry::SessionRegistry(const SessionServices& services, WallClock clock)
+    : services_(services), clock_(std::move(clock)) {}
+
+absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
+    const SessionServices& services, WallClock clock) {
+  POLYEST_ASSIGN_OR_RETURN(std::vector<SessionHead> heads, services.journal.Heads());
+  std::unique_ptr<SessionRegistry> registry(new SessionRegistry(services, std::move(clock)));
+  for (SessionHead& head : heads) {
+    ++registry->count_[head.tenant];
+    const Key key(head.tenant, head.name);
+    registry->sessions_.emplace(key, std::make_shared<Session>(services, std::move(head)));
+  }
+  return registry;
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::string& tenant,
+                                                                 const std::string& id,
+                                                                 const v1::Problem& problem) {
+  if (!id.empty()) POLYEST_RETURN_IF_ERROR(CheckSessionId(id));
+  SessionHead head;
+  head.tenant = tenant;
+  {
+    const std::lock_guard lock(mutex_);
+    head.name = id.empty() ? ChooseName(tenant) : absl::StrCat("sessions/", id);
+    POLYEST_RETURN_IF_ERROR(CheckFree({tenant, head.name}));
+  }
+  // Not under the mutex: a large problem takes its time, and so does the journal, which looks again
+  // whether the name is free.
+  POLYEST_ASSIGN_OR_RETURN(auto loaded, LoadedSession::Make(problem, services_.models));
+  head.create_time = clock_();
+  const auto number = services_.journal.Create(head, problem, /*hidden=*/false);
+  if (absl::IsAlreadyExists(number.status())) {
+    return absl::AlreadyExistsError(
+        absl::StrFormat("there is a session \"%s\" already", head.name));
+  }
+  POLYEST_RETURN_IF_ERROR(number.status());
+  head.number = *number;
+  return Adopt(std::move(head), std::move(loaded));
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
+    SessionHead head, std::unique_ptr<LoadedSession> loaded) {
+  const Key key(head.tenant, head.name);
+  auto session = std::make_shared<Session>(services_, std::move(head), std::move(loaded));
+  const std::lock_guard lock(mutex_);
+  ++count_[key.first];
+  sessions_.emplace(key, session);
+  return session;
+}
+
+absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  return CheckFree({tenant, name});
+}
+
+absl::Status SessionRegistry::CheckFree(const Key& key) const {
+  if (sessions_.contains(key)) {
+    return absl::AlreadyExistsError(
+        absl::StrFormat("there is a session \"%s\" already", key.second));
+  }
+  if (static_cast<int64_t>(sessions_.size()) >= services_.limits.sessions) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("the daemon keeps at most %d sessions (--max-sessions); delete one",
+                        services_.limits.sessions));
+  }
+  const auto count = count_.find(key.first);
+  if (count != count_.end() && count->second >= services_.limits.sessions_per_tenant) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("a tenant may have at most %d sessions (--max-sessions-per-tenant); delete "
+                        "one",
+                        services_.limits.sessions_per_tenant));
+  }
+  return absl::OkStatus();
+}
+
+std::string SessionRegistry::ChooseName(const std::string& tenant) {
+  std::string name;
+  do {
+    name = absl::StrCat("sessions/session-", ++chosen_);
+  } while (sessions_.contains({tenant, name}));
+  return name;
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Get(const std::string& tenant,
+                                                              const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find({tenant, name});
+  if (found == sessions_.end()) return NotFound(name);
+  return found->second;
+}
+
+std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant,
+                                                            const std::string& after,
+                                                            size_t count) const {
+  std::vector<std::shared_ptr<Session>> page;
+  const std::lock_guard lock(mutex_);
+  for (auto it = sessions_.upper_bound({tenant, after});
+       it != sessions_.end() && it->first.first == tenant && page.size() < count; ++it) {
+    page.push_back(it->second);
+  }
+  return page;
+}
+
+absl::Status SessionRegistry::Delete(const std::string& tenant, const std::string& name) {
+  POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, Get(tenant, name));
+  // The journal first: what cannot be deleted goes on as it was.
+  const absl::Status deleted = services_.journal.Delete(session->number());
+  if (absl::IsNotFound(deleted)) return NotFound(name);
+  POLYEST_RETURN_IF_ERROR(deleted);
+  {
+    const std::lock_guard lock(mutex_);
+    sessions_.erase({tenant, name});
+    --count_[tenant];
+  }
+  session->Close();
+  return absl::OkStatus();
+}
+
+std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {
+  std::vector<std::shared_ptr<Session>> all;
+  const std::lock_guard lock(mutex_);
+  all.reserve(sessions_.size());
+  for (const auto& [key, session] : sessions_) all.push_back(session);
+  return all;
+}
+
+}  // namespace polyest

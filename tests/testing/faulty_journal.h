@@ -1,0 +1,91 @@
+#pragma once
+
+// A journal whose disk can be made slow, full or broken.
+
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "server/journal/memory_journal.h"
+
+namespace polyest {
+
+class FaultyJournal final : public SessionJournal {
+ public:
+  // Batches from here on wait for Release.
+  void Hold() {
+    const std::lock_guard lock(mutex_);
+    holding_ = true;
+  }
+  // All that wait are kept, in order, and those to come at once.
+  void Release() {
+    std::deque<std::pair<JournalEntry, Done>> held;
+    {
+      const std::lock_guard lock(mutex_);
+      holding_ = false;
+      held.swap(held_);
+    }
+    for (auto& [entry, done] : held) Append(std::move(entry), std::move(done));
+  }
+  // Batches and sessions from here on cannot be kept, for this reason; OK: they can again.
+  void Fail(const absl::Status& status) {
+    const std::lock_guard lock(mutex_);
+    failure_ = status;
+  }
+
+  bool durable() const override { return true; }
+  absl::StatusOr<std::vector<SessionHead>> Heads() const override { return journal_.Heads(); }
+  absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
+                                 bool hidden) override {
+    if (const absl::Status failed = failure(); !failed.ok()) return failed;
+    return journal_.Create(head, problem, hidden);
+  }
+  absl::Status Show(int64_t session) override { return journal_.Show(session); }
+  absl::Status Delete(int64_t session) override {
+    if (const absl::Status failed = failure(); !failed.ok()) return failed;
+    return journal_.Delete(session);
+  }
+  void Append(JournalEntry entry, Done done) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (holding_) {
+        held_.emplace_back(std::move(entry), std::move(done));
+        return;
+      }
+    }
+    if (const absl::Status failed = failure(); !failed.ok()) return done(failed);
+    journal_.Append(std::move(entry), std::move(done));
+  }
+  void SaveSnapshot(int64_t session, JournalSnapshot snapshot) override {
+    journal_.SaveSnapshot(session, std::move(snapshot));
+  }
+  absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const override {
+    return journal_.ReadProblem(session);
+  }
+  absl::Status ReadBatches(
+      int64_t session, int64_t after,
+      const std::function<absl::Status(const JournalBatch&)>& take) const override {
+    return journal_.ReadBatches(session, after, take);
+  }
+  absl::StatusOr<std::string> ReadDigest(int64_t session, int64_t sequence) const override {
+    return journal_.ReadDigest(session, sequence);
+  }
+  absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const override {
+    return journal_.ReadSnapshot(session);
+  }
+
+ private:
+  absl::Status failure() const {
+    const std::lock_guard lock(mutex_);
+    return failure_;
+  }
+
+  MemoryJournal journal_;
+  mutable std::mutex mutex_;
+  bool holding_ = false;
+  std::deque<std::pair<JournalEntry, Done>> held_;
+  absl::Status failure_;
+};
+
+}  // namespace polyest
