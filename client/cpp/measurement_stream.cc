@@ -4,6 +4,7 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <random>
 #include <thread>
 #include <utility>
 
@@ -12,6 +13,13 @@
 
 namespace polyest {
 namespace {
+
+std::string RandomId() {
+  std::random_device device;
+  std::string id;
+  for (int i = 0; i < 4; ++i) absl::StrAppendFormat(&id, "%08x", device());
+  return id;
+}
 
 // Whether a new connection may help: the daemon is away, or has cut its calls off on its way out.
 bool IsBreak(const absl::Status& status) {
@@ -33,6 +41,7 @@ class MeasurementStream::Connection
   void Start() {
     auto hello = std::make_shared<v1::StreamMeasurementsRequest>();
     hello->set_session(stream_.session_);
+    hello->set_writer(stream_.writer_);
     if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
     stream_.client_.stub().async()->StreamMeasurements(&context_, this);
     StartRead(&response_);
@@ -90,6 +99,7 @@ MeasurementStream::MeasurementStream(Client& client, std::string session,
                                      MeasurementStreamCallbacks callbacks)
     : client_(client),
       session_(std::move(session)),
+      writer_(RandomId()),
       options_(std::move(options)),
       callbacks_(std::move(callbacks)) {
   POLYEST_CHECK(options_.most_unacknowledged >= 1);

@@ -76,6 +76,7 @@ class MeasurementStream {
 
   Client& client_;
   const std::string session_;
+  const std::string writer_;  // by which the daemon knows the next connection for this stream's
   const MeasurementStreamOptions options_;
   const MeasurementStreamCallbacks callbacks_;
 

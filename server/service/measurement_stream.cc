@@ -49,8 +49,12 @@ absl::Status MeasurementFlow::Attach(const v1::StreamMeasurementsRequest& reques
                                                       request.session(), session_->name()));
   }
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", request.session()).status());
+  if (request.writer().size() > kLongestWriter) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "writer: %d characters are more than %d", request.writer().size(), kLongestWriter));
+  }
   POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(kDefaultTenant, request.session()));
-  POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this()));
+  POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));
   session_ = std::move(session);
   return absl::OkStatus();
 }
@@ -73,6 +77,12 @@ void MeasurementFlow::OnClosed() {
   std::lock_guard lock(mutex_);
   stop_source_.request_stop();
   End(absl::NotFoundError(absl::StrFormat("%s has been deleted", session_->name())));
+  Advance();
+}
+
+void MeasurementFlow::OnReplaced() {
+  std::lock_guard lock(mutex_);
+  Break(absl::AbortedError("the writer goes on with another connection"));
   Advance();
 }
 
@@ -127,7 +137,7 @@ void MeasurementFlow::FinishIfIdle() {
   if (!end_ || working_ || writing_ || !outbox_.empty()) return;
   finished_ = true;
   // Before the client hears of the end: it may come back at once.
-  if (session_ != nullptr) session_->ReleaseWriter();
+  if (session_ != nullptr) session_->ReleaseWriter(this);
   reactor_->Finish(ToGrpc(*end_));
 }
 

@@ -40,11 +40,13 @@ class MeasurementFlow final : public SessionObserver,
 
   // The session was deleted.
   void OnClosed() override;
+  void OnReplaced() override;
   void OnEstimate(const SharedEstimate&) override {}
   // The daemon shuts down.
   void Drain() override;
 
  private:
+  static constexpr size_t kLongestWriter = 64;
   static constexpr size_t kInbox = 8;
   static constexpr size_t kOutbox = 16;
 

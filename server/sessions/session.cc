@@ -73,19 +73,25 @@ std::optional<Session::Clock::duration> Session::IdleTime() const {
   return Clock::now() - last_use_;
 }
 
-absl::Status Session::ClaimWriter(std::shared_ptr<SessionObserver> writer) {
-  const std::lock_guard lock(mutex_);
-  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
-  if (writer_ != nullptr) {
-    return absl::AbortedError(absl::StrCat(name(), " has a writer already; one at a time"));
+absl::Status Session::ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id) {
+  std::shared_ptr<SessionObserver> replaced;
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
+    if (writer_ != nullptr && (id.empty() || id != writer_id_)) {
+      return absl::AbortedError(absl::StrCat(name(), " has a writer already; one at a time"));
+    }
+    replaced = std::exchange(writer_, std::move(writer));
+    writer_id_ = id;
   }
-  writer_ = std::move(writer);
+  if (replaced != nullptr) replaced->OnReplaced();
   return absl::OkStatus();
 }
 
-void Session::ReleaseWriter() {
+void Session::ReleaseWriter(const SessionObserver* writer) {
   std::shared_ptr<SessionObserver> released;
   const std::lock_guard lock(mutex_);
+  if (writer_.get() != writer) return;
   released.swap(writer_);
   last_use_ = Clock::now();
 }

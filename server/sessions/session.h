@@ -30,6 +30,8 @@ class SessionObserver {
   virtual void OnEstimate(const SharedEstimate& estimate) = 0;
   // The last call.
   virtual void OnClosed() = 0;
+  // To a writer; the last call.
+  virtual void OnReplaced() {}
 };
 
 // What all sessions need; outlives them.
@@ -70,9 +72,11 @@ class Session : public std::enable_shared_from_this<Session> {
   // Since it was last used; none while it is in use.
   std::optional<Clock::duration> IdleTime() const;
 
-  // One writer at a time: ABORTED while another has it. A writer hears of the closing only.
-  absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer);
-  void ReleaseWriter();
+  // One writer at a time: ABORTED while another has it. A writer hears of the closing, and of being
+  // replaced by one with the same id that is not empty.
+  absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id);
+  // Nothing when it was replaced.
+  void ReleaseWriter(const SessionObserver* writer);
 
   // Ends the session for everybody: calls on it are NOT_FOUND from here on.
   void Close();
@@ -131,6 +135,7 @@ class Session : public std::enable_shared_from_this<Session> {
   mutable std::mutex mutex_;
   bool closed_ = false;
   std::shared_ptr<SessionObserver> writer_;
+  std::string writer_id_;
   std::vector<std::shared_ptr<SessionObserver>> observers_;
   Clock::time_point last_use_ = Clock::now();
   v1::Session::Activity activity_;

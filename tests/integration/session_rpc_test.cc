@@ -108,7 +108,8 @@ TEST_F(SessionRpcTest, AcknowledgesARepeatAndRefusesGaps) {
   EXPECT_THAT(status.error_message(), testing::HasSubstr("the next batch must be 2"));
   status = Add("sessions/rig", 3, OscillatorRows(5, 6));
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
-  EXPECT_THAT(status.error_message(), testing::HasSubstr("3 leaves a gap; the next batch must be 2"));
+  EXPECT_THAT(status.error_message(),
+              testing::HasSubstr("3 leaves a gap; the next batch must be 2"));
   EXPECT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 6)).ok());
 }
 

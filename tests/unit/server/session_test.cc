@@ -26,8 +26,10 @@ v1::Measurements Batch(std::initializer_list<double> times) {
 struct Watcher : SessionObserver {
   void OnEstimate(const SharedEstimate& estimate) override { estimates.push_back(estimate); }
   void OnClosed() override { ++closed; }
+  void OnReplaced() override { ++replaced; }
   std::vector<SharedEstimate> estimates;
   int closed = 0;
+  int replaced = 0;
 };
 
 class SessionTest : public testing::Test {
@@ -128,16 +130,31 @@ TEST_F(SessionTest, PassesThePresentEstimateAndEveryNewOneToObservers) {
 TEST_F(SessionTest, HasOneWriterAtATime) {
   auto first = std::make_shared<Watcher>();
   auto second = std::make_shared<Watcher>();
-  ASSERT_TRUE(session_->ClaimWriter(first).ok());
-  EXPECT_EQ(session_->ClaimWriter(second).code(), absl::StatusCode::kAborted);
-  session_->ReleaseWriter();
-  EXPECT_TRUE(session_->ClaimWriter(second).ok());
+  ASSERT_TRUE(session_->ClaimWriter(first, "").ok());
+  EXPECT_EQ(session_->ClaimWriter(second, "").code(), absl::StatusCode::kAborted);
+  session_->ReleaseWriter(second.get());
+  EXPECT_EQ(session_->ClaimWriter(second, "").code(), absl::StatusCode::kAborted);
+  session_->ReleaseWriter(first.get());
+  EXPECT_TRUE(session_->ClaimWriter(second, "").ok());
+}
+
+TEST_F(SessionTest, LetsAWriterTakeOverFromItsOwnLostConnection) {
+  auto first = std::make_shared<Watcher>();
+  auto second = std::make_shared<Watcher>();
+  auto other = std::make_shared<Watcher>();
+  ASSERT_TRUE(session_->ClaimWriter(first, "rig").ok());
+  EXPECT_EQ(session_->ClaimWriter(other, "other").code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(first->replaced, 0);
+  ASSERT_TRUE(session_->ClaimWriter(second, "rig").ok());
+  EXPECT_EQ(first->replaced, 1);
+  session_->ReleaseWriter(first.get());
+  EXPECT_TRUE(session_->Describe().activity().has_writer());
 }
 
 TEST_F(SessionTest, TellsWriterAndObserversOfItsEndAndIsThenNotFound) {
   auto writer = std::make_shared<Watcher>();
   auto observer = std::make_shared<Watcher>();
-  ASSERT_TRUE(session_->ClaimWriter(writer).ok());
+  ASSERT_TRUE(session_->ClaimWriter(writer, "").ok());
   ASSERT_TRUE(session_->Observe(observer, {}).ok());
   session_->Close();
   EXPECT_EQ(writer->closed, 1);
@@ -145,7 +162,7 @@ TEST_F(SessionTest, TellsWriterAndObserversOfItsEndAndIsThenNotFound) {
   EXPECT_EQ(Add(1, Batch({0.1})).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(session_->CurrentEstimate({}).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(session_->Observe(observer, {}).code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(session_->ClaimWriter(writer).code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(session_->ClaimWriter(writer, "").code(), absl::StatusCode::kNotFound);
 }
 
 TEST_F(SessionTest, GoesOnAfterAStopWithNothingLost) {
@@ -175,10 +192,10 @@ TEST_F(SessionTest, IsUnloadedWhenIdleAndComesBackOnUse) {
   ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
   const std::string before = (*session_->CurrentEstimate({}))->SerializeAsString();
   auto writer = std::make_shared<Watcher>();
-  ASSERT_TRUE(session_->ClaimWriter(writer).ok());
+  ASSERT_TRUE(session_->ClaimWriter(writer, "").ok());
   session_->Unload();
   EXPECT_TRUE(session_->loaded());
-  session_->ReleaseWriter();
+  session_->ReleaseWriter(writer.get());
   session_->Unload();
   EXPECT_FALSE(session_->loaded());
   EXPECT_EQ(session_->Describe().last_sequence(), 1);
