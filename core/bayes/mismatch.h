@@ -31,7 +31,7 @@ double NegativeLogLikelihood(double degrees, double chi_squared, double differen
 
 // The history of one channel.
 struct ChannelSums {
-  explicit ChannelSums(int terms) : samples(terms), differences(terms) {}
+  explicit ChannelSums(int terms = 0) : samples(terms), differences(terms) {}
 
   MismatchSums samples;      // of u_k
   MismatchSums differences;  // of u_k − u_{k−1}; of u_k where a run begins

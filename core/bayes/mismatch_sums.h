@@ -35,6 +35,12 @@ class MismatchSums {
   // The same at W points: differences is W × S, values W (sized). product is scratch (resized).
   void ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
+  // As cereal has it: for writing and for reading; what was read may have any shape.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(g_, b_, w_, count_);
+  }
+
  private:
   Matrix g_;  // symmetric, both triangles kept
   Vector b_;

@@ -4,16 +4,25 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "core/common/status.h"
 #include "core/estimator/assessment.h"
+#include "core/estimator/checkpoints.h"
 #include "core/estimator/memory_store.h"
 #include "core/estimator/mixture_component.h"
 #include "core/estimator/posterior_mixture.h"
+#include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/sample_checks.h"
+#include "core/estimator/snapshot.h"
 
 namespace polyest {
+namespace {
+
+constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
+
+}  // namespace
 
 // Owns the record and the components of the posterior's mixture: one at first, and as long as one
 // expansion serves. Which there are is decided at rows that are a function of the record alone, all
@@ -25,7 +34,10 @@ class Estimator::Implementation {
       : problem_(std::move(problem)),
         threads_(options.threads),
         store_(options.store ? std::move(options.store) : std::make_shared<MemoryStore>()),
-        checks_(problem_) {}
+        checks_(problem_),
+        snapshot_(std::move(options.snapshot)),
+        checkpoints_(problem_.problem().integration.samples_between_checkpoints,
+                     HasCheckpointsInRuns(*problem_.problem().model)) {}
 
   absl::Status Begin() {
     POLYEST_ASSIGN_OR_RETURN(auto component,
@@ -40,6 +52,7 @@ class Estimator::Implementation {
 
   absl::Status Append(const Samples& samples);
   absl::Status Process(const Stop& stop);
+  absl::Status Restore(const EstimatorSnapshot& snapshot);
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop) const;
@@ -56,6 +69,8 @@ class Estimator::Implementation {
   absl::Status Divide(size_t component, const Stop& stop);
   absl::Status Weigh(const Stop& stop);
   absl::Status KeepHeaviest(Components& components, double weight, const Stop& stop);
+  void MakeSnapshot(int64_t rows);
+  absl::StatusOr<Components> ComponentsOf(EstimatorState& state, int64_t rows) const;
   static std::vector<AssessmentRequest> Requests(const Components& components);
   absl::StatusOr<AssessedMixture> AssessAll(const PosteriorEffort& effort, const Stop& stop) const;
 
@@ -63,6 +78,8 @@ class Estimator::Implementation {
   int threads_;
   std::shared_ptr<SampleStore> store_;
   SampleChecks checks_;
+  std::function<void(EstimatorSnapshot)> snapshot_;
+  Checkpoints checkpoints_;
   Components components_;
   int64_t weighing_row_ = 0;  // of several components: where they are weighed next
   double left_out_ = 0;       // largest share of components for which there was no room
@@ -77,6 +94,7 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
     POLYEST_ASSIGN_OR_RETURN(problem_, problem_.WithRuns(checked.after.run + 1));
   }
   checks_.Accept(checked);
+  if (snapshot_) checkpoints_.Add(checked.rows);
   return absl::OkStatus();
 }
 
@@ -96,12 +114,68 @@ int64_t Estimator::Implementation::rows_processed() const {
 absl::Status Estimator::Implementation::Process(const Stop& stop) {
   const int64_t settled = SettledRows();
   while (true) {
-    const int64_t rows = components_.size() > 1 ? std::min(settled, weighing_row_) : settled;
+    const int64_t checkpoint = checkpoints_.next().value_or(kNever);
+    const int64_t weighing = components_.size() > 1 ? weighing_row_ : kNever;
+    const int64_t rows = std::min({settled, weighing, checkpoint});
     POLYEST_ASSIGN_OR_RETURN(const bool divided, TakeUpTo(rows, stop));
     if (divided) continue;
-    if (components_.size() == 1 || rows < weighing_row_) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(Weigh(stop));
+    if (components_.size() > 1 && rows == weighing) {
+      POLYEST_RETURN_IF_ERROR(Weigh(stop));
+    } else if (rows == checkpoint) {
+      MakeSnapshot(rows);
+    } else {
+      return absl::OkStatus();
+    }
   }
+}
+
+void Estimator::Implementation::MakeSnapshot(int64_t rows) {
+  EstimatorState state;
+  for (const auto& component : components_) state.components.push_back(component->State());
+  state.weighing_row = weighing_row_;
+  state.left_out = left_out_;
+  state.reexpansions = reexpansions_;
+  state.propagated_rows = propagated_rows_;
+  snapshot_({rows, EncodeState(state, rows, FingerprintOf(problem_.problem()))});
+  checkpoints_.Pass(rows);
+}
+
+absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapshot) {
+  if (rows_processed() > 0) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "%d rows have been processed; a snapshot is restored before any", rows_processed()));
+  }
+  if (snapshot.rows > rows_appended()) {
+    return absl::FailedPreconditionError(
+        absl::StrFormat("the snapshot is of %d rows and only %d have been appended", snapshot.rows,
+                        rows_appended()));
+  }
+  POLYEST_ASSIGN_OR_RETURN(EstimatorState state, DecodeState(snapshot.state, snapshot.rows,
+                                                             FingerprintOf(problem_.problem())));
+  POLYEST_ASSIGN_OR_RETURN(components_, ComponentsOf(state, snapshot.rows));
+  weighing_row_ = state.weighing_row;
+  left_out_ = state.left_out;
+  reexpansions_ = state.reexpansions;
+  propagated_rows_ = state.propagated_rows;
+  checkpoints_.Pass(snapshot.rows);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation::ComponentsOf(
+    EstimatorState& state, int64_t rows) const {
+  const bool several = state.components.size() > 1;
+  if (state.components.empty() || state.components.size() > kMostComponents ||
+      (several && state.weighing_row <= rows)) {
+    return absl::DataLossError("the snapshot's components cannot be of a mixture");
+  }
+  Components components;
+  for (ComponentState& one : state.components) {
+    if (one.taken != rows) return absl::DataLossError("the snapshot's components do not agree");
+    POLYEST_ASSIGN_OR_RETURN(
+        components.emplace_back(),
+        MixtureComponent::FromState(problem_, std::move(one), store_.get(), threads_));
+  }
+  return components;
 }
 
 // True when one of the components has been divided, or could not be; then not all have got there.
@@ -256,6 +330,9 @@ absl::StatusOr<CostProfiles> Estimator::CurrentProfiles(const ProfileOptions& op
 absl::StatusOr<RegularizationSweep> Estimator::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {
   return implementation_->CurrentRegularizationSweep(options, stop);
+}
+absl::Status Estimator::Restore(const EstimatorSnapshot& snapshot) {
+  return implementation_->Restore(snapshot);
 }
 int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }

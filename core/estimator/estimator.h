@@ -5,7 +5,10 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "core/common/stop.h"
 #include "core/estimator/cost_profile.h"
@@ -17,10 +20,21 @@
 
 namespace polyest {
 
+// All that an estimator has made of the first rows of a record.
+struct EstimatorSnapshot {
+  int64_t rows = 0;
+  std::string state;  // for Estimator::Restore
+};
+
 struct EstimatorOptions {
   int threads = 1;  // for propagation; results do not depend on it
   // Where samples are kept, empty at first; in memory when null.
   std::shared_ptr<SampleStore> store;
+  // Called by Process, if given, once at each checkpoint of the record that it comes to: after
+  // every IntegrationOptions::samples_between_checkpoints rows of a run, and before a new run once
+  // so many rows have passed since the checkpoint before. A model that simulates itself has only
+  // the latter. It changes no answer.
+  std::function<void(EstimatorSnapshot)> snapshot;
 };
 
 class Estimator {
@@ -43,6 +57,13 @@ class Estimator {
   // (Samples::end_of_run), since its curve up to them depends on what follows. On a stop
   // request returns its status; what was taken stays, the next call goes on from there.
   absl::Status Process(const Stop& stop = {});
+
+  // Goes to where the estimator was that the snapshot is of, at a fraction of the cost of its rows:
+  // every later answer has the same bits as that one's. For an estimator of the same problem to
+  // which the same rows have been appended, and maybe more, and none of them processed. Otherwise,
+  // and for a snapshot of another version, FAILED_PRECONDITION; DATA_LOSS for bytes cut off,
+  // corrupted or inconsistent. The estimator is then unchanged and may process its rows itself.
+  absl::Status Restore(const EstimatorSnapshot& snapshot);
 
   // The estimate from all samples processed. Does not change the estimator: how often it is asked
   // never changes a later answer. Its cost does not depend on the number of samples.

@@ -19,6 +19,8 @@ namespace polyest {
 // Where a window that begins after so many rows ends, windows being counted from a row on.
 int64_t NextWindow(int64_t rows, int64_t from = 0);
 
+struct ComponentState;
+
 class MixtureComponent {
  public:
   // The whole prior. FAILED_PRECONDITION when its expansion cannot be factored. `store` must
@@ -26,6 +28,15 @@ class MixtureComponent {
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(const ResolvedProblem& problem,
                                                                    const SampleStore* store,
                                                                    int threads);
+
+  // One in that state (State), on a store that has its rows at least. DATA_LOSS when the state
+  // cannot be of such a problem, FAILED_PRECONDITION when it is not of those rows.
+  static absl::StatusOr<std::unique_ptr<MixtureComponent>> FromState(const ResolvedProblem& problem,
+                                                                     ComponentState state,
+                                                                     const SampleStore* store,
+                                                                     int threads);
+  // After TakeUpTo a checkpoint or the row before a new run, while not torn.
+  ComponentState State() const;
 
   // Takes rows of the store up to the first `rows`. On a stop request returns its status; what was
   // taken stays, the next call goes on from there.

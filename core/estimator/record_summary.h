@@ -42,6 +42,12 @@ class RecordSummary {
 
   static constexpr int kBeginning = 64;
 
+  // As cereal has it: for writing and for reading.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(rows_, time_s_, channels_, beginning_);
+  }
+
  private:
   int64_t rows_ = 0;
   double time_s_ = 0;

@@ -21,6 +21,16 @@ Matrix Stack(const Matrix& top, const Matrix& bottom) {
 
 }  // namespace
 
+AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index check_points)
+    : sums(static_cast<size_t>(channels), ChannelSums(terms)),
+      discount(Vector::Zero(channels)),
+      outliers(static_cast<size_t>(channels), 0),
+      previous_coefficients(Matrix::Zero(terms, channels)),
+      previous_error(Vector::Zero(channels)),
+      check_chi_squared(Matrix::Zero(check_points, channels)),
+      check_residual(Vector::Zero(check_points)),
+      check_valid(static_cast<size_t>(check_points), true) {}
+
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
@@ -39,16 +49,9 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
       channels_(problem.channels()),
       reference_phi_(design_.basis->size()),
       kept_(static_cast<size_t>(design_.points.rows())),
-      check_valid_(static_cast<size_t>(design_.check_points.rows()), true),
       whitening_(noise_.channels, design_.points.rows() + design_.check_points.rows()),
-      sums_(static_cast<size_t>(channels_), ChannelSums(design_.basis->size())),
-      discount_(Vector::Zero(channels_)),
-      outliers_(static_cast<size_t>(channels_), 0),
-      previous_coefficients_(design_.basis->size(), channels_),
-      previous_error_(channels_),
-      difference_(design_.basis->size()),
-      check_chi_squared_(Matrix::Zero(design_.check_points.rows(), channels_)),
-      check_residual_(Vector::Zero(design_.check_points.rows())) {
+      absorbed_(design_.basis->size(), channels_, design_.check_points.rows()),
+      difference_(design_.basis->size()) {
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
@@ -60,7 +63,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
   }
   for (int c = 0; c < channels_; ++c) {
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
-    ChannelSums& sums = sums_[static_cast<size_t>(c)];
+    ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
     const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
     sums.scale_unknown = model.unknown && learned;
     sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned;
@@ -236,10 +239,10 @@ double RegionalExpansion::ResidualToNoise(int row) const {
 void RegionalExpansion::Absorb(int row) {
   const size_t width = block_.values.size() / block_.rows.size();
   const int run = block_.rows[static_cast<size_t>(row)].run;
-  if (run != summed_run_) {
-    summed_run_ = run;
-    previous_coefficients_.setZero();
-    previous_error_.setZero();
+  if (run != absorbed_.summed_run) {
+    absorbed_.summed_run = run;
+    absorbed_.previous_coefficients.setZero();
+    absorbed_.previous_error.setZero();
   }
   for (int c = 0; c < channels_; ++c) {
     const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
@@ -255,17 +258,17 @@ void RegionalExpansion::Absorb(int row) {
     const double noise = model.VarianceFactor() * sigma * sigma / weight;
     const double variance = noise + residual_variance_[column];
     const double error = z - coefficients.dot(reference_phi_);
-    sums_[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
+    absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
     AddDifference(c, coefficients, error, variance);
-    discount_[c] += residual_variance_[column] / variance;
+    absorbed_.discount[c] += residual_variance_[column] / variance;
     Normalize(model.VarianceFactor() * sigma * sigma, residual_variance_[column],
               model.LackOfWeight(deviation));
-    if (weight < 0.5) ++outliers_[static_cast<size_t>(c)];
+    if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
-    ++absorbed_samples_;
+    ++absorbed_.samples;
   }
-  ++absorbed_rows_;
-  propagated_rows_ += thetas_.rows();
+  ++absorbed_.rows;
+  absorbed_.propagated += thetas_.rows();
 }
 
 // In units of what the sample may be off by there; variance: of the sample about the expansion.
@@ -281,47 +284,47 @@ double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef&
 
 // noise: σ²; own_error: the residual's variance ρ; lack: of the outlier's weight.
 void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
-  log_noise_ += 0.5 * std::log(noise) + lack;
-  log_variance_ += 0.5 * std::log(noise + own_error) + lack;
+  absorbed_.log_noise += 0.5 * std::log(noise) + lack;
+  absorbed_.log_variance += 0.5 * std::log(noise + own_error) + lack;
 }
 
 // u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
 void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                                       double variance) {
   const double unit = 1 / std::sqrt(variance);
-  auto previous = previous_coefficients_.col(channel);
+  auto previous = absorbed_.previous_coefficients.col(channel);
   difference_ = unit * coefficients - previous;
-  sums_[static_cast<size_t>(channel)].differences.Add(difference_,
-                                                      unit * error - previous_error_[channel], 1);
+  absorbed_.sums[static_cast<size_t>(channel)].differences.Add(
+      difference_, unit * error - absorbed_.previous_error[channel], 1);
   previous = unit * coefficients;
-  previous_error_[channel] = unit * error;
+  absorbed_.previous_error[channel] = unit * error;
 }
 
 // The check points' own trajectories beside the expansion at one sample.
 void RegionalExpansion::Compare(int column, double z, double variance) {
   const int channel = column % channels_;
   for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
-    if (!check_valid_[static_cast<size_t>(i)]) continue;
+    if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
     const double y = outputs_(points() + i, column);
     if (!std::isfinite(y)) {
-      check_valid_[static_cast<size_t>(i)] = false;
+      absorbed_.check_valid[static_cast<size_t>(i)] = false;
       continue;
     }
     const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
-    check_chi_squared_(i, channel) += (z - y) * (z - y) / variance;
-    check_residual_[i] += difference * difference / variance;
+    absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
+    absorbed_.check_residual[i] += difference * difference / variance;
   }
 }
 
 Cost RegionalExpansion::MakeCost(double regularization) const {
-  return Cost(design_.basis, design_.region, design_.reference, Mismatch(sums_), problem_.prior(),
-              regularization);
+  return Cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
+              problem_.prior(), regularization);
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {
-  const double samples = std::max<double>(1, static_cast<double>(absorbed_samples_));
-  return {check_chi_squared_, (check_residual_ / samples).cwiseSqrt(), check_valid_,
-          absorbed_samples_};
+  const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
+  return {absorbed_.check_chi_squared, (absorbed_.check_residual / samples).cwiseSqrt(),
+          absorbed_.check_valid, absorbed_.samples};
 }
 
 }  // namespace polyest

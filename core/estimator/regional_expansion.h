@@ -34,6 +34,31 @@ struct FailedTrajectory {
   std::string reason;
 };
 
+// What the rows absorbed by an expansion have left behind.
+struct AbsorbedRows {
+  // With S terms, m channels and C check points.
+  AbsorbedRows(int terms, int channels, Eigen::Index check_points);
+
+  int64_t rows = 0;
+  int64_t samples = 0;            // over all channels
+  int64_t propagated = 0;         // trajectories × rows
+  std::vector<ChannelSums> sums;  // by channel, over all runs
+  Vector discount;                // by channel: Σ ρ_k/R_k
+  double log_noise = 0;           // Σ ½ log σ² + what outliers' weights lack
+  double log_variance = 0;        // the same with R in place of σ²
+  std::vector<int64_t> outliers;  // by channel
+  // By channel, the sample before in units of its noise; a zero where a run begins.
+  int summed_run = -1;
+  Matrix previous_coefficients;  // S × m
+  Vector previous_error;
+  // At the check points.
+  Matrix check_chi_squared;       // C × m
+  Vector check_residual;          // Σ ((model − expansion)/σ)²
+  std::vector<bool> check_valid;  // the trajectory could be integrated
+};
+
+struct ExpansionState;
+
 class RegionalExpansion {
  public:
   // FAILED_PRECONDITION when the design's collocation matrix cannot be factored. `problem` must
@@ -41,6 +66,14 @@ class RegionalExpansion {
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
                                                                  ExpansionDesign design,
                                                                  LearnedNoise noise, int threads);
+
+  // One in that state (State), on a store that has its rows at least. DATA_LOSS when the state
+  // cannot be of such a problem, FAILED_PRECONDITION when it is not of those rows.
+  static absl::StatusOr<std::unique_ptr<RegionalExpansion>> FromState(
+      const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads);
+  // After all rows propagated have been absorbed, at a checkpoint or, for a new run to begin on,
+  // anywhere.
+  ExpansionState State() const;
 
   // Propagates over a block of rows that follows the rows propagated before, and fits the outputs
   // of the first fitted_rows(): all, unless too few trajectories are left at the one after, which
@@ -58,22 +91,22 @@ class RegionalExpansion {
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }
   int points() const { return static_cast<int>(design_.points.rows()); }
-  int64_t absorbed_rows() const { return absorbed_rows_; }
+  int64_t absorbed_rows() const { return absorbed_.rows; }
   // Trajectories × rows.
-  int64_t propagated_rows() const { return propagated_rows_; }
+  int64_t propagated_rows() const { return absorbed_.propagated; }
   const std::vector<FailedTrajectory>& failures() const { return failures_; }
 
   // One a measured channel, over all runs.
-  const std::vector<ChannelSums>& sums() const { return sums_; }
+  const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
   // Of a channel: Σ ρ_k/R_k, how many of its samples the expansion's own error ρ has cost.
-  double Discount(int channel) const { return discount_[channel]; }
+  double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Samples of a channel with less than half their weight.
-  int64_t Outliers(int channel) const { return outliers_[static_cast<size_t>(channel)]; }
+  int64_t Outliers(int channel) const { return absorbed_.outliers[static_cast<size_t>(channel)]; }
   // What makes the costs of different expansions of the same record comparable, each with its own
   // noise and weights of outliers: Σ ½ log R_k, and what reweighting leaves out of the likelihood.
   // R with the expansion's own error, which belongs to the sums, or without.
   double LogNormalization(bool with_own_error) const {
-    return with_own_error ? log_variance_ : log_noise_;
+    return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
   }
   // The cost on this expansion with α² = regularization.
   Cost MakeCost(double regularization) const;
@@ -94,6 +127,8 @@ class RegionalExpansion {
 
   void StartRun(int run);
   absl::Status PropagateRun(int first, int count, const Stop& stop);
+  absl::Status RestoreFit(ExpansionState& state);
+  absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
   void AppendKnots(int row);
   void FitRows(int first, int count);
   bool FailsAt(int row) const;
@@ -118,7 +153,6 @@ class RegionalExpansion {
 
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // the collocation points still in the fit
-  std::vector<bool> check_valid_;
   int run_ = -1;
   std::unique_ptr<InputSignals> inputs_;
   double knot_time_s_ = 0;        // of the last knot of the streamed inputs
@@ -140,21 +174,8 @@ class RegionalExpansion {
   Vector centre_phi_;
   Matrix spread_;  // S × n
 
-  std::vector<ChannelSums> sums_;  // by channel
-  Vector discount_;
-  double log_noise_ = 0;     // Σ ½ log σ² + what outliers' weights lack
-  double log_variance_ = 0;  // the same with R in place of σ²
-  std::vector<int64_t> outliers_;
-  // By channel, the sample before in units of its noise; a zero where a run begins.
-  int summed_run_ = -1;
-  Matrix previous_coefficients_;  // S × m
-  Vector previous_error_;
+  AbsorbedRows absorbed_;
   Vector difference_;  // S
-  Matrix check_chi_squared_;
-  Vector check_residual_;  // Σ ((model − expansion)/σ)²
-  int64_t absorbed_rows_ = 0;
-  int64_t absorbed_samples_ = 0;
-  int64_t propagated_rows_ = 0;
 };
 
 // One line that names parameters, time, run and the solver's flag.

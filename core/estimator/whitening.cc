@@ -1,6 +1,9 @@
 #include "core/estimator/whitening.h"
 
 #include <cmath>
+#include <utility>
+
+#include "core/common/check.h"
 
 namespace polyest {
 
@@ -9,14 +12,14 @@ Whitening::Whitening(const std::vector<ChannelNoise>& noise, Eigen::Index trajec
     Channel channel;
     channel.scale = of_channel.scale;
     channel.time_constant_s = of_channel.time_constant_s;
-    channel.output.resize(trajectories);
+    channel.previous.output = Vector::Zero(trajectories);
     channel.scratch.resize(trajectories);
     channels_.push_back(std::move(channel));
   }
 }
 
 void Whitening::BeginRun() {
-  for (Channel& channel : channels_) channel.has_previous = false;
+  for (Channel& channel : channels_) channel.previous.known = false;
 }
 
 void Whitening::Apply(int first, int count, RowBlock& block, MatrixRef outputs) {
@@ -39,18 +42,33 @@ void Whitening::Whiten(Channel& channel, double time_s, double& value, double& n
                        VectorRef output) {
   const double raw_value = value, raw_noise = noise;
   channel.scratch = output;
-  if (channel.has_previous) {
-    const double decay = (time_s - channel.time_s) / channel.time_constant_s;
-    const double g = std::exp(-decay) * noise / channel.noise;
-    value -= g * channel.value;
-    output -= g * channel.output;
+  PreviousSample& previous = channel.previous;
+  if (previous.known) {
+    const double decay = (time_s - previous.time_s) / channel.time_constant_s;
+    const double g = std::exp(-decay) * noise / previous.noise;
+    value -= g * previous.value;
+    output -= g * previous.output;
     noise *= std::sqrt(-std::expm1(-2 * decay));  // σ √(1 − a²)
   }
-  channel.has_previous = true;
-  channel.time_s = time_s;
-  channel.value = raw_value;
-  channel.noise = raw_noise;
-  channel.output.swap(channel.scratch);
+  previous.known = true;
+  previous.time_s = time_s;
+  previous.value = raw_value;
+  previous.noise = raw_noise;
+  previous.output.swap(channel.scratch);
+}
+
+std::vector<PreviousSample> Whitening::State() const {
+  std::vector<PreviousSample> state;
+  for (const Channel& channel : channels_) state.push_back(channel.previous);
+  return state;
+}
+
+void Whitening::Restore(std::vector<PreviousSample> state) {
+  POLYEST_CHECK(state.size() == channels_.size());
+  for (size_t c = 0; c < channels_.size(); ++c) {
+    POLYEST_CHECK(state[c].output.size() == channels_[c].previous.output.size());
+    channels_[c].previous = std::move(state[c]);
+  }
 }
 
 }  // namespace polyest

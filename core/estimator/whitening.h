@@ -15,6 +15,15 @@
 
 namespace polyest {
 
+// The sample before, of one channel: all that is remembered of a run.
+struct PreviousSample {
+  bool known = false;
+  double time_s = 0;
+  double value = 0;
+  double noise = 0;
+  Vector output;  // of each trajectory; of any content while not known
+};
+
 class Whitening {
  public:
   // outputs have `trajectories` rows.
@@ -25,15 +34,16 @@ class Whitening {
   // model's outputs at them (column (row − first)·m + channel). The noise is scaled as well.
   void Apply(int first, int count, RowBlock& block, MatrixRef outputs);
 
+  std::vector<PreviousSample> State() const;
+  // Of as many channels and trajectories.
+  void Restore(std::vector<PreviousSample> state);
+
  private:
   struct Channel {
     double scale = 1;
     double time_constant_s = 0;
-    bool has_previous = false;
-    double time_s = 0;  // of the sample before
-    double value = 0;
-    double noise = 0;
-    Vector output, scratch;
+    PreviousSample previous;
+    Vector scratch;
   };
 
   static void Whiten(Channel& channel, double time_s, double& value, double& noise,

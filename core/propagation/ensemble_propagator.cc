@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/common/check.h"
@@ -21,6 +22,10 @@ absl::Status IntegrationOptions::Validate() const {
     return absl::InvalidArgumentError(
         absl::StrCat("maxSteps: ", most_steps, " must be at least 1"));
   }
+  if (samples_between_checkpoints < 1) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "samplesBetweenCheckpoints: ", samples_between_checkpoints, " must be at least 1"));
+  }
   return absl::OkStatus();
 }
 
@@ -34,11 +39,17 @@ class IntegratedEnsemble final : public TrajectoryEnsemble {
                        const Stop& stop) override;
   int points() const override { return static_cast<int>(specification_.parameters.rows()); }
   const std::vector<PointFailure>& failures() const override { return failures_; }
+  std::optional<EnsembleState> State() const override;
+  bool Restore(const EnsembleState& state) override;
 
  private:
+  bool AtCheckpoint() const;
+  absl::Status AdvanceBlocks(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
   void CollectFailures();
 
   EnsembleSpecification specification_;
+  int64_t samples_ = 0;
+  double time_s_ = 0;  // of the last of them
   std::vector<std::unique_ptr<TrajectoryBlock>> blocks_;
   std::vector<absl::Status> statuses_;  // one a block
   std::vector<PointFailure> failures_;
@@ -58,7 +69,28 @@ IntegratedEnsemble::IntegratedEnsemble(EnsembleSpecification specification,
 absl::Status IntegratedEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
                                          const Stop& stop) {
   POLYEST_CHECK(outputs.rows() == points());
-  POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * std::ssize(specification_.outputs));
+  const Eigen::Index m = std::ssize(specification_.outputs);
+  POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * m);
+  const int64_t interval = specification_.integration.samples_between_checkpoints;
+  for (size_t first = 0; first < times_s.size();) {
+    if (AtCheckpoint()) {
+      for (const auto& block : blocks_) block->Restart();
+    }
+    const auto left = static_cast<int64_t>(times_s.size() - first);
+    const auto count = static_cast<size_t>(std::min(left, interval - samples_ % interval));
+    const std::span<const double> stretch = times_s.subspan(first, count);
+    const auto columns = static_cast<Eigen::Index>(count) * m;
+    POLYEST_RETURN_IF_ERROR(AdvanceBlocks(
+        stretch, outputs.middleCols(static_cast<Eigen::Index>(first) * m, columns), stop));
+    samples_ += static_cast<int64_t>(count);
+    time_s_ = stretch.back();
+    first += count;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status IntegratedEnsemble::AdvanceBlocks(std::span<const double> times_s, MatrixRef outputs,
+                                               const Stop& stop) {
   ParallelFor(static_cast<int>(blocks_.size()), specification_.threads, [&](int block) {
     statuses_[block] = blocks_[block]->Advance(times_s, outputs, stop);
   });
@@ -67,6 +99,30 @@ absl::Status IntegratedEnsemble::Advance(std::span<const double> times_s, Matrix
     if (!status.ok()) return status;
   }
   return absl::OkStatus();
+}
+
+bool IntegratedEnsemble::AtCheckpoint() const {
+  return samples_ > 0 && samples_ % specification_.integration.samples_between_checkpoints == 0;
+}
+
+std::optional<EnsembleState> IntegratedEnsemble::State() const {
+  if (!AtCheckpoint()) return std::nullopt;
+  EnsembleState state{.samples = samples_, .time_s = time_s_, .blocks = {}};
+  for (const auto& block : blocks_) state.blocks.push_back(block->State());
+  return state;
+}
+
+bool IntegratedEnsemble::Restore(const EnsembleState& state) {
+  bool fits = state.blocks.size() == blocks_.size() && state.samples > 0 &&
+              state.samples % specification_.integration.samples_between_checkpoints == 0 &&
+              std::isfinite(state.time_s) && state.time_s >= 0;
+  for (size_t i = 0; fits && i < blocks_.size(); ++i) fits = blocks_[i]->Fits(state.blocks[i]);
+  if (!fits) return false;
+  for (size_t i = 0; i < blocks_.size(); ++i) blocks_[i]->Restore(state.time_s, state.blocks[i]);
+  samples_ = state.samples;
+  time_s_ = state.time_s;
+  CollectFailures();
+  return true;
 }
 
 void IntegratedEnsemble::CollectFailures() {
@@ -113,6 +169,10 @@ std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specific
 }
 
 }  // namespace
+
+bool HasCheckpointsInRuns(const Model& model) {
+  return dynamic_cast<const StateSpaceModel*>(&model) != nullptr;
+}
 
 EnsemblePropagator::EnsemblePropagator(EnsembleSpecification specification,
                                        const InputSignals* inputs)

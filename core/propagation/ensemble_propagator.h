@@ -5,7 +5,8 @@
 //
 // The points are dealt into blocks of fixed size, each integrated as one ODE system; blocks are
 // independent, so that results are the same bits for any number of threads and for any way of
-// cutting the sample times into calls of Advance. A model that simulates itself does so.
+// cutting the sample times into calls of Advance. A model that simulates itself does so; the others
+// have checkpoints, from which an ensemble can be restored.
 
 #include <absl/status/status.h>
 
@@ -19,6 +20,9 @@
 
 namespace polyest {
 
+// Whether ensembles of the model have a State at a checkpoint.
+bool HasCheckpointsInRuns(const Model& model);
+
 class EnsemblePropagator final : public TrajectoryEnsemble {
  public:
   // The ensemble at t = 0. `inputs` must outlive the propagator; knots of streamed inputs may be
@@ -29,6 +33,8 @@ class EnsemblePropagator final : public TrajectoryEnsemble {
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
                        const Stop& stop) override;
   const std::vector<PointFailure>& failures() const override { return ensemble_->failures(); }
+  std::optional<EnsembleState> State() const override { return ensemble_->State(); }
+  bool Restore(const EnsembleState& state) override { return ensemble_->Restore(state); }
 
  private:
   Matrix output_gains_;    // Q × m, or empty

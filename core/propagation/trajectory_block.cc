@@ -193,11 +193,63 @@ void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::strin
   const auto healthy = static_cast<Eigen::Index>(donor - point_alive_.begin());
   for (Eigen::Index copy = 0; copy < std::ssize(source_); ++copy) {
     if (source_[copy] != point) continue;
-    source_[copy] = static_cast<int>(healthy);
-    parameters_.row(copy) = parameters_.row(healthy);
-    inputs_.CopyRow(healthy, copy);
+    CarryPoint(copy, healthy);
     states_.row(copy) = states_.row(healthy);
   }
+}
+
+// The row is from now on a copy of the point, which is in its own row.
+void TrajectoryBlock::CarryPoint(Eigen::Index row, Eigen::Index point) {
+  source_[row] = static_cast<int>(point);
+  parameters_.row(row) = parameters_.row(point);
+  inputs_.CopyRow(point, row);
+}
+
+void TrajectoryBlock::Restart() {
+  if (states_.cols() == 0 || !alive()) return;
+  // Whatever is known of the inputs by now, breaks up to here are behind.
+  inputs_.NextBreak();
+  inputs_.Pass(time_s_);
+  StartIntegrator(time_s_);
+}
+
+EnsembleState::OfBlock TrajectoryBlock::State() const {
+  return {source_, point_alive_, states_, stiff_, last_break_s_, failures_};
+}
+
+bool TrajectoryBlock::Fits(const EnsembleState::OfBlock& state) const {
+  const auto points = std::ssize(point_alive_);
+  if (state.source.size() != source_.size() || std::ssize(state.alive) != points ||
+      state.states.rows() != states_.rows() || state.states.cols() != states_.cols() ||
+      !std::isfinite(state.last_break_s)) {
+    return false;
+  }
+  for (const PointFailure& failure : state.failures) {
+    if (failure.point < first_point_ || failure.point >= first_point_ + points) return false;
+  }
+  if (std::ranges::count(state.alive, true) == 0) return true;
+  for (Eigen::Index row = 0; row < std::ssize(state.source); ++row) {
+    const int source = state.source[row];
+    if (source < 0 || source >= points || !state.alive[source]) return false;
+    if (row < points && state.alive[row] && source != row) return false;
+  }
+  return state.states.isFinite().all();
+}
+
+void TrajectoryBlock::Restore(double time_s, const EnsembleState::OfBlock& state) {
+  point_alive_ = state.alive;
+  alive_points_ = static_cast<int>(std::ranges::count(point_alive_, true));
+  for (Eigen::Index row = 0; alive() && row < std::ssize(source_); ++row) {
+    if (state.source[row] != row) CarryPoint(row, state.source[row]);
+  }
+  source_ = state.source;
+  states_ = state.states;
+  stiff_ = state.stiff;
+  time_s_ = time_s;
+  last_break_s_ = state.last_break_s;
+  failures_ = state.failures;
+  integrator_.reset();
+  Restart();
 }
 
 }  // namespace polyest

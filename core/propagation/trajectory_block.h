@@ -41,6 +41,15 @@ class TrajectoryBlock final : public EnsembleSystem {
 
   const std::vector<PointFailure>& failures() const { return failures_; }
 
+  // Integrates on from the present states as if they were initial ones.
+  void Restart();
+  // What a restart goes on from.
+  EnsembleState::OfBlock State() const;
+  // Whether it can be of such a block.
+  bool Fits(const EnsembleState::OfBlock& state) const;
+  // For a new block, which has not advanced.
+  void Restore(double time_s, const EnsembleState::OfBlock& state);
+
  private:
   // A time at which the integrator stops on its way.
   struct StopTime {
@@ -58,6 +67,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   void FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s, const char* reason);
   // The point in that row is left out from now on.
   void Fail(Eigen::Index row, double time_s, int flag, std::string reason);
+  void CarryPoint(Eigen::Index row, Eigen::Index point);
   bool alive() const { return alive_points_ > 0; }
 
   const EnsembleSpecification* specification_;

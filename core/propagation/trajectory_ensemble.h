@@ -5,7 +5,9 @@
 
 #include <absl/status/status.h>
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,6 +33,10 @@ struct IntegrationOptions {
   double relative_tolerance = 1e-7;
   // Steps from one sample to the next, at most; past it a point has failed.
   int most_steps = 100'000;
+  // ≥ 1. After so many samples of a run, and as many again, …, the integrators start anew from the
+  // states there, as a run does from its initial states, so that what goes on from there is a
+  // function of plain data (EnsembleState). That changes results, within the tolerance.
+  int samples_between_checkpoints = 4096;
 
   absl::Status Validate() const;
 };
@@ -45,6 +51,23 @@ struct PointFailure {
   double time_s = 0;   // the last time it was good
   int flag = 0;        // the solver's own return code
   std::string reason;  // that code in words
+};
+
+// An ensemble at a checkpoint, apart from its specification: all that its way from there depends
+// on.
+struct EnsembleState {
+  struct OfBlock {
+    std::vector<int> source;  // of each row, the block's point that it carries
+    std::vector<bool> alive;  // by point
+    Eigen::ArrayXXd states;   // rows × states
+    bool stiff = false;       // integrated by the stiff method
+    double last_break_s = 0;  // of the inputs
+    std::vector<PointFailure> failures;
+  };
+
+  int64_t samples = 0;  // of the run so far
+  double time_s = 0;    // of the last of them
+  std::vector<OfBlock> blocks;
 };
 
 struct EnsembleSpecification {
@@ -78,6 +101,14 @@ class TrajectoryEnsemble {
 
   // Ordered by point.
   virtual const std::vector<PointFailure>& failures() const = 0;
+
+  // Of an ensemble at a checkpoint (IntegrationOptions::samples_between_checkpoints); nothing
+  // elsewhere, and of models that simulate themselves.
+  virtual std::optional<EnsembleState> State() const { return std::nullopt; }
+  // Puts a new ensemble of the same specification there; the inputs' knots up to there, and as many
+  // after as smooth inputs need, must be appended before it advances. False, and the ensemble
+  // unchanged, when the state cannot be of such an ensemble.
+  virtual bool Restore(const EnsembleState& /*state*/) { return false; }
 };
 
 // A model that is not known by its equations but simulates itself.

@@ -1,0 +1,200 @@
+#include "core/estimator/snapshot.h"
+
+#include <absl/strings/str_format.h>
+#include <zlib.h>
+
+#include <sstream>
+#include <utility>
+
+#include "core/estimator/state_archive.h"
+
+namespace polyest {
+namespace {
+
+const std::string kMagic = "polyest estimator";
+constexpr size_t kChecksumBytes = 4;
+
+uint32_t Checksum(std::string_view bytes) {
+  return static_cast<uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+// A byte may be anything; a bool may not.
+template <class Archive>
+void Flag(Archive& archive, bool& flag) {
+  uint8_t byte = flag ? 1 : 0;
+  archive(byte);
+  flag = byte != 0;
+}
+
+}  // namespace
+
+// As cereal has it: each for writing and for reading.
+
+template <class Archive>
+void serialize(Archive& archive, SampleRow& row) {
+  archive(row.run, row.time_s);
+}
+
+// Without rows ahead.
+template <class Archive>
+void serialize(Archive& archive, RowBlock& block) {
+  archive(block.rows, block.values, block.noise);
+}
+
+template <class Archive>
+void serialize(Archive& archive, RecordSummary::Channel& channel) {
+  archive(channel.samples, channel.noise_variance_sum, channel.largest, channel.intervals,
+          channel.interval_sum_s, channel.last_time_s, channel.last_run);
+}
+
+template <class Archive>
+void serialize(Archive& archive, PointFailure& failure) {
+  archive(failure.point, failure.time_s, failure.flag, failure.reason);
+}
+
+template <class Archive>
+void serialize(Archive& archive, FailedTrajectory& failure) {
+  archive(failure.theta, failure.run, failure.time_s, failure.flag, failure.reason);
+}
+
+template <class Archive>
+void serialize(Archive& archive, EnsembleState::OfBlock& block) {
+  archive(block.source, block.alive, block.states);
+  Flag(archive, block.stiff);
+  archive(block.last_break_s, block.failures);
+}
+
+template <class Archive>
+void serialize(Archive& archive, EnsembleState& ensemble) {
+  archive(ensemble.samples, ensemble.time_s, ensemble.blocks);
+}
+
+template <class Archive>
+void serialize(Archive& archive, ChannelNoise& noise) {
+  archive(noise.scale, noise.time_constant_s);
+  Flag(archive, noise.learned);
+}
+
+template <class Archive>
+void serialize(Archive& archive, LearnedNoise& noise) {
+  archive(noise.channels, noise.posterior.centre, noise.posterior.factor);
+}
+
+template <class Archive>
+void serialize(Archive& archive, PreviousSample& sample) {
+  Flag(archive, sample.known);
+  archive(sample.time_s, sample.value, sample.noise, sample.output);
+}
+
+template <class Archive>
+void serialize(Archive& archive, ChannelSums& sums) {
+  archive(sums.samples, sums.differences);
+}
+
+template <class Archive>
+void serialize(Archive& archive, AbsorbedRows& absorbed) {
+  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
+          absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
+          absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
+          absorbed.check_residual, absorbed.check_valid);
+}
+
+template <class Archive>
+void serialize(Archive& archive, DesignState& design) {
+  archive(design.truncation.order, design.truncation.exponent);
+  Flag(archive, design.whole_prior);
+  archive(design.centre, design.axes, design.points, design.check_points, design.check_costs,
+          design.reference, design.lower, design.upper);
+}
+
+template <class Archive>
+void serialize(Archive& archive, ExpansionState& expansion) {
+  archive(expansion.design, expansion.noise, expansion.absorbed, expansion.kept, expansion.failures,
+          expansion.run, expansion.ensemble, expansion.previous);
+}
+
+template <class Archive>
+void serialize(Archive& archive, ComponentState& component) {
+  archive(component.runs, component.relative_tolerance, component.expansion, component.particles,
+          component.weight, component.taken, component.windows_from, component.window_end,
+          component.patient_until, component.whole_until, component.settled_row,
+          component.settlements_at_row, component.comparable_row, component.settlements,
+          component.reexpansions, component.abandoned_rows, component.summary);
+}
+
+template <class Archive>
+void serialize(Archive& archive, EstimatorState& state) {
+  archive(state.components, state.weighing_row, state.left_out, state.reexpansions,
+          state.propagated_rows);
+}
+
+std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint) {
+  std::ostringstream stream;
+  {
+    cereal::PortableBinaryOutputArchive archive(stream);
+    archive(kMagic, kSnapshotVersion, fingerprint, rows, state);
+  }
+  std::string bytes = std::move(stream).str();
+  const uint32_t checksum = Checksum(bytes);
+  for (int shift = 0; shift < 32; shift += 8) {
+    bytes.push_back(static_cast<char>(checksum >> shift & 0xff));
+  }
+  return bytes;
+}
+
+namespace {
+
+// The last four bytes, lowest first.
+uint32_t ChecksumAtEnd(std::string_view bytes) {
+  uint32_t checksum = 0;
+  for (size_t i = bytes.size(); i-- > bytes.size() - kChecksumBytes;) {
+    checksum = checksum << 8 | static_cast<unsigned char>(bytes[i]);
+  }
+  return checksum;
+}
+
+absl::StatusOr<EstimatorState> DecodeBody(std::string body, int64_t rows, uint32_t fingerprint) {
+  std::istringstream stream(std::move(body));
+  cereal::PortableBinaryInputArchive archive(stream);
+  std::string magic;
+  uint32_t version = 0, fingerprint_there = 0;
+  int64_t rows_there = 0;
+  archive(magic);
+  if (magic != kMagic) return absl::DataLossError("the bytes are not those of a snapshot");
+  archive(version);
+  if (version != kSnapshotVersion) {
+    return absl::FailedPreconditionError(
+        absl::StrFormat("the snapshot is of version %d and this is %d", version, kSnapshotVersion));
+  }
+  archive(fingerprint_there, rows_there);
+  if (fingerprint_there != fingerprint) {
+    return absl::FailedPreconditionError("the snapshot is of another problem");
+  }
+  if (rows_there != rows) {
+    return absl::DataLossError(
+        absl::StrFormat("the snapshot is of %d rows and not of %d", rows_there, rows));
+  }
+  EstimatorState state;
+  archive(state);
+  return state;
+}
+
+}  // namespace
+
+absl::StatusOr<EstimatorState> DecodeState(std::string_view bytes, int64_t rows,
+                                           uint32_t fingerprint) {
+  if (bytes.size() < kChecksumBytes ||
+      ChecksumAtEnd(bytes) != Checksum(bytes.substr(0, bytes.size() - kChecksumBytes))) {
+    return absl::DataLossError(absl::StrFormat(
+        "the snapshot of %d bytes is cut off or corrupted: its checksum is wrong", bytes.size()));
+  }
+  bytes.remove_suffix(kChecksumBytes);
+  try {
+    return DecodeBody(std::string(bytes), rows, fingerprint);
+  } catch (const cereal::Exception& exception) {
+    return absl::DataLossError(absl::StrFormat("the snapshot is malformed: %s", exception.what()));
+  }
+}
+
+}  // namespace polyest

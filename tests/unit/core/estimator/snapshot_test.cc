@@ -1,0 +1,543 @@
+// Estimators restored from a snapshot. The oracle is the estimator that was not interrupted: every
+// number of every later estimate is the same to the bit.
+
+#include "core/estimator/snapshot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <zlib.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "core/estimator/checkpoints.h"
+#include "core/model/equations/equation_model.h"
+#include "tests/unit/core/estimator/estimation.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr double kStep = 0.05;
+constexpr int kInterval = 32;
+
+Samples Rows(const Samples& all, size_t first, size_t end) {
+  const auto cut = [&](const auto& values) {
+    using Values = std::decay_t<decltype(values)>;
+    return Values(values.begin() + static_cast<std::ptrdiff_t>(first),
+                  values.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  Samples some;
+  some.time_s = cut(all.time_s);
+  if (!all.run.empty()) some.run = cut(all.run);
+  for (const SampleColumn& column : all.columns) {
+    some.columns.push_back({column.name, cut(column.value), {}});
+  }
+  return some;
+}
+
+// Equally spaced rows from t = 0 of so many runs, an output with white noise.
+Samples Record(const std::string& output, const std::function<double(double t)>& y, double noise,
+               int rows, int runs = 1) {
+  std::mt19937_64 generator(7);
+  std::normal_distribution<double> normal(0, noise);
+  Samples samples;
+  samples.columns = {{output, {}, {}}};
+  for (int run = 0; run < runs; ++run) {
+    for (int k = 0; k < rows; ++k) {
+      samples.time_s.push_back(kStep * k);
+      samples.run.push_back(run);
+      samples.columns[0].value.push_back(y(kStep * k) + normal(generator));
+    }
+  }
+  return samples;
+}
+
+std::vector<double> AllNumbersOf(const Estimate& estimate) {
+  std::vector<double> numbers = NumbersOf(estimate);
+  for (const ChannelEstimate& c : estimate.channels) {
+    numbers.insert(numbers.end(), {c.lag1_correlation, c.effective_samples, c.noise_time_constant_s,
+                                   static_cast<double>(c.outliers)});
+  }
+  for (const ComponentEstimate& component : estimate.components) {
+    numbers.push_back(component.weight);
+    for (const ParameterEstimate& p : component.parameters) {
+      numbers.insert(numbers.end(), {p.map, p.std_dev, p.mean, p.lower95, p.upper95});
+    }
+  }
+  return numbers;
+}
+
+// An estimator that keeps its last snapshot.
+struct Session {
+  explicit Session(const Problem& problem, int threads = 1) {
+    EstimatorOptions options;
+    options.threads = threads;
+    options.snapshot = [this](EstimatorSnapshot snapshot) {
+      rows.push_back(snapshot.rows);
+      last = std::move(snapshot);
+    };
+    estimator = MakeEstimator(problem, options);
+  }
+  Session(const Session&) = delete;
+
+  void Take(const Samples& samples) {
+    ASSERT_TRUE(estimator->Append(samples).ok());
+    const absl::Status status = estimator->Process();
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  Estimate Current() const { return estimator->CurrentEstimate().value(); }
+
+  std::unique_ptr<Estimator> estimator;
+  EstimatorSnapshot last;
+  std::vector<int64_t> rows;  // of all snapshots
+};
+
+struct Outcome {
+  std::vector<Estimate> estimates;  // undisturbed, one a batch
+  int restored = 0;                 // how often from a snapshot
+};
+
+// The record in batches; after every one the estimator is given up and restored from the latest
+// snapshot, on one thread and two by turns.
+Outcome ExpectSameBitsThroughRestarts(Problem problem, const Samples& samples, size_t batch = 45) {
+  problem.integration.samples_between_checkpoints = kInterval;
+  Outcome outcome;
+  Session undisturbed(problem);
+  EstimatorSnapshot latest;
+  for (size_t first = 0; first < samples.rows(); first += batch) {
+    const size_t end = std::min(first + batch, samples.rows());
+    undisturbed.Take(Rows(samples, first, end));
+    outcome.estimates.push_back(undisturbed.Current());
+    Session session(problem, 1 + outcome.restored % 2);
+    EXPECT_TRUE(session.estimator->Append(Rows(samples, 0, end)).ok());
+    if (!latest.state.empty()) {
+      const absl::Status restored = session.estimator->Restore(latest);
+      EXPECT_TRUE(restored.ok()) << restored;
+      EXPECT_EQ(session.estimator->rows_processed(), latest.rows);
+      ++outcome.restored;
+    }
+    EXPECT_TRUE(session.estimator->Process().ok());
+    EXPECT_EQ(AllNumbersOf(session.Current()), AllNumbersOf(outcome.estimates.back())) << end;
+    ExpectSame(session.Current(), outcome.estimates.back());
+    if (!session.rows.empty()) {
+      EXPECT_GT(session.rows.front(), latest.rows);
+      latest = session.last;
+    }
+    // Bytes and all: a snapshot of a restored estimator is the one of the undisturbed.
+    EXPECT_EQ(latest.rows, undisturbed.last.rows);
+    EXPECT_TRUE(latest.state == undisturbed.last.state) << end;
+  }
+  EXPECT_GT(outcome.restored, 0);
+  return outcome;
+}
+
+// m ẍ + c ẋ + k x = force, k and x0 uncertain, x measured.
+Problem OscillatorProblem(double noise = 0.02) {
+  Problem problem;
+  problem.model = *FindBuiltinModel("mass_spring_damper");
+  problem.fixed = {{"m", 1}, {"c", 0.1}};
+  problem.uncertain = {UncertainParameter::Uniform("k", 8, 12).value(),
+                       UncertainParameter::Normal("x0", 1, 0.2).value()};
+  problem.measured = {{"x", {.absolute = noise}}};
+  problem.expansion.order = 3;
+  return problem;
+}
+
+double Displacement(double t) {
+  return 1.1 * std::exp(-0.05 * t) * std::cos(std::sqrt(9.7 - 0.0025) * t);
+}
+
+Samples OscillatorRecord(int rows = 240, int runs = 1) {
+  return Record("x", Displacement, 0.02, rows, runs);
+}
+
+TEST(Snapshot, LetsAnEstimatorGoOnToTheSameBits) {
+  const Outcome outcome = ExpectSameBitsThroughRestarts(OscillatorProblem(), OscillatorRecord());
+  EXPECT_GT(outcome.estimates.back().expansion.reexpansions, 0);
+  EXPECT_GE(outcome.restored, 4);
+}
+
+TEST(Snapshot, ChangesNoAnswer) {
+  Problem problem = OscillatorProblem();
+  problem.integration.samples_between_checkpoints = kInterval;
+  Session with(problem);
+  with.Take(OscillatorRecord());
+  ExpectSame(with.Current(), EstimateOf(problem, OscillatorRecord()));
+  EXPECT_THAT(with.rows, ElementsAre(32, 64, 96, 128, 160, 192, 224));
+}
+
+TEST(Snapshot, LeavesShortRecordsAsTheyAreWithoutCheckpoints) {
+  Problem rare = OscillatorProblem(), never = OscillatorProblem();
+  rare.integration.samples_between_checkpoints = 240;
+  never.integration.samples_between_checkpoints = 1'000'000;
+  ExpectSame(EstimateOf(rare, OscillatorRecord()), EstimateOf(never, OscillatorRecord()));
+}
+
+TEST(Snapshot, HoldsAFixedExpansion) {
+  Problem problem = OscillatorProblem(0.1);
+  problem.expansion.adaptive = false;
+  ExpectSameBitsThroughRestarts(problem, OscillatorRecord(150));
+}
+
+TEST(Snapshot, HoldsWhatHasBeenLearnedOfTheNoise) {
+  Problem problem = OscillatorProblem();
+  problem.measured[0].noise = {.unknown = true,
+                               .correlation = NoiseCorrelation::kUnknown,
+                               .outliers = OutlierHandling::kStudentT};
+  const Samples samples = OscillatorRecord();
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, samples);
+  EXPECT_NEAR(outcome.estimates.back().channels[0].noise_std_dev, 0.02, 0.01);
+}
+
+TEST(Snapshot, HoldsTheSampleBeforeOfCorrelatedNoise) {
+  Problem problem = OscillatorProblem();
+  problem.measured = {
+      {"x", {.absolute = 0.02, .correlation = NoiseCorrelation::kKnown, .time_constant_s = 0.1}},
+      {"v", {.absolute = 0.1, .unknown = true}}};
+  Samples samples = OscillatorRecord();
+  samples.columns.push_back({"v", {}, {}});
+  for (const double t : samples.time_s)
+    samples.columns[1].value.push_back(-3.4 * std::sin(3.1 * t));
+  ExpectSameBitsThroughRestarts(problem, samples);
+}
+
+TEST(Snapshot, HoldsAnOrderChosenOnTheWay) {
+  Problem problem = OscillatorProblem();
+  problem.expansion.order = std::nullopt;
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord());
+  EXPECT_GT(outcome.estimates.back().expansion.reexpansions, 0);
+}
+
+TEST(Snapshot, HoldsSeveralComponents) {
+  // The frequency tells a² and not its sign.
+  Problem problem;
+  EquationSpecification equations;
+  equations.states = {{"x", "v"}, {"v", "-(5 + a^2)^2 * x"}};
+  equations.parameters = {{"x_0", 1}};
+  equations.outputs = {{"y", "x"}};
+  problem.model = MakeEquationModel(equations).value();
+  problem.uncertain = {UncertainParameter::Normal("a", -0.2, 0.7).value()};
+  problem.measured = {{"y", {.absolute = 0.1}}};
+  problem.expansion.order = 4;
+  const Samples samples = Record(
+      "y", [](double t) { return std::cos(5.64 * t); }, 0.1, 300);
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, samples, 70);
+  EXPECT_THAT(outcome.estimates.back().components, SizeIs(2));
+}
+
+TEST(Snapshot, HoldsParametersOfRuns) {
+  Problem problem = OscillatorProblem();
+  problem.uncertain[1].per_run = true;
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord(50, 4));
+  EXPECT_THAT(outcome.estimates.back().parameters, SizeIs(5));
+}
+
+TEST(Snapshot, HoldsWhereTheRunsAre) {
+  for (const int rows : {20, 50}) {  // a run shorter than the interval, and longer
+    const Outcome outcome =
+        ExpectSameBitsThroughRestarts(OscillatorProblem(), OscillatorRecord(rows, 240 / rows), 30);
+    EXPECT_GE(outcome.restored, 4);
+  }
+}
+
+TEST(Snapshot, HoldsWhichTrajectoriesHaveFailed) {
+  // ẋ = k x² reaches infinity at t = 1/(k x0): that of the larger k within the record.
+  Problem problem;
+  EquationSpecification equations;
+  equations.states = {{"x", "k * x^2"}};
+  equations.parameters = {{"x_0", 1}};
+  equations.outputs = {{"y", "x"}};
+  problem.model = MakeEquationModel(equations).value();
+  problem.uncertain = {UncertainParameter::Uniform("k", 0.05, 0.3).value()};
+  problem.measured = {{"y", {.absolute = 0.3}}};
+  problem.expansion.order = 3;
+  problem.expansion.points_per_term = 6;
+  problem.expansion.adaptive = false;
+  const Samples samples = Record(
+      "y", [](double t) { return 1 / (1 - 0.08 * t); }, 0.3, 120);
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, samples, 25);
+  EXPECT_TRUE(Has(outcome.estimates.back(), DiagnosticCode::kPointsFailed));
+}
+
+TEST(Snapshot, HoldsAStiffModel) {
+  Problem problem;
+  EquationSpecification equations;
+  equations.states = {{"x", "-1000 * (x - cos(w * t))"}};
+  equations.outputs = {{"y", "x"}};
+  problem.model = MakeEquationModel(equations).value();
+  problem.uncertain = {UncertainParameter::Uniform("w", 0.8, 1.2).value()};
+  problem.measured = {{"y", {.absolute = 0.05}}};
+  problem.expansion.order = 3;
+  const Samples samples = Record(
+      "y", [](double t) { return std::cos(0.97 * t); }, 0.05, 150);
+  for (const IntegrationMethod method : {IntegrationMethod::kStiff, IntegrationMethod::kAuto}) {
+    problem.integration.method = method;
+    ExpectSameBitsThroughRestarts(problem, samples);
+  }
+}
+
+// m ẍ + k x = force from rest: x = k⁻¹ F (1 − cos ωt) for a step, which the linear input has from
+// its first knot on; two runs of it.
+Problem DrivenProblem(Interpolation interpolation) {
+  Problem problem = OscillatorProblem(0.02);
+  problem.fixed = {{"m", 1}, {"c", 0}, {"x0", 0}};
+  problem.uncertain.pop_back();
+  problem.inputs = {{"force", StreamedInput{.interpolation = interpolation}}};
+  return problem;
+}
+
+Samples DrivenRecord(int rows) {
+  Samples samples = Record(
+      "x", [](double t) { return (1 - std::cos(3.1 * t)) / 9.61; }, 0.02, rows, 2);
+  samples.columns.push_back({"force", std::vector<double>(samples.rows(), 1.0), {}});
+  return samples;
+}
+
+TEST(Snapshot, FindsTheStreamedInputsInTheRows) {
+  for (const Interpolation interpolation :
+       {Interpolation::kHold, Interpolation::kLinear, Interpolation::kCubic,
+        Interpolation::kShapePreserving}) {
+    Samples samples = DrivenRecord(80);
+    // Not quite constant, so that the knots count.
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      samples.columns[1].value[k] += 0.01 * std::sin(static_cast<double>(k * k));
+    }
+    ExpectSameBitsThroughRestarts(DrivenProblem(interpolation), samples, 30);
+  }
+}
+
+TEST(Snapshot, FindsTheStreamedInputsOfLongBeforeWhereTheyAreDelayed) {
+  Problem problem = DrivenProblem(Interpolation::kLinear);
+  problem.uncertain.push_back(UncertainParameter::Uniform("force.delay", 0, 0.4).value());
+  ExpectSameBitsThroughRestarts(problem, DrivenRecord(60), 40);
+}
+
+TEST(Snapshot, ServesManyTrajectories) {
+  Problem problem = OscillatorProblem();
+  problem.uncertain.push_back(UncertainParameter::Uniform("v0", -0.5, 0.5).value());
+  problem.expansion.points_per_term = 5;  // 20 terms: two blocks
+  ExpectSameBitsThroughRestarts(problem, OscillatorRecord(100));
+}
+
+// A model that simulates itself: x = a in every run.
+class ConstantModel final : public SelfPropagatingModel {
+ public:
+  ConstantModel() {
+    description_.name = "constant";
+    description_.parameters = {{"a", "1", "value", 0}};
+    description_.outputs = {{"x", "1", "value"}};
+  }
+  const ModelDescription& description() const override { return description_; }
+
+  std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
+                                                    const InputSignals*) const override {
+    class Constant final : public TrajectoryEnsemble {
+     public:
+      explicit Constant(const Matrix& a) : a_(a.col(0)) {}
+      int points() const override { return static_cast<int>(a_.size()); }
+      absl::Status Advance(std::span<const double>, MatrixRef outputs, const Stop&) override {
+        outputs.colwise() = a_;
+        return absl::OkStatus();
+      }
+      const std::vector<PointFailure>& failures() const override { return failures_; }
+
+     private:
+      Vector a_;
+      std::vector<PointFailure> failures_;
+    };
+    return std::make_unique<Constant>(specification.parameters);
+  }
+
+ private:
+  ModelDescription description_;
+};
+
+TEST(Snapshot, OfAModelThatSimulatesItselfIsMadeWhereARunBegins) {
+  Problem problem;
+  problem.model = std::make_shared<ConstantModel>();
+  problem.uncertain = {UncertainParameter::Normal("a", 0, 1).value()};
+  problem.measured = {{"x", {.absolute = 0.1}}};
+  problem.expansion.order = 2;
+  const auto constant = [](double) { return 0.4; };
+  ExpectSameBitsThroughRestarts(problem, Record("x", constant, 0.1, 50, 4));
+  problem.integration.samples_between_checkpoints = 60;
+  Session session(problem);
+  session.Take(Record("x", constant, 0.1, 50, 4));
+  EXPECT_THAT(session.rows, ElementsAre(100));
+}
+
+TEST(Checkpoints, AreAFunctionOfTheRecord) {
+  std::vector<SampleRow> rows;
+  for (int run = 0; run < 3; ++run) {
+    for (int k = 0; k < 25; ++k) rows.push_back({run, 0.1 * k});
+  }
+  for (const bool inside_runs : {true, false}) {
+    for (const size_t batch : {1U, 7U, 75U}) {
+      Checkpoints checkpoints(10, inside_runs);
+      std::vector<int64_t> all;
+      for (size_t first = 0; first < rows.size(); first += batch) {
+        const auto begin = rows.begin() + static_cast<std::ptrdiff_t>(first);
+        const size_t count = std::min(batch, rows.size() - first);
+        checkpoints.Add({begin, begin + static_cast<std::ptrdiff_t>(count)});
+        for (; checkpoints.next(); checkpoints.Pass(all.back())) all.push_back(*checkpoints.next());
+      }
+      if (inside_runs) {
+        EXPECT_THAT(all, ElementsAre(10, 20, 35, 45, 60, 70));
+      } else {
+        EXPECT_THAT(all, ElementsAre(25, 50));
+      }
+    }
+  }
+}
+
+// Everything that may be wrong with a snapshot, on a problem made small.
+class BadSnapshot : public ::testing::Test {
+ protected:
+  BadSnapshot() : problem_(OscillatorProblem()), samples_(OscillatorRecord(40)) {
+    problem_.integration.samples_between_checkpoints = kInterval;
+    Session session(problem_);
+    session.Take(samples_);
+    good_ = session.last;
+    estimate_ = session.Current();
+  }
+
+  // Of an estimator to which the samples have been appended.
+  absl::Status Restored(const EstimatorSnapshot& snapshot, const Problem& problem) const {
+    const auto estimator = MakeEstimator(problem);
+    EXPECT_TRUE(estimator->Append(samples_).ok());
+    return estimator->Restore(snapshot);
+  }
+  absl::Status Restored(const std::string& state) const {
+    return Restored({good_.rows, state}, problem_);
+  }
+
+  // With a checksum that is right.
+  static std::string Sealed(std::string body) {
+    const auto checksum =
+        static_cast<uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size()));
+    for (int shift = 0; shift < 32; shift += 8) {
+      body.push_back(static_cast<char>(checksum >> shift & 0xff));
+    }
+    return body;
+  }
+  std::string Body() const { return good_.state.substr(0, good_.state.size() - 4); }
+
+  Problem problem_;
+  Samples samples_;
+  EstimatorSnapshot good_;
+  Estimate estimate_;
+};
+
+TEST_F(BadSnapshot, IsRefusedWhenCutOff) {
+  ASSERT_TRUE(Restored(Sealed(Body())).ok());
+  for (size_t size = 0; size < good_.state.size(); size += 1 + size / 20) {
+    EXPECT_TRUE(absl::IsDataLoss(Restored(good_.state.substr(0, size)))) << size;
+    // The same where the checksum is right.
+    EXPECT_TRUE(absl::IsDataLoss(Restored(Sealed(Body().substr(0, size))))) << size;
+  }
+}
+
+TEST_F(BadSnapshot, IsRefusedWithAnyByteChanged) {
+  for (size_t i = 0; i < good_.state.size(); i += 1 + i / 20) {
+    std::string state = good_.state;
+    state[i] = static_cast<char>(state[i] ^ 0x40);
+    EXPECT_TRUE(absl::IsDataLoss(Restored(state))) << i;
+  }
+}
+
+// Even one who seals what has been changed makes nothing crash or take the memory: sizes without
+// bounds, indices out of range, numbers that are none.
+TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
+  std::mt19937_64 random(3);
+  int refused = 0;
+  constexpr int kTrials = 300;
+  const size_t size = Body().size();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::string body = Body();
+    // The beginning has most of the sizes; the end, most of the counters.
+    const size_t near_end = trial % 3 == 0 ? size : std::min<size_t>(size, 600);
+    const size_t at = trial % 3 == 2 ? size - 1 - random() % near_end : random() % near_end;
+    for (size_t i = at; i < std::min(size, at + 1 + random() % 8); ++i) {
+      body[i] = static_cast<char>(trial % 2 == 0 ? 0xff : random());
+    }
+    const auto estimator = MakeEstimator(problem_);
+    ASSERT_TRUE(estimator->Append(samples_).ok());
+    const absl::Status status = estimator->Restore({good_.rows, Sealed(body)});
+    if (status.ok()) {  // whatever it says now
+      estimator->Process().IgnoreError();
+      estimator->CurrentEstimate().status().IgnoreError();
+      continue;
+    }
+    ++refused;
+    EXPECT_TRUE(absl::IsDataLoss(status) || absl::IsFailedPrecondition(status)) << status;
+    EXPECT_EQ(estimator->rows_processed(), 0);
+  }
+  EXPECT_GT(refused, kTrials / 4);
+}
+
+TEST_F(BadSnapshot, LeavesTheEstimatorToProcessTheRowsItself) {
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(samples_).ok());
+  ASSERT_FALSE(estimator->Restore({good_.rows, "anything"}).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  ExpectSame(estimator->CurrentEstimate().value(), estimate_);
+}
+
+TEST_F(BadSnapshot, IsOneOfAnotherProblem) {
+  const auto refused = [&](const auto& change) {
+    Problem problem = problem_;
+    change(problem);
+    const absl::Status status = Restored(good_, problem);
+    return absl::IsFailedPrecondition(status) &&
+           status.message() == "the snapshot is of another problem";
+  };
+  EXPECT_FALSE(refused([](Problem&) {}));
+  EXPECT_TRUE(refused([](Problem& p) { p.fixed["c"] = 0.11; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.uncertain[0].scale *= 1.01; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.measured[0].noise.absolute = 0.021; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.inputs = {{"force", ConstantInput{0}}}; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.expansion.order = 4; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.regularization = 2; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.integration.relative_tolerance = 1e-6; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.integration.samples_between_checkpoints = 31; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.derived = {{"v0", "0 * k"}}; }));
+}
+
+TEST_F(BadSnapshot, IsOneOfAnotherVersion) {
+  std::string body = Body();
+  // After cereal's mark of endianness, the size of the name and the name.
+  const size_t version = 1 + 8 + std::string("polyest estimator").size();
+  ASSERT_EQ(body[version], static_cast<char>(kSnapshotVersion));
+  body[version] = static_cast<char>(kSnapshotVersion + 1);
+  const absl::Status status = Restored(Sealed(body));
+  EXPECT_TRUE(absl::IsFailedPrecondition(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("version 2"));
+}
+
+TEST_F(BadSnapshot, IsOneOfOtherRows) {
+  EXPECT_TRUE(absl::IsDataLoss(Restored({good_.rows - 1, good_.state}, problem_)));
+  Samples later = samples_;
+  for (double& t : later.time_s) t += 0.01;
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(later).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+}
+
+TEST_F(BadSnapshot, IsOneForWhichTheRowsAreNotThereOrTaken) {
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(Rows(samples_, 0, 20)).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+  ASSERT_TRUE(estimator->Append(Rows(samples_, 20, 40)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+}
+
+}  // namespace
+}  // namespace polyest
