@@ -13,7 +13,7 @@ packages=(
   libspdlog-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev clang-format
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl
 )
 fuzz_packages=(
   clang-14 libclang-rt-14-dev

@@ -91,8 +91,39 @@ class Parser {
     command
         .add_option("--deadline", place_.deadline_s, "Give up after this many seconds; 0: never")
         ->check(CLI::Range(0.0, 1e9));
+    AddAccess(command);
     return command.add_option("--server", place_.server, "The daemon to ask, HOST:PORT")
         ->check(CLI::Validator(CheckServer, "HOST:PORT"));
+  }
+
+  void AddAccess(CLI::App& command) {
+    ServerAccess& access = place_.access;
+    const std::string group = "Access to a daemon";
+    command
+        .add_option("--tls-ca", access.ca_file, "PEM file of the CA of the daemon's certificate")
+        ->envname("POLYEST_TLS_CA")
+        ->group(group);
+    CLI::Option* const certificate =
+        command
+            .add_option("--tls-certificate", access.certificate_file,
+                        "PEM file of the client's own certificate, where the daemon asks for one")
+            ->envname("POLYEST_TLS_CERTIFICATE")
+            ->group(group);
+    CLI::Option* const key =
+        command.add_option("--tls-key", access.key_file, "PEM file of its key")
+            ->envname("POLYEST_TLS_KEY")
+            ->group(group);
+    certificate->needs(key);
+    key->needs(certificate);
+    command
+        .add_option("--tls-server-name", access.server_name,
+                    "The name in the daemon's certificate, if it is not that of --server")
+        ->group(group);
+    command
+        .add_option("--token-file", access.token_file,
+                    "File of the token, in place of the environment's POLYEST_TOKEN")
+        ->envname("POLYEST_TOKEN_FILE")
+        ->group(group);
   }
 
   CLI::Option* AddFmuFolder(CLI::App& command) {

@@ -13,9 +13,19 @@ namespace polyest {
 
 enum class Format { kTable, kJson, kJsonLines, kCsv };
 
+// How to get into a daemon. Empty: without.
+struct ServerAccess {
+  std::string ca_file;
+  std::string certificate_file;
+  std::string key_file;
+  std::string server_name;
+  std::string token_file;
+};
+
 // Where a command runs.
 struct Place {
   std::string server;     // HOST:PORT; empty: in this process
+  ServerAccess access;    // to it
   double deadline_s = 0;  // 0: none
   int threads = 1;        // in this process
   std::string fmu_dir;    // of FMUs, in this process; empty: none

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <chrono>
+#include <cstdlib>
 
 #include "core/common/status.h"
 #include "core/common/stop.h"
@@ -132,6 +133,15 @@ ClientOptions ToClientOptions(const Place& place) {
     options.deadline = std::chrono::ceil<std::chrono::milliseconds>(
         std::chrono::duration<double>(place.deadline_s));
   }
+  const ServerAccess& access = place.access;
+  if (!access.ca_file.empty() || !access.certificate_file.empty() || !access.server_name.empty()) {
+    options.tls =
+        ClientTls{access.ca_file, access.certificate_file, access.key_file, access.server_name};
+  }
+  options.token_file = access.token_file;
+  // Not an option: every user of a machine sees the command lines of all.
+  const char* const token = std::getenv("POLYEST_TOKEN");
+  if (token != nullptr) options.token = token;
   return options;
 }
 

@@ -1,9 +1,5 @@
 #include "client/cpp/client.h"
 
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
-#include <grpcpp/support/channel_arguments.h>
-
 #include <utility>
 
 #include "core/common/status.h"
@@ -12,23 +8,6 @@ namespace polyest {
 namespace {
 
 using Stub = v1::EstimationService::Stub;
-
-std::shared_ptr<grpc::Channel> Connect(const std::string& server, const ClientOptions& options) {
-  grpc::ChannelArguments arguments;
-  const int keepalive_ms = static_cast<int>(options.keepalive.count());
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, keepalive_ms);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 0);
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  arguments.SetMaxReceiveMessageSize(options.most_response_bytes);
-  // A connection of its own, which others cannot block.
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // A stream that reconnects has delays of its own; the channel's must not outlast them.
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5'000);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1'000);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
-}
 
 }  // namespace
 
@@ -39,12 +18,16 @@ absl::Status FromGrpc(const grpc::Status& status) {
 
 Client::Client(const std::string& server, ClientOptions options)
     : server_(server),
-      options_(options),
-      stub_(v1::EstimationService::NewStub(Connect(server, options))) {}
+      options_(std::move(options)),
+      connection_(DaemonConnection::Open(server, options_)) {
+  if (connection_.ok()) stub_ = v1::EstimationService::NewStub(connection_->channel());
+}
 
 template <typename Response, typename Request>
 absl::StatusOr<Response> Client::Call(Method<Response, Request> method, const Request& request) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
+  connection_->Identify(context);
   if (options_.deadline) {
     context.set_deadline(std::chrono::system_clock::now() + *options_.deadline);
   }
@@ -128,7 +111,9 @@ absl::StatusOr<v1::SweepRegularizationResponse> Client::SweepRegularization(
 absl::Status Client::WatchSession(
     const v1::WatchSessionRequest& request,
     const std::function<bool(const v1::EstimateResponse&)>& estimate) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
+  connection_->Identify(context);
   const auto reader = stub_->WatchSession(&context, request);
   v1::EstimateResponse response;
   while (reader->Read(&response)) {

@@ -4,33 +4,23 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
-#include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
 
-#include <chrono>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
+#include "client/cpp/connection.h"
 #include "polyest/v1/estimation_service.grpc.pb.h"
 
 namespace polyest {
-
-struct ClientOptions {
-  // How long a call may take; none: as long as it takes.
-  std::optional<std::chrono::milliseconds> deadline;
-  // Silence after which the connection is probed; the daemon's own, or it would refuse the probes.
-  std::chrono::milliseconds keepalive{20'000};
-  // The longest answer taken.
-  int most_response_bytes = 64 << 20;
-};
 
 // A gRPC status as the same absl::Status.
 absl::Status FromGrpc(const grpc::Status& status);
 
 // Threads may share a client. Every function fails with the daemon's status; UNAVAILABLE when the
-// daemon cannot be reached, DEADLINE_EXCEEDED when it did not answer in time.
+// daemon cannot be reached, DEADLINE_EXCEEDED when it did not answer in time; as
+// DaemonConnection::Open when the options cannot be used.
 class Client {
  public:
   // `server` is HOST:PORT. Connects on the first call.
@@ -60,8 +50,9 @@ class Client {
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::EstimateResponse&)>& estimate);
 
-  // For MeasurementStream.
+  // For MeasurementStream, once another call has gone well.
   v1::EstimationService::Stub& stub() { return *stub_; }
+  void Identify(grpc::ClientContext& call) const { connection_->Identify(call); }
   const std::string& server() const { return server_; }
 
  private:
@@ -73,7 +64,8 @@ class Client {
 
   std::string server_;
   ClientOptions options_;
-  std::unique_ptr<v1::EstimationService::Stub> stub_;
+  absl::StatusOr<DaemonConnection> connection_;
+  std::unique_ptr<v1::EstimationService::Stub> stub_;  // null without a connection
 };
 
 }  // namespace polyest

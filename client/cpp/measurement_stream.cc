@@ -43,6 +43,7 @@ class MeasurementStream::Connection
     hello->set_session(stream_.session_);
     hello->set_writer(stream_.writer_);
     if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
+    stream_.client_.Identify(context_);
     stream_.client_.stub().async()->StreamMeasurements(&context_, this);
     StartRead(&response_);
     Write(std::move(hello));

@@ -1,0 +1,110 @@
+#include "client/cpp/connection.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/channel_arguments.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/status.h"
+#include "server/security/exposure.h"
+#include "server/security/file_text.h"
+
+namespace polyest {
+namespace {
+
+grpc::ChannelArguments Arguments(const ClientOptions& options) {
+  grpc::ChannelArguments arguments;
+  const int keepalive_ms = static_cast<int>(options.keepalive.count());
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, keepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  arguments.SetMaxReceiveMessageSize(options.most_response_bytes);
+  // A connection of its own, which others cannot block.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  // A stream that reconnects has delays of its own; the channel's must not outlast them.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5'000);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1'000);
+  return arguments;
+}
+
+absl::StatusOr<std::string> ReadClientFile(const char* what, const std::string& file) {
+  auto text = ReadFileText(file);
+  if (text.ok()) return text;
+  return absl::InvalidArgumentError(absl::StrCat(what, ": ", text.status().message()));
+}
+
+absl::StatusOr<std::string> ReadPem(const char* what, const std::string& file) {
+  if (file.empty()) return std::string();
+  POLYEST_ASSIGN_OR_RETURN(std::string text, ReadClientFile(what, file));
+  if (text.find("-----BEGIN ") != std::string::npos) return text;
+  return absl::InvalidArgumentError(absl::StrCat(what, ": ", file, " is not in PEM form"));
+}
+
+absl::StatusOr<std::string> ReadToken(const ClientOptions& options) {
+  std::string token = options.token;
+  if (!options.token_file.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(token, ReadClientFile("token file", options.token_file));
+    absl::StripAsciiWhitespace(&token);
+    if (token.empty()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("token file: ", options.token_file, " is empty"));
+    }
+  }
+  // Anything else would break the header, and gRPC takes that for a programmer's error.
+  if (!std::all_of(token.begin(), token.end(),
+                   [](unsigned char c) { return absl::ascii_isgraph(c); })) {
+    return absl::InvalidArgumentError("token: must be one word of printable ASCII characters");
+  }
+  return token;
+}
+
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const ClientTls& tls) {
+  if (tls.certificate_file.empty() != tls.key_file.empty()) {
+    return absl::InvalidArgumentError("a client's certificate and its key must be given together");
+  }
+  grpc::SslCredentialsOptions options;
+  POLYEST_ASSIGN_OR_RETURN(options.pem_root_certs, ReadPem("CA file", tls.ca_file));
+  POLYEST_ASSIGN_OR_RETURN(options.pem_cert_chain,
+                           ReadPem("certificate file", tls.certificate_file));
+  POLYEST_ASSIGN_OR_RETURN(options.pem_private_key, ReadPem("key file", tls.key_file));
+  return grpc::SslCredentials(options);
+}
+
+}  // namespace
+
+DaemonConnection::DaemonConnection(std::shared_ptr<grpc::Channel> channel, const std::string& token)
+    : channel_(std::move(channel)),
+      authorization_(token.empty() ? "" : absl::StrCat("Bearer ", token)) {}
+
+absl::StatusOr<DaemonConnection> DaemonConnection::Open(const std::string& server,
+                                                        const ClientOptions& options) {
+  POLYEST_ASSIGN_OR_RETURN(const std::string token, ReadToken(options));
+  grpc::ChannelArguments arguments = Arguments(options);
+  std::shared_ptr<grpc::ChannelCredentials> credentials = grpc::InsecureChannelCredentials();
+  if (options.tls) {
+    POLYEST_ASSIGN_OR_RETURN(credentials, Credentials(*options.tls));
+    if (!options.tls->server_name.empty()) {
+      arguments.SetSslTargetNameOverride(options.tls->server_name);
+    }
+  } else if (!token.empty()) {
+    if (!IsLoopback(server.substr(0, server.rfind(':')))) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "token: ", server, " is beyond loopback, where a token goes over TLS only (--tls-ca)"));
+    }
+    // A proxy would be told the token, too.
+    arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  }
+  return DaemonConnection(grpc::CreateCustomChannel(server, credentials, arguments), token);
+}
+
+void DaemonConnection::Identify(grpc::ClientContext& call) const {
+  if (!authorization_.empty()) call.AddMetadata("authorization", authorization_);
+}
+
+}  // namespace polyest

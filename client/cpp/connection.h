@@ -1,0 +1,58 @@
+#pragma once
+
+// How a client reaches the daemon: the channel, its security, the token.
+
+#include <absl/status/statusor.h>
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace polyest {
+
+// Names of PEM files.
+struct ClientTls {
+  std::string ca_file{};  // of the CAs that may have signed the daemon's; empty: the system's
+  std::string certificate_file{};  // the client's own; empty: none
+  std::string key_file{};          // its key
+  std::string server_name{};       // the name in the daemon's certificate; empty: the host's
+};
+
+struct ClientOptions {
+  // How long a call may take; none: as long as it takes.
+  std::optional<std::chrono::milliseconds> deadline{};
+  // Silence after which the connection is probed; the daemon's own, or it would refuse the probes.
+  std::chrono::milliseconds keepalive{20'000};
+  // The longest answer taken.
+  int most_response_bytes = 64 << 20;
+  // None: no TLS.
+  std::optional<ClientTls> tls{};
+  // What the daemon knows the client by; empty: none. It is sent over TLS, or to loopback, only.
+  std::string token{};
+  // A file of it alone, in place of `token`; empty: none.
+  std::string token_file{};
+};
+
+class DaemonConnection {
+ public:
+  // `server` is HOST:PORT. Connects on the first call. INVALID_ARGUMENT, naming the file and never
+  // what is in it, for files that cannot be used and for a token that would go unencrypted over a
+  // network.
+  static absl::StatusOr<DaemonConnection> Open(const std::string& server,
+                                               const ClientOptions& options);
+
+  const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
+  // Says who calls.
+  void Identify(grpc::ClientContext& call) const;
+
+ private:
+  DaemonConnection(std::shared_ptr<grpc::Channel> channel, const std::string& token);
+
+  std::shared_ptr<grpc::Channel> channel_;
+  std::string authorization_;  // the header; empty: none
+};
+
+}  // namespace polyest

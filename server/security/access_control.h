@@ -1,0 +1,58 @@
+#pragma once
+
+// Who calls, and whether they may.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/server_context.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "server/security/caller.h"
+#include "server/security/method_roles.h"
+#include "server/security/token_table.h"
+
+namespace polyest {
+
+struct AccessOptions {
+  std::string token_file{};          // empty: no tokens are asked for
+  bool client_certificates = false;  // the transport lets in only who has one
+};
+
+// What a call says of who calls.
+struct Identification {
+  std::optional<std::string> authorization{};     // the header; none unless there is exactly one
+  std::optional<std::string> certificate_name{};  // the common name of the client's certificate
+};
+
+// Thread-safe.
+class AccessControl {
+ public:
+  // As TokenTable::Read.
+  static absl::StatusOr<std::unique_ptr<AccessControl>> Open(AccessOptions options);
+
+  // UNAUTHENTICATED without a token that is known, where one is asked for; PERMISSION_DENIED when
+  // its role may not call the method. With client certificates alone, their holders are admins of
+  // the tenant "default"; without authentication everybody is.
+  absl::StatusOr<Caller> Authorize(const grpc::ServerContextBase& call, Method method) const;
+  absl::StatusOr<Caller> Authorize(const Identification& identification, Method method) const;
+
+  // Reads the tokens again; keeps the old ones if that fails.
+  absl::Status Reload();
+  const std::string& token_file() const { return options_.token_file; }
+
+ private:
+  explicit AccessControl(AccessOptions options) : options_(std::move(options)) {}
+
+  absl::StatusOr<Caller> Identify(const Identification& identification) const;
+  std::shared_ptr<const TokenTable> tokens() const;
+
+  const AccessOptions options_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const TokenTable> tokens_;  // null when none are asked for
+};
+
+}  // namespace polyest

@@ -1,0 +1,29 @@
+#pragma once
+
+// Bearer tokens: 256 random bits each, of which the daemon keeps the SHA-256 only.
+//
+// A password needs a slow, salted hash because it can be guessed. A token of 256 random bits
+// cannot, whatever the speed of the hash, and no two are the same: a plain SHA-256 is enough, and
+// quick enough to compute for every call.
+
+#include <absl/strings/string_view.h>
+
+#include <array>
+#include <optional>
+#include <string>
+
+namespace polyest {
+
+using TokenDigest = std::array<unsigned char, 32>;
+
+// "polyest_" and 64 hexadecimal digits: recognizable to scanners for secrets.
+std::string MakeToken();
+
+TokenDigest DigestOf(absl::string_view token);
+std::string ToHex(const TokenDigest& digest);
+// None unless it is 64 hexadecimal digits.
+std::optional<TokenDigest> DigestFromHex(absl::string_view hex);
+// In the same time whatever the digests are.
+bool SameDigest(const TokenDigest& a, const TokenDigest& b);
+
+}  // namespace polyest
