@@ -4,6 +4,9 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "server/security/exposure.h"
+#include "server/security/token_table.h"
+
 namespace polyest {
 namespace {
 
@@ -47,6 +50,46 @@ std::string DefaultDataDir() {
   return home.empty() ? "" : home + "/.local/state/polyest";
 }
 
+// The secret goes to stdout and its line for the file of tokens to stderr, each alone.
+CommandLine PrintNewToken(const std::string& words) {
+  const auto token = MakeTokenFor(words);
+  if (!token.ok()) return Refuse("--new-token: " + std::string(token.status().message()));
+  std::cout << token->secret << std::endl;
+  std::cerr << token->line << std::endl;
+  return Done(std::cout ? 0 : 1);
+}
+
+void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::string& new_token) {
+  CLI::Option* const certificate = app.add_option(
+      "--tls-certificate", daemon.tls.certificate,
+      "PEM file of the daemon's certificate, then those between it and its CA: serve TLS only");
+  CLI::Option* const key =
+      app.add_option("--tls-key", daemon.tls.key, "PEM file of its key, without a passphrase");
+  certificate->needs(key);
+  key->needs(certificate);
+  app.add_option("--tls-client-ca", daemon.tls.client_ca,
+                 "PEM file of CAs: clients must have a certificate that one of them signed")
+      ->needs(certificate);
+  app.add_option("--tokens", daemon.token_file,
+                 "File of the tokens that get in, one a line: NAME TENANT ROLE SHA256; ROLE is "
+                 "reader, writer or admin");
+  app.add_flag("--insecure", insecure, "Listen beyond loopback without TLS and authentication");
+  app.add_option("--new-token", new_token,
+                 "Make a token for NAME:TENANT:ROLE and end: the secret on stdout, its line for "
+                 "the file of tokens on stderr");
+  app.footer(
+      "Tokens and certificates are read again when their files change, and on SIGHUP. To make a "
+      "token: polyestd --new-token rig1:chassis:writer > rig1.token 2>> tokens");
+}
+
+absl::Status CheckListening(const DaemonOptions& daemon, bool insecure) {
+  return CheckExposure(
+      {.host = daemon.listen.host,
+       .tls = !daemon.tls.certificate.empty(),
+       .authentication = !daemon.token_file.empty() || !daemon.tls.client_ca.empty(),
+       .insecure = insecure});
+}
+
 }  // namespace
 
 CommandLine ParseCommandLine(int argc, char** argv) {
@@ -82,6 +125,9 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   app.add_option("--log-level", command_line.log_level, "How much is logged, on stderr")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
       ->capture_default_str();
+  bool insecure = false;
+  std::string new_token;
+  AddSecurity(app, daemon, insecure, new_token);
   app.set_version_flag("--version", "polyestd " POLYEST_VERSION);
   try {
     app.parse(argc, argv);
@@ -90,6 +136,7 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return Refuse(error.what());
   }
+  if (!new_token.empty()) return PrintNewToken(new_token);
   if (durability == "memory") {
     daemon.data_dir.clear();
   } else if (daemon.data_dir.empty()) {
@@ -101,6 +148,8 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   auto address = ListenAddress::Parse(listen);
   if (!address.ok()) return Refuse(std::string(address.status().message()));
   daemon.listen = *std::move(address);
+  const absl::Status exposure = CheckListening(daemon, insecure);
+  if (!exposure.ok()) return Refuse(std::string(exposure.message()));
   return command_line;
 }
 

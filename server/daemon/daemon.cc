@@ -4,10 +4,12 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "core/common/status.h"
 #include "polyest/v1/estimation_service.grpc.pb.h"
@@ -29,6 +31,8 @@ constexpr int kWaitingTasks = 20'000;
 // Lanes of the executor that may be busy with long tasks before another lane has to wait: a tenant
 // has two, one for the streams of its sessions and one for all other calls.
 constexpr int kBusyLanes = 8;
+// From a change of tokens or certificates to its notice, twice that until it is settled.
+constexpr std::chrono::seconds kWatchInterval{1};
 // What the last bytes of calls already ended may take.
 constexpr std::chrono::seconds kFlushTime{1};
 
@@ -78,7 +82,8 @@ absl::Status Daemon::OpenSessions() {
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
-  service_ = MakeEstimationService({executor_, *sessions_, calls_, stop_.get_token(), models_});
+  service_ =
+      MakeEstimationService({executor_, *sessions_, calls_, *access_, stop_.get_token(), models_});
   return absl::OkStatus();
 }
 
@@ -94,16 +99,50 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
   }
   POLYEST_ASSIGN_OR_RETURN(auto journal, OpenJournal(options));
   std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models), std::move(journal)));
+  POLYEST_RETURN_IF_ERROR(daemon->Secure());
   POLYEST_RETURN_IF_ERROR(daemon->OpenSessions());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
+}
+
+absl::Status Daemon::Secure() {
+  std::vector<std::string> files;
+  for (const std::string& file :
+       {options_.token_file, options_.tls.certificate, options_.tls.key, options_.tls.client_ca}) {
+    if (!file.empty()) files.push_back(file);
+  }
+  FileChanges changes(files);
+  AccessOptions access{options_.token_file, !options_.tls.client_ca.empty()};
+  POLYEST_ASSIGN_OR_RETURN(access_, AccessControl::Open(std::move(access)));
+  if (!options_.tls.certificate.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(tls_, ServerTls::Open(options_.tls));
+  }
+  if (!files.empty()) {
+    watch_ = std::make_unique<FileWatch>(std::move(changes), kWatchInterval, [this] { Reload(); });
+  }
+  return absl::OkStatus();
+}
+
+void Daemon::Reload() {
+  const std::lock_guard lock(reloading_);
+  const auto report = [](const char* what, const absl::Status& status) {
+    if (status.ok()) {
+      spdlog::info("{} read again", what);
+    } else {
+      spdlog::warn("{} not read again, the old ones stay: {}", what, std::string(status.message()));
+    }
+  };
+  if (!options_.token_file.empty()) report("tokens", access_->Reload());
+  if (tls_ != nullptr) report("certificates", tls_->Reload());
 }
 
 absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(address_.ToString(), grpc::InsecureServerCredentials(), &address_.port);
+  builder.AddListeningPort(
+      address_.ToString(),
+      tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials(), &address_.port);
   // Otherwise a second daemon on the same port would silently take half of the connections.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostConcurrentStreams);

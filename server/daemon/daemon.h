@@ -8,12 +8,16 @@
 
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <stop_token>
 #include <string>
 
 #include "core/fmu/model_library.h"
 #include "server/daemon/listen_address.h"
 #include "server/execution/executor.h"
+#include "server/security/access_control.h"
+#include "server/security/file_watch.h"
+#include "server/security/server_tls.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
@@ -31,18 +35,25 @@ struct DaemonOptions {
   int most_message_mb = 64;
   std::string fmu_dir{};  // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
+  std::string token_file{};  // empty: no tokens are asked for
+  TlsFiles tls{};            // without a certificate: no TLS
 };
 
 class Daemon {
  public:
   // UNAVAILABLE when the address cannot be listened on, NOT_FOUND when there is no folder of FMUs;
-  // what SqliteJournal::Open says of the data folder.
+  // what SqliteJournal::Open says of the data folder; as TokenTable and ReadTlsMaterial for what is
+  // wrong with tokens, certificates and keys.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
   // Drains first.
   ~Daemon();
 
   // Where it listens, with the port chosen.
   const ListenAddress& address() const { return address_; }
+
+  // Reads the tokens and the certificates again, as happens by itself when their files change. What
+  // cannot be used is logged, and the old ones stay.
+  void Reload();
 
   // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
   // sockets: at most the drain time-out, past which what is left is cancelled.
@@ -52,11 +63,15 @@ class Daemon {
   Daemon(const DaemonOptions& options, ModelLibrary models,
          std::unique_ptr<SessionJournal> journal);
   absl::Status OpenSessions();
+  absl::Status Secure();
   absl::Status Listen();
 
   const DaemonOptions options_;
   ListenAddress address_;
   const ModelLibrary models_;
+  std::mutex reloading_;
+  std::unique_ptr<AccessControl> access_;
+  std::unique_ptr<ServerTls> tls_;  // null without
   std::stop_source stop_;
   OpenCalls calls_;
   // In the order in which they need each other: the executor finishes its tasks, which use the
@@ -67,6 +82,7 @@ class Daemon {
   std::unique_ptr<Housekeeper> housekeeper_;
   std::unique_ptr<grpc::Service> service_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<FileWatch> watch_;  // null without files to watch
 };
 
 }  // namespace polyest

@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
+#include <cstdlib>
 
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
@@ -28,6 +29,7 @@ sigset_t BlockSignals() {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   return signals;
 }
@@ -38,6 +40,8 @@ int main(int argc, char** argv) {
   const polyest::CommandLine command_line = polyest::ParseCommandLine(argc, argv);
   if (command_line.done) return command_line.exit_status;
   const sigset_t signals = BlockSignals();
+  // gRPC's traces show the headers of calls, and so the tokens.
+  if (!command_line.daemon.token_file.empty()) unsetenv("GRPC_TRACE");
   StartLog(command_line.log_level);
 
   auto daemon = polyest::Daemon::Start(command_line.daemon);
@@ -49,7 +53,7 @@ int main(int argc, char** argv) {
   std::fflush(stdout);
 
   int signal_number = 0;
-  sigwait(&signals, &signal_number);
+  while (sigwait(&signals, &signal_number) == 0 && signal_number == SIGHUP) (*daemon)->Reload();
   spdlog::info("{}: draining", strsignal(signal_number));
   (*daemon)->Stop();
   spdlog::info("stopped");

@@ -21,13 +21,15 @@ namespace {
 constexpr int kThreadsPerCall = 1;
 
 absl::StatusOr<std::shared_ptr<Session>> FindSession(const SessionRegistry& sessions,
+                                                     const std::string& tenant,
                                                      const std::string& field,
                                                      const std::string& name) {
   POLYEST_RETURN_IF_ERROR(ResourceId(field, "sessions", name).status());
-  return sessions.Get(kDefaultTenant, name);
+  return sessions.Get(tenant, name);
 }
 
 absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& sessions,
+                                                  const std::string& tenant,
                                                   const v1::ListSessionsRequest& request) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
   if (!request.page_token().empty() &&
@@ -35,7 +37,7 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
     return UnknownPageToken(request.page_token());
   }
   // One more than asked for tells whether there is another page.
-  auto page = sessions.List(kDefaultTenant, request.page_token(), page_size + 1);
+  auto page = sessions.List(tenant, request.page_token(), page_size + 1);
   v1::ListSessionsResponse response;
   if (page.size() > page_size) {
     page.pop_back();
@@ -103,35 +105,52 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 
  private:
   using Work = std::function<absl::Status(const Stop&)>;
+  using CallerWork = std::function<absl::Status(const Caller&, const Stop&)>;
   using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
 
-  Unary* OnExecutor(Context* context, Work work);
+  // All of these refuse a caller who may not call the method, before anything else.
+  Unary* OnExecutor(Context* context, Method method, Work work);
+  Unary* ForCaller(Context* context, Method method, CallerWork work);
   // The session is `field` of the request; its work runs on its strand, and the call is finished
   // when everything is kept that the work may have seen.
-  Unary* OnStrand(Context* context, const std::string& field, const std::string& session,
-                  SessionWork work);
+  Unary* OnStrand(Context* context, Method method, const std::string& field,
+                  const std::string& session, SessionWork work);
   // A new estimate for those who watch a session that is fed by unary calls.
   void EstimateForObservers(const std::shared_ptr<Session>& session);
 
   ServiceContext context_;
 };
 
-EstimationService::Unary* EstimationService::OnExecutor(Context* context, Work work) {
+EstimationService::Unary* EstimationService::OnExecutor(Context* context, Method method,
+                                                        Work work) {
+  return ForCaller(context, method, [work = std::move(work)](const Caller&, const Stop& stop) {
+    return work(stop);
+  });
+}
+
+EstimationService::Unary* EstimationService::ForCaller(Context* context, Method method,
+                                                       CallerWork work) {
+  const auto caller = context_.access.Authorize(*context, method);
+  if (!caller.ok()) return FinishAtOnce(context, caller.status());
   return UnaryCall::Start(
       context_.calls, context,
-      [this](Task task) {
-        return context_.executor.Submit(absl::StrCat(kDefaultTenant, "/calls"), std::move(task));
+      [&](Task task) {
+        return context_.executor.Submit(absl::StrCat(caller->tenant, "/calls"), std::move(task));
       },
-      [work = std::move(work)](const Stop& stop, const UnaryCall::Finisher& finish) {
-        finish(work(stop));
+      [caller = *caller, work = std::move(work)](const Stop& stop,
+                                                 const UnaryCall::Finisher& finish) {
+        finish(work(caller, stop));
         return absl::OkStatus();
       });
 }
 
-EstimationService::Unary* EstimationService::OnStrand(Context* context, const std::string& field,
+EstimationService::Unary* EstimationService::OnStrand(Context* context, Method method,
+                                                      const std::string& field,
                                                       const std::string& session,
                                                       SessionWork work) {
-  auto found = FindSession(context_.sessions, field, session);
+  const auto caller = context_.access.Authorize(*context, method);
+  if (!caller.ok()) return FinishAtOnce(context, caller.status());
+  auto found = FindSession(context_.sessions, caller->tenant, field, session);
   if (!found.ok()) return FinishAtOnce(context, found.status());
   return UnaryCall::Start(
       context_.calls, context,
@@ -148,7 +167,7 @@ EstimationService::Unary* EstimationService::ListModels(Context* context,
                                                         const v1::ListModelsRequest* request,
                                                         v1::ListModelsResponse* response) {
   // A folder of FMUs may have to be read.
-  return OnExecutor(context, [=, this](const Stop&) {
+  return OnExecutor(context, "ListModels", [=, this](const Stop&) {
     return Deliver(polyest::ListModels(*request, context_.models), response);
   });
 }
@@ -156,7 +175,7 @@ EstimationService::Unary* EstimationService::ListModels(Context* context,
 EstimationService::Unary* EstimationService::GetModel(Context* context,
                                                       const v1::GetModelRequest* request,
                                                       v1::Model* response) {
-  return OnExecutor(context, [=, this](const Stop&) {
+  return OnExecutor(context, "GetModel", [=, this](const Stop&) {
     return Deliver(polyest::GetModel(*request, context_.models), response);
   });
 }
@@ -164,7 +183,7 @@ EstimationService::Unary* EstimationService::GetModel(Context* context,
 EstimationService::Unary* EstimationService::Estimate(Context* context,
                                                       const v1::EstimateRequest* request,
                                                       v1::EstimateResponse* response) {
-  return OnExecutor(context, [=, this](const Stop& stop) {
+  return OnExecutor(context, "Estimate", [=, this](const Stop& stop) {
     return Deliver(RunEstimate(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
@@ -172,7 +191,7 @@ EstimationService::Unary* EstimationService::Estimate(Context* context,
 EstimationService::Unary* EstimationService::Propagate(Context* context,
                                                        const v1::PropagateRequest* request,
                                                        v1::PropagateResponse* response) {
-  return OnExecutor(context, [=, this](const Stop& stop) {
+  return OnExecutor(context, "Propagate", [=, this](const Stop& stop) {
     return Deliver(RunPropagate(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
@@ -180,7 +199,7 @@ EstimationService::Unary* EstimationService::Propagate(Context* context,
 EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
                                                           const v1::EvaluateCostRequest* request,
                                                           v1::EvaluateCostResponse* response) {
-  return OnExecutor(context, [=, this](const Stop& stop) {
+  return OnExecutor(context, "EvaluateCost", [=, this](const Stop& stop) {
     return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
@@ -188,7 +207,7 @@ EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
 EstimationService::Unary* EstimationService::AnalyzeSensitivity(
     Context* context, const v1::AnalyzeSensitivityRequest* request,
     v1::AnalyzeSensitivityResponse* response) {
-  return OnExecutor(context, [=, this](const Stop& stop) {
+  return OnExecutor(context, "AnalyzeSensitivity", [=, this](const Stop& stop) {
     return Deliver(RunAnalyzeSensitivity(*request, kThreadsPerCall, stop, context_.models),
                    response);
   });
@@ -197,7 +216,7 @@ EstimationService::Unary* EstimationService::AnalyzeSensitivity(
 EstimationService::Unary* EstimationService::DesignExperiment(
     Context* context, const v1::DesignExperimentRequest* request,
     v1::DesignExperimentResponse* response) {
-  return OnExecutor(context, [=, this](const Stop& stop) {
+  return OnExecutor(context, "DesignExperiment", [=, this](const Stop& stop) {
     return Deliver(RunDesignExperiment(*request, kThreadsPerCall, stop, context_.models), response);
   });
 }
@@ -205,48 +224,54 @@ EstimationService::Unary* EstimationService::DesignExperiment(
 EstimationService::Unary* EstimationService::CreateSession(Context* context,
                                                            const v1::CreateSessionRequest* request,
                                                            v1::Session* response) {
-  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(
-        const auto session,
-        context_.sessions.Create(kDefaultTenant, request->session_id(), request->problem()));
-    *response = session->Describe();
-    *response->mutable_problem() = request->problem();
-    return absl::OkStatus();
-  });
+  return ForCaller(
+      context, "CreateSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+        POLYEST_ASSIGN_OR_RETURN(
+            const auto session,
+            context_.sessions.Create(caller.tenant, request->session_id(), request->problem()));
+        *response = session->Describe();
+        *response->mutable_problem() = request->problem();
+        return absl::OkStatus();
+      });
 }
 
 EstimationService::Unary* EstimationService::GetSession(Context* context,
                                                         const v1::GetSessionRequest* request,
                                                         v1::Session* response) {
-  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(const auto session,
-                             FindSession(context_.sessions, "name", request->name()));
-    *response = session->Describe();
-    POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
-    return absl::OkStatus();
-  });
+  return ForCaller(
+      context, "GetSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+        POLYEST_ASSIGN_OR_RETURN(const auto session, FindSession(context_.sessions, caller.tenant,
+                                                                 "name", request->name()));
+        *response = session->Describe();
+        POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
+        return absl::OkStatus();
+      });
 }
 
 EstimationService::Unary* EstimationService::ListSessions(Context* context,
                                                           const v1::ListSessionsRequest* request,
                                                           v1::ListSessionsResponse* response) {
-  return FinishAtOnce(context, Deliver(ListPage(context_.sessions, *request), response));
+  const auto caller = context_.access.Authorize(*context, "ListSessions");
+  if (!caller.ok()) return FinishAtOnce(context, caller.status());
+  return FinishAtOnce(context,
+                      Deliver(ListPage(context_.sessions, caller->tenant, *request), response));
 }
 
 EstimationService::Unary* EstimationService::DeleteSession(Context* context,
                                                            const v1::DeleteSessionRequest* request,
                                                            google::protobuf::Empty*) {
-  return OnExecutor(context, [=, this](const Stop&) -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
-    return context_.sessions.Delete(kDefaultTenant, request->name());
-  });
+  return ForCaller(
+      context, "DeleteSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
+        return context_.sessions.Delete(caller.tenant, request->name());
+      });
 }
 
 EstimationService::Unary* EstimationService::AddMeasurements(
     Context* context, const v1::AddMeasurementsRequest* request,
     v1::AddMeasurementsResponse* response) {
   return OnStrand(
-      context, "session", request->session(),
+      context, "AddMeasurements", "session", request->session(),
       [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
         POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
                                  session->Add(request->sequence(), request->measurements(), stop));
@@ -268,7 +293,7 @@ void EstimationService::EstimateForObservers(const std::shared_ptr<Session>& ses
 EstimationService::Unary* EstimationService::GetEstimate(Context* context,
                                                          const v1::GetEstimateRequest* request,
                                                          v1::EstimateResponse* response) {
-  return OnStrand(context, "session", request->session(),
+  return OnStrand(context, "GetEstimate", "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
                     POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate,
                                              session->CurrentEstimate(stop));
@@ -291,14 +316,15 @@ EstimationService::Unary* EstimationService::GetPosterior(Context* context,
                                                           const v1::GetPosteriorRequest* request,
                                                           v1::GetPosteriorResponse* response) {
   if (request->session().empty()) {
-    return OnExecutor(context, [=, this](const Stop& stop) {
+    return OnExecutor(context, "GetPosterior", [=, this](const Stop& stop) {
       return Deliver(RunGetPosterior(*request, kThreadsPerCall, stop, context_.models), response);
     });
   }
   if (request->has_problem() || request->has_measurements()) {
-    return FinishAtOnce(context, SessionAndProblem(request->session()));
+    return OnExecutor(context, "GetPosterior",
+                      [=](const Stop&) { return SessionAndProblem(request->session()); });
   }
-  return OnStrand(context, "session", request->session(),
+  return OnStrand(context, "GetPosterior", "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) {
                     return Deliver(session->CurrentPosterior(*request, stop), response);
                   });
@@ -308,14 +334,15 @@ EstimationService::Unary* EstimationService::ProfileCost(Context* context,
                                                          const v1::ProfileCostRequest* request,
                                                          v1::ProfileCostResponse* response) {
   if (request->session().empty()) {
-    return OnExecutor(context, [=, this](const Stop& stop) {
+    return OnExecutor(context, "ProfileCost", [=, this](const Stop& stop) {
       return Deliver(RunProfileCost(*request, kThreadsPerCall, stop, context_.models), response);
     });
   }
   if (request->has_problem() || request->has_measurements()) {
-    return FinishAtOnce(context, SessionAndProblem(request->session()));
+    return OnExecutor(context, "ProfileCost",
+                      [=](const Stop&) { return SessionAndProblem(request->session()); });
   }
-  return OnStrand(context, "session", request->session(),
+  return OnStrand(context, "ProfileCost", "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) {
                     return Deliver(session->CurrentProfiles(*request, stop), response);
                   });
@@ -325,15 +352,16 @@ EstimationService::Unary* EstimationService::SweepRegularization(
     Context* context, const v1::SweepRegularizationRequest* request,
     v1::SweepRegularizationResponse* response) {
   if (request->session().empty()) {
-    return OnExecutor(context, [=, this](const Stop& stop) {
+    return OnExecutor(context, "SweepRegularization", [=, this](const Stop& stop) {
       return Deliver(RunSweepRegularization(*request, kThreadsPerCall, stop, context_.models),
                      response);
     });
   }
   if (request->has_problem() || request->has_measurements()) {
-    return FinishAtOnce(context, SessionAndProblem(request->session()));
+    return OnExecutor(context, "SweepRegularization",
+                      [=](const Stop&) { return SessionAndProblem(request->session()); });
   }
-  return OnStrand(context, "session", request->session(),
+  return OnStrand(context, "SweepRegularization", "session", request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) {
                     return Deliver(session->CurrentRegularizationSweep(*request, stop), response);
                   });

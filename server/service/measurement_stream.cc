@@ -14,7 +14,15 @@
 namespace polyest {
 
 MeasurementFlow::MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call)
-    : context_(context), stop_(CallStop(call, stop_source_.get_token())) {}
+    : context_(context), call_(call), stop_(CallStop(call, stop_source_.get_token())) {}
+
+absl::StatusOr<Caller> MeasurementFlow::Authorize() const {
+  POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "StreamMeasurements"));
+  if (session_ != nullptr && session_->tenant() != caller.tenant) {
+    return absl::PermissionDeniedError("the token is another tenant's now");
+  }
+  return caller;
+}
 
 void MeasurementFlow::OnStart(MeasurementReactor* reactor, const absl::Status& admitted) {
   std::lock_guard lock(mutex_);
@@ -38,11 +46,14 @@ void MeasurementFlow::OnRead(bool ok) {
 }
 
 void MeasurementFlow::Take(v1::StreamMeasurementsRequest request) {
-  if (const absl::Status attached = Attach(request); !attached.ok()) return End(attached);
+  const absl::StatusOr<Caller> caller = Authorize();
+  if (!caller.ok()) return End(caller.status());
+  if (const absl::Status attached = Attach(*caller, request); !attached.ok()) return End(attached);
   inbox_.push_back(std::move(request));
 }
 
-absl::Status MeasurementFlow::Attach(const v1::StreamMeasurementsRequest& request) {
+absl::Status MeasurementFlow::Attach(const Caller& caller,
+                                     const v1::StreamMeasurementsRequest& request) {
   if (session_ != nullptr) {
     if (request.session().empty() || request.session() == session_->name()) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrFormat("session: \"%s\" is not the stream's own, %s",
@@ -53,7 +64,7 @@ absl::Status MeasurementFlow::Attach(const v1::StreamMeasurementsRequest& reques
     return absl::InvalidArgumentError(absl::StrFormat(
         "writer: %d characters are more than %d", request.writer().size(), kLongestWriter));
   }
-  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(kDefaultTenant, request.session()));
+  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(caller.tenant, request.session()));
   POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));
   session_ = std::move(session);
   return absl::OkStatus();
@@ -221,9 +232,12 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
 
 MeasurementStream::MeasurementStream(ServiceContext& context, grpc::CallbackServerContext& call)
     : flow_(std::make_shared<MeasurementFlow>(context, call)) {
-  auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
-  const absl::Status admitted = ticket.status();
-  if (admitted.ok()) ticket_ = *std::move(ticket);
+  absl::Status admitted = flow_->Authorize().status();
+  if (admitted.ok()) {
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    admitted = ticket.status();
+    if (admitted.ok()) ticket_ = *std::move(ticket);
+  }
   flow_->OnStart(this, admitted);
 }
 

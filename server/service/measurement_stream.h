@@ -31,6 +31,9 @@ class MeasurementFlow final : public SessionObserver,
  public:
   MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
+  // Again for each message: a token may be taken back while the stream is open.
+  absl::StatusOr<Caller> Authorize() const;
+
   // The reactions, in the reactor's words.
   void OnStart(MeasurementReactor* reactor, const absl::Status& admitted);
   void OnRead(bool ok);
@@ -52,7 +55,7 @@ class MeasurementFlow final : public SessionObserver,
 
   // All with the mutex held.
   void Take(v1::StreamMeasurementsRequest request);
-  absl::Status Attach(const v1::StreamMeasurementsRequest& request);
+  absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
   void End(const absl::Status& status);
   void Break(const absl::Status& status);
   // Starts whatever can be started: a write, a read, work, the end.
@@ -71,6 +74,7 @@ class MeasurementFlow final : public SessionObserver,
   void OnKept(int64_t sequence, const absl::Status& kept);
 
   ServiceContext& context_;
+  grpc::CallbackServerContext& call_;  // until OnDone
   std::stop_source stop_source_;
   const Stop stop_;
   EstimateSchedule schedule_;  // the strand's

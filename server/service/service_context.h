@@ -4,19 +4,18 @@
 
 #include "core/fmu/model_library.h"
 #include "server/execution/executor.h"
+#include "server/security/access_control.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
 
 namespace polyest {
-
-// Whose sessions are meant where nobody says who calls.
-inline constexpr char kDefaultTenant[] = "default";
 
 // What the service's calls share; outlives them all.
 struct ServiceContext {
   Executor& executor;
   SessionRegistry& sessions;
   OpenCalls& calls;
+  const AccessControl& access;
   // Asked for when the drain's time is over: ends work that no call waits for.
   std::stop_token stop;
   const ModelLibrary& models;

@@ -13,7 +13,15 @@
 namespace polyest {
 
 WatchFlow::WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call)
-    : context_(context), stop_(CallStop(call, stop_source_.get_token())) {}
+    : context_(context), call_(call), stop_(CallStop(call, stop_source_.get_token())) {}
+
+absl::StatusOr<Caller> WatchFlow::Authorize() const {
+  POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "WatchSession"));
+  if (session_ != nullptr && session_->tenant() != caller.tenant) {
+    return absl::PermissionDeniedError("the token is another tenant's now");
+  }
+  return caller;
+}
 
 void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
                         const std::string& session) {
@@ -25,8 +33,9 @@ void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
 }
 
 absl::Status WatchFlow::Attach(const std::string& session) {
+  POLYEST_ASSIGN_OR_RETURN(const Caller caller, Authorize());
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", session).status());
-  POLYEST_ASSIGN_OR_RETURN(session_, context_.sessions.Get(kDefaultTenant, session));
+  POLYEST_ASSIGN_OR_RETURN(session_, context_.sessions.Get(caller.tenant, session));
   registering_ = true;
   const absl::Status accepted =
       session_->strand().Submit([flow = shared_from_this()] { flow->Register(); });
@@ -45,8 +54,13 @@ void WatchFlow::Register() {
 
 void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
   std::lock_guard lock(mutex_);
-  if (end_ || estimate == last_) return;
-  pending_ = last_ = estimate;
+  if (end_ || reactor_ == nullptr || estimate == last_) return;
+  const absl::Status allowed = Authorize().status();
+  if (allowed.ok()) {
+    pending_ = last_ = estimate;
+  } else {
+    End(allowed);
+  }
   Advance();
 }
 
@@ -106,9 +120,12 @@ void WatchFlow::OnDone() {
 SessionWatch::SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
                            const std::string& session)
     : flow_(std::make_shared<WatchFlow>(context, call)) {
-  auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
-  const absl::Status admitted = ticket.status();
-  if (admitted.ok()) ticket_ = *std::move(ticket);
+  absl::Status admitted = flow_->Authorize().status();
+  if (admitted.ok()) {
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
+    admitted = ticket.status();
+    if (admitted.ok()) ticket_ = *std::move(ticket);
+  }
   flow_->OnStart(this, admitted, session);
 }
 

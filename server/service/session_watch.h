@@ -25,6 +25,9 @@ class WatchFlow final : public SessionObserver,
  public:
   WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
+  // Again for each estimate: a token may be taken back while the watch is open.
+  absl::StatusOr<Caller> Authorize() const;
+
   void OnStart(WatchReactor* reactor, const absl::Status& admitted, const std::string& session);
   void OnWritten(bool ok);
   void OnCancelled();
@@ -44,6 +47,7 @@ class WatchFlow final : public SessionObserver,
   void Register();
 
   ServiceContext& context_;
+  grpc::CallbackServerContext& call_;  // until OnDone
   std::stop_source stop_source_;
   const Stop stop_;
 

@@ -119,8 +119,11 @@ class DaemonTest : public testing::Test {
 // One stream of measurements, from the client's side.
 class ClientStream {
  public:
-  explicit ClientStream(v1::EstimationService::Stub& stub)
-      : stream_(stub.StreamMeasurements(&context_)) {}
+  explicit ClientStream(v1::EstimationService::Stub& stub, const std::string& token = "")
+      : stream_([&] {
+          if (!token.empty()) context_.AddMetadata("authorization", "Bearer " + token);
+          return stub.StreamMeasurements(&context_);
+        }()) {}
 
   bool Send(const std::string& session, int64_t sequence, const v1::Measurements& rows,
             const std::function<void(v1::StreamMeasurementsRequest&)>& change = {}) {

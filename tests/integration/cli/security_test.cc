@@ -1,0 +1,192 @@
+#include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include "server/security/token_table.h"
+#include "tests/integration/cli/command_test.h"
+#include "tests/testing/certificates.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+class SecurityTest : public CommandTest {
+ protected:
+  SecurityTest() : authority_("test CA") {
+    const IssuedCertificate issued = authority_.Issue("daemon");
+    certificate_ = File("daemon.pem", issued.certificate);
+    key_ = File("daemon.key", issued.key);
+    ca_ = File("ca.pem", authority_.certificate());
+    tokens_ = File("tokens", reader_.line + "\n" + writer_.line + "\n");
+    reader_file_ = File("reader.token", reader_.secret + "\n");
+    writer_file_ = File("writer.token", writer_.secret + "\n");
+  }
+  ~SecurityTest() override { unsetenv("POLYEST_TOKEN"); }
+
+  std::vector<std::string> WithTls() const {
+    return {"--tls-certificate", certificate_, "--tls-key", key_, "--tokens", tokens_};
+  }
+
+  // The one line of stderr of a command that fails so.
+  static std::string OneLine(const Finished& finished, int exit_status) {
+    EXPECT_EQ(finished.exit_status, exit_status) << finished.err;
+    EXPECT_EQ(finished.out, "");
+    EXPECT_THAT(Lines(finished.err), SizeIs(1));
+    return finished.err;
+  }
+
+  const CertificateAuthority authority_;
+  const NewToken reader_ = *MakeTokenFor("anna:chassis:reader");
+  const NewToken writer_ = *MakeTokenFor("rig1:chassis:writer");
+  std::string certificate_, key_, ca_, tokens_, reader_file_, writer_file_;
+};
+
+TEST_F(SecurityTest, StreamsOverTlsWithAToken) {
+  DaemonProcess daemon(WithTls());
+  const Finished stream =
+      Run({"stream", Example("oscillator.json"), File("d.csv", DemoRows(40)), "--server",
+           daemon.address(), "--tls-ca", ca_, "--token-file", writer_file_, "--format", "jsonl"});
+  EXPECT_EQ(stream.exit_status, 0) << stream.err;
+  EXPECT_EQ(ParseEstimate(Lines(stream.out).back()).samples(), 40);
+}
+
+TEST_F(SecurityTest, TakesTheTokenFromTheEnvironment) {
+  DaemonProcess daemon({"--tokens", tokens_});
+  setenv("POLYEST_TOKEN", reader_.secret.c_str(), 1);
+  EXPECT_EQ(Run({"models", "--server", daemon.address()}).exit_status, 0);
+  setenv("POLYEST_TOKEN", "wrong", 1);
+  EXPECT_EQ(Run({"models", "--server", daemon.address(), "--token-file", reader_file_}).exit_status,
+            0);
+}
+
+TEST_F(SecurityTest, SaysInOneLineWhatWasRefused) {
+  DaemonProcess daemon({"--tokens", tokens_});
+  const std::string at = "polyest: server " + daemon.address() + ": ";
+  EXPECT_EQ(OneLine(Run({"models", "--server", daemon.address()}), 3), at + "a token is needed\n");
+  EXPECT_EQ(OneLine(Run({"models", "--server", daemon.address(), "--token-file",
+                         File("wrong.token", MakeToken())}),
+                    3),
+            at + "the token is not known\n");
+  EXPECT_EQ(OneLine(Run({"stream", Example("oscillator.json"), Example("oscillator.csv"),
+                         "--server", daemon.address(), "--token-file", reader_file_}),
+                    3),
+            at + "CreateSession needs the role writer, the token has reader\n");
+}
+
+TEST_F(SecurityTest, SendsNoTokenOverANetworkWithoutTls) {
+  EXPECT_EQ(
+      OneLine(Run({"models", "--server", "rig.example.org:50051", "--token-file", reader_file_}),
+              2),
+      "polyest: token: rig.example.org:50051 is beyond loopback, where a token goes over TLS "
+      "only (--tls-ca)\n");
+}
+
+TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {
+  DaemonProcess daemon(WithTls());
+  const std::string other = File("other.pem", CertificateAuthority("another CA").certificate());
+  EXPECT_THAT(OneLine(Run({"models", "--server", daemon.address(), "--tls-ca", other,
+                           "--token-file", reader_file_}),
+                      3),
+              StartsWith("polyest: server " + daemon.address() + ": "));
+  // Named other than its certificate says.
+  EXPECT_THAT(OneLine(Run({"models", "--server", daemon.address(), "--tls-ca", ca_,
+                           "--tls-server-name", "rig.example.org", "--token-file", reader_file_}),
+                      3),
+              StartsWith("polyest: server " + daemon.address() + ": "));
+}
+
+TEST_F(SecurityTest, NamesFilesThatAreNoGoodAndNothingOfThem) {
+  const std::string bad = File("bad", "secret words");
+  const auto models = [](const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {"models", "--server", "localhost:1"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return OneLine(Run(arguments), 2);
+  };
+  EXPECT_THAT(models({"--tls-ca", bad}),
+              AllOf(HasSubstr(bad + " is not in PEM form"), Not(HasSubstr("secret"))));
+  EXPECT_THAT(models({"--tls-ca", "/nowhere/ca.pem"}),
+              HasSubstr("/nowhere/ca.pem: cannot be read"));
+  EXPECT_THAT(models({"--token-file", bad}),
+              AllOf(HasSubstr("token: must be one word"), Not(HasSubstr("secret"))));
+  EXPECT_THAT(models({"--token-file", File("empty", "\n")}), HasSubstr("is empty"));
+  EXPECT_THAT(models({"--tls-certificate", certificate_}), HasSubstr("--tls-key"));
+}
+
+TEST_F(SecurityTest, ShowsAClientsCertificateToADaemonThatAsksForOne) {
+  DaemonProcess daemon(
+      {"--tls-certificate", certificate_, "--tls-key", key_, "--tls-client-ca", ca_});
+  const IssuedCertificate rig = authority_.Issue("rig");
+  EXPECT_EQ(Run({"models", "--server", daemon.address(), "--tls-ca", ca_, "--tls-certificate",
+                 File("rig.pem", rig.certificate), "--tls-key", File("rig.key", rig.key)})
+                .exit_status,
+            0);
+  OneLine(Run({"models", "--server", daemon.address(), "--tls-ca", ca_}), 3);
+}
+
+// The commands of a section of README.md, continued lines as one.
+std::vector<std::string> CommandsOf(const std::string& section) {
+  std::ifstream in(std::string(POLYEST_SOURCE_DIR) + "/README.md");
+  std::vector<std::string> commands;
+  bool inside = false, code = false, continued = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("## ")) inside = line == "## " + section;
+    if (!inside) continue;
+    if (line.starts_with("```")) {
+      code = line == "```sh";
+    } else if (code) {
+      const bool continues = line.ends_with("\\");
+      if (continues) line.pop_back();
+      if (continued) {
+        commands.back() += line;
+      } else {
+        commands.push_back(line);
+      }
+      continued = continues;
+    }
+  }
+  return commands;
+}
+
+std::string Replaced(std::string text, const std::string& old_text, const std::string& new_text) {
+  const size_t place = text.find(old_text);
+  EXPECT_NE(place, std::string::npos) << text;
+  return text.replace(place, old_text.size(), new_text);
+}
+
+TEST_F(SecurityTest, WorksAsTheReadmeSays) {
+  const std::string prepare =
+      "set -eu; cd " + folder_.string() + "; export XDG_STATE_HOME=$PWD/state; PATH=" +
+      std::filesystem::path(POLYEST_PROGRAM).parent_path().string() + ":" +
+      std::filesystem::path(POLYESTD_PROGRAM).parent_path().string() + ":$PATH; ";
+  std::filesystem::remove(tokens_);
+  for (const char* file : {"oscillator.json", "oscillator.csv"}) {
+    std::filesystem::copy(Example(file), folder_ / file);
+  }
+  const auto shell = [&](const std::string& command) {
+    return std::vector<std::string>{"/bin/bash", "-c", prepare + command};
+  };
+  std::unique_ptr<Process> daemon;
+  std::string address;
+  bool streamed = false;
+  for (const std::string& command : CommandsOf("Security")) {
+    if (command.starts_with("polyestd --listen")) {
+      daemon = std::make_unique<Process>(shell("exec " + Replaced(command, ":50051", ":0")));
+      address = daemon->ReadLine();
+      ASSERT_THAT(address, StartsWith("listening on 0.0.0.0:")) << daemon->Errors();
+      continue;
+    }
+    const bool client = command.starts_with("polyest stream");
+    const Finished finished = RunProgram(
+        shell(client ? Replaced(command, ":50051", address.substr(address.rfind(':'))) : command));
+    EXPECT_EQ(finished.exit_status, 0) << command << "\n" << finished.err;
+    if (client) streamed = finished.out.find("identified") != std::string::npos;
+  }
+  EXPECT_TRUE(streamed);
+}
+
+}  // namespace
+}  // namespace polyest
