@@ -57,6 +57,8 @@ class Parser {
     AddPosterior();
     AddProfile();
     AddRegularization();
+    AddExport();
+    AddImport();
   }
 
   CLI::App& app() { return app_; }
@@ -77,6 +79,8 @@ class Parser {
     if (name == "posterior") return Placed(posterior_);
     if (name == "profile") return Placed(profile_);
     if (name == "regularization") return Placed(regularization_);
+    if (name == "export") return Placed(export_);
+    if (name == "import") return Placed(import_);
     return paper_;
   }
 
@@ -366,6 +370,21 @@ class Parser {
     AddFormat(command, regularization_.format, {"table", "json", "csv"});
   }
 
+  void AddExport() {
+    CLI::App& command = *app_.add_subcommand("export", "Write a session of a daemon into a file");
+    command.add_option("session", export_.session, "The session's name")->required();
+    command.add_option("file", export_.file, "The file to write")->required();
+    AddServer(command)->required();
+  }
+
+  void AddImport() {
+    CLI::App& command = *app_.add_subcommand(
+        "import", "Make a session of a daemon out of a file: the same estimate to the last bit");
+    command.add_option("file", import_.file, "What `polyest export` has written")->required();
+    command.add_option("--session", import_.session, "Its name there (default the one it had)");
+    AddServer(command)->required();
+  }
+
   CLI::App app_;
   Place place_;
   bool local_ = false;
@@ -383,6 +402,8 @@ class Parser {
   PosteriorArguments posterior_;
   ProfileArguments profile_;
   RegularizationArguments regularization_;
+  ExportArguments export_;
+  ImportArguments import_;
 };
 
 }  // namespace

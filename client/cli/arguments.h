@@ -145,11 +145,23 @@ struct RegularizationArguments {
   Format format = Format::kTable;
 };
 
-using Command =
-    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                 SensitivityArguments, DesignArguments, PosteriorArguments, ProfileArguments,
-                 RegularizationArguments, ExplainArguments, PaperOptions>;
+struct ExportArguments {
+  Place place;
+  std::string session;  // its id
+  std::string file;
+};
+
+struct ImportArguments {
+  Place place;
+  std::string file;
+  std::string session;  // its id here; empty: the one it had
+};
+
+using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                             SensitivityArguments, DesignArguments, PosteriorArguments,
+                             ProfileArguments, RegularizationArguments, ExplainArguments,
+                             ExportArguments, ImportArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

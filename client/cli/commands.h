@@ -23,5 +23,7 @@ int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostrea
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ExportArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ImportArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

@@ -125,4 +125,49 @@ absl::Status Client::WatchSession(
   return FromGrpc(reader->Finish());
 }
 
+absl::Status Client::ExportSession(
+    const v1::ExportSessionRequest& request,
+    const std::function<absl::Status(const v1::SessionRecord&)>& take) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
+  grpc::ClientContext context;
+  connection_->Identify(context);
+  const auto reader = stub_->ExportSession(&context, request);
+  v1::SessionRecord record;
+  while (reader->Read(&record)) {
+    const absl::Status taken = take(record);
+    if (taken.ok()) continue;
+    context.TryCancel();
+    reader->Finish();
+    return taken;
+  }
+  return FromGrpc(reader->Finish());
+}
+
+absl::StatusOr<v1::Session> Client::ImportSession(
+    const std::string& session_id,
+    const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
+  grpc::ClientContext context;
+  connection_->Identify(context);
+  v1::Session session;
+  const auto writer = stub_->ImportSession(&context, &session);
+  v1::ImportSessionRequest request;
+  request.set_session_id(session_id);
+  while (true) {
+    auto record = next();
+    if (!record.ok()) {
+      context.TryCancel();
+      writer->Finish();
+      return record.status();
+    }
+    if (!record->has_value()) break;
+    *request.mutable_record() = **std::move(record);
+    if (!writer->Write(request)) break;  // refused: Finish says why
+  }
+  writer->WritesDone();
+  const grpc::Status status = writer->Finish();
+  if (!status.ok()) return FromGrpc(status);
+  return session;
+}
+
 }  // namespace polyest

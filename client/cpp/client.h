@@ -49,6 +49,14 @@ class Client {
   // Calls `estimate` with each one until it returns false (then OK) or the daemon ends the stream.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::EstimateResponse&)>& estimate);
+  // Calls `take` with each record until it is not OK: its status is then the answer.
+  absl::Status ExportSession(const v1::ExportSessionRequest& request,
+                             const std::function<absl::Status(const v1::SessionRecord&)>& take);
+  // Sends what `next` gives until it gives nothing; a status of it that is not OK ends the import,
+  // of which nothing stays, and is the answer. `session_id`: as in ImportSessionRequest.
+  absl::StatusOr<v1::Session> ImportSession(
+      const std::string& session_id,
+      const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next);
 
   // For MeasurementStream, once another call has gone well.
   v1::EstimationService::Stub& stub() { return *stub_; }

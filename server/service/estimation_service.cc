@@ -9,7 +9,9 @@
 #include "server/operations/names.h"
 #include "server/operations/operations.h"
 #include "server/operations/pages.h"
+#include "server/service/export_call.h"
 #include "server/service/guarded.h"
+#include "server/service/import_call.h"
 #include "server/service/measurement_stream.h"
 #include "server/service/session_watch.h"
 #include "server/service/unary_call.h"
@@ -86,6 +88,15 @@ class EstimationService final : public v1::EstimationService::CallbackService {
                       v1::ListSessionsResponse* response) override;
   Unary* DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
                        google::protobuf::Empty* response) override;
+
+  grpc::ServerWriteReactor<v1::SessionRecord>* ExportSession(
+      Context* context, const v1::ExportSessionRequest* request) override {
+    return new ExportCall(context_, *context, request->name());
+  }
+  grpc::ServerReadReactor<v1::ImportSessionRequest>* ImportSession(Context* context,
+                                                                   v1::Session* response) override {
+    return new ImportCall(context_, *context, response);
+  }
 
   Unary* AddMeasurements(Context* context, const v1::AddMeasurementsRequest* request,
                          v1::AddMeasurementsResponse* response) override;

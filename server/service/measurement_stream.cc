@@ -61,8 +61,8 @@ absl::Status MeasurementFlow::Attach(const Caller& caller,
   }
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", request.session()).status());
   if (request.writer().size() > kLongestWriter) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "writer: %d characters are more than %d", request.writer().size(), kLongestWriter));
+    return absl::InvalidArgumentError(absl::StrFormat("writer: %d characters are more than %d",
+                                                      request.writer().size(), kLongestWriter));
   }
   POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(caller.tenant, request.session()));
   POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));

@@ -61,8 +61,9 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<v1::Problem> ReadProblem() const {
     return services_.journal.ReadProblem(number());
   }
-  absl::Status ReadBatches(const std::function<absl::Status(const JournalBatch&)>& take) const {
-    return services_.journal.ReadBatches(number(), 0, take);
+  absl::Status ReadBatches(int64_t after,
+                           const std::function<absl::Status(const JournalBatch&)>& take) const {
+    return services_.journal.ReadBatches(number(), after, take);
   }
   // Batches acknowledged.
   SessionPlace place() const { return ledger_.kept(); }

@@ -11,27 +11,6 @@
 
 namespace polyest {
 
-absl::Status ExportSession(const Session& session,
-                           const std::function<absl::Status(const v1::SessionRecord&)>& take) {
-  const v1::Session described = session.Describe();
-  v1::SessionRecord record;
-  v1::SessionRecord::Head& head = *record.mutable_head();
-  head.set_name(described.name());
-  *head.mutable_create_time() = described.create_time();
-  head.set_batches(described.last_sequence());
-  POLYEST_ASSIGN_OR_RETURN(*head.mutable_problem(), session.ReadProblem());
-  POLYEST_RETURN_IF_ERROR(take(record));
-  // Batches that come meanwhile are left to the next export.
-  const absl::Status end = absl::OutOfRangeError("all there were");
-  const absl::Status exported = session.ReadBatches([&](const JournalBatch& batch) -> absl::Status {
-    if (batch.sequence > described.last_sequence()) return end;
-    record.mutable_batch()->set_sequence(batch.sequence);
-    *record.mutable_batch()->mutable_measurements() = batch.measurements;
-    return take(record);
-  });
-  return exported == end ? absl::OkStatus() : exported;
-}
-
 SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : registry_(registry) {
   head_.tenant = std::move(tenant);
 }

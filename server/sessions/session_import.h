@@ -11,10 +11,6 @@
 
 namespace polyest {
 
-// The records of a session, one after the other. Waits for the journal.
-absl::Status ExportSession(const Session& session,
-                           const std::function<absl::Status(const v1::SessionRecord&)>& take);
-
 // For one thread at a time.
 class SessionImport {
  public:

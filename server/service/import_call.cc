@@ -1,0 +1,110 @@
+#include "server/service/import_call.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "core/common/status.h"
+#include "server/service/guarded.h"
+#include "server/service/status_mapping.h"
+
+namespace polyest {
+
+void ImportFlow::OnStart(ImportReactor* reactor, const grpc::CallbackServerContext& call,
+                         const absl::Status& admitted) {
+  const std::lock_guard lock(mutex_);
+  reactor_ = reactor;
+  const auto caller = context_.access.Authorize(call, "ImportSession");
+  if (!admitted.ok() || !caller.ok()) {
+    End(admitted.ok() ? caller.status() : admitted);
+  } else {
+    import_ = std::make_unique<SessionImport>(context_.sessions, caller->tenant);
+    lane_ = absl::StrCat(caller->tenant, "/calls");
+  }
+  Advance();
+}
+
+void ImportFlow::OnRead(bool ok) {
+  const std::lock_guard lock(mutex_);
+  reading_ = false;
+  half_closed_ = !ok;
+  if (!end_ && !finished_) {
+    working_ = true;
+    const absl::Status accepted =
+        context_.executor.Submit(lane_, [flow = shared_from_this()] { flow->Take(); });
+    if (!accepted.ok()) {
+      working_ = false;
+      End(accepted);
+    }
+  }
+  Advance();
+}
+
+void ImportFlow::Take() {
+  const absl::Status taken =
+      Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
+  const std::lock_guard lock(mutex_);
+  working_ = false;
+  if (!taken.ok() || half_closed_) End(taken);
+  Advance();
+}
+
+absl::Status ImportFlow::TakeRequest() { return import_->Take(request_); }
+
+absl::Status ImportFlow::FinishImport() {
+  {
+    // A client that went away, or a daemon that shuts down, has not said that this is all.
+    const std::lock_guard lock(mutex_);
+    if (end_) return *end_;
+  }
+  POLYEST_ASSIGN_OR_RETURN(const auto session, import_->Finish());
+  *response_ = session->Describe();
+  return absl::OkStatus();
+}
+
+void ImportFlow::OnCancelled() {
+  const std::lock_guard lock(mutex_);
+  End(absl::CancelledError("the call was cancelled"));
+  Advance();
+}
+
+void ImportFlow::Drain() {
+  const std::lock_guard lock(mutex_);
+  End(ShuttingDown());
+  Advance();
+}
+
+void ImportFlow::End(const absl::Status& status) {
+  if (!end_) end_ = status;
+}
+
+void ImportFlow::Advance() {
+  if (finished_ || reactor_ == nullptr || working_) return;
+  if (!end_) {
+    if (!std::exchange(reading_, true)) reactor_->StartRead(&request_);
+    return;
+  }
+  finished_ = true;
+  reactor_->Finish(ToGrpc(*end_));
+}
+
+void ImportFlow::OnDone() {
+  const std::lock_guard lock(mutex_);
+  reactor_ = nullptr;
+}
+
+ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
+                       v1::Session* response)
+    : flow_(std::make_shared<ImportFlow>(context, response)) {
+  auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+  const absl::Status admitted = ticket.status();
+  if (admitted.ok()) ticket_ = *std::move(ticket);
+  flow_->OnStart(this, call, admitted);
+}
+
+void ImportCall::OnDone() {
+  flow_->OnDone();
+  delete this;
+}
+
+}  // namespace polyest

@@ -1,0 +1,70 @@
+#pragma once
+
+// ImportSession: the records of a session, taken one at a time.
+
+#include <grpcpp/support/server_callback.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "server/service/service_context.h"
+#include "server/sessions/session_import.h"
+
+namespace polyest {
+
+using ImportReactor = grpc::ServerReadReactor<v1::ImportSessionRequest>;
+
+// The state of one import; outlives its reactor, for the executor may still hold it.
+class ImportFlow final : public Drainable, public std::enable_shared_from_this<ImportFlow> {
+ public:
+  ImportFlow(ServiceContext& context, v1::Session* response)
+      : context_(context), response_(response) {}
+
+  void OnStart(ImportReactor* reactor, const grpc::CallbackServerContext& call,
+               const absl::Status& admitted);
+  void OnRead(bool ok);
+  void OnCancelled();
+  void OnDone();
+  void Drain() override;
+
+ private:
+  // With the mutex held.
+  void End(const absl::Status& status);
+  void Advance();
+
+  // On the executor.
+  void Take();
+  absl::Status TakeRequest();
+  absl::Status FinishImport();
+
+  ServiceContext& context_;
+  v1::Session* const response_;  // gRPC's, until the end
+  std::unique_ptr<SessionImport> import_;
+  std::string lane_;
+  v1::ImportSessionRequest request_;  // of whoever reads or works, in turns
+
+  std::mutex mutex_;
+  ImportReactor* reactor_ = nullptr;
+  bool reading_ = false;
+  bool working_ = false;
+  bool half_closed_ = false;
+  bool finished_ = false;
+  std::optional<absl::Status> end_;
+};
+
+class ImportCall final : public ImportReactor {
+ public:
+  ImportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
+             v1::Session* response);
+
+  void OnReadDone(bool ok) override { flow_->OnRead(ok); }
+  void OnCancel() override { flow_->OnCancelled(); }
+  void OnDone() override;
+
+ private:
+  std::shared_ptr<ImportFlow> flow_;
+  std::unique_ptr<OpenCalls::Ticket> ticket_;
+};
+
+}  // namespace polyest

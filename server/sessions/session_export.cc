@@ -1,0 +1,51 @@
+#include "server/sessions/session_export.h"
+
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest {
+namespace {
+
+// Of one answer, so that a long session is not all in memory: it ends with the batch that passes
+// this.
+constexpr size_t kBytes = 1 << 20;
+
+}  // namespace
+
+SessionExport::SessionExport(std::shared_ptr<const Session> session)
+    : session_(std::move(session)), described_(session_->Describe()) {}
+
+v1::SessionRecord SessionExport::Head(const v1::Problem& problem) const {
+  v1::SessionRecord record;
+  v1::SessionRecord::Head& head = *record.mutable_head();
+  head.set_name(described_.name());
+  *head.mutable_problem() = problem;
+  *head.mutable_create_time() = described_.create_time();
+  head.set_batches(described_.last_sequence());
+  return record;
+}
+
+absl::StatusOr<std::vector<v1::SessionRecord>> SessionExport::Next() {
+  std::vector<v1::SessionRecord> records;
+  if (!std::exchange(begun_, true)) {
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, session_->ReadProblem());
+    records.push_back(Head(problem));
+  }
+  size_t bytes = 0;
+  const absl::Status full = absl::OutOfRangeError("enough for one answer");
+  const absl::Status read =
+      session_->ReadBatches(given_, [&](const JournalBatch& batch) -> absl::Status {
+        if (bytes > kBytes || batch.sequence > described_.last_sequence()) return full;
+        v1::SessionRecord::Batch& record = *records.emplace_back().mutable_batch();
+        record.set_sequence(batch.sequence);
+        *record.mutable_measurements() = batch.measurements;
+        bytes += batch.measurements.ByteSizeLong();
+        given_ = batch.sequence;
+        return absl::OkStatus();
+      });
+  if (!read.ok() && read != full) return read;
+  return records;
+}
+
+}  // namespace polyest

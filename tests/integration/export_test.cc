@@ -1,0 +1,123 @@
+#include <google/protobuf/util/message_differencer.h>
+
+#include "tests/integration/daemon_fixture.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ExportTest : public DaemonTest {
+ protected:
+  grpc::Status Export(const std::string& name, std::vector<v1::SessionRecord>& records) {
+    grpc::ClientContext context;
+    v1::ExportSessionRequest request;
+    request.set_name(name);
+    const auto reader = stub_->ExportSession(&context, request);
+    v1::SessionRecord record;
+    while (reader->Read(&record)) records.push_back(record);
+    return reader->Finish();
+  }
+  grpc::Status Import(const std::string& id, const std::vector<v1::SessionRecord>& records,
+                      v1::Session* session = nullptr) {
+    grpc::ClientContext context;
+    v1::Session imported;
+    const auto writer = stub_->ImportSession(&context, &imported);
+    v1::ImportSessionRequest request;
+    request.set_session_id(id);
+    for (const v1::SessionRecord& record : records) {
+      *request.mutable_record() = record;
+      if (!writer->Write(request)) break;
+    }
+    writer->WritesDone();
+    const grpc::Status status = writer->Finish();
+    if (session != nullptr) *session = imported;
+    return status;
+  }
+  v1::Estimate Estimate(const std::string& session) {
+    grpc::ClientContext context;
+    v1::GetEstimateRequest request;
+    request.set_session(session);
+    v1::EstimateResponse response;
+    const grpc::Status status = stub_->GetEstimate(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.estimate();
+  }
+  // A session of three batches, exported.
+  std::vector<v1::SessionRecord> Exported() {
+    EXPECT_TRUE(Create("rig").ok());
+    for (const int batch : {1, 2, 3}) {
+      EXPECT_TRUE(Add("sessions/rig", batch, OscillatorRows(10 * (batch - 1), 10 * batch)).ok());
+    }
+    std::vector<v1::SessionRecord> records;
+    const grpc::Status status = Export("sessions/rig", records);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return records;
+  }
+};
+
+TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
+  const auto records = Exported();
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_EQ(records[0].head().batches(), 3);
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(records[0].head().problem(),
+                                                                 Oscillator()));
+  EXPECT_EQ(records[3].batch().sequence(), 3);
+  v1::Session imported;
+  const grpc::Status status = Import("copy", records, &imported);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(imported.name(), "sessions/copy");
+  EXPECT_EQ(imported.last_sequence(), 3);
+  EXPECT_EQ(imported.samples(), 30);
+  EXPECT_EQ(WithoutSequence(Estimate("sessions/copy")), WithoutSequence(Estimate("sessions/rig")));
+  // It goes on as the first one would.
+  EXPECT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
+  EXPECT_TRUE(Add("sessions/copy", 2, OscillatorRows(10, 20)).ok());
+}
+
+TEST_F(ExportTest, GivesAnImportTheNameThatItHadUnlessThatIsTaken) {
+  const auto records = Exported();
+  EXPECT_EQ(Import("", records).error_code(), grpc::StatusCode::ALREADY_EXISTS);
+  ASSERT_TRUE(Delete("sessions/rig").ok());
+  EXPECT_TRUE(Import("", records).ok());
+  EXPECT_EQ(Estimate("sessions/rig").samples(), 30);
+}
+
+TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
+  const auto records = Exported();
+  struct Case {
+    std::string what;
+    std::vector<v1::SessionRecord> records;
+    std::string message;
+  };
+  v1::SessionRecord bad = records[2];
+  bad.mutable_batch()->mutable_measurements()->set_time(0, 0);
+  for (const Case& one : {
+           Case{"nothing", {}, "breaks off after batch 0 of 0"},
+           Case{"no head", {records[1]}, "the first must be a session's head"},
+           Case{"two heads", {records[0], records[0]}, "there is one already"},
+           Case{"a batch too few", {records[0], records[1], records[2]}, "after batch 2 of 3"},
+           Case{"a gap", {records[0], records[1], records[3]}, "3 must be 2"},
+           Case{"a batch too many",
+                {records[0], records[1], records[2], records[3], records[3]},
+                "3 must be 4, and the head promises 3 batches"},
+           Case{"a bad batch", {records[0], records[1], bad}, "measurements.time"},
+           Case{"an empty record", {v1::SessionRecord()}, "must be a head or a batch"},
+       }) {
+    const grpc::Status status = Import("copy", one.records);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << one.what;
+    EXPECT_THAT(status.error_message(), HasSubstr(one.message)) << one.what;
+    EXPECT_EQ(Delete("sessions/copy").error_code(), grpc::StatusCode::NOT_FOUND) << one.what;
+  }
+  EXPECT_TRUE(Import("copy", records).ok());
+}
+
+TEST_F(ExportTest, NamesASessionThatIsNotThere) {
+  std::vector<v1::SessionRecord> none;
+  EXPECT_EQ(Export("sessions/none", none).error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(Export("none", none).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_TRUE(none.empty());
+}
+
+}  // namespace
+}  // namespace polyest
