@@ -8,6 +8,7 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 bin="$root/build/release/bin"
 examples="$root/client/examples"
 daemon_pid=""
+data=""
 
 say() { echo "==> $*" >&2; }
 
@@ -22,6 +23,7 @@ stop_daemon() {
     done
     kill -KILL "$daemon_pid" 2>/dev/null || true
   fi
+  [[ -z "$data" ]] || rm -rf "$data"
   exit "$status"
 }
 
@@ -38,7 +40,8 @@ build() {
 start_daemon() {
   local line
   say "starting the daemon"
-  exec {daemon_output}< <(exec "$bin/polyestd" --listen 127.0.0.1:0)
+  data="$(mktemp --directory)"
+  exec {daemon_output}< <(exec "$bin/polyestd" --listen 127.0.0.1:0 --data-dir "$data")
   daemon_pid=$!
   while read -r -t 30 -u "$daemon_output" line; do
     if [[ "$line" =~ listening\ on\ ([^[:space:]]+:[0-9]+) ]]; then

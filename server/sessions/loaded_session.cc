@@ -15,9 +15,27 @@ namespace polyest {
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
                                                                    const ModelLibrary& models) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models));
-  POLYEST_ASSIGN_OR_RETURN(auto estimator, Estimator::Make(std::move(resolved)));
-  return std::unique_ptr<LoadedSession>(
-      new LoadedSession(std::move(problem), std::move(estimator)));
+  std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem)));
+  EstimatorOptions options;
+  options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {
+    if (session->save_) session->save_(std::move(snapshot));
+  };
+  POLYEST_ASSIGN_OR_RETURN(loaded->estimator_,
+                           Estimator::Make(std::move(resolved), std::move(options)));
+  return loaded;
+}
+
+void LoadedSession::SaveSnapshots(SessionJournal& journal, int64_t session) {
+  save_ = [this, &journal, session](EstimatorSnapshot snapshot) {
+    journal.SaveSnapshot(session, {place_.sequence, snapshot.rows, std::move(snapshot.state)});
+  };
+}
+
+// A snapshot only saves time: one that is of no use is not missed.
+void LoadedSession::Restore(const SessionJournal& journal, int64_t session) {
+  auto snapshot = journal.ReadSnapshot(session);
+  if (!snapshot.ok() || !snapshot->has_value()) return;
+  estimator_->Restore({(*snapshot)->rows, std::move((*snapshot)->state)}).IgnoreError();
 }
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const SessionJournal& journal,
@@ -32,12 +50,14 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
     return loaded->Append(batch.measurements);
   };
   POLYEST_RETURN_IF_ERROR(journal.ReadBatches(session, 0, append));
-  if (loaded->place_.sequence == place.sequence && loaded->place_.rows == place.rows) return loaded;
-  return absl::DataLossError("the last batches of the session are missing in the journal");
+  if (loaded->place_.sequence != place.sequence || loaded->place_.rows != place.rows) {
+    return absl::DataLossError("the last batches of the session are missing in the journal");
+  }
+  loaded->Restore(journal, session);
+  return loaded;
 }
 
-LoadedSession::LoadedSession(v1::Problem problem, std::unique_ptr<Estimator> estimator)
-    : problem_(std::move(problem)), estimator_(std::move(estimator)) {
+LoadedSession::LoadedSession(v1::Problem problem) : problem_(std::move(problem)) {
   for (const v1::MeasuredOutput& output : problem_.measured()) measured_.insert(output.output());
 }
 

@@ -25,12 +25,16 @@ class LoadedSession {
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
                                                              const ModelLibrary& models);
-  // As it was after the batches that the journal keeps. DATA_LOSS when they do not lead to `place`.
+  // As it was after the batches that the journal keeps, from its latest snapshot on if that is of
+  // use. DATA_LOSS when they do not lead to `place`.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
                                                              int64_t session,
                                                              const SessionPlace& place,
                                                              const ModelLibrary& models,
                                                              const Stop& stop);
+
+  // From here on the journal is given the estimator's snapshots of this session.
+  void SaveSnapshots(SessionJournal& journal, int64_t session);
 
   const v1::Problem& problem() const { return problem_; }
   // What the session has taken.
@@ -51,13 +55,15 @@ class LoadedSession {
       const v1::SweepRegularizationRequest& request, const Stop& stop);
 
  private:
-  LoadedSession(v1::Problem problem, std::unique_ptr<Estimator> estimator);
+  explicit LoadedSession(v1::Problem problem);
+  void Restore(const SessionJournal& journal, int64_t session);
   int64_t CountValues(const Samples& samples) const;
   void Advance(const Samples& samples);
 
   const v1::Problem problem_;
   std::set<std::string> measured_;
   std::unique_ptr<Estimator> estimator_;
+  std::function<void(EstimatorSnapshot)> save_;
   SessionPlace place_;
   double measured_s_ = 0;
   SharedEstimate latest_;

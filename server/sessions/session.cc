@@ -38,6 +38,7 @@ Session::Session(const SessionServices& services, SessionHead head,
       ledger_(head_.place),
       loaded_(std::move(loaded)) {
   activity_.set_loaded(loaded_ != nullptr);
+  if (loaded_ != nullptr) loaded_->SaveSnapshots(services.journal, number());
 }
 
 v1::Session Session::Describe() const {
@@ -122,6 +123,7 @@ absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
   // After a loss nothing is under way, and only this strand takes more.
   POLYEST_ASSIGN_OR_RETURN(loaded_, LoadedSession::Load(services_.journal, number(), ledger_.kept(),
                                                         services_.models, stop));
+  loaded_->SaveSnapshots(services_.journal, number());
   losses_ = losses;
   const std::lock_guard lock(mutex_);
   computed_s_ = 0;

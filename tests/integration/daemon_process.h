@@ -27,6 +27,7 @@ class DaemonProcess {
   // HOST:PORT out of its first line.
   std::string ReadAddress();
   void Signal(int number);
+  pid_t pid() const { return pid_; }
   // Its exit status, or −(signal) that ended it.
   int Wait();
   // Everything it wrote to stderr so far.

@@ -244,6 +244,35 @@ TEST_F(SessionTest, ForgetsWhatAFullDiskCouldNotKeepAndGoesOnAfterIt) {
   EXPECT_EQ((*session_->CurrentEstimate({}))->samples(), 2);
 }
 
+TEST_F(SessionTest, GoesOnFromASnapshotToTheSameBits) {
+  limits_ = {};
+  Restart();
+  v1::Measurements rows;
+  auto& x = *rows.add_channels();
+  x.set_name("x");
+  for (int row = 1; row <= 5'000; ++row) {
+    const double t = 0.01 * row;
+    rows.add_time(t);
+    x.add_values(std::sin(2 * M_PI * t) * std::exp(-0.1 * t) / (2 * M_PI) +
+                 0.01 * std::sin(12.9898 * row));
+  }
+  ASSERT_TRUE(Add(1, rows).ok());
+  const std::string before = (*session_->CurrentEstimate({}))->SerializeAsString();
+  const int64_t number = session_->number();
+  auto snapshot = *journal_.ReadSnapshot(number);
+  ASSERT_TRUE(snapshot.has_value());
+  EXPECT_EQ(snapshot->sequence, 1);
+  EXPECT_GT(snapshot->rows, 0);
+  EXPECT_LT(snapshot->rows, 5'000);
+  Restart();
+  EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
+  // One that cannot be read is not needed.
+  snapshot->state.resize(snapshot->state.size() / 2);
+  journal_.SaveSnapshot(number, *snapshot);
+  Restart();
+  EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
+}
+
 TEST_F(SessionTest, RefusesMoreRowsThanItMayHave) {
   EXPECT_EQ(Add(1, Batch({0.1, 0.2, 0.3, 0.4, 0.5})).status().message(),
             "measurements.time: 5 rows are more than a batch may have, 4 (--max-batch-rows)");

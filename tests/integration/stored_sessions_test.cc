@@ -1,0 +1,93 @@
+// A daemon that finds many sessions in its data folder.
+
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "server/journal/digest.h"
+#include "server/journal/sqlite_journal.h"
+#include "tests/integration/daemon_fixture.h"
+#include "tests/testing/test_folder.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kSessions = 10'000;
+constexpr int kWriters = 64;  // share their commits
+
+std::string Name(int session) { return "sessions/rig-" + std::to_string(session); }
+
+// Sessions of one batch each.
+void Store(const std::string& folder) {
+  auto journal = SqliteJournal::Open({.folder = folder});
+  ASSERT_TRUE(journal.ok()) << journal.status();
+  JournalEntry entry;
+  entry.measurements = DeterministicBytes(OscillatorRows(0, 20));
+  entry.digest = Digest(entry.measurements);
+  entry.place = {1, 20, 20, {0, 1.0}};
+  const auto write = [&](int writer) {
+    for (int session = writer; session < kSessions; session += kWriters) {
+      SessionHead head;
+      head.tenant = "default";
+      head.name = Name(session);
+      const auto number = (*journal)->Create(head, Oscillator(), /*hidden=*/false);
+      ASSERT_TRUE(number.ok()) << number.status();
+      JournalEntry own = entry;
+      own.session = *number;
+      (*journal)->Append(std::move(own),
+                         [](const absl::Status& kept) { EXPECT_TRUE(kept.ok()) << kept; });
+    }
+  };
+  std::vector<std::jthread> writers;
+  for (int writer = 0; writer < kWriters; ++writer) writers.emplace_back(write, writer);
+}
+
+int64_t ResidentMegabytes(pid_t process) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmRSS:")) return std::stoll(line.substr(6)) / 1024;
+  }
+  return -1;
+}
+
+TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
+  const TestFolder data;
+  Store(data.path());
+  DaemonProcess daemon({"--listen", "127.0.0.1:0", "--data-dir", data.path()});
+  const std::string address = daemon.ReadAddress();
+  ASSERT_FALSE(address.empty()) << daemon.Errors();
+  const auto stub = v1::EstimationService::NewStub(
+      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+
+  int listed = 0, loaded = 0;
+  v1::ListSessionsRequest list;
+  list.set_page_size(200);
+  do {
+    grpc::ClientContext context;
+    v1::ListSessionsResponse page;
+    ASSERT_TRUE(stub->ListSessions(&context, list, &page).ok());
+    for (const v1::Session& session : page.sessions()) {
+      ++listed;
+      loaded += session.activity().loaded() ? 1 : 0;
+      EXPECT_EQ(session.samples(), 20);
+    }
+    list.set_page_token(page.next_page_token());
+  } while (!list.page_token().empty());
+  EXPECT_EQ(listed, kSessions);
+  EXPECT_EQ(loaded, 0);
+  const int64_t resident = ResidentMegabytes(daemon.pid());
+  EXPECT_GT(resident, 0);
+  EXPECT_LT(resident, 1'024);
+
+  // Any of them comes back on use.
+  grpc::ClientContext context;
+  v1::GetEstimateRequest get;
+  get.set_session(Name(kSessions / 2));
+  v1::EstimateResponse estimate;
+  const grpc::Status status = stub->GetEstimate(&context, get, &estimate);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(estimate.estimate().samples(), 20);
+}
+
+}  // namespace
+}  // namespace polyest
