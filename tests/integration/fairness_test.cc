@@ -1,0 +1,65 @@
+// Long computations of some do not keep others waiting.
+
+#include <future>
+
+#include "tests/integration/daemon_fixture.h"
+
+namespace polyest {
+namespace {
+
+class OneThreadTest : public DaemonTest {
+ protected:
+  OneThreadTest() : DaemonTest({"--threads", "1"}) {}
+};
+
+// Order 8 in four unknowns is 495 terms and a thousand trajectories, over 20,000 rows.
+v1::EstimateRequest LongRequest() {
+  v1::EstimateRequest request;
+  *request.mutable_problem() = ProblemFromJson(R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "uncertain": [{"name": "k", "uniform": {"lower": 31.58, "upper": 47.37}},
+                  {"name": "c", "uniform": {"lower": 0.1, "upper": 0.3}},
+                  {"name": "x0", "uniform": {"lower": 0.5, "upper": 1.5}},
+                  {"name": "v0", "uniform": {"lower": -1, "upper": 1}}],
+    "fixed": {"m": 1},
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}],
+    "expansion": {"order": 8, "adaptive": false}
+  })");
+  *request.mutable_measurements() = OscillatorRows(0, 20'000);
+  return request;
+}
+
+TEST_F(OneThreadTest, StreamsWhileLongRequestsAreComputed) {
+  constexpr int kRequests = 3;
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::future<grpc::Status>> answers;
+  for (int i = 0; i < kRequests; ++i) {
+    grpc::ClientContext& context = *contexts.emplace_back(std::make_unique<grpc::ClientContext>());
+    answers.push_back(std::async(std::launch::async, [this, &context] {
+      v1::EstimateResponse response;
+      return stub_->Estimate(&context, LongRequest(), &response);
+    }));
+  }
+  ASSERT_TRUE(Create("rig").ok());
+  for (int batch = 1; batch <= 10; ++batch) {
+    ASSERT_TRUE(Add("sessions/rig", batch, OscillatorRows(5 * (batch - 1), 5 * batch)).ok());
+  }
+  ClientStream stream(*stub_);
+  ASSERT_TRUE(stream.Send("sessions/rig", 11, OscillatorRows(50, 55)));
+  stream.ExpectAcknowledgement(11);
+  v1::Estimate estimate;
+  stream.ExpectEstimate(estimate);
+  EXPECT_EQ(estimate.samples(), 55);
+  for (int i = 0; i < kRequests; ++i) {
+    EXPECT_EQ(answers[static_cast<size_t>(i)].wait_for(std::chrono::seconds(0)),
+              std::future_status::timeout)
+        << "the request was not long enough to show anything";
+    contexts[static_cast<size_t>(i)]->TryCancel();
+  }
+  for (auto& answer : answers) {
+    EXPECT_EQ(answer.get().error_code(), grpc::StatusCode::CANCELLED);
+  }
+}
+
+}  // namespace
+}  // namespace polyest
