@@ -36,6 +36,10 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
   AddLimit(app, "--max-sessions-per-tenant", limits.sessions_per_tenant, "Sessions of a tenant");
   AddLimit(app, "--max-batch-rows", limits.batch_rows, "Rows of a batch");
   AddLimit(app, "--max-session-rows", limits.rows, "Rows of a session");
+  app.add_option("--max-compute-s", daemon.most_computing_s,
+                 "Seconds that one request, or one batch of a stream, may be computed")
+      ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
+      ->capture_default_str();
 }
 
 // Where a service of the user's keeps its state; systemd gives a service of the system its own.

@@ -82,8 +82,8 @@ absl::Status Daemon::OpenSessions() {
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
-  service_ =
-      MakeEstimationService({executor_, *sessions_, calls_, *access_, stop_.get_token(), models_});
+  service_ = MakeEstimationService({executor_, *sessions_, calls_, *access_, stop_.get_token(),
+                                    models_, std::chrono::seconds(options_.most_computing_s)});
   return absl::OkStatus();
 }
 

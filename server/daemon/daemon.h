@@ -33,7 +33,8 @@ struct DaemonOptions {
   SessionLimits limits{};
   std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
   int most_message_mb = 64;
-  std::string fmu_dir{};  // of FMUs that problems may name; empty: none
+  int64_t most_computing_s = 3'600;  // of one call, or one batch of a stream
+  std::string fmu_dir{};             // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
   std::string token_file{};  // empty: no tokens are asked for
   TlsFiles tls{};            // without a certificate: no TLS

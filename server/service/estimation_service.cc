@@ -144,7 +144,7 @@ EstimationService::Unary* EstimationService::ForCaller(Context* context, Method 
   const auto caller = context_.access.Authorize(*context, method);
   if (!caller.ok()) return FinishAtOnce(context, caller.status());
   return UnaryCall::Start(
-      context_.calls, context,
+      context_, context,
       [&](Task task) {
         return context_.executor.Submit(absl::StrCat(caller->tenant, "/calls"), std::move(task));
       },
@@ -164,7 +164,7 @@ EstimationService::Unary* EstimationService::OnStrand(Context* context, Method m
   auto found = FindSession(context_.sessions, caller->tenant, field, session);
   if (!found.ok()) return FinishAtOnce(context, found.status());
   return UnaryCall::Start(
-      context_.calls, context,
+      context_, context,
       [found = *found](Task task) { return found->strand().Submit(std::move(task)); },
       [found = *found, work = std::move(work)](const Stop& stop,
                                                UnaryCall::Finisher finish) -> absl::Status {

@@ -7,14 +7,15 @@
 
 #include "core/common/status.h"
 #include "server/operations/names.h"
-#include "server/service/call_stop.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest {
 
 MeasurementFlow::MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call)
-    : context_(context), call_(call), stop_(CallStop(call, stop_source_.get_token())) {}
+    : context_(context),
+      call_(call),
+      stop_(call, stop_source_.get_token(), context.most_computing) {}
 
 absl::StatusOr<Caller> MeasurementFlow::Authorize() const {
   POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "StreamMeasurements"));
@@ -170,7 +171,9 @@ void MeasurementFlow::Work() {
     }
     const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
     lock.unlock();
-    const absl::Status answered = Guarded([&] { return last ? AnswerLast() : Answer(request); });
+    const Stop stop = stop_.Begin();
+    const absl::Status answered =
+        stop_.Name(Guarded([&] { return last ? AnswerLast(stop) : Answer(request, stop); }));
     lock.lock();
     if (!answered.ok()) End(answered);
     if (last) End(at_end);
@@ -180,7 +183,8 @@ void MeasurementFlow::Work() {
   Advance();
 }
 
-absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& request) {
+absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& request,
+                                     const Stop& stop) {
   if (request.has_estimates()) POLYEST_RETURN_IF_ERROR(schedule_.Set(request.estimates()));
   if (!request.has_measurements()) {
     if (request.sequence() == 0) return absl::OkStatus();
@@ -189,19 +193,19 @@ absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& reques
   }
   v1::StreamMeasurementsResponse response;
   POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
-                           session_->Add(request.sequence(), request.measurements(), stop_));
+                           session_->Add(request.sequence(), request.measurements(), stop));
   Send(std::move(response), request.sequence());
-  POLYEST_RETURN_IF_ERROR(session_->Process(stop_));
-  if (schedule_.Due(EstimateSchedule::Clock::now())) return SendEstimate();
+  POLYEST_RETURN_IF_ERROR(session_->Process(stop));
+  if (schedule_.Due(EstimateSchedule::Clock::now())) return SendEstimate(stop);
   return absl::OkStatus();
 }
 
-absl::Status MeasurementFlow::AnswerLast() {
-  return session_->taken().samples > 0 ? SendEstimate() : absl::OkStatus();
+absl::Status MeasurementFlow::AnswerLast(const Stop& stop) {
+  return session_->taken().samples > 0 ? SendEstimate(stop) : absl::OkStatus();
 }
 
-absl::Status MeasurementFlow::SendEstimate() {
-  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->CurrentEstimate(stop_));
+absl::Status MeasurementFlow::SendEstimate(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->CurrentEstimate(stop));
   v1::StreamMeasurementsResponse response;
   *response.mutable_estimate() = *estimate;
   Send(std::move(response), estimate->sequence());

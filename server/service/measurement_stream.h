@@ -16,6 +16,7 @@
 #include <stop_token>
 
 #include "polyest/v1/estimation_service.pb.h"
+#include "server/service/call_stop.h"
 #include "server/service/estimate_schedule.h"
 #include "server/service/service_context.h"
 
@@ -66,9 +67,9 @@ class MeasurementFlow final : public SessionObserver,
   // On the strand, without the mutex.
   void Work();
   // One message; the answers go to the outbox.
-  absl::Status Answer(const v1::StreamMeasurementsRequest& request);
-  absl::Status AnswerLast();
-  absl::Status SendEstimate();
+  absl::Status Answer(const v1::StreamMeasurementsRequest& request, const Stop& stop);
+  absl::Status AnswerLast(const Stop& stop);
+  absl::Status SendEstimate(const Stop& stop);
   // Once everything up to batch `sequence` is kept.
   void Send(v1::StreamMeasurementsResponse response, int64_t sequence);
   void OnKept(int64_t sequence, const absl::Status& kept);
@@ -76,7 +77,7 @@ class MeasurementFlow final : public SessionObserver,
   ServiceContext& context_;
   grpc::CallbackServerContext& call_;  // until OnDone
   std::stop_source stop_source_;
-  const Stop stop_;
+  const CallStop stop_;
   EstimateSchedule schedule_;  // the strand's
 
   std::mutex mutex_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <stop_token>
 
 #include "core/fmu/model_library.h"
@@ -19,6 +20,8 @@ struct ServiceContext {
   // Asked for when the drain's time is over: ends work that no call waits for.
   std::stop_token stop;
   const ModelLibrary& models;
+  // Of one unary call, or of one batch of a stream.
+  std::chrono::seconds most_computing;
 };
 
 }  // namespace polyest

@@ -6,14 +6,15 @@
 
 #include "core/common/status.h"
 #include "server/operations/names.h"
-#include "server/service/call_stop.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest {
 
 WatchFlow::WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call)
-    : context_(context), call_(call), stop_(CallStop(call, stop_source_.get_token())) {}
+    : context_(context),
+      call_(call),
+      stop_(call, stop_source_.get_token(), context.most_computing) {}
 
 absl::StatusOr<Caller> WatchFlow::Authorize() const {
   POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "WatchSession"));
@@ -45,7 +46,7 @@ absl::Status WatchFlow::Attach(const std::string& session) {
 
 void WatchFlow::Register() {
   const absl::Status observing =
-      Guarded([this] { return session_->Observe(shared_from_this(), stop_); });
+      stop_.Name(Guarded([this] { return session_->Observe(shared_from_this(), stop_.Begin()); }));
   std::lock_guard lock(mutex_);
   registering_ = false;
   if (!observing.ok()) End(observing);

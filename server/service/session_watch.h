@@ -12,6 +12,7 @@
 #include <stop_token>
 
 #include "polyest/v1/estimation_service.pb.h"
+#include "server/service/call_stop.h"
 #include "server/service/service_context.h"
 
 namespace polyest {
@@ -49,7 +50,7 @@ class WatchFlow final : public SessionObserver,
   ServiceContext& context_;
   grpc::CallbackServerContext& call_;  // until OnDone
   std::stop_source stop_source_;
-  const Stop stop_;
+  const CallStop stop_;
 
   std::mutex mutex_;
   WatchReactor* reactor_ = nullptr;

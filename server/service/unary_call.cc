@@ -7,19 +7,24 @@
 
 namespace polyest {
 
-grpc::ServerUnaryReactor* UnaryCall::Start(OpenCalls& calls, grpc::CallbackServerContext* context,
+grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service,
+                                           grpc::CallbackServerContext* context,
                                            const Submit& submit, Work work) {
-  auto ticket = calls.Enter(OpenCalls::Kind::kUnary);
+  auto ticket = service.calls.Enter(OpenCalls::Kind::kUnary);
   if (!ticket.ok()) return FinishAtOnce(context, ticket.status());
   auto* call = new UnaryCall;
   call->ticket_ = *std::move(ticket);
   call->state_->reactor = call;
-  auto run = [state = call->state_, stop = CallStop(*context, call->state_->stop.get_token()),
-              work = std::move(work)] {
+  auto run = [state = call->state_, work = std::move(work),
+              call_stop =
+                  CallStop(*context, call->state_->stop.get_token(), service.most_computing)] {
+    const Stop stop = call_stop.Begin();
+    const auto finish = [state, call_stop](const absl::Status& outcome) {
+      Finish(*state, call_stop.Name(outcome));
+    };
     absl::Status status = stop.Check();
-    const auto finish = [state](const absl::Status& outcome) { Finish(*state, outcome); };
     if (status.ok()) status = Guarded([&] { return work(stop, finish); });
-    if (!status.ok()) Finish(*state, status);
+    if (!status.ok()) finish(status);
   };
   const absl::Status accepted = submit(std::move(run));
   if (!accepted.ok()) Finish(*call->state_, accepted);

@@ -14,6 +14,7 @@
 #include "core/common/stop.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
+#include "server/service/service_context.h"
 
 namespace polyest {
 
@@ -27,8 +28,9 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
 
-  static grpc::ServerUnaryReactor* Start(OpenCalls& calls, grpc::CallbackServerContext* context,
-                                         const Submit& submit, Work work);
+  static grpc::ServerUnaryReactor* Start(const ServiceContext& service,
+                                         grpc::CallbackServerContext* context, const Submit& submit,
+                                         Work work);
 
   void OnCancel() override;
   void OnDone() override;

@@ -76,7 +76,8 @@ std::optional<std::string> AboutTheRig(const std::string& method) {
                                 ->FindServiceByName("EstimationService")
                                 ->FindMethodByName(method)
                                 ->input_type();
-  const bool by_name = method == "GetSession" || method == "DeleteSession";
+  const bool by_name =
+      method == "GetSession" || method == "DeleteSession" || method == "ExportSession";
   const auto* const field = descriptor.FindFieldByName(by_name ? "name" : "session");
   if (field == nullptr || field->type() != google::protobuf::FieldDescriptor::TYPE_STRING) {
     return std::nullopt;

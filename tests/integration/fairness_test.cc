@@ -61,5 +61,24 @@ TEST_F(OneThreadTest, StreamsWhileLongRequestsAreComputed) {
   }
 }
 
+class OneSecondTest : public DaemonTest {
+ protected:
+  OneSecondTest() : DaemonTest({"--max-compute-s", "1"}) {}
+};
+
+TEST_F(OneSecondTest, EndsARequestThatIsComputedForLonger) {
+  grpc::ClientContext context;
+  v1::EstimateResponse response;
+  const grpc::Status status = stub_->Estimate(&context, LongRequest(), &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(status.error_message(),
+            "the request was computed for 1 s, the longest that one may be (--max-compute-s)");
+  // The caller's own deadline is another matter.
+  grpc::ClientContext hurried;
+  hurried.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(100));
+  EXPECT_EQ(stub_->Estimate(&hurried, LongRequest(), &response).error_code(),
+            grpc::StatusCode::DEADLINE_EXCEEDED);
+}
+
 }  // namespace
 }  // namespace polyest

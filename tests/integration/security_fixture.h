@@ -67,8 +67,7 @@ inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const
 }
 
 // Methods of the contract that no daemon serves yet.
-inline const std::vector<std::string> kNotServedYet = {"ExportSession", "ImportSession",
-                                                       "GetStatus"};
+inline const std::vector<std::string> kNotServedYet = {"GetStatus"};
 
 // The names of all other methods of the service, out of the contract.
 inline std::vector<std::string> AllMethods() {
