@@ -10,7 +10,7 @@ packages=(
   build-essential cmake ninja-build ccache pkg-config
   libeigen3-dev libsundials-dev libnlopt-dev libnlopt-cxx-dev libabsl-dev libcereal-dev zlib1g-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libspdlog-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
+  libspdlog-dev prometheus-cpp-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "server/daemon/configuration.h"
 #include "server/security/exposure.h"
 #include "server/security/token_table.h"
 
@@ -40,6 +41,42 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
                  "Seconds that one request, or one batch of a stream, may be computed")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
       ->capture_default_str();
+}
+
+void AddOperations(CLI::App& app, CommandLine& command_line, std::string& metrics) {
+  app.add_option("--metrics", metrics,
+                 "HOST:PORT at which Prometheus may scrape /metrics, HOST an address or localhost; "
+                 "port 0 picks a free one. Plain HTTP without authentication: beyond loopback only "
+                 "with --insecure. By default nowhere");
+  app.add_option("--log-level", command_line.log_level, "How much is logged, on stderr")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
+      ->capture_default_str();
+  app.add_option("--log-format", command_line.log_format,
+                 "text, or json: one object a line, with the fields beside the message")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  app.add_option_function<int>(
+         "--drain-timeout-s",
+         [&](int seconds) { command_line.daemon.drain_timeout = std::chrono::seconds(seconds); },
+         "How long open calls may take to end after SIGTERM or SIGINT, s")
+      ->check(CLI::Range(0, 3600))
+      ->default_str(std::to_string(command_line.daemon.drain_timeout.count()));
+  app.footer(
+      app.get_footer() +
+      "\n\nEvery option may be set by its flag, by an environment variable (POLYESTD_DATA_DIR for "
+      "--data-dir), or in the file of --config; the first of these that says something holds.");
+}
+
+// Numeric, as the endpoint takes it.
+absl::StatusOr<ListenAddress> MetricsAddress(const std::string& text, bool insecure) {
+  auto address = ListenAddress::Parse(text, "--metrics");
+  if (!address.ok()) return address;
+  if (!insecure && !IsLoopback(address->host)) {
+    return absl::FailedPreconditionError("--metrics: " + address->host +
+                                         " is beyond loopback, where plain HTTP needs --insecure");
+  }
+  if (address->host == "localhost") address->host = "127.0.0.1";
+  return address;
 }
 
 // Where a service of the user's keeps its state; systemd gives a service of the system its own.
@@ -126,19 +163,19 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   app.add_option("--max-message-mb", daemon.most_message_mb, "Largest message taken, MiB")
       ->check(CLI::Range(1, 2047))
       ->capture_default_str();
-  app.add_option("--log-level", command_line.log_level, "How much is logged, on stderr")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
-      ->capture_default_str();
   bool insecure = false;
   std::string new_token;
   AddSecurity(app, daemon, insecure, new_token);
+  std::string metrics;
+  AddOperations(app, command_line, metrics);
   app.set_version_flag("--version", "polyestd " POLYEST_VERSION);
+  AddConfiguration(app, {"--new-token"});
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
     return Done(app.exit(success));
   } catch (const CLI::ParseError& error) {
-    return Refuse(error.what());
+    return Refuse(DescribeError(app, error, argc, argv));
   }
   if (!new_token.empty()) return PrintNewToken(new_token);
   if (durability == "memory") {
@@ -154,6 +191,11 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   daemon.listen = *std::move(address);
   const absl::Status exposure = CheckListening(daemon, insecure);
   if (!exposure.ok()) return Refuse(std::string(exposure.message()));
+  if (!metrics.empty()) {
+    auto metrics_address = MetricsAddress(metrics, insecure);
+    if (!metrics_address.ok()) return Refuse(std::string(metrics_address.status().message()));
+    daemon.metrics = *std::move(metrics_address);
+  }
   return command_line;
 }
 

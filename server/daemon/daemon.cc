@@ -16,6 +16,8 @@
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
 #include "server/service/estimation_service.h"
+#include "server/telemetry/call_interceptor.h"
+#include "server/telemetry/process_info.h"
 
 namespace polyest {
 namespace {
@@ -51,11 +53,6 @@ google::protobuf::Timestamp Now() {
   return now;
 }
 
-absl::StatusOr<std::unique_ptr<SessionJournal>> OpenJournal(const DaemonOptions& options) {
-  if (options.data_dir.empty()) return std::make_unique<MemoryJournal>();
-  return SqliteJournal::Open({.folder = options.data_dir, .most_mb = options.most_disk_mb});
-}
-
 void SetKeepalive(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
@@ -66,19 +63,34 @@ void SetKeepalive(grpc::ServerBuilder& builder) {
 
 }  // namespace
 
-Daemon::Daemon(const DaemonOptions& options, ModelLibrary models,
-               std::unique_ptr<SessionJournal> journal)
+Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
     : options_(options),
       address_(options.listen),
       models_(std::move(models)),
-      journal_(std::move(journal)),
+      metrics_(Version()),
+      readiness_([this] { return journal_->CheckWritable(); }),
       executor_({.threads_per_lane = Threads(options.threads),
                  .threads = kBusyLanes * Threads(options.threads),
                  .capacity = kWaitingTasks,
                  .capacity_per_lane = kWaitingTasks / 2}) {}
 
+absl::Status Daemon::OpenJournal() {
+  if (options_.data_dir.empty()) {
+    journal_ = std::make_unique<MemoryJournal>();
+    return absl::OkStatus();
+  }
+  SqliteJournalOptions journal{.folder = options_.data_dir, .most_mb = options_.most_disk_mb};
+  journal.on_commit = [this](const CommitReport& commit) {
+    metrics_.Count(Metrics::Commit{static_cast<int64_t>(commit.writes), !commit.outcome.ok(),
+                                   commit.duration.count()});
+    readiness_.OnCommit(commit.outcome.ok());
+  };
+  POLYEST_ASSIGN_OR_RETURN(journal_, SqliteJournal::Open(journal));
+  return absl::OkStatus();
+}
+
 absl::Status Daemon::OpenSessions() {
-  const SessionServices services{executor_, *journal_, models_, options_.limits};
+  const SessionServices services{executor_, *journal_, models_, options_.limits, &metrics_};
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
@@ -97,10 +109,11 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
     }
     models = ModelLibrary(*std::move(fmus));
   }
-  POLYEST_ASSIGN_OR_RETURN(auto journal, OpenJournal(options));
-  std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models), std::move(journal)));
+  std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models)));
+  POLYEST_RETURN_IF_ERROR(daemon->OpenJournal());
   POLYEST_RETURN_IF_ERROR(daemon->Secure());
   POLYEST_RETURN_IF_ERROR(daemon->OpenSessions());
+  POLYEST_RETURN_IF_ERROR(daemon->TellMetrics());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
 }
@@ -149,6 +162,10 @@ absl::Status Daemon::Listen() {
   builder.SetMaxReceiveMessageSize(options_.most_message_mb * 1024 * 1024);
   SetKeepalive(builder);
   builder.RegisterService(service_.get());
+  ObserveCalls(builder, metrics_, [this](const grpc::ServerContextBase& call) {
+    const auto caller = access_->Authorize(call, "GetStatus");
+    return caller.ok() ? caller->tenant : "";
+  });
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) {
     return absl::UnavailableError(absl::StrFormat(
@@ -157,11 +174,25 @@ absl::Status Daemon::Listen() {
   }
   server_->GetHealthCheckService()->SetServingStatus(v1::EstimationService::service_full_name(),
                                                      true);
+  readiness_.Start(server_->GetHealthCheckService());
+  return absl::OkStatus();
+}
+
+absl::Status Daemon::TellMetrics() {
+  if (!options_.metrics) return absl::OkStatus();
+  const auto gauges = std::make_shared<DaemonGauges>(*sessions_, executor_, calls_,
+                                                     options_.data_dir, readiness_.ready());
+  POLYEST_ASSIGN_OR_RETURN(
+      metrics_endpoint_,
+      MetricsEndpoint::Start(options_.metrics->ToString(), {metrics_.collectable(), gauges}));
+  metrics_address_ = options_.metrics;
+  metrics_address_->port = metrics_endpoint_->port();
   return absl::OkStatus();
 }
 
 void Daemon::Stop() {
   if (server_ == nullptr) return;
+  readiness_.Drain();
   server_->GetHealthCheckService()->SetServingStatus(false);
   calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
   stop_.request_stop();
@@ -172,6 +203,7 @@ void Daemon::Stop() {
 
 Daemon::~Daemon() {
   Stop();
+  metrics_endpoint_ = nullptr;
   housekeeper_ = nullptr;
 }
 

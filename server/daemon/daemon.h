@@ -9,11 +9,14 @@
 #include <chrono>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 
 #include "core/fmu/model_library.h"
+#include "server/daemon/daemon_gauges.h"
 #include "server/daemon/listen_address.h"
+#include "server/daemon/readiness.h"
 #include "server/execution/executor.h"
 #include "server/security/access_control.h"
 #include "server/security/file_watch.h"
@@ -21,6 +24,8 @@
 #include "server/service/open_calls.h"
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
+#include "server/telemetry/metrics.h"
+#include "server/telemetry/metrics_endpoint.h"
 
 namespace polyest {
 
@@ -36,8 +41,9 @@ struct DaemonOptions {
   int64_t most_computing_s = 3'600;  // of one call, or one batch of a stream
   std::string fmu_dir{};             // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
-  std::string token_file{};  // empty: no tokens are asked for
-  TlsFiles tls{};            // without a certificate: no TLS
+  std::string token_file{};                // empty: no tokens are asked for
+  TlsFiles tls{};                          // without a certificate: no TLS
+  std::optional<ListenAddress> metrics{};  // where they are told; none: nowhere
 };
 
 class Daemon {
@@ -51,6 +57,8 @@ class Daemon {
 
   // Where it listens, with the port chosen.
   const ListenAddress& address() const { return address_; }
+  // Where its metrics are, if anywhere, with the port chosen.
+  const std::optional<ListenAddress>& metrics_address() const { return metrics_address_; }
 
   // Reads the tokens and the certificates again, as happens by itself when their files change. What
   // cannot be used is logged, and the old ones stay.
@@ -61,11 +69,12 @@ class Daemon {
   void Stop();
 
  private:
-  Daemon(const DaemonOptions& options, ModelLibrary models,
-         std::unique_ptr<SessionJournal> journal);
+  Daemon(const DaemonOptions& options, ModelLibrary models);
+  absl::Status OpenJournal();
   absl::Status OpenSessions();
   absl::Status Secure();
   absl::Status Listen();
+  absl::Status TellMetrics();
 
   const DaemonOptions options_;
   ListenAddress address_;
@@ -75,6 +84,8 @@ class Daemon {
   std::unique_ptr<ServerTls> tls_;  // null without
   std::stop_source stop_;
   OpenCalls calls_;
+  Metrics metrics_;
+  Readiness readiness_;
   // In the order in which they need each other: the executor finishes its tasks, which use the
   // journal, before the journal goes.
   std::unique_ptr<SessionJournal> journal_;
@@ -84,6 +95,8 @@ class Daemon {
   std::unique_ptr<grpc::Service> service_;
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<FileWatch> watch_;  // null without files to watch
+  std::optional<ListenAddress> metrics_address_;
+  std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };
 
 }  // namespace polyest

@@ -29,7 +29,8 @@ bool IsPort(const std::string& port) {
 
 }  // namespace
 
-absl::StatusOr<ListenAddress> ListenAddress::Parse(const std::string& text) {
+absl::StatusOr<ListenAddress> ListenAddress::Parse(const std::string& text,
+                                                   const std::string& flag) {
   const size_t colon = text.rfind(':');
   if (colon != std::string::npos) {
     const std::string port = text.substr(colon + 1);
@@ -40,9 +41,9 @@ absl::StatusOr<ListenAddress> ListenAddress::Parse(const std::string& text) {
     }
   }
   return absl::InvalidArgumentError(absl::StrFormat(
-      "--listen: \"%s\" must be HOST:PORT with a port from 0 to %d, as in 127.0.0.1:50051 or "
+      "%s: \"%s\" must be HOST:PORT with a port from 0 to %d, as in 127.0.0.1:50051 or "
       "[::1]:50051",
-      text, kLargestPort));
+      flag, text, kLargestPort));
 }
 
 std::string ListenAddress::ToString() const { return absl::StrCat(host, ":", port); }

@@ -11,8 +11,9 @@ struct ListenAddress {
   std::string host;  // with its brackets
   int port = 0;      // 0: any free one
 
-  // INVALID_ARGUMENT for anything else.
-  static absl::StatusOr<ListenAddress> Parse(const std::string& text);
+  // INVALID_ARGUMENT for anything else; `flag` is where it was given.
+  static absl::StatusOr<ListenAddress> Parse(const std::string& text,
+                                             const std::string& flag = "--listen");
   std::string ToString() const;
 };
 

@@ -2,7 +2,6 @@
 
 #include <grpc/support/log.h>
 #include <signal.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
@@ -10,15 +9,17 @@
 
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
+#include "server/telemetry/structured_log.h"
 
 namespace {
 
 // gRPC's own messages are for debugging; what matters of them comes back as a status.
 void LogOfGrpc(gpr_log_func_args* arguments) { spdlog::debug("grpc: {}", arguments->message); }
 
-void StartLog(const std::string& level) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("polyestd"));
-  spdlog::set_level(spdlog::level::from_str(level));
+void StartLog(const polyest::CommandLine& command_line) {
+  polyest::StartLog(
+      command_line.log_format == "json" ? polyest::LogFormat::kJson : polyest::LogFormat::kText,
+      spdlog::level::from_str(command_line.log_level));
   gpr_set_log_function(LogOfGrpc);
 }
 
@@ -42,7 +43,7 @@ int main(int argc, char** argv) {
   const sigset_t signals = BlockSignals();
   // gRPC's traces show the headers of calls, and so the tokens.
   if (!command_line.daemon.token_file.empty()) unsetenv("GRPC_TRACE");
-  StartLog(command_line.log_level);
+  StartLog(command_line);
 
   auto daemon = polyest::Daemon::Start(command_line.daemon);
   if (!daemon.ok()) {
@@ -50,6 +51,9 @@ int main(int argc, char** argv) {
     return 1;
   }
   std::printf("listening on %s\n", (*daemon)->address().ToString().c_str());
+  if (const auto& metrics = (*daemon)->metrics_address()) {
+    std::printf("metrics on %s\n", metrics->ToString().c_str());
+  }
   std::fflush(stdout);
 
   int signal_number = 0;

@@ -37,6 +37,13 @@ int Executor::accepted() const {
   return accepted_;
 }
 
+int Executor::waiting() const {
+  const std::lock_guard lock(mutex_);
+  int waiting = accepted_;
+  for (const auto& [name, lane] : lanes_) waiting -= lane.running;
+  return waiting;
+}
+
 absl::Status Executor::Reserve(const std::string& lane) {
   const std::lock_guard lock(mutex_);
   const auto found = lanes_.find(lane);

@@ -41,6 +41,8 @@ class Executor {
   absl::Status Submit(const std::string& lane, Task task);
   // Tasks that wait or run.
   int accepted() const;
+  // Of these, those that wait.
+  int waiting() const;
 
  private:
   friend class Strand;

@@ -18,8 +18,10 @@ bool ConcernsOnlyItself(const absl::Status& status) {
 
 }  // namespace
 
-CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database)
-    : database_(std::move(database)), thread_([this] { Serve(); }) {}
+CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit)
+    : database_(std::move(database)),
+      on_commit_(std::move(on_commit)),
+      thread_([this] { Serve(); }) {}
 
 CommitQueue::~CommitQueue() {
   const std::lock_guard lock(mutex_);
@@ -57,9 +59,13 @@ std::vector<CommitQueue::Item> CommitQueue::Take() {
 }
 
 void CommitQueue::Commit(std::vector<Item> items) {
+  const auto begin = std::chrono::steady_clock::now();
   std::vector<absl::Status> outcomes(items.size());
   const absl::Status committed = WriteAll(items, outcomes);
   if (!committed.ok()) database_->Execute("ROLLBACK").IgnoreError();
+  if (on_commit_) {
+    on_commit_({items.size(), std::chrono::steady_clock::now() - begin, committed});
+  }
   for (size_t i = 0; i < items.size(); ++i) {
     items[i].done(committed.ok() ? outcomes[i] : committed);
   }

@@ -5,6 +5,7 @@
 
 #include <absl/status/status.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -17,6 +18,12 @@
 
 namespace polyest {
 
+struct CommitReport {
+  size_t writes = 0;
+  std::chrono::duration<double> duration{0};
+  absl::Status outcome;
+};
+
 class CommitQueue {
  public:
   // NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that it has changed nothing and others
@@ -25,7 +32,10 @@ class CommitQueue {
   // Once, from the writing thread: OK when it is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database);
+  // After each commit, before those who wait for it hear of it; must not wait.
+  using OnCommit = std::function<void(const CommitReport&)>;
+
+  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {});
   // Writes what was submitted.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
@@ -48,6 +58,7 @@ class CommitQueue {
   absl::Status WriteAll(const std::vector<Item>& items, std::vector<absl::Status>& outcomes);
 
   std::unique_ptr<SqliteDatabase> database_;
+  const OnCommit on_commit_;
   std::mutex mutex_;
   std::condition_variable submitted_;
   std::deque<Item> queue_;

@@ -72,6 +72,8 @@ class SessionJournal {
 
   // Whether what is here outlives the process.
   virtual bool durable() const = 0;
+  // Tries to keep something, and forgets it again. Waits.
+  virtual absl::Status CheckWritable() { return absl::OkStatus(); }
 
   // All sessions, in the order of tenants and names. Those that are hidden are not among them.
   virtual absl::StatusOr<std::vector<SessionHead>> Heads() const = 0;

@@ -153,12 +153,14 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
   return std::unique_ptr<SqliteJournal>(new SqliteJournal(
-      std::move(file), std::move(lock), *std::move(writer), *std::move(maintainer)));
+      std::move(file), std::move(lock), *std::move(writer), *std::move(maintainer),
+      options.on_commit));
 }
 
 SqliteJournal::SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
                              std::unique_ptr<SqliteDatabase> writer,
-                             std::unique_ptr<SqliteDatabase> maintainer)
+                             std::unique_ptr<SqliteDatabase> maintainer,
+                             CommitQueue::OnCommit on_commit)
     : file_(std::move(file)), lock_(std::move(lock)), maintainer_(std::move(maintainer)) {
   // In place of SQLite's own checkpoint, which would delay the commit that it follows.
   sqlite3_wal_hook(
@@ -170,7 +172,7 @@ SqliteJournal::SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
         return SQLITE_OK;
       },
       this);
-  queue_ = std::make_unique<CommitQueue>(std::move(writer));
+  queue_ = std::make_unique<CommitQueue>(std::move(writer), std::move(on_commit));
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 
@@ -178,6 +180,15 @@ SqliteJournal::~SqliteJournal() {
   maintenance_thread_.request_stop();
   maintenance_thread_.join();
   queue_ = nullptr;
+}
+
+absl::Status SqliteJournal::CheckWritable() {
+  // As large as a batch may well be, for a disk that is full still takes a little.
+  return queue_->Run([](SqliteDatabase& database) {
+    return database.Execute(
+        "CREATE TABLE room (bytes BLOB); INSERT INTO room VALUES (zeroblob(65536)); "
+        "DROP TABLE room");
+  });
 }
 
 absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {

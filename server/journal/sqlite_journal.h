@@ -20,6 +20,7 @@ struct SqliteJournalOptions {
   std::string folder;
   // Largest size of that file, MiB; 0: as large as the disk. Past it: RESOURCE_EXHAUSTED.
   int64_t most_mb = 0;
+  CommitQueue::OnCommit on_commit{};
 };
 
 class SqliteJournal final : public SessionJournal {
@@ -31,6 +32,7 @@ class SqliteJournal final : public SessionJournal {
   ~SqliteJournal() override;
 
   bool durable() const override { return true; }
+  absl::Status CheckWritable() override;
   absl::StatusOr<std::vector<SessionHead>> Heads() const override;
   absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
                                  bool hidden) override;
@@ -52,7 +54,8 @@ class SqliteJournal final : public SessionJournal {
   class FolderLock;
 
   SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
-                std::unique_ptr<SqliteDatabase> writer, std::unique_ptr<SqliteDatabase> maintainer);
+                std::unique_ptr<SqliteDatabase> writer, std::unique_ptr<SqliteDatabase> maintainer,
+                CommitQueue::OnCommit on_commit);
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();

@@ -9,6 +9,7 @@
 #include "server/operations/names.h"
 #include "server/operations/operations.h"
 #include "server/operations/pages.h"
+#include "server/service/daemon_status.h"
 #include "server/service/export_call.h"
 #include "server/service/guarded.h"
 #include "server/service/import_call.h"
@@ -88,6 +89,8 @@ class EstimationService final : public v1::EstimationService::CallbackService {
                       v1::ListSessionsResponse* response) override;
   Unary* DeleteSession(Context* context, const v1::DeleteSessionRequest* request,
                        google::protobuf::Empty* response) override;
+  Unary* GetStatus(Context* context, const v1::GetStatusRequest* request,
+                   v1::DaemonStatus* response) override;
 
   grpc::ServerWriteReactor<v1::SessionRecord>* ExportSession(
       Context* context, const v1::ExportSessionRequest* request) override {
@@ -276,6 +279,15 @@ EstimationService::Unary* EstimationService::DeleteSession(Context* context,
         POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
         return context_.sessions.Delete(caller.tenant, request->name());
       });
+}
+
+EstimationService::Unary* EstimationService::GetStatus(Context* context,
+                                                       const v1::GetStatusRequest*,
+                                                       v1::DaemonStatus* response) {
+  return ForCaller(context, "GetStatus", [=, this](const Caller& caller, const Stop&) {
+    *response = DescribeDaemon(context_, caller.tenant);
+    return absl::OkStatus();
+  });
 }
 
 EstimationService::Unary* EstimationService::AddMeasurements(

@@ -34,6 +34,11 @@ void OpenCalls::Leave(Kind kind) {
   left_.notify_all();
 }
 
+int OpenCalls::Count(Kind kind) const {
+  const std::lock_guard lock(mutex_);
+  return open_[static_cast<int>(kind)];
+}
+
 void OpenCalls::DrainKind(Kind kind) {
   std::vector<std::weak_ptr<Drainable>> streams;
   {

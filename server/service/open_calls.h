@@ -44,6 +44,8 @@ class OpenCalls {
   // until the deadline.
   void Drain(std::chrono::steady_clock::time_point deadline);
 
+  int Count(Kind kind) const;
+
   static constexpr int kMostStreams = 10'000;
 
  private:
@@ -53,7 +55,7 @@ class OpenCalls {
   void DrainKind(Kind kind);
   int& open(Kind kind) { return open_[static_cast<int>(kind)]; }
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable left_;
   bool draining_ = false;
   int open_[kKinds] = {};

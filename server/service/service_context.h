@@ -22,6 +22,7 @@ struct ServiceContext {
   const ModelLibrary& models;
   // Of one unary call, or of one batch of a stream.
   std::chrono::seconds most_computing;
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
 
 }  // namespace polyest

@@ -8,6 +8,8 @@
 
 #include "core/common/status.h"
 #include "server/journal/digest.h"
+#include "server/telemetry/metrics.h"
+#include "server/telemetry/structured_log.h"
 
 namespace polyest {
 
@@ -16,6 +18,9 @@ class Session::Computing {
   explicit Computing(Session& session) : session_(session) {}
   ~Computing() {
     const std::chrono::duration<double> spent = Clock::now() - begin_;
+    if (session_.services_.metrics != nullptr) {
+      session_.services_.metrics->CountComputing(spent.count());
+    }
     const std::lock_guard lock(session_.mutex_);
     session_.activity_.set_compute_time(session_.activity_.compute_time() + spent.count());
     session_.computed_s_ += spent.count();
@@ -125,6 +130,7 @@ absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
                                                         services_.models, stop));
   loaded_->SaveSnapshots(services_.journal, number());
   losses_ = losses;
+  Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   const std::lock_guard lock(mutex_);
   computed_s_ = 0;
   activity_.set_loaded(true);
@@ -162,18 +168,31 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
                            }));
   if (kind == BatchLedger::Kind::kNext) {
     POLYEST_RETURN_IF_ERROR(CheckRoom(loaded->place(), batch));
+    const int64_t samples = loaded->place().samples;
+    const double measured_s = loaded->measured_s();
     POLYEST_RETURN_IF_ERROR(loaded->Append(batch));
     entry.place = loaded->place();
     POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, losses_));
-    services_.journal.Append(std::move(entry), [self = shared_from_this(), losses = losses_,
-                                                sequence](const absl::Status& kept) {
-      self->ledger_.Settle(losses, sequence, kept);
-    });
+    const int64_t values = entry.place.samples - samples;
+    Keep(std::move(entry), batch.time_size(), values, loaded->measured_s() - measured_s);
   }
   v1::Acknowledgement acknowledgement;
   acknowledgement.set_sequence(sequence);
   acknowledgement.set_samples(loaded->place().samples);
   return acknowledgement;
+}
+
+void Session::Keep(JournalEntry entry, int64_t rows, int64_t values, double measured_s) {
+  const int64_t sequence = entry.place.sequence;
+  services_.journal.Append(
+      std::move(entry), [self = shared_from_this(), losses = losses_, sequence, rows, values,
+                         measured_s, begin = Clock::now()](const absl::Status& kept) {
+        const std::chrono::duration<double> duration = Clock::now() - begin;
+        if (Metrics* const metrics = self->services_.metrics; metrics != nullptr && kept.ok()) {
+          metrics->Count(Metrics::Batch{rows, values, measured_s, duration.count()});
+        }
+        self->ledger_.Settle(losses, sequence, kept);
+      });
 }
 
 absl::Status Session::Process(const Stop& stop) {
@@ -185,21 +204,30 @@ absl::Status Session::Process(const Stop& stop) {
 absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
   SharedEstimate latest;
+  const Clock::time_point begin = Clock::now();
   {
     const Computing computing(*this);
     POLYEST_ASSIGN_OR_RETURN(latest, loaded->CurrentEstimate(stop));
   }
   if (latest == passed_on_) return latest;
   passed_on_ = latest;
-  {
-    const std::lock_guard lock(mutex_);
-    activity_.set_estimates(activity_.estimates() + 1);
-    activity_.set_reexpansions(latest->expansion().reexpansions());
-  }
+  CountEstimate(*latest, Clock::now() - begin);
   WhenKept(latest->sequence(), [self = shared_from_this(), latest](const absl::Status& kept) {
     if (kept.ok()) self->PassOn(latest);
   });
   return latest;
+}
+
+void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration duration) {
+  const int64_t reexpansions = estimate.expansion().reexpansions();
+  const std::lock_guard lock(mutex_);
+  if (services_.metrics != nullptr) {
+    services_.metrics->Count(
+        Metrics::NewEstimate{std::chrono::duration<double>(duration).count(),
+                             std::max<int64_t>(0, reexpansions - activity_.reexpansions())});
+  }
+  activity_.set_estimates(activity_.estimates() + 1);
+  activity_.set_reexpansions(reexpansions);
 }
 
 void Session::PassOn(const SharedEstimate& estimate) {
@@ -261,6 +289,7 @@ void Session::Unload() {
   if (!IdleTime()) return;
   loaded_ = nullptr;
   passed_on_ = nullptr;
+  Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
   const std::lock_guard lock(mutex_);
   activity_.set_loaded(false);
 }

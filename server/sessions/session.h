@@ -23,6 +23,8 @@
 
 namespace polyest {
 
+class Metrics;
+
 // Called from the session's strand, from the journal, or from whoever closes it; must not wait.
 class SessionObserver {
  public:
@@ -40,6 +42,7 @@ struct SessionServices {
   SessionJournal& journal;
   const ModelLibrary& models;
   SessionLimits limits = {};
+  Metrics* metrics = nullptr;  // null: nothing is counted
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -122,6 +125,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // The estimator as it is after every batch taken.
   absl::StatusOr<LoadedSession*> Loaded(const Stop& stop);
   void PassOn(const SharedEstimate& estimate);
+  // In the journal, with what is to be counted once it is there.
+  void Keep(JournalEntry entry, int64_t rows, int64_t values, double measured_s);
+  void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
   const SessionServices services_;
   const SessionHead head_;

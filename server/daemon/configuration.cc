@@ -1,0 +1,101 @@
+#include "server/daemon/configuration.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+
+namespace polyest {
+namespace {
+
+constexpr char kConfig[] = "--config";
+
+std::string Variable(const std::string& name) {
+  const char* value = std::getenv(name.c_str());
+  return value == nullptr ? "" : value;
+}
+
+std::string OneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+// A file whose keys are options, less those that the environment sets: CLI11 would prefer the file.
+class File final : public CLI::ConfigTOML {
+ public:
+  explicit File(const CLI::App& app) : app_(app) {}
+
+  std::vector<CLI::ConfigItem> from_config(std::istream& in) const override {
+    std::vector<CLI::ConfigItem> kept;
+    for (CLI::ConfigItem& item : ConfigTOML::from_config(in)) {
+      const CLI::Option* option = app_.get_option_no_throw("--" + item.name);
+      if (!item.parents.empty() || option == nullptr || !option->get_configurable()) {
+        throw CLI::ConfigError("there is no key \"" + item.fullname() + "\"",
+                               CLI::ExitCodes::ConfigError);
+      }
+      if (Variable(option->get_envname()).empty()) kept.push_back(std::move(item));
+    }
+    return kept;
+  }
+
+ private:
+  const CLI::App& app_;
+};
+
+bool IsGiven(const std::string& option, int argc, const char* const* argv) {
+  return std::any_of(argv, argv + argc, [&](const std::string& argument) {
+    return argument == option || argument.rfind(option + "=", 0) == 0;
+  });
+}
+
+}  // namespace
+
+std::string EnvironmentVariable(const std::string& option) {
+  std::string name = "POLYESTD_";
+  for (const char c : option.substr(option.find_first_not_of('-'))) {
+    name += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  }
+  return name;
+}
+
+void AddConfiguration(CLI::App& app, const std::vector<std::string>& flags_only) {
+  for (CLI::Option* option : app.get_options()) {
+    const std::string name = option->get_name();
+    const bool flag_only =
+        name == "--help" || name == "--version" ||
+        std::find(flags_only.begin(), flags_only.end(), name) != flags_only.end();
+    option->configurable(!flag_only);
+    if (!flag_only) option->envname(EnvironmentVariable(name));
+  }
+  const std::string file = Variable(EnvironmentVariable(kConfig));
+  app.set_config(kConfig, file,
+                 "File of options, one a line: data-dir = \"/srv/polyest\"; by default "
+                 "$POLYESTD_CONFIG, if that is set",
+                 !file.empty());
+  app.config_formatter(std::make_shared<File>(app));
+}
+
+std::string DescribeError(const CLI::App& app, const CLI::ParseError& error, int argc,
+                          const char* const* argv) {
+  const std::string what = OneLine(error.what());
+  std::string file;
+  const CLI::Option* const config = app.get_config_ptr();
+  if (config != nullptr && !config->results().empty()) {
+    file = config->results().front();
+  } else {
+    file = Variable(EnvironmentVariable(kConfig));
+  }
+  if (error.get_name() == "FileError") return file + ": cannot be read";
+  if (error.get_name() == "ConfigError") return file + ": " + what;
+  // Of a bad value CLI11 says "--name: what is wrong".
+  const std::string option = what.substr(0, what.find(':'));
+  if (option.rfind("--", 0) != 0 || app.get_option_no_throw(option) == nullptr ||
+      IsGiven(option, argc, argv)) {
+    return what;
+  }
+  const std::string variable = EnvironmentVariable(option);
+  if (!Variable(variable).empty()) return variable + what.substr(option.size());
+  return file.empty() ? what : file + ": " + what.substr(2);
+}
+
+}  // namespace polyest

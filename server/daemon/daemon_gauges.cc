@@ -1,0 +1,85 @@
+#include "server/daemon/daemon_gauges.h"
+
+#include <prometheus/metric_family.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "server/telemetry/process_info.h"
+
+namespace polyest {
+namespace {
+
+using Families = std::vector<prometheus::MetricFamily>;
+
+void Add(Families& families, const char* name, const char* help, double value) {
+  prometheus::MetricFamily family{name, help, prometheus::MetricType::Gauge, {}};
+  family.metric.resize(1);
+  family.metric.front().gauge.value = value;
+  families.push_back(std::move(family));
+}
+
+// 0 for one that is not there.
+double FileBytes(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  return error ? 0 : static_cast<double>(size);
+}
+
+}  // namespace
+
+std::vector<prometheus::MetricFamily> DaemonGauges::Collect() const {
+  Families families;
+  Add(families, "polyest_ready", "Whether the daemon is ready, as its health service says.",
+      ready_ ? 1 : 0);
+  CollectSessions(families);
+  Add(families, "polyest_writers", "Open streams of measurements.",
+      calls_.Count(OpenCalls::Kind::kWriter));
+  Add(families, "polyest_watchers", "Open watches of sessions.",
+      calls_.Count(OpenCalls::Kind::kWatcher));
+  Add(families, "polyest_waiting_tasks", "Tasks that wait for a thread of the numerics.",
+      executor_.waiting());
+  Add(families, "process_resident_memory_bytes", "Resident memory of the process.",
+      static_cast<double>(ResidentMemoryBytes()));
+  if (!data_dir_.empty()) CollectDisk(families);
+  return families;
+}
+
+void DaemonGauges::CollectSessions(Families& families) const {
+  int sessions = 0;
+  int loaded = 0;
+  int behind = 0;
+  int64_t waiting = 0;
+  for (const auto& session : sessions_.All()) {
+    const v1::Session described = session->Describe();
+    const v1::Session::Activity& activity = described.activity();
+    ++sessions;
+    if (activity.loaded()) ++loaded;
+    // A factor of 0: nothing measured yet.
+    const double factor = activity.real_time_factor();
+    if (activity.has_writer() && factor > 0 && factor < 1) ++behind;
+    waiting += std::max<int64_t>(0, session->taken().sequence - described.last_sequence());
+  }
+  Add(families, "polyest_sessions", "Sessions of all tenants.", sessions);
+  Add(families, "polyest_sessions_loaded", "Sessions whose estimator is in memory.", loaded);
+  Add(families, "polyest_sessions_behind_real_time",
+      "Sessions with an open stream whose real-time factor is below 1.", behind);
+  Add(families, "polyest_journal_waiting_batches", "Batches taken and not yet kept.",
+      static_cast<double>(waiting));
+}
+
+void DaemonGauges::CollectDisk(Families& families) const {
+  const std::filesystem::path file = std::filesystem::path(data_dir_) / "journal.db";
+  Add(families, "polyest_journal_file_bytes", "Size of the journal's file.", FileBytes(file));
+  Add(families, "polyest_journal_log_bytes", "Size of the journal's write-ahead log.",
+      FileBytes(file.string() + "-wal"));
+  std::error_code error;
+  const auto space = std::filesystem::space(data_dir_, error);
+  if (error) return;
+  Add(families, "polyest_disk_free_bytes", "Free space on the disk of the data folder.",
+      static_cast<double>(space.available));
+}
+
+}  // namespace polyest

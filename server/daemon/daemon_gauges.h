@@ -1,0 +1,41 @@
+#pragma once
+
+// What Prometheus is told of the present: looked up at each scrape, and counted nowhere.
+
+#include <prometheus/collectable.h>
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "server/execution/executor.h"
+#include "server/service/open_calls.h"
+#include "server/sessions/session_registry.h"
+
+namespace polyest {
+
+class DaemonGauges final : public prometheus::Collectable {
+ public:
+  // All outlive it. `data_dir`: of the journal; empty without one on disk.
+  DaemonGauges(const SessionRegistry& sessions, const Executor& executor, const OpenCalls& calls,
+               std::string data_dir, const std::atomic<bool>& ready)
+      : sessions_(sessions),
+        executor_(executor),
+        calls_(calls),
+        data_dir_(std::move(data_dir)),
+        ready_(ready) {}
+
+  std::vector<prometheus::MetricFamily> Collect() const override;
+
+ private:
+  void CollectSessions(std::vector<prometheus::MetricFamily>& families) const;
+  void CollectDisk(std::vector<prometheus::MetricFamily>& families) const;
+
+  const SessionRegistry& sessions_;
+  const Executor& executor_;
+  const OpenCalls& calls_;
+  const std::string data_dir_;
+  const std::atomic<bool>& ready_;
+};
+
+}  // namespace polyest

@@ -1,0 +1,166 @@
+#include "server/telemetry/call_interceptor.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_format.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/server_interceptor.h>
+
+#include <chrono>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "server/telemetry/request_id.h"
+#include "server/telemetry/structured_log.h"
+
+namespace polyest {
+namespace {
+
+using grpc::experimental::InterceptionHookPoints;
+using grpc::experimental::InterceptorBatchMethods;
+using grpc::experimental::ServerRpcInfo;
+
+constexpr char kPrefix[] = "/polyest.v1.EstimationService/";
+
+std::string CodeName(const grpc::Status& status) {
+  // The codes of both are the same numbers.
+  return absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code()));
+}
+
+// The session that a message names, if it does: of a request or a response.
+std::string SessionNamed(const google::protobuf::Message& message) {
+  for (const char* name : {"session", "name"}) {
+    const auto* field = message.GetDescriptor()->FindFieldByName(name);
+    if (field == nullptr || field->is_repeated() ||
+        field->type() != google::protobuf::FieldDescriptor::TYPE_STRING) {
+      continue;
+    }
+    std::string value = message.GetReflection()->GetString(message, field);
+    if (absl::StartsWith(value, "sessions/")) return value;
+  }
+  return "";
+}
+
+spdlog::level::level_enum LevelOf(grpc::StatusCode code, bool changes_sessions) {
+  switch (code) {
+    case grpc::StatusCode::OK:
+      return changes_sessions ? spdlog::level::info : spdlog::level::debug;
+    case grpc::StatusCode::CANCELLED:
+      return spdlog::level::debug;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::UNAUTHENTICATED:
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return spdlog::level::warn;
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::DATA_LOSS:
+    case grpc::StatusCode::UNKNOWN:
+      return spdlog::level::err;
+    default:
+      return spdlog::level::info;
+  }
+}
+
+// What a refusal says of the daemon. What others say repeats the request.
+bool MayTellReason(grpc::StatusCode code) {
+  return code == grpc::StatusCode::RESOURCE_EXHAUSTED || code == grpc::StatusCode::UNAVAILABLE ||
+         code == grpc::StatusCode::INTERNAL || code == grpc::StatusCode::DATA_LOSS;
+}
+
+class CallInterceptor final : public grpc::experimental::Interceptor {
+ public:
+  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const TenantOf& tenant_of)
+      : call_(call),
+        metrics_(metrics),
+        tenant_of_(tenant_of),
+        method_(call.method() + sizeof(kPrefix) - 1) {}
+
+  void Intercept(InterceptorBatchMethods* methods) override {
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
+      ChooseId(*methods->GetRecvInitialMetadata());
+    }
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_MESSAGE)) {
+      NoteSession(methods->GetRecvMessage());
+    }
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace(kRequestIdKey, id_);
+    }
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
+      NoteSession(methods->GetSendMessage());
+    }
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
+      OnEnd(methods->GetSendStatus());
+    }
+    methods->Proceed();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void ChooseId(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
+    const auto given = metadata.find(kRequestIdKey);
+    if (given != metadata.end()) id_.assign(given->second.data(), given->second.size());
+    if (!IsRequestId(id_)) id_ = MakeRequestId();
+  }
+
+  // Every message of the service is a protobuf message; none when the stream has ended.
+  void NoteSession(const void* message) {
+    if (message == nullptr || !session_.empty()) return;
+    session_ = SessionNamed(*static_cast<const google::protobuf::Message*>(message));
+  }
+
+  void OnEnd(const grpc::Status& status) {
+    const std::chrono::duration<double> duration = Clock::now() - begin_;
+    const bool unary = call_.type() == ServerRpcInfo::Type::UNARY;
+    metrics_.Count(Metrics::Call{method_, CodeName(status), unary, duration.count()});
+    const bool changes_sessions =
+        method_ == "CreateSession" || method_ == "DeleteSession" || method_ == "ImportSession";
+    const auto level = LevelOf(status.error_code(), changes_sessions);
+    if (!IsLogged(level)) return;
+    Log(level, "call",
+        {{"request", id_},
+         {"method", method_},
+         {"session", session_},
+         {"tenant", tenant_of_(*call_.server_context())},
+         {"code", CodeName(status)},
+         {"duration_s", absl::StrFormat("%.6f", duration.count())},
+         {"reason", MayTellReason(status.error_code()) ? status.error_message() : ""}});
+  }
+
+  ServerRpcInfo& call_;
+  Metrics& metrics_;
+  const TenantOf& tenant_of_;
+  const std::string method_;
+  const Clock::time_point begin_ = Clock::now();
+  std::string id_;
+  std::string session_;
+};
+
+class CallInterceptors final : public grpc::experimental::ServerInterceptorFactoryInterface {
+ public:
+  CallInterceptors(Metrics& metrics, TenantOf tenant_of)
+      : metrics_(metrics), tenant_of_(std::move(tenant_of)) {}
+
+  // None for calls of health and reflection, whose messages are of other kinds.
+  grpc::experimental::Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
+    if (!absl::StartsWith(call->method(), kPrefix)) return nullptr;
+    return new CallInterceptor(*call, metrics_, tenant_of_);
+  }
+
+ private:
+  Metrics& metrics_;
+  const TenantOf tenant_of_;
+};
+
+}  // namespace
+
+void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, TenantOf tenant_of) {
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> creators;
+  creators.push_back(std::make_unique<CallInterceptors>(metrics, std::move(tenant_of)));
+  builder.experimental().SetInterceptorCreators(std::move(creators));
+}
+
+}  // namespace polyest

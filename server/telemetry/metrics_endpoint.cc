@@ -1,0 +1,35 @@
+#include "server/telemetry/metrics_endpoint.h"
+
+#include <absl/strings/str_format.h>
+#include <prometheus/collectable.h>
+#include <prometheus/exposer.h>
+
+#include <exception>
+#include <utility>
+
+namespace polyest {
+
+absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
+                                                                        Collectables collectables) {
+  // The library tells of a port in use by an exception, and has no other word for it.
+  try {
+    auto exposer = std::make_unique<prometheus::Exposer>(address, /*num_threads=*/1);
+    return std::unique_ptr<MetricsEndpoint>(
+        new MetricsEndpoint(std::move(exposer), std::move(collectables)));
+  } catch (const std::exception&) {
+    return absl::UnavailableError(absl::StrFormat(
+        "--metrics: cannot listen on %s: the port is in use or the address is not this machine's",
+        address));
+  }
+}
+
+MetricsEndpoint::MetricsEndpoint(std::unique_ptr<prometheus::Exposer> exposer,
+                                 Collectables collectables)
+    : collectables_(std::move(collectables)), exposer_(std::move(exposer)) {
+  for (const auto& collectable : collectables_) exposer_->RegisterCollectable(collectable);
+  port_ = exposer_->GetListeningPorts().front();
+}
+
+MetricsEndpoint::~MetricsEndpoint() = default;
+
+}  // namespace polyest

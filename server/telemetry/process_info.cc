@@ -1,0 +1,20 @@
+#include "server/telemetry/process_info.h"
+
+#include <unistd.h>
+
+#include <fstream>
+
+namespace polyest {
+
+std::string Version() { return POLYEST_VERSION; }
+
+int64_t ResidentMemoryBytes() {
+  // Pages: of the address space, then resident.
+  std::ifstream statm("/proc/self/statm");
+  int64_t all = 0;
+  int64_t resident = 0;
+  if (!(statm >> all >> resident)) return 0;
+  return resident * sysconf(_SC_PAGESIZE);
+}
+
+}  // namespace polyest
