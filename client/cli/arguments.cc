@@ -59,6 +59,7 @@ class Parser {
     AddRegularization();
     AddExport();
     AddImport();
+    AddTop();
   }
 
   CLI::App& app() { return app_; }
@@ -81,6 +82,7 @@ class Parser {
     if (name == "regularization") return Placed(regularization_);
     if (name == "export") return Placed(export_);
     if (name == "import") return Placed(import_);
+    if (name == "top") return Placed(top_);
     return paper_;
   }
 
@@ -385,6 +387,21 @@ class Parser {
     AddServer(command)->required();
   }
 
+  void AddTop() {
+    CLI::App& command =
+        *app_.add_subcommand("top", "Show how a daemon and its sessions are, until Ctrl-C");
+    AddServer(command)->required();
+    command.add_flag("--once", top_.once, "Once, and end");
+    command.add_option("--interval", top_.interval_s, "From one look to the next, s")
+        ->check(CLI::Range(0.1, 3600.0))
+        ->capture_default_str();
+    command.footer(
+        "Of each session: the batches acknowledged, estimates made and re-expansions since the "
+        "daemon was started, values of measured outputs in all and a second, seconds of "
+        "measurements over seconds computed for them (below 1 it falls behind), whether a stream "
+        "is open and how many watch, whether it is in memory, seconds since its last use.");
+  }
+
   CLI::App app_;
   Place place_;
   bool local_ = false;
@@ -404,6 +421,7 @@ class Parser {
   RegularizationArguments regularization_;
   ExportArguments export_;
   ImportArguments import_;
+  TopArguments top_;
 };
 
 }  // namespace

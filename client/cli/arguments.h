@@ -157,11 +157,17 @@ struct ImportArguments {
   std::string session;  // its id here; empty: the one it had
 };
 
+struct TopArguments {
+  Place place;
+  bool once = false;
+  double interval_s = 2;
+};
+
 using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
                              ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
                              SensitivityArguments, DesignArguments, PosteriorArguments,
                              ProfileArguments, RegularizationArguments, ExplainArguments,
-                             ExportArguments, ImportArguments, PaperOptions>;
+                             ExportArguments, ImportArguments, TopArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -85,6 +85,10 @@ absl::Status Client::DeleteSession(const v1::DeleteSessionRequest& request) {
   return Call(&Stub::DeleteSession, request).status();
 }
 
+absl::StatusOr<v1::DaemonStatus> Client::GetStatus(const v1::GetStatusRequest& request) {
+  return Call(&Stub::GetStatus, request);
+}
+
 absl::StatusOr<v1::AddMeasurementsResponse> Client::AddMeasurements(
     const v1::AddMeasurementsRequest& request) {
   return Call(&Stub::AddMeasurements, request);

@@ -39,6 +39,7 @@ class Client {
   absl::StatusOr<v1::Session> GetSession(const v1::GetSessionRequest& request);
   absl::StatusOr<v1::ListSessionsResponse> ListSessions(const v1::ListSessionsRequest& request);
   absl::Status DeleteSession(const v1::DeleteSessionRequest& request);
+  absl::StatusOr<v1::DaemonStatus> GetStatus(const v1::GetStatusRequest& request);
   absl::StatusOr<v1::AddMeasurementsResponse> AddMeasurements(
       const v1::AddMeasurementsRequest& request);
   absl::StatusOr<v1::EstimateResponse> GetEstimate(const v1::GetEstimateRequest& request);
