@@ -21,13 +21,14 @@ std::string OneLine(std::string text) {
 }
 
 // A file whose keys are options, less those that the environment sets: CLI11 would prefer the file.
-class File final : public CLI::ConfigTOML {
+class File final : public CLI::ConfigBase {
  public:
   explicit File(const CLI::App& app) : app_(app) {}
 
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override {
     std::vector<CLI::ConfigItem> kept;
-    for (CLI::ConfigItem& item : ConfigTOML::from_config(in)) {
+    for (CLI::ConfigItem& item : ConfigBase::from_config(in)) {
+      if (item.name == "++" || item.name == "--") continue;  // of a section, whose keys follow
       const CLI::Option* option = app_.get_option_no_throw("--" + item.name);
       if (!item.parents.empty() || option == nullptr || !option->get_configurable()) {
         throw CLI::ConfigError("there is no key \"" + item.fullname() + "\"",

@@ -52,8 +52,8 @@ void Readiness::Tell() {
 
 void Readiness::Run(std::stop_token stop) {
   std::unique_lock lock(mutex_);
-  while (true) {
-    if (!failed_.wait(lock, stop, [this] { return !writable_; })) return;
+  while (!stop.stop_requested()) {
+    failed_.wait(lock, stop, [this] { return !writable_; });
     failed_.wait_for(lock, stop, kPause, [this] { return writable_; });
     if (stop.stop_requested() || writable_) continue;
     lock.unlock();

@@ -88,7 +88,9 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
       methods->GetSendInitialMetadata()->emplace(kRequestIdKey, id_);
     }
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
+    // Only where a response is the end of the call, for a stream writes while it reads.
+    if (one_response_ &&
+        methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
       NoteSession(methods->GetSendMessage());
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
@@ -134,6 +136,8 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
   Metrics& metrics_;
   const TenantOf& tenant_of_;
   const std::string method_;
+  const bool one_response_ = call_.type() == ServerRpcInfo::Type::UNARY ||
+                             call_.type() == ServerRpcInfo::Type::CLIENT_STREAMING;
   const Clock::time_point begin_ = Clock::now();
   std::string id_;
   std::string session_;

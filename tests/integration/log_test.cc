@@ -28,8 +28,7 @@ class LogTest : public DaemonTest {
     stub_->GetSession(&context, request, &response);
     const auto& metadata = context.GetServerInitialMetadata();
     const auto found = metadata.find(kRequestIdKey);
-    return found == metadata.end() ? ""
-                                   : std::string(found->second.data(), found->second.size());
+    return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
   }
 
   // The line of a call; without fields if there is none.

@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+#include <regex>
+#include <sstream>
+
 #include "tests/integration/operations_fixture.h"
 
 namespace polyest {
@@ -79,6 +83,20 @@ TEST_F(MetricsTest, CountRefusalsByCode) {
   EXPECT_EQ(ValueOf("polyest_refusals_total{code=\"RESOURCE_EXHAUSTED\"}", text), 1);
   EXPECT_EQ(ValueOf("polyest_refusals_total{code=\"UNAUTHENTICATED\"}", text), 0);
   EXPECT_EQ(ValueOf("polyest_calls_total{code=\"NOT_FOUND\",method=\"DeleteSession\"}", text), 1);
+}
+
+TEST_F(MetricsTest, HaveEveryNameThatTheAlertsUse) {
+  std::ifstream in(POLYEST_SOURCE_DIR "/deploy/monitoring/alerts.yml");
+  std::ostringstream alerts;
+  alerts << in.rdbuf();
+  const std::string rules = alerts.str();
+  const std::string text = Scrape(port_);
+  const std::regex name("polyest_[a-z_]+");
+  int names = 0;
+  for (std::sregex_iterator it(rules.begin(), rules.end(), name), end; it != end; ++it, ++names) {
+    EXPECT_THAT(text, HasSubstr("\n" + it->str())) << it->str();
+  }
+  EXPECT_GT(names, 5);
 }
 
 TEST_F(MetricsTest, GetStatusSaysHowTheDaemonIs) {

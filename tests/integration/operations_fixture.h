@@ -1,6 +1,7 @@
 #pragma once
 
-// What the tests of the daemon's operation share: a scrape, log lines, variables of the environment.
+// What the tests of the daemon's operation share: a scrape, log lines, variables of the
+// environment.
 
 #include <arpa/inet.h>
 #include <google/protobuf/struct.pb.h>

@@ -52,8 +52,8 @@ class HealthWatch {
   grpc::TemplatedGenericStub<google::protobuf::StringValue, google::protobuf::Int32Value> stub_;
   grpc::ClientContext context_;
   grpc::CompletionQueue queue_;
-  std::unique_ptr<grpc::ClientAsyncReaderWriter<google::protobuf::StringValue,
-                                                google::protobuf::Int32Value>>
+  std::unique_ptr<
+      grpc::ClientAsyncReaderWriter<google::protobuf::StringValue, google::protobuf::Int32Value>>
       call_;
 };
 
@@ -89,8 +89,8 @@ TEST_F(FullJournalTest, IsNotReadyUntilThereIsRoomAgain) {
   int sequence = 0;
   constexpr int kRows = 2000;  // 16 bytes each
   while (status.ok() && sequence < 100) {
-    status = Add("sessions/rig", sequence + 1,
-                 OscillatorRows(sequence * kRows, (sequence + 1) * kRows));
+    status =
+        Add("sessions/rig", sequence + 1, OscillatorRows(sequence * kRows, (sequence + 1) * kRows));
     ++sequence;
   }
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();

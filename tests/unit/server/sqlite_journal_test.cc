@@ -202,6 +202,34 @@ TEST_F(SqliteJournalTest, RefusesWhatDoesNotFitOnTheDiskAndKeepsTheRest) {
   EXPECT_TRUE(again.ok()) << again;
 }
 
+TEST_F(SqliteJournalTest, CanBeWrittenAsLongAsThereIsRoom) {
+  ASSERT_TRUE(Open(/*most_mb=*/1).ok());
+  EXPECT_TRUE(journal_->CheckWritable().ok());
+  const int64_t number = Create("sessions/a");
+  int64_t kept = 0;
+  while (kept < 100 && Append(number, kept + 1, 5'000).ok()) ++kept;
+  EXPECT_EQ(journal_->CheckWritable().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(*CountBatches(number), kept);
+}
+
+TEST_F(SqliteJournalTest, TellsOfEachCommitBeforeThoseWhoWaitForIt) {
+  std::vector<CommitReport> commits;
+  auto opened =
+      SqliteJournal::Open({.folder = folder_.path(), .on_commit = [&](const CommitReport& commit) {
+                             commits.push_back(commit);
+                           }});
+  ASSERT_TRUE(opened.ok()) << opened.status();
+  journal_ = *std::move(opened);
+  const int64_t number = Create("sessions/a");
+  ASSERT_EQ(commits.size(), 1u);
+  ASSERT_TRUE(Append(number, 1).ok());
+  ASSERT_EQ(commits.size(), 2u);
+  EXPECT_EQ(commits[1].writes, 1u);
+  EXPECT_TRUE(commits[1].outcome.ok());
+  EXPECT_GT(commits[1].duration.count(), 0);
+  journal_ = nullptr;  // it tells until its end
+}
+
 TEST_F(SqliteJournalTest, ForgetsAnImportThatWasNotFinished) {
   ASSERT_TRUE(Open().ok());
   const int64_t hidden = Create("sessions/a", /*hidden=*/true);
