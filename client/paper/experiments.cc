@@ -74,8 +74,8 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
   POLYEST_ASSIGN_OR_RETURN(result.samples, SyntheticSamples(variant, reference));
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ResolvedProblem::Make(variant.problem));
   POLYEST_ASSIGN_OR_RETURN(result.response, Respond(problem, reference, until_s));
-  POLYEST_ASSIGN_OR_RETURN(auto estimator,
-                           Estimator::Make(problem, {.threads = threads, .store = nullptr}));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto estimator, Estimator::Make(problem, {.threads = threads, .store = {}, .snapshot = {}}));
   POLYEST_RETURN_IF_ERROR(estimator->Append(result.samples));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(result.estimate, estimator->CurrentEstimate(stop));

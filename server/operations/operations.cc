@@ -31,8 +31,9 @@ absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const Request& request, int t
                                                    const ModelLibrary& models) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
-  POLYEST_ASSIGN_OR_RETURN(auto estimator,
-                           Estimator::Make(std::move(problem), {.threads = threads, .store = {}}));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto estimator,
+      Estimator::Make(std::move(problem), {.threads = threads, .store = {}, .snapshot = {}}));
   samples.end_of_run = true;
   POLYEST_RETURN_IF_ERROR(estimator->Append(samples));
   return estimator;

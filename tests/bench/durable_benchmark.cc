@@ -39,10 +39,8 @@ constexpr int kRows = 100;
 constexpr int kBatchesASecond = 10;
 constexpr double kStiffness = 40, kDamping = 0.4;
 
-v1::Problem FourChannels() {
-  v1::Problem problem;
-  POLYEST_CHECK(google::protobuf::util::JsonStringToMessage(R"({
-    "model": {"equations": {"states": {"x": "v", "v": "-(k*x + c*v)"
+constexpr char kFourChannels[] = R"({
+  "model": {"equations": {"states": {"x": "v", "v": "-(k*x + c*v)"
 }
 , "outputs" : {"x" : "x", "v" : "v", "a" : "-(k*x + c*v)", "f" : "k*x"}, "parameters" : {
   "x_0" : 1
@@ -50,16 +48,18 @@ v1::Problem FourChannels() {
 }
 }
 ,
-    "uncertain": [{"name": "k", "uniform": {"lower": 35, "upper": 45}},
-                  {"name": "c", "uniform": {"lower": 0.2, "upper": 0.6}}],
-    "measured": [{"output": "x", "noise": {"absolute": 0.01}},
-                 {"output": "v", "noise": {"absolute": 0.05}},
-                 {"output": "a", "noise": {"absolute": 0.3}},
-                 {"output": "f", "noise": {"absolute": 0.3}}]
-})",
-                                                            &problem)
-                    .ok());
-return problem;
+  "uncertain": [{"name": "k", "uniform": {"lower": 35, "upper": 45}},
+                {"name": "c", "uniform": {"lower": 0.2, "upper": 0.6}}],
+  "measured": [{"output": "x", "noise": {"absolute": 0.01}},
+               {"output": "v", "noise": {"absolute": 0.05}},
+               {"output": "a", "noise": {"absolute": 0.3}},
+               {"output": "f", "noise": {"absolute": 0.3}}]
+})";
+
+v1::Problem FourChannels() {
+  v1::Problem problem;
+  POLYEST_CHECK(google::protobuf::util::JsonStringToMessage(kFourChannels, &problem).ok());
+  return problem;
 }
 
 // A hundred rows of the closed solution, with a ripple in the place of noise.

@@ -140,7 +140,8 @@ void TakeDay(const Rig& rig, Estimator& estimator) {
 void Run(int rate_hz) {
   const auto rig = std::make_shared<Rig>(rate_hz);
   const auto estimator =
-      Estimator::Make(ResolvedProblem::Make(Oscillator()).value(), {.store = rig}).value();
+      Estimator::Make(ResolvedProblem::Make(Oscillator()).value(), {.store = rig, .snapshot = {}})
+          .value();
   std::printf(
       " day        rows  min to take it   MB  ms an estimate          k - truth      c - truth\n");
   double first_megabytes = 0, first_milliseconds = 0, megabytes = 0, milliseconds = 0;
