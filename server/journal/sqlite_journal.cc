@@ -152,9 +152,9 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   if (!prepared.ok()) return named(prepared);
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
-  return std::unique_ptr<SqliteJournal>(new SqliteJournal(
-      std::move(file), std::move(lock), *std::move(writer), *std::move(maintainer),
-      options.on_commit));
+  return std::unique_ptr<SqliteJournal>(
+      new SqliteJournal(std::move(file), std::move(lock), *std::move(writer),
+                        *std::move(maintainer), options.on_commit));
 }
 
 SqliteJournal::SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,

@@ -171,8 +171,9 @@ EstimationService::Unary* EstimationService::OnStrand(Context* context, Method m
       [found = *found](Task task) { return found->strand().Submit(std::move(task)); },
       [found = *found, work = std::move(work)](const Stop& stop,
                                                UnaryCall::Finisher finish) -> absl::Status {
+        const uint64_t losses = found->losses();
         POLYEST_RETURN_IF_ERROR(work(found, stop));
-        found->WhenKept(found->taken().sequence, std::move(finish));
+        found->WhenAllKept(losses, std::move(finish));
         return absl::OkStatus();
       });
 }

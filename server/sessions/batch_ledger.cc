@@ -103,4 +103,18 @@ void BatchLedger::WhenKept(int64_t sequence, Done done) {
   done(now);
 }
 
+void BatchLedger::WhenAllKept(uint64_t losses, Done done) {
+  absl::Status now;
+  {
+    const std::lock_guard lock(mutex_);
+    if (losses != losses_) {
+      now = last_loss_;
+    } else if (taken_.sequence > kept_.sequence) {
+      waiting_.emplace(taken_.sequence, std::move(done));
+      return;
+    }
+  }
+  done(now);
+}
+
 }  // namespace polyest

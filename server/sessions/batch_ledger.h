@@ -50,6 +50,9 @@ class BatchLedger {
   // Calls `done` when every batch up to this one is kept, at once if they are; with the reason when
   // one of them is not.
   void WhenKept(int64_t sequence, Done done);
+  // The same of everything taken, for who has seen `losses` before: with the reason when there were
+  // more since.
+  void WhenAllKept(uint64_t losses, Done done);
 
  private:
   struct Taken {

@@ -90,6 +90,12 @@ class Session : public std::enable_shared_from_this<Session> {
   void WhenKept(int64_t sequence, BatchLedger::Done done) {
     ledger_.WhenKept(sequence, std::move(done));
   }
+  // The same of everything taken, where `losses` were seen before it was looked at.
+  void WhenAllKept(uint64_t losses, BatchLedger::Done done) {
+    ledger_.WhenAllKept(losses, std::move(done));
+  }
+  // How often batches were taken and then not kept.
+  uint64_t losses() const { return ledger_.losses(); }
 
   // The following only on the strand. Each brings the estimator back into memory if it is not
   // there.

@@ -39,22 +39,17 @@ constexpr int kRows = 100;
 constexpr int kBatchesASecond = 10;
 constexpr double kStiffness = 40, kDamping = 0.4;
 
-constexpr char kFourChannels[] = R"({
-  "model": {"equations": {"states": {"x": "v", "v": "-(k*x + c*v)"
-}
-, "outputs" : {"x" : "x", "v" : "v", "a" : "-(k*x + c*v)", "f" : "k*x"}, "parameters" : {
-  "x_0" : 1
-}
-}
-}
-,
+constexpr char kFourChannels[] = R"json({
+  "model": {"equations": {"states": {"x": "v", "v": "-(k*x + c*v)"},
+                          "outputs": {"x": "x", "v": "v", "a": "-(k*x + c*v)", "f": "k*x"},
+                          "parameters": {"x_0": 1}}},
   "uncertain": [{"name": "k", "uniform": {"lower": 35, "upper": 45}},
                 {"name": "c", "uniform": {"lower": 0.2, "upper": 0.6}}],
   "measured": [{"output": "x", "noise": {"absolute": 0.01}},
                {"output": "v", "noise": {"absolute": 0.05}},
                {"output": "a", "noise": {"absolute": 0.3}},
                {"output": "f", "noise": {"absolute": 0.3}}]
-})";
+})json";
 
 v1::Problem FourChannels() {
   v1::Problem problem;

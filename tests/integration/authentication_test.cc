@@ -120,14 +120,6 @@ TEST_F(AuthenticationTest, HidesTheSessionsOfATenantFromOthers) {
       CallRaw(channel, MethodPath("GetSession"), reader_.secret, *AboutTheRig("GetSession")).ok());
 }
 
-TEST_F(AuthenticationTest, LeavesOutOnlyWhatNoDaemonServes) {
-  for (const std::string& method : kNotServedYet) {
-    EXPECT_EQ(CallRaw(Connect(), MethodPath(method), admin_.secret).error_code(),
-              StatusCode::UNIMPLEMENTED)
-        << method << " is served: take it out of the list";
-  }
-}
-
 TEST_F(AuthenticationTest, LetsNobodyInWithAnExpiredCertificate) {
   ExpectNoConnection(
       Connect(authority_, authority_.Issue("rig", CertificateAuthority::Validity::kExpired)));

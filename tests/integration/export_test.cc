@@ -101,7 +101,7 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
            Case{"a batch too many",
                 {records[0], records[1], records[2], records[3], records[3]},
                 "3 must be 4, and the head promises 3 batches"},
-           Case{"a bad batch", {records[0], records[1], bad}, "measurements.time"},
+           Case{"a bad batch", {records[0], records[1], bad}, "times must increase"},
            Case{"an empty record", {v1::SessionRecord()}, "must be a head or a batch"},
        }) {
     const grpc::Status status = Import("copy", one.records);

@@ -72,7 +72,8 @@ TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   EXPECT_GT(ValueOf("polyest_journal_file_bytes", text), 0);
   EXPECT_GT(ValueOf("polyest_disk_free_bytes", text), 0);
   EXPECT_GT(ValueOf("process_resident_memory_bytes", text), 1 << 20);
-  EXPECT_THAT(text, Not(HasSubstr("rig")));
+  EXPECT_THAT(text, Not(HasSubstr("\"rig")));
+  EXPECT_THAT(text, Not(HasSubstr("sessions/rig")));
 }
 
 TEST_F(MetricsTest, CountRefusalsByCode) {

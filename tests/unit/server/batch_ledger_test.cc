@@ -73,6 +73,21 @@ TEST_F(BatchLedgerTest, TellsWhenABatchIsKeptAndNotBefore) {
   EXPECT_EQ(told, (std::vector<int64_t>{3, 4, 5}));
 }
 
+TEST_F(BatchLedgerTest, SaysThatNotAllIsKeptHoweverSoonABatchIsLost) {
+  std::vector<absl::StatusCode> told;
+  const auto tell = [&](const absl::Status& kept) { told.push_back(kept.code()); };
+  const uint64_t losses = ledger_.losses();
+  ledger_.WhenAllKept(losses, tell);
+  Take(4);
+  ledger_.WhenAllKept(losses, tell);
+  EXPECT_EQ(told, (std::vector{absl::StatusCode::kOk}));
+  ledger_.Settle(losses, 4, absl::ResourceExhaustedError("full"));
+  ledger_.WhenAllKept(losses, tell);
+  ledger_.WhenAllKept(ledger_.losses(), tell);
+  EXPECT_EQ(told, (std::vector{absl::StatusCode::kOk, absl::StatusCode::kResourceExhausted,
+                               absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk}));
+}
+
 TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
   Take(4);
   Take(5);
