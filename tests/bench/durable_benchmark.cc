@@ -10,6 +10,7 @@
 
 #include <google/protobuf/util/json_util.h>
 #include <grpcpp/grpcpp.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -277,5 +278,6 @@ void Run(int sessions, int seconds) {
 }  // namespace polyest
 
 int main(int argc, char** argv) {
+  spdlog::set_level(spdlog::level::off);
   polyest::Run(argc > 1 ? std::atoi(argv[1]) : 100, argc > 2 ? std::atoi(argv[2]) : 10);
 }
