@@ -43,9 +43,12 @@ void ImportFlow::OnRead(bool ok) {
 void ImportFlow::Take() {
   const absl::Status taken =
       Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
+  const bool over = !taken.ok() || half_closed_;
+  // Before the call ends, for the daemon may then go at any moment.
+  if (over) import_ = nullptr;
   const std::lock_guard lock(mutex_);
   working_ = false;
-  if (!taken.ok() || half_closed_) End(taken);
+  if (over) End(taken);
   Advance();
 }
 

@@ -1,13 +1,13 @@
 #include "server/sessions/session.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "core/common/status.h"
 #include "server/journal/digest.h"
+#include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/structured_log.h"
 
@@ -138,21 +138,7 @@ absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
 }
 
 absl::Status Session::CheckRoom(const SessionPlace& place, const v1::Measurements& batch) const {
-  const SessionLimits& limits = services_.limits;
-  const int64_t rows = batch.time_size();
-  if (rows > limits.batch_rows) {
-    return absl::ResourceExhaustedError(
-        absl::StrFormat("measurements.time: %d rows are more than a batch may have, %d "
-                        "(--max-batch-rows)",
-                        rows, limits.batch_rows));
-  }
-  if (place.rows + rows > limits.rows) {
-    return absl::ResourceExhaustedError(
-        absl::StrFormat("measurements.time: %d rows beside the %d of the session are more than it "
-                        "may have, %d (--max-session-rows)",
-                        rows, place.rows, limits.rows));
-  }
-  return absl::OkStatus();
+  return CheckRows(services_.limits, place, batch);
 }
 
 absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,

@@ -8,6 +8,7 @@
 
 #include "core/common/status.h"
 #include "server/journal/digest.h"
+#include "server/sessions/row_limits.h"
 
 namespace polyest {
 
@@ -67,6 +68,8 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
         absl::StrFormat("record.batch.sequence: %d must be %d, and the head promises %d batches",
                         batch.sequence(), next, promised_));
   }
+  POLYEST_RETURN_IF_ERROR(
+      CheckRows(registry_.services().limits, loaded_->place(), batch.measurements()));
   POLYEST_RETURN_IF_ERROR(loaded_->Append(batch.measurements()));
   JournalEntry entry;
   entry.session = head_.number;

@@ -9,6 +9,7 @@ using ::testing::HasSubstr;
 
 class ExportTest : public DaemonTest {
  protected:
+  explicit ExportTest(std::vector<std::string> arguments = {}) : DaemonTest(std::move(arguments)) {}
   grpc::Status Export(const std::string& name, std::vector<v1::SessionRecord>& records) {
     grpc::ClientContext context;
     v1::ExportSessionRequest request;
@@ -110,6 +111,23 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
     EXPECT_EQ(Delete("sessions/copy").error_code(), grpc::StatusCode::NOT_FOUND) << one.what;
   }
   EXPECT_TRUE(Import("copy", records).ok());
+}
+
+class FewRowsTest : public ExportTest {
+ protected:
+  FewRowsTest() : ExportTest({"--max-session-rows", "30"}) {}
+};
+
+TEST_F(FewRowsTest, AreTheLimitOfAnImportToo) {
+  auto records = Exported();
+  ASSERT_EQ(records.size(), 4u);
+  records[0].mutable_head()->set_batches(4);
+  v1::SessionRecord::Batch& more = *records.emplace_back().mutable_batch();
+  more.set_sequence(4);
+  *more.mutable_measurements() = OscillatorRows(30, 31);
+  const grpc::Status status = Import("copy", records);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("(--max-session-rows)"));
 }
 
 TEST_F(ExportTest, NamesASessionThatIsNotThere) {

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include "polyest/v1/measurements.pb.h"
+#include "server/journal/session_journal.h"
+#include "server/sessions/limits.h"
+
+namespace polyest {
+
+// RESOURCE_EXHAUSTED, naming the limit, for a batch with too many rows, or too many beside those of
+// the session so far.
+absl::Status CheckRows(const SessionLimits& limits, const SessionPlace& place,
+                       const v1::Measurements& batch);
+
+}  // namespace polyest
