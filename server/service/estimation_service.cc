@@ -124,7 +124,9 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 
   // All of these refuse a caller who may not call the method, before anything else.
   Unary* OnExecutor(Context* context, Method method, Work work);
+  // What is soon done, in the lane of the caller's sessions: it does not wait for long requests.
   Unary* ForCaller(Context* context, Method method, CallerWork work);
+  Unary* InLane(const char* lane, Context* context, Method method, CallerWork work);
   // The session is `field` of the request; its work runs on its strand, and the call is finished
   // when everything is kept that the work may have seen.
   Unary* OnStrand(Context* context, Method method, const std::string& field,
@@ -137,19 +139,23 @@ class EstimationService final : public v1::EstimationService::CallbackService {
 
 EstimationService::Unary* EstimationService::OnExecutor(Context* context, Method method,
                                                         Work work) {
-  return ForCaller(context, method, [work = std::move(work)](const Caller&, const Stop& stop) {
-    return work(stop);
-  });
+  return InLane("/calls", context, method,
+                [work = std::move(work)](const Caller&, const Stop& stop) { return work(stop); });
 }
 
 EstimationService::Unary* EstimationService::ForCaller(Context* context, Method method,
                                                        CallerWork work) {
+  return InLane("/sessions", context, method, std::move(work));
+}
+
+EstimationService::Unary* EstimationService::InLane(const char* lane, Context* context,
+                                                    Method method, CallerWork work) {
   const auto caller = context_.access.Authorize(*context, method);
   if (!caller.ok()) return FinishAtOnce(context, caller.status());
   return UnaryCall::Start(
       context_, context,
       [&](Task task) {
-        return context_.executor.Submit(absl::StrCat(caller->tenant, "/calls"), std::move(task));
+        return context_.executor.Submit(absl::StrCat(caller->tenant, lane), std::move(task));
       },
       [caller = *caller, work = std::move(work)](const Stop& stop,
                                                  const UnaryCall::Finisher& finish) {

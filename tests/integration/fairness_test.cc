@@ -30,7 +30,6 @@ v1::EstimateRequest LongRequest() {
 }
 
 TEST_F(OneThreadTest, StreamsWhileLongRequestsAreComputed) {
-  ASSERT_TRUE(Create("rig").ok());
   constexpr int kRequests = 3;
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
   std::vector<std::future<grpc::Status>> answers;
@@ -41,6 +40,7 @@ TEST_F(OneThreadTest, StreamsWhileLongRequestsAreComputed) {
       return stub_->Estimate(&context, LongRequest(), &response);
     }));
   }
+  ASSERT_TRUE(Create("rig").ok());
   for (int batch = 1; batch <= 10; ++batch) {
     ASSERT_TRUE(Add("sessions/rig", batch, OscillatorRows(5 * (batch - 1), 5 * batch)).ok());
   }
