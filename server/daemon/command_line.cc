@@ -25,9 +25,13 @@ CommandLine Refuse(const std::string& message) {
   return Done(kBadUsage);
 }
 
-void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std::string& meaning) {
+constexpr int64_t kMostOfAnything = int64_t{1} << 60;
+
+// From 1 to `highest`, what the method itself can bear.
+void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std::string& meaning,
+              int64_t highest = kMostOfAnything) {
   app.add_option(name, limit, meaning)
-      ->check(CLI::Range(int64_t{1}, int64_t{1} << 60))
+      ->check(CLI::Range(int64_t{1}, highest))
       ->capture_default_str();
 }
 
@@ -37,6 +41,20 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
   AddLimit(app, "--max-sessions-per-tenant", limits.sessions_per_tenant, "Sessions of a tenant");
   AddLimit(app, "--max-batch-rows", limits.batch_rows, "Rows of a batch");
   AddLimit(app, "--max-session-rows", limits.rows, "Rows of a session");
+  AddLimit(app, "--max-tenant-rows", limits.rows_per_tenant, "Rows of all sessions of a tenant");
+  AddLimit(app, "--max-total-rows", limits.total_rows, "Rows of all sessions of all tenants");
+  ProblemLimits& problem = limits.problem;
+  AddLimit(app, "--max-parameters", problem.parameters,
+           "Uncertain parameters of a problem, those of all its runs together", kMostTerms);
+  AddLimit(app, "--max-states", problem.states, "States of a problem's model");
+  AddLimit(app, "--max-points", problem.points,
+           "Collocation points of a problem, of the highest order that its expansion may get",
+           kMostPoints);
+  app.add_option("--max-memory-mb", daemon.most_memory_mb,
+                 "Resident memory in MiB beyond which idle sessions leave the memory and new "
+                 "sessions, those that come back, and requests without one are refused; 0: none")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
+      ->capture_default_str();
   app.add_option("--max-compute-s", daemon.most_computing_s,
                  "Seconds that one request, or one batch of a stream, may be computed")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))

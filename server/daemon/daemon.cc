@@ -90,7 +90,8 @@ absl::Status Daemon::OpenJournal() {
 }
 
 absl::Status Daemon::OpenSessions() {
-  const SessionServices services{executor_, *journal_, models_, options_.limits, &metrics_};
+  const SessionServices services{executor_,       *journal_, models_,
+                                 options_.limits, &metrics_, MemoryLimit(options_.most_memory_mb)};
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});

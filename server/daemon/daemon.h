@@ -36,6 +36,7 @@ struct DaemonOptions {
   std::string data_dir{};
   int64_t most_disk_mb = 0;  // of the data folder; 0: as large as the disk
   SessionLimits limits{};
+  int64_t most_memory_mb = 0;  // resident, of the process; 0: no limit
   std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
   int most_message_mb = 64;
   int64_t most_computing_s = 3'600;  // of one call, or one batch of a stream

@@ -2,12 +2,20 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <chrono>
 #include <utility>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
+namespace {
+
+// What a full queue takes to have room again, or more.
+constexpr std::chrono::seconds kBusyDelay{1};
+
+}  // namespace
 
 Executor::Executor(const ExecutorOptions& options) : options_(options) {
   POLYEST_CHECK(options.threads_per_lane >= 1 && options.threads >= options.threads_per_lane &&
@@ -50,9 +58,11 @@ absl::Status Executor::Reserve(const std::string& lane) {
   const bool lane_full =
       found != lanes_.end() && found->second.accepted >= options_.capacity_per_lane;
   if (accepted_ >= options_.capacity || lane_full) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "the daemon is busy: its queue of ",
-        lane_full ? options_.capacity_per_lane : options_.capacity, " tasks is full; try later"));
+    return Refuse(absl::StatusCode::kResourceExhausted,
+                  absl::StrCat("the daemon is busy: its queue of ",
+                               lane_full ? options_.capacity_per_lane : options_.capacity,
+                               " tasks is full; try later"),
+                  {.reason = kBusy, .retry_delay = kBusyDelay});
   }
   ++accepted_;
   ++lanes_[lane].accepted;

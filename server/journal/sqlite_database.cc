@@ -3,13 +3,19 @@
 #include <absl/strings/str_format.h>
 #include <sqlite3.h>
 
+#include <chrono>
+#include <string>
+
 #include "core/common/status.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
 
 // For a lock that another connection of this process holds for a moment.
 constexpr int kBusyTimeoutMs = 10'000;
+// Until somebody may have made room on a full disk.
+constexpr std::chrono::seconds kFullDiskDelay{1};
 
 absl::StatusCode CodeOf(int code) {
   switch (code & 0xff) {
@@ -41,8 +47,12 @@ absl::StatusCode CodeOf(int code) {
 
 absl::Status FromSqlite(int code, std::string_view doing) {
   if (code == SQLITE_OK || code == SQLITE_ROW || code == SQLITE_DONE) return absl::OkStatus();
-  return absl::Status(CodeOf(code),
-                      absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code));
+  const std::string message =
+      absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code);
+  if ((code & 0xff) == SQLITE_FULL) {
+    return Refuse(CodeOf(code), message, {.reason = kDiskFull, .retry_delay = kFullDiskDelay});
+  }
+  return absl::Status(CodeOf(code), message);
 }
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(const std::string& file) {

@@ -16,7 +16,7 @@
 #include "server/convert/measurements.h"
 #include "server/convert/model.h"
 #include "server/convert/posterior.h"
-#include "server/convert/problem.h"
+#include "server/convert/problem_limits.h"
 #include "server/convert/regularization.h"
 #include "server/convert/studies.h"
 #include "server/operations/names.h"
@@ -28,8 +28,10 @@ namespace {
 // An estimator of a request's problem that holds all its measurements, not yet processed.
 template <typename Request>
 absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const Request& request, int threads,
-                                                   const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
+                                                   const ModelLibrary& models,
+                                                   const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models, limits));
+  POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, request.measurements()));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   POLYEST_ASSIGN_OR_RETURN(
       auto estimator,
@@ -42,9 +44,10 @@ absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const Request& request, int t
 // What the measurements of a request have told, if there are any.
 absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::DesignExperimentRequest& request,
                                                       int threads, const Stop& stop,
-                                                      const ModelLibrary& models) {
+                                                      const ModelLibrary& models,
+                                                      const ProblemLimits& limits) {
   if (request.measurements().time().empty()) return std::optional<Estimate>();
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models, limits));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   return estimator->CurrentEstimate(stop);
 }
@@ -52,10 +55,10 @@ absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::DesignExperiment
 // The next experiment with the inputs of a candidate.
 absl::StatusOr<ResolvedProblem> NextExperiment(
     const v1::Problem& given, const v1::DesignExperimentRequest::Candidate& candidate,
-    const std::optional<Estimate>& known, const ModelLibrary& models) {
+    const std::optional<Estimate>& known, const ModelLibrary& models, const ProblemLimits& limits) {
   v1::Problem next = given;
   *next.mutable_inputs() = candidate.inputs();
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(next, models));
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(next, models, limits));
   if (known) return WithEstimateAsPrior(problem, *known);
   return problem;
 }
@@ -63,8 +66,9 @@ absl::StatusOr<ResolvedProblem> NextExperiment(
 }  // namespace
 
 absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& request, int threads,
-                                                 const Stop& stop, const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+                                                 const Stop& stop, const ModelLibrary& models,
+                                                 const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models, limits));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
   v1::EstimateResponse response;
@@ -73,8 +77,9 @@ absl::StatusOr<v1::EstimateResponse> RunEstimate(const v1::EstimateRequest& requ
 }
 
 absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& request, int threads,
-                                                   const Stop& stop, const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
+                                                   const Stop& stop, const ModelLibrary& models,
+                                                   const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models, limits));
   PropagationOptions options = ToPropagationOptions(request);
   options.threads = threads;
   POLYEST_ASSIGN_OR_RETURN(Propagation propagation, PropagatePrior(problem, options, stop));
@@ -83,8 +88,9 @@ absl::StatusOr<v1::PropagateResponse> RunPropagate(const v1::PropagateRequest& r
 
 absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostRequest& request,
                                                          int threads, const Stop& stop,
-                                                         const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
+                                                         const ModelLibrary& models,
+                                                         const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models, limits));
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(request.measurements()));
   CostGridOptions options = ToCostGridOptions(request);
   options.threads = threads;
@@ -94,8 +100,8 @@ absl::StatusOr<v1::EvaluateCostResponse> RunEvaluateCost(const v1::EvaluateCostR
 
 absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
     const v1::AnalyzeSensitivityRequest& request, int threads, const Stop& stop,
-    const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models));
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(request.problem(), models, limits));
   SensitivityOptions options = ToSensitivityOptions(request);
   options.threads = threads;
   POLYEST_ASSIGN_OR_RETURN(SensitivityAnalysis analysis,
@@ -105,19 +111,19 @@ absl::StatusOr<v1::AnalyzeSensitivityResponse> RunAnalyzeSensitivity(
 
 absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
     const v1::DesignExperimentRequest& request, int threads, const Stop& stop,
-    const ModelLibrary& models) {
+    const ModelLibrary& models, const ProblemLimits& limits) {
   ExperimentOptions options = ToExperimentOptions(request);
   options.threads = threads;
   POLYEST_RETURN_IF_ERROR(options.Validate());
   POLYEST_ASSIGN_OR_RETURN(const std::optional<Estimate> known,
-                           EstimateSoFar(request, threads, stop, models));
+                           EstimateSoFar(request, threads, stop, models, limits));
   v1::DesignExperimentRequest::Candidate own;
   *own.mutable_inputs() = request.problem().inputs();
   v1::DesignExperimentResponse response;
   for (int i = 0; i < std::max(1, request.candidates_size()); ++i) {
     const bool given = !request.candidates().empty();
     const auto& candidate = given ? request.candidates(i) : own;
-    const auto problem = NextExperiment(request.problem(), candidate, known, models);
+    const auto problem = NextExperiment(request.problem(), candidate, known, models, limits);
     auto design = problem.ok() ? DesignExperiment(*problem, options, stop) : problem.status();
     if (!design.ok()) {
       if (!given || !absl::IsInvalidArgument(design.status())) return design.status();
@@ -139,8 +145,9 @@ absl::StatusOr<v1::DesignExperimentResponse> RunDesignExperiment(
 
 absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorRequest& request,
                                                          int threads, const Stop& stop,
-                                                         const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+                                                         const ModelLibrary& models,
+                                                         const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models, limits));
   const PosteriorOptions options = ToPosteriorOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate(estimator->problem().prior()));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
@@ -150,8 +157,9 @@ absl::StatusOr<v1::GetPosteriorResponse> RunGetPosterior(const v1::GetPosteriorR
 
 absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequest& request,
                                                        int threads, const Stop& stop,
-                                                       const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+                                                       const ModelLibrary& models,
+                                                       const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models, limits));
   const ProfileOptions options = ToProfileOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate(estimator->problem().prior()));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
@@ -161,8 +169,8 @@ absl::StatusOr<v1::ProfileCostResponse> RunProfileCost(const v1::ProfileCostRequ
 
 absl::StatusOr<v1::SweepRegularizationResponse> RunSweepRegularization(
     const v1::SweepRegularizationRequest& request, int threads, const Stop& stop,
-    const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models));
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(request, threads, models, limits));
   const RegularizationOptions options = ToRegularizationOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate());
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/common/stop.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 
@@ -37,9 +38,11 @@ class CallStop {
   absl::Status Name(absl::Status status) const {
     const bool in_time = !deadline_ || Stop::Clock::now() < *deadline_;
     if (!absl::IsDeadlineExceeded(status) || !in_time) return status;
-    return absl::ResourceExhaustedError(absl::StrFormat(
-        "the request was computed for %d s, the longest that one may be (--max-compute-s)",
-        most_computing_.count()));
+    return LimitExceeded(
+        "--max-compute-s",
+        absl::StrFormat(
+            "the request was computed for %d s, the longest that one may be (--max-compute-s)",
+            most_computing_.count()));
   }
 
  private:

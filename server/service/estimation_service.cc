@@ -53,9 +53,9 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
 }
 
 absl::Status SessionAndProblem(const std::string& session) {
-  return InvalidField("session", absl::StrCat("\"", session,
-                                              "\" is given and a problem or measurements too; "
-                                              "a session has its own"));
+  return InvalidField(
+      "session",
+      absl::StrCat("\"", session, "\" is given and a problem too: a session has its own"));
 }
 
 class EstimationService final : public v1::EstimationService::CallbackService {
@@ -120,10 +120,22 @@ class EstimationService final : public v1::EstimationService::CallbackService {
  private:
   using Work = std::function<absl::Status(const Stop&)>;
   using CallerWork = std::function<absl::Status(const Caller&, const Stop&)>;
+  template <typename Request, typename Response>
+  using Operation = absl::StatusOr<Response> (*)(const Request&, int threads, const Stop&,
+                                                 const ModelLibrary&, const ProblemLimits&);
   using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
 
   // All of these refuse a caller who may not call the method, before anything else.
   Unary* OnExecutor(Context* context, Method method, Work work);
+  // An operation that needs no session, within the limits.
+  template <typename Request, typename Response>
+  Unary* Compute(Context* context, Method method, Operation<Request, Response> operation,
+                 const Request* request, Response* response);
+  // The same of the request's problem, or of its session.
+  template <typename Request, typename Response>
+  Unary* Study(Context* context, Method method, Operation<Request, Response> operation,
+               absl::StatusOr<Response> (Session::*of_session)(const Request&, const Stop&),
+               const Request* request, Response* response);
   // What is soon done, in the lane of the caller's sessions: it does not wait for long requests.
   Unary* ForCaller(Context* context, Method method, CallerWork work);
   Unary* InLane(const char* lane, Context* context, Method method, CallerWork work);
@@ -141,6 +153,19 @@ EstimationService::Unary* EstimationService::OnExecutor(Context* context, Method
                                                         Work work) {
   return InLane("/calls", context, method,
                 [work = std::move(work)](const Caller&, const Stop& stop) { return work(stop); });
+}
+
+template <typename Request, typename Response>
+EstimationService::Unary* EstimationService::Compute(Context* context, Method method,
+                                                     Operation<Request, Response> operation,
+                                                     const Request* request, Response* response) {
+  return OnExecutor(context, method, [=, this](const Stop& stop) -> absl::Status {
+    const SessionServices& services = context_.sessions.services();
+    POLYEST_RETURN_IF_ERROR(services.memory.Check());
+    return Deliver(
+        operation(*request, kThreadsPerCall, stop, context_.models, services.limits.problem),
+        response);
+  });
 }
 
 EstimationService::Unary* EstimationService::ForCaller(Context* context, Method method,
@@ -184,6 +209,22 @@ EstimationService::Unary* EstimationService::OnStrand(Context* context, Method m
       });
 }
 
+template <typename Request, typename Response>
+EstimationService::Unary* EstimationService::Study(
+    Context* context, Method method, Operation<Request, Response> operation,
+    absl::StatusOr<Response> (Session::*of_session)(const Request&, const Stop&),
+    const Request* request, Response* response) {
+  if (request->session().empty()) return Compute(context, method, operation, request, response);
+  if (request->has_problem() || request->has_measurements()) {
+    return OnExecutor(context, method,
+                      [=](const Stop&) { return SessionAndProblem(request->session()); });
+  }
+  return OnStrand(context, method, "session", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
+                    return Deliver((session.get()->*of_session)(*request, stop), response);
+                  });
+}
+
 EstimationService::Unary* EstimationService::ListModels(Context* context,
                                                         const v1::ListModelsRequest* request,
                                                         v1::ListModelsResponse* response) {
@@ -204,42 +245,31 @@ EstimationService::Unary* EstimationService::GetModel(Context* context,
 EstimationService::Unary* EstimationService::Estimate(Context* context,
                                                       const v1::EstimateRequest* request,
                                                       v1::EstimateResponse* response) {
-  return OnExecutor(context, "Estimate", [=, this](const Stop& stop) {
-    return Deliver(RunEstimate(*request, kThreadsPerCall, stop, context_.models), response);
-  });
+  return Compute(context, "Estimate", RunEstimate, request, response);
 }
 
 EstimationService::Unary* EstimationService::Propagate(Context* context,
                                                        const v1::PropagateRequest* request,
                                                        v1::PropagateResponse* response) {
-  return OnExecutor(context, "Propagate", [=, this](const Stop& stop) {
-    return Deliver(RunPropagate(*request, kThreadsPerCall, stop, context_.models), response);
-  });
+  return Compute(context, "Propagate", RunPropagate, request, response);
 }
 
 EstimationService::Unary* EstimationService::EvaluateCost(Context* context,
                                                           const v1::EvaluateCostRequest* request,
                                                           v1::EvaluateCostResponse* response) {
-  return OnExecutor(context, "EvaluateCost", [=, this](const Stop& stop) {
-    return Deliver(RunEvaluateCost(*request, kThreadsPerCall, stop, context_.models), response);
-  });
+  return Compute(context, "EvaluateCost", RunEvaluateCost, request, response);
 }
 
 EstimationService::Unary* EstimationService::AnalyzeSensitivity(
     Context* context, const v1::AnalyzeSensitivityRequest* request,
     v1::AnalyzeSensitivityResponse* response) {
-  return OnExecutor(context, "AnalyzeSensitivity", [=, this](const Stop& stop) {
-    return Deliver(RunAnalyzeSensitivity(*request, kThreadsPerCall, stop, context_.models),
-                   response);
-  });
+  return Compute(context, "AnalyzeSensitivity", RunAnalyzeSensitivity, request, response);
 }
 
 EstimationService::Unary* EstimationService::DesignExperiment(
     Context* context, const v1::DesignExperimentRequest* request,
     v1::DesignExperimentResponse* response) {
-  return OnExecutor(context, "DesignExperiment", [=, this](const Stop& stop) {
-    return Deliver(RunDesignExperiment(*request, kThreadsPerCall, stop, context_.models), response);
-  });
+  return Compute(context, "DesignExperiment", RunDesignExperiment, request, response);
 }
 
 EstimationService::Unary* EstimationService::CreateSession(Context* context,
@@ -345,56 +375,22 @@ grpc::ServerWriteReactor<v1::EstimateResponse>* EstimationService::WatchSession(
 EstimationService::Unary* EstimationService::GetPosterior(Context* context,
                                                           const v1::GetPosteriorRequest* request,
                                                           v1::GetPosteriorResponse* response) {
-  if (request->session().empty()) {
-    return OnExecutor(context, "GetPosterior", [=, this](const Stop& stop) {
-      return Deliver(RunGetPosterior(*request, kThreadsPerCall, stop, context_.models), response);
-    });
-  }
-  if (request->has_problem() || request->has_measurements()) {
-    return OnExecutor(context, "GetPosterior",
-                      [=](const Stop&) { return SessionAndProblem(request->session()); });
-  }
-  return OnStrand(context, "GetPosterior", "session", request->session(),
-                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
-                    return Deliver(session->CurrentPosterior(*request, stop), response);
-                  });
+  return Study(context, "GetPosterior", RunGetPosterior, &Session::CurrentPosterior, request,
+               response);
 }
 
 EstimationService::Unary* EstimationService::ProfileCost(Context* context,
                                                          const v1::ProfileCostRequest* request,
                                                          v1::ProfileCostResponse* response) {
-  if (request->session().empty()) {
-    return OnExecutor(context, "ProfileCost", [=, this](const Stop& stop) {
-      return Deliver(RunProfileCost(*request, kThreadsPerCall, stop, context_.models), response);
-    });
-  }
-  if (request->has_problem() || request->has_measurements()) {
-    return OnExecutor(context, "ProfileCost",
-                      [=](const Stop&) { return SessionAndProblem(request->session()); });
-  }
-  return OnStrand(context, "ProfileCost", "session", request->session(),
-                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
-                    return Deliver(session->CurrentProfiles(*request, stop), response);
-                  });
+  return Study(context, "ProfileCost", RunProfileCost, &Session::CurrentProfiles, request,
+               response);
 }
 
 EstimationService::Unary* EstimationService::SweepRegularization(
     Context* context, const v1::SweepRegularizationRequest* request,
     v1::SweepRegularizationResponse* response) {
-  if (request->session().empty()) {
-    return OnExecutor(context, "SweepRegularization", [=, this](const Stop& stop) {
-      return Deliver(RunSweepRegularization(*request, kThreadsPerCall, stop, context_.models),
-                     response);
-    });
-  }
-  if (request->has_problem() || request->has_measurements()) {
-    return OnExecutor(context, "SweepRegularization",
-                      [=](const Stop&) { return SessionAndProblem(request->session()); });
-  }
-  return OnStrand(context, "SweepRegularization", "session", request->session(),
-                  [=](const std::shared_ptr<Session>& session, const Stop& stop) {
-                    return Deliver(session->CurrentRegularizationSweep(*request, stop), response);
-                  });
+  return Study(context, "SweepRegularization", RunSweepRegularization,
+               &Session::CurrentRegularizationSweep, request, response);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <new>
 #include <utility>
 
+#include "server/refusal/refusal.h"
+
 namespace polyest {
 
 // A request may be within every limit and still need more memory than there is: then it fails, and
@@ -14,7 +16,8 @@ absl::Status Guarded(Work&& work) {
   try {
     return std::forward<Work>(work)();
   } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError("the daemon has not enough memory for this request");
+    return Refuse(absl::StatusCode::kResourceExhausted,
+                  "the daemon has not enough memory for this request", {.reason = kOutOfMemory});
   }
 }
 

@@ -2,11 +2,24 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <chrono>
 #include <utility>
+
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 
-absl::Status ShuttingDown() { return absl::UnavailableError("the daemon is shutting down"); }
+namespace {
+
+// Until another stream may have ended; until another daemon may serve.
+constexpr std::chrono::seconds kRetryDelay{1};
+
+}  // namespace
+
+absl::Status ShuttingDown() {
+  return Refuse(absl::StatusCode::kUnavailable, "the daemon is shutting down",
+                {.reason = kShuttingDown, .retry_delay = kRetryDelay});
+}
 
 absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
     Kind kind, std::weak_ptr<Drainable> stream) {
@@ -14,8 +27,9 @@ absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
   if (draining_) return ShuttingDown();
   if (kind != Kind::kUnary) {
     if (open(kind) >= kMostStreams) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the daemon serves at most ", kMostStreams, " streams at a time"));
+      return Refuse(absl::StatusCode::kResourceExhausted,
+                    absl::StrCat("the daemon serves at most ", kMostStreams, " streams at a time"),
+                    {.reason = kBusy, .retry_delay = kRetryDelay});
     }
     auto& streams = streams_[static_cast<int>(kind)];
     // Those that ended are swept out when they outnumber the rest.

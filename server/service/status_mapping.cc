@@ -1,6 +1,19 @@
 #include "server/service/status_mapping.h"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/string_view.h>
+#include <google/protobuf/util/time_util.h>
+#include <grpcpp/support/error_details.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
 #include <string>
+
+#include "core/common/check.h"
+#include "polyest/rpc/error_details.pb.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
@@ -47,11 +60,89 @@ grpc::StatusCode ToGrpc(absl::StatusCode code) {
   return grpc::StatusCode::UNKNOWN;
 }
 
+// The trailers of a call have room for 8 KiB. There a byte of the message takes three at the most,
+// and again one and a third in the details.
+constexpr size_t kLongestMessage = 1'400;
+constexpr size_t kLongestDescription = 200;
+
+std::string Shortened(absl::string_view text, size_t longest) {
+  if (text.size() <= longest) return std::string(text);
+  // Not within a character of UTF-8.
+  while ((text[longest] & 0xC0) == 0x80) --longest;
+  return absl::StrCat(text.substr(0, longest), "…");
+}
+
+// The path of the field that a message begins with, "uncertain[0].uniform: …"; empty: none.
+absl::string_view FieldOf(absl::string_view message) {
+  const absl::string_view path = message.substr(0, message.find(": "));
+  const auto in_path = [](unsigned char c) {
+    return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '[' || c == ']';
+  };
+  const bool is_path = path.size() < message.size() && !path.empty() &&
+                       path.size() <= kLongestDescription && absl::ascii_islower(path.front()) &&
+                       std::all_of(path.begin(), path.end(), in_path);
+  return is_path ? path : "";
+}
+
+template <typename Detail>
+void AddDetail(const Detail& detail, rpc::Status& status) {
+  google::protobuf::Any& any = *status.add_details();
+  any.set_type_url("type.googleapis.com/google.rpc." + detail.GetDescriptor()->name());
+  detail.SerializeToString(any.mutable_value());
+}
+
+void AddBadRequest(absl::string_view field, rpc::Status& status) {
+  rpc::BadRequest bad;
+  auto& violation = *bad.add_field_violations();
+  violation.set_field(std::string(field));
+  violation.set_description(
+      Shortened(absl::string_view(status.message()).substr(field.size() + 2), kLongestDescription));
+  AddDetail(bad, status);
+}
+
+void AddQuotaFailure(absl::string_view subject, rpc::Status& status) {
+  rpc::QuotaFailure failure;
+  auto& violation = *failure.add_violations();
+  violation.set_subject(std::string(subject));
+  violation.set_description(Shortened(status.message(), kLongestDescription));
+  AddDetail(failure, status);
+}
+
+void AddErrorInfo(const Refusal& refusal, rpc::Status& status) {
+  rpc::ErrorInfo info;
+  info.set_reason(refusal.reason);
+  info.set_domain("polyest");
+  if (!refusal.limit.empty()) (*info.mutable_metadata())["limit"] = refusal.limit;
+  AddDetail(info, status);
+}
+
+void AddRetryInfo(std::chrono::milliseconds delay, rpc::Status& status) {
+  rpc::RetryInfo retry;
+  *retry.mutable_retry_delay() =
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(delay.count());
+  AddDetail(retry, status);
+}
+
 }  // namespace
 
 grpc::Status ToGrpc(const absl::Status& status) {
   if (status.ok()) return grpc::Status::OK;
-  return grpc::Status(ToGrpc(status.code()), std::string(status.message()));
+  rpc::Status detailed;
+  detailed.set_code(ToGrpc(status.code()));
+  detailed.set_message(Shortened(status.message(), kLongestMessage));
+  const std::optional<Refusal> refusal = RefusalOf(status);
+  const std::string field(FieldOf(status.message()));
+  if (absl::IsInvalidArgument(status) && !field.empty()) AddBadRequest(field, detailed);
+  if (absl::IsResourceExhausted(status)) {
+    const std::string& subject = refusal && !refusal->limit.empty() ? refusal->limit : field;
+    if (!subject.empty()) AddQuotaFailure(subject, detailed);
+  }
+  if (refusal) AddErrorInfo(*refusal, detailed);
+  if (refusal && refusal->retry_delay) AddRetryInfo(*refusal->retry_delay, detailed);
+  if (detailed.details().empty()) return grpc::Status(ToGrpc(status.code()), detailed.message());
+  grpc::Status result;
+  POLYEST_CHECK(grpc::SetErrorDetails(detailed, &result).ok());
+  return result;
 }
 
 }  // namespace polyest

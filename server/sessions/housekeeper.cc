@@ -1,6 +1,12 @@
 #include "server/sessions/housekeeper.h"
 
+#include <malloc.h>
+
 #include <algorithm>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
 
 namespace polyest {
 namespace {
@@ -8,6 +14,13 @@ namespace {
 // How often it looks, as a part of the time after which a session is idle.
 constexpr int kLooks = 4;
 constexpr std::chrono::milliseconds kShortestPause{10};
+// Of the idle sessions in memory, how many leave it at a look that finds it full: one in so many.
+constexpr size_t kLeaving = 4;
+
+// Refused when the daemon is busy: then the next look does it.
+void Unload(const std::shared_ptr<Session>& session) {
+  session->strand().Submit([session] { session->Unload(); }).IgnoreError();
+}
 
 }  // namespace
 
@@ -17,10 +30,12 @@ Housekeeper::Housekeeper(SessionRegistry& registry, const HousekeepingOptions& o
       thread_([this](std::stop_token stop) { Run(stop); }) {}
 
 void Housekeeper::Run(std::stop_token stop) {
-  const auto pause = std::max(kShortestPause, options_.idle / kLooks);
+  auto pause = std::max(kShortestPause, options_.idle / kLooks);
+  if (registry_.services().memory.limited()) pause = std::min(pause, options_.memory_pause);
   std::unique_lock lock(mutex_);
   while (!stopping_.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); })) {
     UnloadIdle();
+    if (registry_.services().memory.Exceeded()) MakeRoom();
   }
 }
 
@@ -28,9 +43,21 @@ void Housekeeper::UnloadIdle() {
   for (const auto& session : registry_.All()) {
     const auto idle = session->IdleTime();
     if (!session->loaded() || !idle || *idle < options_.idle) continue;
-    // Refused when the daemon is busy: then the next look does it.
-    session->strand().Submit([session] { session->Unload(); }).IgnoreError();
+    Unload(session);
   }
+}
+
+void Housekeeper::MakeRoom() {
+  std::vector<std::pair<Session::Clock::duration, std::shared_ptr<Session>>> idle;
+  for (auto& session : registry_.All()) {
+    const auto time = session->IdleTime();
+    if (session->loaded() && time) idle.emplace_back(*time, std::move(session));
+  }
+  std::sort(idle.begin(), idle.end(), std::greater<>());
+  idle.resize((idle.size() + kLeaving - 1) / kLeaving);
+  for (const auto& [time, session] : idle) Unload(session);
+  // What was unloaded since the last look, and otherwise stays with the allocator.
+  malloc_trim(0);
 }
 
 }  // namespace polyest

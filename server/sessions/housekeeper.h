@@ -1,6 +1,7 @@
 #pragma once
 
-// Takes the estimators of idle sessions out of memory.
+// Takes the estimators of idle sessions out of memory: after a time, and while the daemon has more
+// memory than it may have those first that were idle longest.
 
 #include <chrono>
 #include <condition_variable>
@@ -15,6 +16,8 @@ namespace polyest {
 struct HousekeepingOptions {
   // An estimator that was not used for so long is unloaded.
   std::chrono::milliseconds idle{std::chrono::minutes(10)};
+  // How often it looks at the memory, if that is limited.
+  std::chrono::milliseconds memory_pause{std::chrono::seconds(1)};
 };
 
 class Housekeeper {
@@ -25,6 +28,7 @@ class Housekeeper {
  private:
   void Run(std::stop_token stop);
   void UnloadIdle();
+  void MakeRoom();
 
   SessionRegistry& registry_;
   const HousekeepingOptions options_;

@@ -5,13 +5,20 @@
 
 #include <cstdint>
 
+#include "server/convert/problem_limits.h"
+
 namespace polyest {
 
 struct SessionLimits {
-  int64_t sessions = 10'000;             // --max-sessions: of all tenants
-  int64_t sessions_per_tenant = 10'000;  // --max-sessions-per-tenant
-  int64_t batch_rows = 1'000'000;        // --max-batch-rows
-  int64_t rows = 100'000'000;            // --max-session-rows: of one session
+  int64_t sessions = 10'000;                // --max-sessions: of all tenants
+  int64_t sessions_per_tenant = 10'000;     // --max-sessions-per-tenant
+  int64_t batch_rows = 1'000'000;           // --max-batch-rows
+  int64_t rows = 100'000'000;               // --max-session-rows: of one session
+  int64_t rows_per_tenant = 1'000'000'000;  // --max-tenant-rows: of all sessions of a tenant
+  int64_t total_rows = 10'000'000'000;      // --max-total-rows: of all sessions of all tenants
+  // Of a problem that comes with a request, for a session or without one. Sessions that are there
+  // stay, whatever the limits are now.
+  ProblemLimits problem{.parameters = 64, .states = 1'000};
 };
 
 }  // namespace polyest

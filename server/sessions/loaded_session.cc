@@ -7,14 +7,14 @@
 #include "server/convert/estimate.h"
 #include "server/convert/measurements.h"
 #include "server/convert/posterior.h"
-#include "server/convert/problem.h"
 #include "server/convert/regularization.h"
 
 namespace polyest {
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
-                                                                   const ModelLibrary& models) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models));
+                                                                   const ModelLibrary& models,
+                                                                   const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models, limits));
   std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem)));
   EstimatorOptions options;
   options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {

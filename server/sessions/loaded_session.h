@@ -13,6 +13,7 @@
 #include "core/estimator/estimator.h"
 #include "core/fmu/model_library.h"
 #include "polyest/v1/estimation_service.pb.h"
+#include "server/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
 
 namespace polyest {
@@ -24,7 +25,8 @@ class LoadedSession {
  public:
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
-                                                             const ModelLibrary& models);
+                                                             const ModelLibrary& models,
+                                                             const ProblemLimits& limits = {});
   // As it was after the batches that the journal keeps, from its latest snapshot on if that is of
   // use. DATA_LOSS when they do not lead to `place`.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
@@ -41,6 +43,7 @@ class LoadedSession {
   const SessionPlace& place() const { return place_; }
   // Seconds of measurements appended, over all runs.
   double measured_s() const { return measured_s_; }
+  const ResolvedProblem& resolved() const { return estimator_->problem(); }
   // Takes the next batch, all of it or nothing; INVALID_ARGUMENT when it is no good. Cheap.
   absl::Status Append(const v1::Measurements& batch);
 

@@ -1,5 +1,6 @@
 #include "server/sessions/session.h"
 
+#include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -123,6 +124,7 @@ absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
   const uint64_t losses = ledger_.losses();
   if (loaded_ != nullptr && losses == losses_) return loaded_.get();
+  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   loaded_ = nullptr;
   passed_on_ = nullptr;
   // After a loss nothing is under way, and only this strand takes more.
@@ -137,8 +139,15 @@ absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
   return loaded_.get();
 }
 
-absl::Status Session::CheckRoom(const SessionPlace& place, const v1::Measurements& batch) const {
-  return CheckRows(services_.limits, place, batch);
+absl::Status Session::TakeRoom(const LoadedSession& loaded, const v1::Measurements& batch) const {
+  POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, loaded.place(), batch));
+  POLYEST_RETURN_IF_ERROR(CheckRuns(services_.limits.problem, loaded.resolved(), batch));
+  if (services_.rows == nullptr) return absl::OkStatus();
+  return services_.rows->Take(number(), tenant(), batch.time_size());
+}
+
+void Session::ReleaseRoom(int64_t rows) const {
+  if (services_.rows != nullptr) services_.rows->Release(number(), rows);
 }
 
 absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,
@@ -153,13 +162,15 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
                              return services_.journal.ReadDigest(number(), kept);
                            }));
   if (kind == BatchLedger::Kind::kNext) {
-    POLYEST_RETURN_IF_ERROR(CheckRoom(loaded->place(), batch));
+    POLYEST_RETURN_IF_ERROR(TakeRoom(*loaded, batch));
+    absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_size()); };
     const int64_t samples = loaded->place().samples;
     const double measured_s = loaded->measured_s();
     POLYEST_RETURN_IF_ERROR(loaded->Append(batch));
     entry.place = loaded->place();
     POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, losses_));
     const int64_t values = entry.place.samples - samples;
+    std::move(release_room).Cancel();
     Keep(std::move(entry), batch.time_size(), values, loaded->measured_s() - measured_s);
   }
   v1::Acknowledgement acknowledgement;
@@ -177,6 +188,7 @@ void Session::Keep(JournalEntry entry, int64_t rows, int64_t values, double meas
         if (Metrics* const metrics = self->services_.metrics; metrics != nullptr && kept.ok()) {
           metrics->Count(Metrics::Batch{rows, values, measured_s, duration.count()});
         }
+        if (!kept.ok()) self->ReleaseRoom(rows);
         self->ledger_.Settle(losses, sequence, kept);
       });
 }

@@ -20,6 +20,8 @@
 #include "server/sessions/batch_ledger.h"
 #include "server/sessions/limits.h"
 #include "server/sessions/loaded_session.h"
+#include "server/sessions/memory_limit.h"
+#include "server/sessions/stored_rows.h"
 
 namespace polyest {
 
@@ -43,6 +45,9 @@ struct SessionServices {
   const ModelLibrary& models;
   SessionLimits limits = {};
   Metrics* metrics = nullptr;  // null: nothing is counted
+  MemoryLimit memory = MemoryLimit();
+  // Null: rows are not counted; the registry does.
+  std::shared_ptr<StoredRows> rows = nullptr;
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -127,7 +132,9 @@ class Session : public std::enable_shared_from_this<Session> {
   class Computing;
 
   absl::Status CheckOpen() const;
-  absl::Status CheckRoom(const SessionPlace& place, const v1::Measurements& batch) const;
+  // Whether the next batch keeps to the limits; its rows are taken then.
+  absl::Status TakeRoom(const LoadedSession& loaded, const v1::Measurements& batch) const;
+  void ReleaseRoom(int64_t rows) const;
   // The estimator as it is after every batch taken.
   absl::StatusOr<LoadedSession*> Loaded(const Stop& stop);
   void PassOn(const SharedEstimate& estimate);

@@ -17,7 +17,9 @@ SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : re
 }
 
 SessionImport::~SessionImport() {
-  if (loaded_ != nullptr) registry_.services().journal.Delete(head_.number).IgnoreError();
+  if (loaded_ == nullptr) return;
+  registry_.services().journal.Delete(head_.number).IgnoreError();
+  registry_.services().rows->Forget(head_.number);
 }
 
 absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
@@ -51,7 +53,8 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   head_.create_time = head.create_time();
   promised_ = head.batches();
   const SessionServices& services = registry_.services();
-  POLYEST_ASSIGN_OR_RETURN(auto loaded, LoadedSession::Make(head.problem(), services.models));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto loaded, LoadedSession::Make(head.problem(), services.models, services.limits.problem));
   POLYEST_ASSIGN_OR_RETURN(head_.number,
                            services.journal.Create(head_, head.problem(), /*hidden=*/true));
   loaded_ = std::move(loaded);
@@ -68,8 +71,12 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
         absl::StrFormat("record.batch.sequence: %d must be %d, and the head promises %d batches",
                         batch.sequence(), next, promised_));
   }
+  const SessionServices& services = registry_.services();
+  POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, loaded_->place(), batch.measurements()));
   POLYEST_RETURN_IF_ERROR(
-      CheckRows(registry_.services().limits, loaded_->place(), batch.measurements()));
+      CheckRuns(services.limits.problem, loaded_->resolved(), batch.measurements()));
+  POLYEST_RETURN_IF_ERROR(
+      services.rows->Take(head_.number, head_.tenant, batch.measurements().time_size()));
   POLYEST_RETURN_IF_ERROR(loaded_->Append(batch.measurements()));
   JournalEntry entry;
   entry.session = head_.number;
@@ -77,8 +84,8 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   entry.digest = Digest(entry.measurements);
   entry.place = loaded_->place();
   std::promise<absl::Status> kept;
-  registry_.services().journal.Append(std::move(entry),
-                                      [&](const absl::Status& status) { kept.set_value(status); });
+  services.journal.Append(std::move(entry),
+                          [&](const absl::Status& status) { kept.set_value(status); });
   return kept.get_future().get();
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
@@ -31,7 +32,10 @@ absl::Status CheckSessionId(const std::string& id) {
 }
 
 SessionRegistry::SessionRegistry(const SessionServices& services, WallClock clock)
-    : services_(services), clock_(std::move(clock)) {}
+    : services_(services), clock_(std::move(clock)) {
+  const SessionLimits& limits = services.limits;
+  services_.rows = std::make_shared<StoredRows>(limits.rows_per_tenant, limits.total_rows);
+}
 
 absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
     const SessionServices& services, WallClock clock) {
@@ -39,8 +43,10 @@ absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
   std::unique_ptr<SessionRegistry> registry(new SessionRegistry(services, std::move(clock)));
   for (SessionHead& head : heads) {
     ++registry->count_[head.tenant];
+    registry->services_.rows->Count(head.number, head.tenant, head.place.rows);
     const Key key(head.tenant, head.name);
-    registry->sessions_.emplace(key, std::make_shared<Session>(services, std::move(head)));
+    registry->sessions_.emplace(key,
+                                std::make_shared<Session>(registry->services_, std::move(head)));
   }
   return registry;
 }
@@ -49,6 +55,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
                                                                  const std::string& id,
                                                                  const v1::Problem& problem) {
   if (!id.empty()) POLYEST_RETURN_IF_ERROR(CheckSessionId(id));
+  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   SessionHead head;
   head.tenant = tenant;
   {
@@ -58,7 +65,8 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   }
   // Not under the mutex: a large problem takes its time, and so does the journal, which looks again
   // whether the name is free.
-  POLYEST_ASSIGN_OR_RETURN(auto loaded, LoadedSession::Make(problem, services_.models));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto loaded, LoadedSession::Make(problem, services_.models, services_.limits.problem));
   head.create_time = clock_();
   const auto number = services_.journal.Create(head, problem, /*hidden=*/false);
   if (absl::IsAlreadyExists(number.status())) {
@@ -81,6 +89,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
 }
 
 absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
+  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   const std::lock_guard lock(mutex_);
   return CheckFree({tenant, name});
 }
@@ -91,13 +100,15 @@ absl::Status SessionRegistry::CheckFree(const Key& key) const {
         absl::StrFormat("there is a session \"%s\" already", key.second));
   }
   if (static_cast<int64_t>(sessions_.size()) >= services_.limits.sessions) {
-    return absl::ResourceExhaustedError(
+    return LimitExceeded(
+        "--max-sessions",
         absl::StrFormat("the daemon keeps at most %d sessions (--max-sessions); delete one",
                         services_.limits.sessions));
   }
   const auto count = count_.find(key.first);
   if (count != count_.end() && count->second >= services_.limits.sessions_per_tenant) {
-    return absl::ResourceExhaustedError(
+    return LimitExceeded(
+        "--max-sessions-per-tenant",
         absl::StrFormat("a tenant may have at most %d sessions (--max-sessions-per-tenant); delete "
                         "one",
                         services_.limits.sessions_per_tenant));
@@ -144,6 +155,7 @@ absl::Status SessionRegistry::Delete(const std::string& tenant, const std::strin
     sessions_.erase({tenant, name});
     --count_[tenant];
   }
+  services_.rows->Forget(session->number());
   session->Close();
   return absl::OkStatus();
 }

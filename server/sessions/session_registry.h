@@ -56,7 +56,7 @@ class SessionRegistry {
   absl::Status CheckFree(const Key& key) const;
   std::string ChooseName(const std::string& tenant);
 
-  const SessionServices services_;
+  SessionServices services_;
   const WallClock clock_;
   mutable std::mutex mutex_;
   std::map<Key, std::shared_ptr<Session>> sessions_;

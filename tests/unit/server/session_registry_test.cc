@@ -4,6 +4,7 @@
 #include <google/protobuf/util/message_differencer.h>
 #include <gtest/gtest.h>
 
+#include "server/refusal/refusal.h"
 #include "tests/testing/faulty_journal.h"
 #include "tests/unit/server/problem_json.h"
 
@@ -22,9 +23,25 @@ class SessionRegistryTest : public testing::Test {
     return names;
   }
 
+  static v1::Measurements Rows(std::initializer_list<double> times) {
+    v1::Measurements batch;
+    auto& x = *batch.add_channels();
+    x.set_name("x");
+    for (const double time : times) {
+      batch.add_time(time);
+      x.add_values(0.1);
+    }
+    return batch;
+  }
+
   void SetUp() override { Open(); }
   void Open() {
-    auto opened = SessionRegistry::Open({executor_, journal_, models_, limits_}, [] {
+    const SessionServices services{.executor = executor_,
+                                   .journal = journal_,
+                                   .models = models_,
+                                   .limits = limits_,
+                                   .memory = MemoryLimit(1, [this] { return resident_bytes_; })};
+    auto opened = SessionRegistry::Open(services, [] {
       google::protobuf::Timestamp time;
       time.set_seconds(42);
       return time;
@@ -38,6 +55,7 @@ class SessionRegistryTest : public testing::Test {
       {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
   ModelLibrary models_;
   SessionLimits limits_{.sessions = 4, .sessions_per_tenant = 3};
+  int64_t resident_bytes_ = 0;
   std::unique_ptr<SessionRegistry> registry_;
 };
 
@@ -131,6 +149,56 @@ TEST_F(SessionRegistryTest, FindsWhatTheJournalHas) {
   EXPECT_EQ(again.samples(), 1);
   EXPECT_EQ(again.last_time(), 0.25);
   EXPECT_FALSE(again.activity().loaded());
+}
+
+TEST_F(SessionRegistryTest, HoldsNoMoreRowsThanATenantMayHaveAlsoAfterARestart) {
+  limits_.rows_per_tenant = 3;
+  Open();
+  ASSERT_TRUE(StatusOfCreate("a").ok());
+  ASSERT_TRUE(StatusOfCreate("b").ok());
+  ASSERT_TRUE((*registry_->Get("t", "sessions/a"))->Add(1, Rows({0.1, 0.2}), {}).ok());
+  Open();
+  const auto b = *registry_->Get("t", "sessions/b");
+  const auto refused = b->Add(1, Rows({0.1, 0.2}), {});
+  EXPECT_EQ(RefusalOf(refused.status())->limit, "--max-tenant-rows");
+  EXPECT_TRUE(b->Add(1, Rows({0.1}), {}).ok());
+  ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
+  EXPECT_TRUE(b->Add(2, Rows({0.2, 0.3}), {}).ok());
+}
+
+TEST_F(SessionRegistryTest, CountsNoRowsThatWereRefused) {
+  limits_.rows_per_tenant = 2;
+  Open();
+  ASSERT_TRUE(StatusOfCreate("a").ok());
+  const auto a = *registry_->Get("t", "sessions/a");
+  EXPECT_FALSE(a->Add(1, Rows({0.2, 0.1}), {}).ok());
+  journal_.Fail(absl::ResourceExhaustedError("full"));
+  EXPECT_TRUE(a->Add(1, Rows({0.1, 0.2}), {}).ok());  // and is not kept
+  journal_.Fail(absl::OkStatus());
+  EXPECT_TRUE(a->Add(1, Rows({0.1, 0.2}), {}).ok());
+}
+
+TEST_F(SessionRegistryTest, TakesOnlyProblemsWithinItsLimits) {
+  ASSERT_TRUE(StatusOfCreate("before").ok());
+  limits_.problem.states = 1;
+  Open();
+  EXPECT_EQ(RefusalOf(StatusOfCreate("after"))->limit, "--max-states");
+  // What is there stays.
+  EXPECT_TRUE((*registry_->Get("t", "sessions/before"))->Add(1, Rows({0.1}), {}).ok());
+}
+
+TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoaded) {
+  ASSERT_TRUE(StatusOfCreate("a").ok());
+  const auto a = *registry_->Get("t", "sessions/a");
+  resident_bytes_ = (1 << 20) + 1;
+  EXPECT_EQ(RefusalOf(StatusOfCreate("b"))->limit, "--max-memory-mb");
+  EXPECT_TRUE(a->Add(1, Rows({0.1}), {}).ok());
+  a->Unload();
+  const auto refused = a->Add(2, Rows({0.2}), {});
+  EXPECT_EQ(RefusalOf(refused.status())->limit, "--max-memory-mb");
+  EXPECT_TRUE(RefusalOf(refused.status())->retry_delay);
+  resident_bytes_ = 1 << 20;
+  EXPECT_TRUE(a->Add(2, Rows({0.2}), {}).ok());
 }
 
 TEST_F(SessionRegistryTest, KeepsWhatItWasWhenTheDiskFails) {

@@ -1,6 +1,13 @@
 #include "server/service/status_mapping.h"
 
+#include <grpcpp/support/error_details.h>
 #include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+
+#include "polyest/rpc/error_details.pb.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
@@ -12,6 +19,72 @@ TEST(ToGrpc, KeepsCodeAndMessageOfEveryStatus) {
     EXPECT_EQ(static_cast<int>(status.error_code()), code);
     EXPECT_EQ(status.error_message(), "why");
   }
+}
+
+// The details of one kind, by their standard name; fails when there are none.
+template <typename Detail>
+Detail Find(const grpc::Status& status) {
+  rpc::Status detailed;
+  EXPECT_TRUE(grpc::ExtractErrorDetails(status, &detailed).ok());
+  EXPECT_EQ(detailed.code(), status.error_code());
+  EXPECT_EQ(detailed.message(), status.error_message());
+  Detail found;
+  const std::string type = "type.googleapis.com/google.rpc." + found.GetDescriptor()->name();
+  for (const auto& detail : detailed.details()) {
+    if (detail.type_url() == type && found.ParseFromString(detail.value())) return found;
+  }
+  ADD_FAILURE() << "no " << type << " in " << detailed.ShortDebugString();
+  return found;
+}
+
+TEST(ToGrpc, TellsTheFieldOfABadRequest) {
+  const auto bad = Find<rpc::BadRequest>(
+      ToGrpc(absl::InvalidArgumentError("uncertain[0].uniform: lower 5 must be below upper: 3")));
+  ASSERT_EQ(bad.field_violations_size(), 1);
+  EXPECT_EQ(bad.field_violations(0).field(), "uncertain[0].uniform");
+  EXPECT_EQ(bad.field_violations(0).description(), "lower 5 must be below upper: 3");
+}
+
+TEST(ToGrpc, MakesNoFieldOfWhatIsNone) {
+  for (const char* message : {"the journal: is closed", "no field", ": odd", "Odd: too", ""}) {
+    EXPECT_EQ(ToGrpc(absl::InvalidArgumentError(message)).error_details(), "") << message;
+  }
+  EXPECT_EQ(ToGrpc(absl::NotFoundError("name: is none")).error_details(), "");
+}
+
+TEST(ToGrpc, TellsTheLimitThatWasPassed) {
+  const grpc::Status status = ToGrpc(LimitExceeded("--max-sessions", "too many"));
+  const auto quota = Find<rpc::QuotaFailure>(status);
+  ASSERT_EQ(quota.violations_size(), 1);
+  EXPECT_EQ(quota.violations(0).subject(), "--max-sessions");
+  EXPECT_EQ(quota.violations(0).description(), "too many");
+  const auto info = Find<rpc::ErrorInfo>(status);
+  EXPECT_EQ(info.reason(), "LIMIT_EXCEEDED");
+  EXPECT_EQ(info.domain(), "polyest");
+  EXPECT_EQ(info.metadata().at("limit"), "--max-sessions");
+}
+
+TEST(ToGrpc, TellsTheFieldThatIsTooLargeForTheCore) {
+  const auto quota = Find<rpc::QuotaFailure>(
+      ToGrpc(absl::ResourceExhaustedError("expansion.order: order 9 needs too much")));
+  EXPECT_EQ(quota.violations(0).subject(), "expansion.order");
+}
+
+TEST(ToGrpc, TellsWhenToTryAgain) {
+  const auto retry = Find<rpc::RetryInfo>(
+      ToGrpc(Refuse(absl::StatusCode::kUnavailable, "later",
+                    {.reason = kBusy, .retry_delay = std::chrono::milliseconds(1'500)})));
+  EXPECT_EQ(retry.retry_delay().seconds(), 1);
+  EXPECT_EQ(retry.retry_delay().nanos(), 500'000'000);
+}
+
+TEST(ToGrpc, CutsMessagesThatNoTrailerHasRoomFor) {
+  std::string longest = "sessionId: ";
+  while (longest.size() < 100'000) longest += "ü";
+  const grpc::Status status = ToGrpc(absl::InvalidArgumentError(longest));
+  EXPECT_LT(3 * status.error_message().size() + status.error_details().size() * 4 / 3, 8'000u);
+  EXPECT_TRUE(status.error_message().ends_with("ü…"));
+  EXPECT_EQ(Find<rpc::BadRequest>(status).field_violations(0).field(), "sessionId");
 }
 
 TEST(ToGrpc, KeepsOk) { EXPECT_TRUE(ToGrpc(absl::OkStatus()).ok()); }

@@ -1,0 +1,26 @@
+#include "server/sessions/memory_limit.h"
+
+#include <absl/strings/str_format.h>
+
+#include <chrono>
+
+#include "server/refusal/refusal.h"
+
+namespace polyest {
+namespace {
+
+// In which idle sessions are unloaded.
+constexpr std::chrono::seconds kRetryDelay{2};
+
+}  // namespace
+
+absl::Status MemoryLimit::Check() const {
+  if (!Exceeded()) return absl::OkStatus();
+  return Refuse(absl::StatusCode::kResourceExhausted,
+                absl::StrFormat("the daemon has more memory in use than it may have, %d MiB "
+                                "(--max-memory-mb); try later",
+                                most_mb_),
+                {.reason = kOutOfMemory, .limit = "--max-memory-mb", .retry_delay = kRetryDelay});
+}
+
+}  // namespace polyest
