@@ -4,33 +4,16 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <map>
-#include <optional>
 #include <thread>
 
 #include "client/cli/exit_status.h"
+#include "client/cli/shared_options.h"
 
 namespace polyest {
 namespace {
 
-const std::map<std::string, Format> kFormats = {{"table", Format::kTable},
-                                                {"json", Format::kJson},
-                                                {"jsonl", Format::kJsonLines},
-                                                {"csv", Format::kCsv}};
-
-std::string CheckServer(const std::string& server) {
-  const size_t colon = server.rfind(':');
-  int port = 0;
-  if (colon != std::string::npos && colon > 0) {
-    const char* const end = server.data() + server.size();
-    const auto result = std::from_chars(server.data() + colon + 1, end, port);
-    if (result.ec == std::errc() && result.ptr == end && port >= 1 && port <= 65535) return "";
-  }
-  return "\"" + server + "\" must be HOST:PORT, the port from 1 to 65535";
-}
-
-// Options shared by several commands.
+// One method a command.
 class Parser {
  public:
   Parser() : app_("Estimates uncertain parameters of mechanical models from measurements.") {
@@ -40,8 +23,8 @@ class Parser {
     app_.footer(
         "Exit status: 0 success, 2 bad usage or input, 3 server unreachable or refused, 1 else.");
     const int cores = static_cast<int>(std::thread::hardware_concurrency());
-    place_.threads = std::clamp(cores, 1, 256);
-    paper_.threads = place_.threads;
+    threads_ = std::clamp(cores, 1, 256);
+    paper_.threads = threads_;
     AddEstimate();
     AddExplain();
     AddStream();
@@ -59,6 +42,7 @@ class Parser {
     AddRegularization();
     AddExport();
     AddImport();
+    AddDelete();
     AddTop();
   }
 
@@ -82,101 +66,31 @@ class Parser {
     if (name == "regularization") return Placed(regularization_);
     if (name == "export") return Placed(export_);
     if (name == "import") return Placed(import_);
+    if (name == "delete") return Placed(delete_);
     if (name == "top") return Placed(top_);
     return paper_;
   }
 
  private:
+  // Each command has one of its own: the parser takes the environment into the options of those
+  // commands, too, that are not given.
+  Place& PlaceOf(CLI::App& command) {
+    Place place;
+    place.threads = threads_;
+    return places_.try_emplace(&command, place).first->second;
+  }
+
   template <typename Arguments>
-  Command Placed(Arguments arguments) const {
-    arguments.place = place_;
+  Command Placed(Arguments arguments) {
+    arguments.place = PlaceOf(*app_.get_subcommands().front());
     return arguments;
-  }
-
-  CLI::Option* AddServer(CLI::App& command) {
-    command
-        .add_option("--deadline", place_.deadline_s, "Give up after this many seconds; 0: never")
-        ->check(CLI::Range(0.0, 1e9));
-    AddAccess(command);
-    return command.add_option("--server", place_.server, "The daemon to ask, HOST:PORT")
-        ->check(CLI::Validator(CheckServer, "HOST:PORT"));
-  }
-
-  void AddAccess(CLI::App& command) {
-    ServerAccess& access = place_.access;
-    const std::string group = "Access to a daemon";
-    command
-        .add_option("--tls-ca", access.ca_file, "PEM file of the CA of the daemon's certificate")
-        ->envname("POLYEST_TLS_CA")
-        ->group(group);
-    CLI::Option* const certificate =
-        command
-            .add_option("--tls-certificate", access.certificate_file,
-                        "PEM file of the client's own certificate, where the daemon asks for one")
-            ->envname("POLYEST_TLS_CERTIFICATE")
-            ->group(group);
-    CLI::Option* const key =
-        command.add_option("--tls-key", access.key_file, "PEM file of its key")
-            ->envname("POLYEST_TLS_KEY")
-            ->group(group);
-    certificate->needs(key);
-    key->needs(certificate);
-    command
-        .add_option("--tls-server-name", access.server_name,
-                    "The name in the daemon's certificate, if it is not that of --server")
-        ->group(group);
-    command
-        .add_option("--token-file", access.token_file,
-                    "File of the token, in place of the environment's POLYEST_TOKEN")
-        ->envname("POLYEST_TOKEN_FILE")
-        ->group(group);
-  }
-
-  CLI::Option* AddFmuFolder(CLI::App& command) {
-    return command.add_option("--fmu-dir", place_.fmu_dir,
-                              "Folder of the FMUs that problems may name here");
-  }
-
-  void AddPlace(CLI::App& command) {
-    CLI::Option* const server = AddServer(command);
-    command.add_flag("--local", local_, "Compute in this process (the default)")->excludes(server);
-    AddFmuFolder(command)->excludes(server);
-    command.add_option("--threads", place_.threads, "Threads for computing in this process")
-        ->check(CLI::Range(1, 256))
-        ->capture_default_str();
-  }
-
-  static void AddProblem(CLI::App& command, std::string& file) {
-    command.add_option("problem", file, "The problem, a JSON file")->required();
-  }
-
-  static void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {
-    command.add_option("--outputs", outputs, help)->allow_extra_args(false)->delimiter(',');
-  }
-
-  static void AddFormat(CLI::App& command, Format& format, std::vector<std::string> names) {
-    std::map<std::string, Format> formats;
-    std::string list;
-    for (const std::string& name : names) {
-      formats[name] = kFormats.at(name);
-      list += (list.empty() ? "" : ", ") + name;
-    }
-    const auto check = [formats, list](const std::string& name) {
-      if (formats.count(name) != 0) return std::string();
-      return "\"" + name + "\" must be one of " + list;
-    };
-    command
-        .add_option_function<std::string>(
-            "--format", [formats, &format](const std::string& name) { format = formats.at(name); },
-            "How to print: " + list + " (default " + names.front() + ")")
-        ->check(CLI::Validator(check, "FORMAT"));
   }
 
   void AddEstimate() {
     CLI::App& command = *app_.add_subcommand("estimate", "Estimate from a data file");
     AddProblem(command, estimate_.problem_file);
     command.add_option("data", estimate_.data_file, "The measurements, a CSV file")->required();
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, estimate_.format, {"table", "json"});
   }
 
@@ -185,7 +99,7 @@ class Parser {
         "explain", "Say in words what the data tell, what they do not, and what would help");
     AddProblem(command, explain_.problem_file);
     command.add_option("data", explain_.data_file, "The measurements, a CSV file")->required();
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
   }
 
   void AddStream() {
@@ -193,7 +107,7 @@ class Parser {
         *app_.add_subcommand("stream", "Stream data to a daemon, printing each estimate");
     AddProblem(command, stream_.problem_file);
     command.add_option("data", stream_.data_file, "The measurements, a CSV file, or -")->required();
-    AddServer(command)->required();
+    AddServer(command, PlaceOf(command))->required();
     command.add_option("--batch", stream_.batch_rows, "Rows a message")
         ->check(CLI::Range(1, 100'000))
         ->capture_default_str();
@@ -214,7 +128,7 @@ class Parser {
     AddProblem(command, propagate_.problem_file);
     command.add_option("--until", propagate_.until_s, "The last time, s")->required();
     command.add_option("--step", propagate_.step_s, "From one time to the next, s")->required();
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, propagate_.format, {"table", "json", "csv"});
   }
 
@@ -230,7 +144,7 @@ class Parser {
         ->take_all();
     command.add_option("--grid", cost_.grid_points, "Points an axis; 0: 201 for one, 41 for two")
         ->check(CLI::Range(0, 1001));
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, cost_.format, {"json", "csv"});
   }
 
@@ -238,7 +152,7 @@ class Parser {
     CLI::App& command =
         *app_.add_subcommand("models", "List the models there are, or describe one");
     command.add_option("name", models_.name, "A model's name");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, models_.format, {"table", "json"});
   }
 
@@ -248,7 +162,7 @@ class Parser {
         "Say all that is wrong with a problem, and with data for it, before anything runs");
     AddProblem(command, check_.problem_file);
     command.add_option("data", check_.data_file, "The measurements, a CSV file");
-    AddFmuFolder(command);
+    AddFmuFolder(command, PlaceOf(command));
     AddFormat(command, check_.format, {"table", "json"});
   }
 
@@ -260,7 +174,7 @@ class Parser {
         ->excludes(model);
     command.add_option("-o,--output", init_.output_file, "The file (default: standard output)");
     command.add_flag("--force", init_.force, "Overwrite the file if it is there");
-    AddFmuFolder(command);
+    AddFmuFolder(command, PlaceOf(command));
   }
 
   void AddSchema() {
@@ -275,7 +189,7 @@ class Parser {
     command.add_option("--step", sensitivity_.step_s,
                        "From one time to the next, s (default: a hundredth of the last)");
     AddOutputs(command, sensitivity_.outputs, "The outputs, comma-separated (default: measured)");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, sensitivity_.format, {"table", "json", "csv"});
   }
 
@@ -297,7 +211,7 @@ class Parser {
         ->take_all();
     AddOutputs(command, design_.outputs,
                "Further outputs that could be measured, comma-separated (default: all)");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, design_.format, {"table", "json"});
   }
 
@@ -329,7 +243,7 @@ class Parser {
     command.footer(
         "As csv: the samples if --samples is given, else the joint densities if --joint is, else "
         "one row a parameter. The densities of single parameters are in json.");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, posterior_.format, {"table", "json", "csv"});
   }
 
@@ -348,7 +262,7 @@ class Parser {
     command.footer(
         "On the expansion, over four posterior standard deviations to each side of the minimum as "
         "far as the prior and the region go in which the expansion is trusted.");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, profile_.format, {"table", "json", "csv"});
   }
 
@@ -368,7 +282,7 @@ class Parser {
     command.footer(
         "On the expansion where the posterior of α² = 1 is: an α² that pulls the estimate out of "
         "the region in which it is trusted is left out. The rules choose from 1e-4 … 1e4.");
-    AddPlace(command);
+    AddPlace(command, PlaceOf(command));
     AddFormat(command, regularization_.format, {"table", "json", "csv"});
   }
 
@@ -376,7 +290,7 @@ class Parser {
     CLI::App& command = *app_.add_subcommand("export", "Write a session of a daemon into a file");
     command.add_option("session", export_.session, "The session's name")->required();
     command.add_option("file", export_.file, "The file to write")->required();
-    AddServer(command)->required();
+    AddServer(command, PlaceOf(command))->required();
   }
 
   void AddImport() {
@@ -384,13 +298,20 @@ class Parser {
         "import", "Make a session of a daemon out of a file: the same estimate to the last bit");
     command.add_option("file", import_.file, "What `polyest export` has written")->required();
     command.add_option("--session", import_.session, "Its name there (default the one it had)");
-    AddServer(command)->required();
+    AddServer(command, PlaceOf(command))->required();
+  }
+
+  void AddDelete() {
+    CLI::App& command = *app_.add_subcommand(
+        "delete", "Delete a session of a daemon, with all that was measured for it");
+    command.add_option("session", delete_.session, "The session's name")->required();
+    AddServer(command, PlaceOf(command))->required();
   }
 
   void AddTop() {
     CLI::App& command =
         *app_.add_subcommand("top", "Show how a daemon and its sessions are, until Ctrl-C");
-    AddServer(command)->required();
+    AddServer(command, PlaceOf(command))->required();
     command.add_flag("--once", top_.once, "Once, and end");
     command.add_option("--interval", top_.interval_s, "From one look to the next, s")
         ->check(CLI::Range(0.1, 3600.0))
@@ -403,8 +324,8 @@ class Parser {
   }
 
   CLI::App app_;
-  Place place_;
-  bool local_ = false;
+  int threads_ = 1;
+  std::map<CLI::App*, Place> places_;
   EstimateArguments estimate_;
   ExplainArguments explain_;
   StreamArguments stream_;
@@ -421,6 +342,7 @@ class Parser {
   RegularizationArguments regularization_;
   ExportArguments export_;
   ImportArguments import_;
+  DeleteArguments delete_;
   TopArguments top_;
 };
 

@@ -157,17 +157,23 @@ struct ImportArguments {
   std::string session;  // its id here; empty: the one it had
 };
 
+struct DeleteArguments {
+  Place place;
+  std::string session;  // its id
+};
+
 struct TopArguments {
   Place place;
   bool once = false;
   double interval_s = 2;
 };
 
-using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                             SensitivityArguments, DesignArguments, PosteriorArguments,
-                             ProfileArguments, RegularizationArguments, ExplainArguments,
-                             ExportArguments, ImportArguments, TopArguments, PaperOptions>;
+using Command =
+    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                 SensitivityArguments, DesignArguments, PosteriorArguments, ProfileArguments,
+                 RegularizationArguments, ExplainArguments, ExportArguments, ImportArguments,
+                 DeleteArguments, TopArguments, PaperOptions>;
 
 // A command, or the exit status after help, version or an error have been printed.
 std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,

@@ -8,6 +8,7 @@
 #include "core/common/status.h"
 #include "core/common/stop.h"
 #include "server/operations/operations.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
@@ -81,9 +82,11 @@ class RemoteBackend : public Backend {
 
   absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) override {
     auto response = client_.Estimate(request);
-    if (absl::IsResourceExhausted(response.status())) {
-      return absl::ResourceExhaustedError(absl::StrCat(
-          response.status().message(), " (data too long for one message can be streamed)"));
+    // What gRPC itself refuses, before the daemon sees it.
+    if (absl::IsResourceExhausted(response.status()) && !RefusalOf(response.status())) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat(response.status().message(),
+                       " (--max-message-mb; data too long for one message can be streamed)"));
     }
     return response;
   }

@@ -25,6 +25,7 @@ int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostrea
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ExportArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ImportArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const DeleteArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const TopArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest

@@ -10,6 +10,7 @@
 #include <istream>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
@@ -102,7 +103,12 @@ class StreamCommand {
   }
 
   LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch) {
-    MeasurementStream stream(client_, session.name, {}, Callbacks());
+    MeasurementStreamOptions options;
+    options.wait = [this](std::chrono::milliseconds delay) {
+      interrupt_.WaitUntil(std::chrono::steady_clock::now() + delay);
+      return !interrupted();
+    };
+    MeasurementStream stream(client_, session.name, std::move(options), Callbacks());
     POLYEST_RETURN_IF_ERROR(stream.Open());
     if (isatty(STDERR_FILENO) != 0) err_ << "streaming to " << session.name << std::endl;
     Pace pace(arguments_.rate, interrupt_);

@@ -1,19 +1,55 @@
 #include "client/cpp/client.h"
 
+#include <google/protobuf/util/time_util.h>
+#include <grpc/support/time.h>
+#include <grpcpp/support/error_details.h>
+
+#include <chrono>
 #include <utility>
 
 #include "core/common/status.h"
+#include "polyest/rpc/error_details.pb.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
 
 using Stub = v1::EstimationService::Stub;
 
+template <typename Detail>
+bool Unpack(const google::protobuf::Any& any, Detail& detail) {
+  return any.type_url() == "type.googleapis.com/google.rpc." + detail.GetDescriptor()->name() &&
+         detail.ParseFromString(any.value());
+}
+
+// What the details of a status say; without a reason: nothing.
+Refusal RefusalIn(const grpc::Status& status) {
+  Refusal refusal;
+  rpc::Status detailed;
+  if (!grpc::ExtractErrorDetails(status, &detailed).ok()) return refusal;
+  rpc::ErrorInfo info;
+  rpc::RetryInfo retry;
+  for (const google::protobuf::Any& detail : detailed.details()) {
+    if (Unpack(detail, info)) {
+      refusal.reason = info.reason();
+      const auto limit = info.metadata().find("limit");
+      if (limit != info.metadata().end()) refusal.limit = limit->second;
+    } else if (Unpack(detail, retry)) {
+      refusal.retry_delay = std::chrono::milliseconds(
+          google::protobuf::util::TimeUtil::DurationToMilliseconds(retry.retry_delay()));
+    }
+  }
+  return refusal;
+}
+
 }  // namespace
 
 absl::Status FromGrpc(const grpc::Status& status) {
   // The codes of both are the same numbers.
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  const auto code = static_cast<absl::StatusCode>(status.error_code());
+  const Refusal refusal = RefusalIn(status);
+  if (status.ok() || refusal.reason.empty()) return absl::Status(code, status.error_message());
+  return Refuse(code, status.error_message(), refusal);
 }
 
 Client::Client(const std::string& server, ClientOptions options)
@@ -29,7 +65,9 @@ absl::StatusOr<Response> Client::Call(Method<Response, Request> method, const Re
   grpc::ClientContext context;
   connection_->Identify(context);
   if (options_.deadline) {
-    context.set_deadline(std::chrono::system_clock::now() + *options_.deadline);
+    context.set_deadline(
+        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                     gpr_time_from_millis(options_.deadline->count(), GPR_TIMESPAN)));
   }
   Response response;
   const grpc::Status status = (stub_.get()->*method)(&context, request, &response);

@@ -15,7 +15,7 @@
 
 namespace polyest {
 
-// A gRPC status as the same absl::Status.
+// A gRPC status as the same absl::Status, with the Refusal (server/refusal) that its details tell.
 absl::Status FromGrpc(const grpc::Status& status);
 
 // Threads may share a client. Every function fails with the daemon's status; UNAVAILABLE when the
@@ -62,6 +62,7 @@ class Client {
   // For MeasurementStream, once another call has gone well.
   v1::EstimationService::Stub& stub() { return *stub_; }
   void Identify(grpc::ClientContext& call) const { connection_->Identify(call); }
+  std::string Authorization() const { return connection_->Authorization(); }
   const std::string& server() const { return server_; }
 
  private:

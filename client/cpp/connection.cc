@@ -7,6 +7,7 @@
 #include <grpcpp/support/channel_arguments.h>
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "core/common/status.h"
@@ -78,9 +79,29 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Clie
 
 }  // namespace
 
-DaemonConnection::DaemonConnection(std::shared_ptr<grpc::Channel> channel, const std::string& token)
-    : channel_(std::move(channel)),
-      authorization_(token.empty() ? "" : absl::StrCat("Bearer ", token)) {}
+// From any thread.
+class DaemonConnection::TokenSource {
+ public:
+  TokenSource(const ClientOptions& options, std::string token)
+      : options_(options), token_(std::move(token)) {}
+
+  std::string Current() {
+    const std::lock_guard lock(mutex_);
+    if (options_.token_file.empty()) return token_;
+    auto token = ReadToken(options_);
+    if (token.ok()) token_ = *std::move(token);
+    return token_;
+  }
+
+ private:
+  const ClientOptions options_;
+  std::mutex mutex_;
+  std::string token_;
+};
+
+DaemonConnection::DaemonConnection(std::shared_ptr<grpc::Channel> channel,
+                                   std::shared_ptr<TokenSource> token)
+    : channel_(std::move(channel)), token_(std::move(token)) {}
 
 absl::StatusOr<DaemonConnection> DaemonConnection::Open(const std::string& server,
                                                         const ClientOptions& options) {
@@ -100,11 +121,18 @@ absl::StatusOr<DaemonConnection> DaemonConnection::Open(const std::string& serve
     // A proxy would be told the token, too.
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   }
-  return DaemonConnection(grpc::CreateCustomChannel(server, credentials, arguments), token);
+  return DaemonConnection(grpc::CreateCustomChannel(server, credentials, arguments),
+                          std::make_shared<TokenSource>(options, token));
+}
+
+std::string DaemonConnection::Authorization() const {
+  const std::string token = token_->Current();
+  return token.empty() ? "" : absl::StrCat("Bearer ", token);
 }
 
 void DaemonConnection::Identify(grpc::ClientContext& call) const {
-  if (!authorization_.empty()) call.AddMetadata("authorization", authorization_);
+  const std::string authorization = Authorization();
+  if (!authorization.empty()) call.AddMetadata("authorization", authorization);
 }
 
 }  // namespace polyest

@@ -32,7 +32,8 @@ struct ClientOptions {
   std::optional<ClientTls> tls{};
   // What the daemon knows the client by; empty: none. It is sent over TLS, or to loopback, only.
   std::string token{};
-  // A file of it alone, in place of `token`; empty: none.
+  // A file of it alone, in place of `token`; empty: none. It is read again for each call, so that a
+  // new token is taken; while it cannot be used, the last one stays.
   std::string token_file{};
 };
 
@@ -47,12 +48,17 @@ class DaemonConnection {
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   // Says who calls.
   void Identify(grpc::ClientContext& call) const;
+  // As what it would call now, for comparison.
+  std::string Authorization() const;
 
  private:
-  DaemonConnection(std::shared_ptr<grpc::Channel> channel, const std::string& token);
+  // The token, the last one that could be used.
+  class TokenSource;
+
+  DaemonConnection(std::shared_ptr<grpc::Channel> channel, std::shared_ptr<TokenSource> token);
 
   std::shared_ptr<grpc::Channel> channel_;
-  std::string authorization_;  // the header; empty: none
+  std::shared_ptr<TokenSource> token_;
 };
 
 }  // namespace polyest

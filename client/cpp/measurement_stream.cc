@@ -10,6 +10,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
@@ -24,6 +25,13 @@ std::string RandomId() {
 // Whether a new connection may help: the daemon is away, or has cut its calls off on its way out.
 bool IsBreak(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsCancelled(status);
+}
+
+// How long to wait where waiting helps, although the daemon answers: its disk is full, it is busy.
+std::optional<std::chrono::milliseconds> DelayOfRefusal(const absl::Status& status) {
+  if (!absl::IsResourceExhausted(status)) return std::nullopt;
+  const std::optional<Refusal> refusal = RefusalOf(status);
+  return refusal ? refusal->retry_delay : std::nullopt;
 }
 
 }  // namespace
@@ -43,7 +51,8 @@ class MeasurementStream::Connection
     hello->set_session(stream_.session_);
     hello->set_writer(stream_.writer_);
     if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
-    stream_.client_.Identify(context_);
+    authorization_ = stream_.client_.Authorization();
+    if (!authorization_.empty()) context_.AddMetadata("authorization", authorization_);
     stream_.client_.stub().async()->StreamMeasurements(&context_, this);
     StartRead(&response_);
     Write(std::move(hello));
@@ -53,6 +62,8 @@ class MeasurementStream::Connection
   bool writable() const { return !writing_ && !ended_ && !half_closed_; }
   bool done() const { return status_.has_value(); }
   const absl::Status& status() const { return *status_; }
+  // Whether the client would be known by another token now.
+  bool Outdated() const { return authorization_ != stream_.client_.Authorization(); }
 
   void Write(std::shared_ptr<const v1::StreamMeasurementsRequest> request) {
     writing_ = std::move(request);
@@ -88,6 +99,7 @@ class MeasurementStream::Connection
  private:
   MeasurementStream& stream_;
   grpc::ClientContext context_;
+  std::string authorization_;
   v1::StreamMeasurementsResponse response_;
   std::shared_ptr<const v1::StreamMeasurementsRequest> writing_;  // gRPC's until OnWriteDone
   bool ended_ = false;
@@ -114,6 +126,20 @@ MeasurementStream::~MeasurementStream() {
   changed_.wait(lock, [this] { return connection_->done(); });
 }
 
+bool MeasurementStream::Wait(std::chrono::milliseconds delay) const {
+  if (options_.wait) return options_.wait(delay);
+  std::this_thread::sleep_for(delay);
+  return true;
+}
+
+// Locked: once batches are acknowledged again after a refusal.
+void MeasurementStream::TellOfRoom(Lock& lock) {
+  if (refusals_ > 0 || !std::exchange(told_of_refusal_, false)) return;
+  lock.unlock();
+  Tell("the daemon takes batches again");
+  lock.lock();
+}
+
 void MeasurementStream::Tell(const std::string& sentence) const {
   if (callbacks_.connection) callbacks_.connection(sentence);
 }
@@ -138,6 +164,7 @@ void MeasurementStream::Take(const v1::StreamMeasurementsResponse& response) {
         written_ -= std::min<size_t>(written_, 1);
       }
       attempts_ = 0;
+      refusals_ = 0;
       changed_.notify_all();
     }
     if (callbacks_.acknowledgement) callbacks_.acknowledgement(response.acknowledgement());
@@ -187,23 +214,50 @@ absl::Status MeasurementStream::Open() {
   return Connect();
 }
 
+// Locked.
+bool MeasurementStream::MayRecover(const absl::Status& status) const {
+  if (IsBreak(status)) return attempts_ < options_.most_attempts;
+  // After a break the daemon may still hold the old connection as the session's writer.
+  if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.most_attempts;
+  // The daemon may have the new one a moment later.
+  if (absl::IsUnauthenticated(status)) {
+    return attempts_ < options_.most_attempts && connection_->Outdated();
+  }
+  return DelayOfRefusal(status).has_value();
+}
+
+// Locked, for what may be recovered from: what has happened, in words.
+std::string MeasurementStream::CountAttempt(const absl::Status& status) {
+  if (DelayOfRefusal(status)) {
+    ++refusals_;
+    attempts_ = 0;
+    told_of_refusal_ = true;
+    return "the daemon takes no batches now";
+  }
+  ++attempts_;
+  return absl::IsUnauthenticated(status) ? "the token is good no more, there is a new one"
+                                         : "connection lost";
+}
+
 // Locked, with a connection that is done: connects again or says why not.
 absl::Status MeasurementStream::Recover(Lock& lock) {
   absl::Status status = connection_->status();
   if (status.ok()) return absl::InternalError("the daemon ended the stream before its end");
-  // After a break the daemon may still hold the old connection as the session's writer.
-  while (IsBreak(status) || (attempts_ > 0 && absl::IsAborted(status))) {
-    if (attempts_ == options_.most_attempts) return status;
+  while (MayRecover(status)) {
+    const int before = std::min(attempts_ + refusals_, 20);
     const auto delay =
-        std::min(options_.longest_delay, options_.first_delay * (1 << std::min(attempts_, 20)));
-    ++attempts_;
+        std::max(std::min(options_.longest_delay, options_.first_delay * (1 << before)),
+                 DelayOfRefusal(status).value_or(std::chrono::milliseconds(0)));
+    const std::string what = CountAttempt(status);
     lock.unlock();
-    Tell(absl::StrFormat("connection lost (%s); trying again in %g s", status.message(),
+    Tell(absl::StrFormat("%s (%s); trying again in %g s", what, status.message(),
                          static_cast<double>(delay.count()) / 1000));
-    std::this_thread::sleep_for(delay);
-    status = Connect();
-    if (status.ok()) Tell("connected again");
+    const bool lost = !DelayOfRefusal(status);
+    const bool waited = Wait(delay);
+    if (waited) status = Connect();
+    if (waited && status.ok() && lost) Tell("connected again");
     lock.lock();
+    if (!waited) return status;
   }
   if (absl::IsNotFound(status)) {
     return absl::DataLossError(absl::StrCat(
@@ -229,6 +283,7 @@ absl::Status MeasurementStream::Send(v1::Measurements batch) {
       changed_.wait(lock);
     }
   }
+  TellOfRoom(lock);
   request->set_sequence(++last_sequence_);
   pending_.push_back(std::move(request));
   Write();
@@ -245,6 +300,7 @@ absl::StatusOr<std::optional<v1::Estimate>> MeasurementStream::Finish() {
     if (connection_->status().ok()) break;
     POLYEST_RETURN_IF_ERROR(Recover(lock));
   }
+  TellOfRoom(lock);
   if (!pending_.empty()) {
     return absl::InternalError(absl::StrCat("the daemon ended the stream with ", pending_.size(),
                                             " batches not acknowledged"));

@@ -4,7 +4,8 @@
 //
 // A batch is kept until the daemon has acknowledged it. When the connection breaks, the next Send
 // or Finish connects again, asks for the last batch that the session has, and sends what came
-// after. So nothing is lost and nothing is counted twice.
+// after. So nothing is lost and nothing is counted twice. The same when the daemon has no room now
+// but says that it may have later (its disk is full, it is busy), and when the token was exchanged.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -31,15 +32,18 @@ struct MeasurementStreamOptions {
   // Before the first attempt to connect again; doubles up to the longest.
   std::chrono::milliseconds first_delay{100};
   std::chrono::milliseconds longest_delay{5'000};
-  // Attempts without an acknowledgement in between, ≥ 0; then the stream fails.
+  // Attempts to reach the daemon without an acknowledgement in between, ≥ 0; then the stream fails.
+  // While the daemon answers, and asks to try later, it is tried without end.
   int most_attempts = 16;
+  // Waits so long; false: give up, the stream then fails. Null: sleeps.
+  std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };
 
 // Called from a thread of gRPC, one at a time, except `connection`: from within Send and Finish.
 struct MeasurementStreamCallbacks {
   std::function<void(const v1::Estimate&)> estimate;
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
-  // One sentence on a connection that was lost or is back.
+  // One sentence on a connection that was lost or is back, or a daemon that has no room, or again.
   std::function<void(const std::string&)> connection;
 };
 
@@ -69,9 +73,13 @@ class MeasurementStream {
 
   absl::Status Connect();
   absl::Status Recover(Lock& lock);
+  bool MayRecover(const absl::Status& status) const;
+  std::string CountAttempt(const absl::Status& status);
+  void TellOfRoom(Lock& lock);
   absl::Status ForgetAcknowledged(int64_t sequence);
   void Write();
   void Take(const v1::StreamMeasurementsResponse& response);
+  bool Wait(std::chrono::milliseconds delay) const;
   void Tell(const std::string& sentence) const;
 
   Client& client_;
@@ -87,7 +95,9 @@ class MeasurementStream {
   std::deque<std::shared_ptr<const v1::StreamMeasurementsRequest>> pending_;
   size_t written_ = 0;
   int64_t last_sequence_ = 0;  // of the last batch handed over
-  int attempts_ = 0;           // to connect again, since the last acknowledgement
+  int attempts_ = 0;  // to reach the daemon, since the last acknowledgement or other answer
+  int refusals_ = 0;  // for want of room, since the last acknowledgement
+  bool told_of_refusal_ = false;
   bool finishing_ = false;
   std::optional<v1::Estimate> last_estimate_;
 };

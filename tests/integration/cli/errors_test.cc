@@ -16,6 +16,7 @@ using ::testing::AllOf;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr char kProblem[] = R"({
@@ -137,7 +138,17 @@ TEST_F(ErrorsTest, AMessageTooLarge) {
                            daemon.address()}),
                       3),
               AllOf(HasSubstr(daemon.address()), HasSubstr("larger than max"),
-                    HasSubstr("can be streamed")));
+                    HasSubstr("(--max-message-mb; "), HasSubstr("can be streamed")));
+}
+
+TEST_F(ErrorsTest, AProblemTooLarge) {
+  DaemonProcess daemon({"--max-states", "1"});
+  const std::string problem = File("p.json", kProblem);
+  const std::string data = File("d.csv", kData);
+  const std::string line =
+      OneLine(Run({"estimate", problem, data, "--server", daemon.address()}), 3);
+  EXPECT_THAT(line, AllOf(HasSubstr("(--max-states)"), Not(HasSubstr("streamed"))));
+  EXPECT_EQ(OneLine(Run({"stream", problem, data, "--server", daemon.address()}), 3), line);
 }
 
 TEST_F(ErrorsTest, ASessionThatDoesNotExist) {

@@ -46,6 +46,15 @@ TEST_F(ExportTest, BringsASessionThroughAFileToTheSameEstimates) {
   EXPECT_EQ(LastEstimateOf("again"), LastEstimateOf("monday"));
 }
 
+TEST_F(ExportTest, DeletesASessionOnce) {
+  const Finished deleted = OfDaemon({"delete", "monday"});
+  EXPECT_EQ(deleted.exit_status, 0) << deleted.err;
+  EXPECT_EQ(deleted.out, "deleted sessions/monday\n");
+  const Finished again = OfDaemon({"delete", "monday"});
+  EXPECT_EQ(again.exit_status, 2);
+  EXPECT_EQ(again.err, "polyest: there is no session \"sessions/monday\"\n");
+}
+
 TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
   const std::string file = File("good.session", "");
   ASSERT_EQ(OfDaemon({"export", "monday", file}).exit_status, 0);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <stdlib.h>
 
+#include "client/cpp/client.h"
 #include "server/security/token_table.h"
 #include "tests/integration/cli/command_test.h"
 #include "tests/testing/certificates.h"
@@ -52,6 +53,38 @@ TEST_F(SecurityTest, StreamsOverTlsWithAToken) {
            daemon.address(), "--tls-ca", ca_, "--token-file", writer_file_, "--format", "jsonl"});
   EXPECT_EQ(stream.exit_status, 0) << stream.err;
   EXPECT_EQ(ParseEstimate(Lines(stream.out).back()).samples(), 40);
+}
+
+TEST_F(SecurityTest, TakesTheTokenOfTheOptionBeforeThatOfTheEnvironment) {
+  DaemonProcess daemon({"--tokens", tokens_});
+  setenv("POLYEST_TOKEN_FILE", File("stale.token", "polyest_stale\n").c_str(), 1);
+  const Finished stale = Run({"models", "--server", daemon.address()});
+  const Finished given =
+      Run({"models", "--server", daemon.address(), "--token-file", reader_file_});
+  unsetenv("POLYEST_TOKEN_FILE");
+  EXPECT_EQ(stale.exit_status, 3);
+  EXPECT_EQ(given.exit_status, 0) << given.err;
+}
+
+TEST_F(SecurityTest, GoesOnWithATokenThatWasRotatedUnderAStream) {
+  DaemonProcess daemon({"--tokens", tokens_});
+  Process process({POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server",
+                   daemon.address(), "--token-file", writer_file_, "--batch", "30", "--format",
+                   "jsonl"});
+  process.Write(DemoRows(30));
+  EXPECT_THAT(process.ReadLine(), HasSubstr("\"sequence\":\"1\""));
+  // As the runbook has it, but for the time in which both are good.
+  const NewToken rotated = *MakeTokenFor("rig1:chassis:writer");
+  File("writer.token", rotated.secret + "\n");
+  File("tokens", reader_.line + "\n" + rotated.line + "\n");
+  Client client(daemon.address(), {.token_file = writer_file_});
+  while (!client.GetStatus({}).ok()) {
+  }
+  process.Write(DemoRows(60).substr(DemoRows(30).size()));
+  process.CloseInput();
+  EXPECT_THAT(process.ReadAll(), HasSubstr("\"sequence\":\"2\""));
+  EXPECT_EQ(process.Wait(), 0) << process.Errors();
+  EXPECT_THAT(process.Errors(), HasSubstr("the token is good no more, there is a new one"));
 }
 
 TEST_F(SecurityTest, TakesTheTokenFromTheEnvironment) {

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
 
+#include "client/cpp/client.h"
+#include "client/cpp/problem_file.h"
 #include "tests/integration/cli/command_test.h"
 
 namespace polyest {
@@ -167,6 +169,71 @@ TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {
   const Finished undisturbed =
       Run(Command("-", {"--batch", "30", "--format", "jsonl"}), DemoRows(90));
   EXPECT_EQ(last, Lines(undisturbed.out).back());
+}
+
+// Rows until the daemon's disk has no room for one more.
+void FillDisk(Client& client, const v1::Problem& problem) {
+  v1::CreateSessionRequest create;
+  *create.mutable_problem() = problem;
+  create.set_session_id("ballast");
+  ASSERT_TRUE(client.CreateSession(create).ok());
+  v1::AddMeasurementsRequest add;
+  add.set_session("sessions/ballast");
+  int64_t sequence = 0, row = 0;
+  for (int rows = 4096; rows > 0; rows /= 2) {
+    absl::Status added;
+    while (added.ok() && sequence < 10'000) {
+      add.clear_measurements();
+      auto& x = *add.mutable_measurements()->add_channels();
+      x.set_name("x");
+      for (int i = 0; i < rows; ++i) {
+        add.mutable_measurements()->add_time(0.001 * static_cast<double>(row + i));
+        x.add_values(0.1);
+      }
+      add.set_sequence(sequence + 1);
+      added = client.AddMeasurements(add).status();
+      if (!added.ok()) break;
+      ++sequence;
+      row += rows;
+    }
+    ASSERT_TRUE(absl::IsResourceExhausted(added)) << added;
+  }
+}
+
+TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
+  DaemonProcess daemon({"--max-disk-mb", "1"});
+  Process process({POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server",
+                   daemon.address(), "--batch", "30", "--format", "jsonl"});
+  process.Write(DemoRows(30));
+  EXPECT_THAT(process.ReadLine(), HasSubstr("\"sequence\":\"1\""));
+  Client client(daemon.address());
+  const auto problem = ReadProblemFile(Example("oscillator.json"));
+  ASSERT_TRUE(problem.ok()) << problem.status();
+  FillDisk(client, *problem);
+
+  process.Write(DemoRows(90).substr(DemoRows(30).size()));
+  process.CloseInput();
+  // Asking the daemon is what the test does meanwhile.
+  while (process.Errors().find("takes no batches now") == std::string::npos) {
+    ASSERT_TRUE(client.GetStatus({}).ok());
+  }
+  ASSERT_EQ(Run({"delete", "ballast", "--server", daemon.address()}).exit_status, 0);
+  const std::vector<std::string> estimates = Lines(process.ReadAll());
+  EXPECT_EQ(process.Wait(), 0) << process.Errors();
+  EXPECT_THAT(process.Errors(), HasSubstr("the daemon takes batches again"));
+  const Finished undisturbed =
+      Run(Command("-", {"--batch", "30", "--format", "jsonl"}), DemoRows(90));
+  EXPECT_EQ(estimates.back(), Lines(undisturbed.out).back());
+}
+
+TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {
+  DaemonProcess daemon({"--max-session-rows", "45"});
+  const Finished run = Run({"stream", Example("oscillator.json"), "-", "--server", daemon.address(),
+                            "--batch", "30", "--format", "jsonl"},
+                           DemoRows(90));
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(Lines(run.err), testing::SizeIs(1));
+  EXPECT_THAT(run.err, HasSubstr("(--max-session-rows)"));
 }
 
 TEST_F(StreamTest, SaysThatARestartedDaemonHasLostTheSession) {

@@ -5,10 +5,15 @@
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
+#include <grpcpp/support/error_details.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <numeric>
+
+#include "polyest/rpc/error_details.pb.h"
+#include "server/refusal/refusal.h"
+#include "tests/testing/test_folder.h"
 
 namespace polyest {
 namespace {
@@ -34,17 +39,19 @@ class FakeDaemon : public v1::EstimationService::Service {
   std::string address() const { return absl::StrCat("127.0.0.1:", port_); }
   void Stop() { server_->Shutdown(std::chrono::system_clock::now()); }
 
-  grpc::Status GetSession(grpc::ServerContext*, const v1::GetSessionRequest* request,
+  grpc::Status GetSession(grpc::ServerContext* context, const v1::GetSessionRequest* request,
                           v1::Session* session) override {
+    if (!Knows(*context)) return {grpc::StatusCode::UNAUTHENTICATED, "the token is not known"};
     if (lost) return {grpc::StatusCode::NOT_FOUND, "no such session"};
     session->set_name(request->name());
     session->set_last_sequence(last_sequence);
     return grpc::Status::OK;
   }
 
-  grpc::Status StreamMeasurements(grpc::ServerContext*, Stream* stream) override {
+  grpc::Status StreamMeasurements(grpc::ServerContext* context, Stream* stream) override {
     ++connections;
-    if (refusal && connections == 1) return *refusal;
+    if (!Knows(*context)) return {grpc::StatusCode::UNAUTHENTICATED, "the token is not known"};
+    if (refusal && connections <= refusals) return *refusal;
     v1::StreamMeasurementsRequest request;
     int taken = 0;
     while (stream->Read(&request)) {
@@ -71,13 +78,23 @@ class FakeDaemon : public v1::EstimationService::Service {
   int breaks = 0;  // so many connections break after three batches
   int acknowledge_every = 1;
   std::atomic<bool> lost = false;
-  std::optional<grpc::Status> refusal;  // of the first stream
+  std::optional<grpc::Status> refusal;  // of the first streams,
+  int refusals = 1;                     // so many
+  std::string authorization;            // asked for; empty: none
   std::atomic<int64_t> last_sequence = 0;
   std::atomic<int64_t> acknowledged = 0;
   std::atomic<int> connections = 0;
   std::vector<double> times;  // taken
 
  private:
+  bool Knows(const grpc::ServerContext& context) const {
+    const auto found = context.client_metadata().find("authorization");
+    const std::string given = found == context.client_metadata().end()
+                                  ? ""
+                                  : std::string(found->second.data(), found->second.size());
+    return authorization.empty() || given == authorization;
+  }
+
   void Acknowledge(Stream& stream) {
     acknowledged = last_sequence.load();
     v1::StreamMeasurementsResponse response;
@@ -213,6 +230,119 @@ TEST_F(MeasurementStreamTest, GivesUpWhenTheDaemonStaysAway) {
   // A call that is cut off ends CANCELLED, one that finds nobody UNAVAILABLE.
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(told_.size(), 3);
+}
+
+// RESOURCE_EXHAUSTED with an ErrorInfo, and a RetryInfo if there is a delay.
+grpc::Status Exhausted(const std::string& message, int delay_ms) {
+  rpc::Status status;
+  status.set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
+  status.set_message(message);
+  const auto add = [&](const google::protobuf::Message& detail) {
+    auto& any = *status.add_details();
+    any.set_type_url("type.googleapis.com/google.rpc." + detail.GetDescriptor()->name());
+    detail.SerializeToString(any.mutable_value());
+  };
+  rpc::ErrorInfo info;
+  info.set_reason(delay_ms > 0 ? kDiskFull : kLimitExceeded);
+  (*info.mutable_metadata())["limit"] = "--max-something";
+  add(info);
+  rpc::RetryInfo retry;
+  retry.mutable_retry_delay()->set_nanos(delay_ms * 1'000'000);
+  if (delay_ms > 0) add(retry);
+  grpc::Status result;
+  EXPECT_TRUE(grpc::SetErrorDetails(status, &result).ok());
+  return result;
+}
+
+TEST_F(MeasurementStreamTest, HoldsOutWhileTheDaemonHasNoRoomAndSaysSo) {
+  daemon_.refusal = Exhausted("the disk is full", 2);
+  daemon_.refusals = 25;  // more than it would try to reach a daemon that is away
+  std::vector<std::chrono::milliseconds> delays;
+  options_.wait = [&](std::chrono::milliseconds delay) {
+    delays.push_back(delay);
+    return true;
+  };
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  ASSERT_TRUE(SendBatches(stream, 10).ok());
+  const auto last = stream.Finish();
+  ASSERT_TRUE(last.ok()) << last.status();
+  EXPECT_THAT(daemon_.times, ElementsAreArray(Times(10)));
+  ASSERT_EQ(told_.size(), 26u);
+  EXPECT_EQ(told_.front(),
+            "the daemon takes no batches now (the disk is full); trying again in 0.002 s");
+  EXPECT_EQ(told_.back(), "the daemon takes batches again");
+  // Never before the daemon has asked for it, ever longer, up to the longest.
+  EXPECT_EQ(delays.front(), std::chrono::milliseconds(2));
+  EXPECT_EQ(delays.back(), options_.longest_delay);
+}
+
+TEST_F(MeasurementStreamTest, DoesNotWaitForALimitThatWaitingDoesNotCure) {
+  daemon_.refusal = Exhausted("too many rows", 0);
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  const absl::Status status = stream.Finish().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(status.message(), "too many rows");
+  EXPECT_EQ(RefusalOf(status), (Refusal{kLimitExceeded, "--max-something", std::nullopt}));
+  EXPECT_THAT(told_, IsEmpty());
+}
+
+TEST_F(MeasurementStreamTest, DoesNotWaitWhenItIsToldNotTo) {
+  daemon_.refusal = Exhausted("the disk is full", 2);
+  options_.wait = [](std::chrono::milliseconds) { return false; };
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  EXPECT_EQ(stream.Finish().status().message(), "the disk is full");
+  EXPECT_EQ(daemon_.connections, 1);
+}
+
+class RotatedTokenTest : public MeasurementStreamTest {
+ protected:
+  // Streams with the token "one", which the daemon has exchanged for "two" when it breaks.
+  absl::Status Stream() {
+    daemon_.authorization = "Bearer one";
+    daemon_.breaks = 1;
+    options_.most_unacknowledged = 1;
+    Client client(daemon_.address(), {.token_file = file_});
+    options_.wait = [this](std::chrono::milliseconds) {
+      daemon_.authorization = "Bearer two";
+      return true;
+    };
+    MeasurementStream stream(client, "sessions/a", options_, callbacks_);
+    if (absl::Status opened = stream.Open(); !opened.ok()) return opened;
+    if (absl::Status sent = SendBatches(stream, 2); !sent.ok()) return sent;
+    exchange_();
+    if (absl::Status sent = stream.Send(Batch(3)); !sent.ok()) return sent;
+    return stream.Finish().status();
+  }
+
+  const TestFolder folder_;
+  const std::string file_ = folder_.Write("token", "one");
+  std::function<void()> exchange_;
+};
+
+TEST_F(RotatedTokenTest, IsTakenFromItsFileWithTheNextConnection) {
+  exchange_ = [this] { folder_.Write("token", "two"); };
+  const absl::Status status = Stream();
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_THAT(daemon_.times, ElementsAreArray(Times(3)));
+}
+
+TEST_F(RotatedTokenTest, IsMissedWithoutEndlessAttempts) {
+  exchange_ = [] {};
+  EXPECT_EQ(Stream().code(), absl::StatusCode::kUnauthenticated);
+}
+
+TEST_F(RotatedTokenTest, LeavesTheLastOneWhileItsFileIsHalfWritten) {
+  Client client(daemon_.address(), {.token_file = file_});
+  EXPECT_EQ(client.Authorization(), "Bearer one");
+  for (const char* bad : {"", "two words"}) {
+    folder_.Write("token", bad);
+    EXPECT_EQ(client.Authorization(), "Bearer one");
+  }
+  folder_.Write("token", "two");
+  EXPECT_EQ(client.Authorization(), "Bearer two");
 }
 
 TEST_F(MeasurementStreamTest, MayBeDroppedInMidstream) {

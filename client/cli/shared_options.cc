@@ -1,0 +1,104 @@
+#include "client/cli/shared_options.h"
+
+#include <charconv>
+#include <map>
+
+namespace polyest {
+namespace {
+
+const std::map<std::string, Format> kFormats = {{"table", Format::kTable},
+                                                {"json", Format::kJson},
+                                                {"jsonl", Format::kJsonLines},
+                                                {"csv", Format::kCsv}};
+
+std::string CheckServer(const std::string& server) {
+  const size_t colon = server.rfind(':');
+  int port = 0;
+  if (colon != std::string::npos && colon > 0) {
+    const char* const end = server.data() + server.size();
+    const auto result = std::from_chars(server.data() + colon + 1, end, port);
+    if (result.ec == std::errc() && result.ptr == end && port >= 1 && port <= 65535) return "";
+  }
+  return "\"" + server + "\" must be HOST:PORT, the port from 1 to 65535";
+}
+
+void AddAccess(CLI::App& command, ServerAccess& access) {
+  const std::string group = "Access to a daemon";
+  command.add_option("--tls-ca", access.ca_file, "PEM file of the CA of the daemon's certificate")
+      ->envname("POLYEST_TLS_CA")
+      ->group(group);
+  CLI::Option* const certificate =
+      command
+          .add_option("--tls-certificate", access.certificate_file,
+                      "PEM file of the client's own certificate, where the daemon asks for one")
+          ->envname("POLYEST_TLS_CERTIFICATE")
+          ->group(group);
+  CLI::Option* const key = command.add_option("--tls-key", access.key_file, "PEM file of its key")
+                               ->envname("POLYEST_TLS_KEY")
+                               ->group(group);
+  certificate->needs(key);
+  key->needs(certificate);
+  command
+      .add_option("--tls-server-name", access.server_name,
+                  "The name in the daemon's certificate, if it is not that of --server")
+      ->group(group);
+  command
+      .add_option("--token-file", access.token_file,
+                  "File of the token, in place of the environment's POLYEST_TOKEN")
+      ->envname("POLYEST_TOKEN_FILE")
+      ->group(group);
+}
+
+}  // namespace
+
+CLI::Option* AddServer(CLI::App& command, Place& place) {
+  command.add_option("--deadline", place.deadline_s, "Give up after this many seconds; 0: never")
+      ->check(CLI::Range(0.0, 1e9));
+  AddAccess(command, place.access);
+  return command.add_option("--server", place.server, "The daemon to ask, HOST:PORT")
+      ->check(CLI::Validator(CheckServer, "HOST:PORT"));
+}
+
+CLI::Option* AddFmuFolder(CLI::App& command, Place& place) {
+  return command.add_option("--fmu-dir", place.fmu_dir,
+                            "Folder of the FMUs that problems may name here");
+}
+
+void AddPlace(CLI::App& command, Place& place) {
+  CLI::Option* const server = AddServer(command, place);
+  command.add_flag("--local")
+      ->description("Compute in this process (the default)")
+      ->excludes(server);
+  AddFmuFolder(command, place)->excludes(server);
+  command.add_option("--threads", place.threads, "Threads for computing in this process")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+}
+
+void AddProblem(CLI::App& command, std::string& file) {
+  command.add_option("problem", file, "The problem, a JSON file")->required();
+}
+
+void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {
+  command.add_option("--outputs", outputs, help)->allow_extra_args(false)->delimiter(',');
+}
+
+void AddFormat(CLI::App& command, Format& format, const std::vector<std::string>& names) {
+  std::map<std::string, Format> formats;
+  std::string list;
+  for (const std::string& name : names) {
+    formats[name] = kFormats.at(name);
+    list += (list.empty() ? "" : ", ") + name;
+  }
+  const auto check = [formats, list](const std::string& name) {
+    if (formats.count(name) != 0) return std::string();
+    return "\"" + name + "\" must be one of " + list;
+  };
+  command
+      .add_option_function<std::string>(
+          "--format", [formats, &format](const std::string& name) { format = formats.at(name); },
+          "How to print: " + list + " (default " + names.front() + ")")
+      ->check(CLI::Validator(check, "FORMAT"));
+}
+
+}  // namespace polyest
