@@ -1,6 +1,7 @@
 #include "server/daemon/daemon.h"
 
 #include <absl/strings/str_format.h>
+#include <grpc/support/time.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
@@ -36,13 +37,15 @@ constexpr int kBusyLanes = 8;
 // From a change of tokens or certificates to its notice, twice that until it is settled.
 constexpr std::chrono::seconds kWatchInterval{1};
 // What the last bytes of calls already ended may take.
-constexpr std::chrono::seconds kFlushTime{1};
+constexpr int kFlushTimeS = 1;
 
 int Threads(int requested) {
   if (requested > 0) return requested;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+// The only use of the clock on the wall, which may be set at any moment: it is shown, and decides
+// nothing.
 google::protobuf::Timestamp Now() {
   const auto since = std::chrono::system_clock::now().time_since_epoch();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(since);
@@ -197,7 +200,8 @@ void Daemon::Stop() {
   server_->GetHealthCheckService()->SetServingStatus(false);
   calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
   stop_.request_stop();
-  server_->Shutdown(std::chrono::system_clock::now() + kFlushTime);
+  server_->Shutdown(
+      gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
   server_->Wait();
   server_ = nullptr;
 }

@@ -2,9 +2,8 @@
 
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-#include <openssl/evp.h>
 
-#include "core/common/check.h"
+#include "server/digest/sha256.h"
 
 namespace polyest {
 
@@ -19,13 +18,8 @@ std::string DeterministicBytes(const google::protobuf::Message& message) {
 }
 
 std::string Digest(std::string_view bytes) {
-  std::string digest(32, '\0');
-  unsigned int length = 0;
-  POLYEST_CHECK(EVP_Digest(bytes.data(), bytes.size(),
-                           reinterpret_cast<unsigned char*>(digest.data()), &length, EVP_sha256(),
-                           nullptr) == 1 &&
-                length == digest.size());
-  return digest;
+  const Sha256Digest digest = Sha256(bytes);
+  return std::string(digest.begin(), digest.end());
 }
 
 }  // namespace polyest

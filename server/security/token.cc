@@ -5,7 +5,6 @@
 #include <absl/strings/str_cat.h>
 #include <openssl/crypto.h>
 #include <openssl/rand.h>
-#include <openssl/sha.h>
 
 #include <algorithm>
 
@@ -28,9 +27,7 @@ std::string MakeToken() {
 }
 
 TokenDigest DigestOf(absl::string_view token) {
-  TokenDigest digest;
-  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest.data());
-  return digest;
+  return Sha256({token.data(), token.size()});
 }
 
 std::string ToHex(const TokenDigest& digest) { return absl::BytesToHexString(Bytes(digest)); }

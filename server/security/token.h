@@ -8,13 +8,14 @@
 
 #include <absl/strings/string_view.h>
 
-#include <array>
 #include <optional>
 #include <string>
 
+#include "server/digest/sha256.h"
+
 namespace polyest {
 
-using TokenDigest = std::array<unsigned char, 32>;
+using TokenDigest = Sha256Digest;
 
 // "polyest_" and 64 hexadecimal digits: recognizable to scanners for secrets.
 std::string MakeToken();

@@ -2,6 +2,7 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_format.h>
+#include <grpc/support/time.h>
 #include <grpcpp/server_context.h>
 
 #include <algorithm>
@@ -22,10 +23,13 @@ class CallStop {
   CallStop(const grpc::CallbackServerContext& context, std::stop_token token,
            std::chrono::seconds most_computing)
       : token_(std::move(token)), most_computing_(most_computing) {
-    const auto deadline = context.deadline();
-    if (deadline == std::chrono::system_clock::time_point::max()) return;
-    const auto remaining = deadline - std::chrono::system_clock::now();
-    deadline_ = Stop::Clock::now() + std::chrono::duration_cast<Stop::Clock::duration>(remaining);
+    // Not by the clock on the wall, which may be set meanwhile.
+    const gpr_timespec deadline =
+        gpr_convert_clock_type(context.raw_deadline(), GPR_CLOCK_MONOTONIC);
+    if (gpr_time_cmp(deadline, gpr_inf_future(GPR_CLOCK_MONOTONIC)) == 0) return;
+    const gpr_timespec remaining = gpr_time_sub(deadline, gpr_now(GPR_CLOCK_MONOTONIC));
+    deadline_ = Stop::Clock::now() + std::chrono::seconds(remaining.tv_sec) +
+                std::chrono::nanoseconds(remaining.tv_nsec);
   }
 
   // For a piece of work that begins now.

@@ -1,5 +1,6 @@
 #include "server/sessions/session_registry.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
 #include <gtest/gtest.h>
@@ -41,9 +42,9 @@ class SessionRegistryTest : public testing::Test {
                                    .models = models_,
                                    .limits = limits_,
                                    .memory = MemoryLimit(1, [this] { return resident_bytes_; })};
-    auto opened = SessionRegistry::Open(services, [] {
+    auto opened = SessionRegistry::Open(services, [this] {
       google::protobuf::Timestamp time;
-      time.set_seconds(42);
+      time.set_seconds(wall_clock_s_);
       return time;
     });
     ASSERT_TRUE(opened.ok()) << opened.status();
@@ -56,6 +57,7 @@ class SessionRegistryTest : public testing::Test {
   ModelLibrary models_;
   SessionLimits limits_{.sessions = 4, .sessions_per_tenant = 3};
   int64_t resident_bytes_ = 0;
+  int64_t wall_clock_s_ = 42;
   std::unique_ptr<SessionRegistry> registry_;
 };
 
@@ -199,6 +201,23 @@ TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoa
   EXPECT_TRUE(RefusalOf(refused.status())->retry_delay);
   resident_bytes_ = 1 << 20;
   EXPECT_TRUE(a->Add(2, Rows({0.2}), {}).ok());
+}
+
+TEST_F(SessionRegistryTest, OnlyShowsTheClockOnTheWallWhichMayJump) {
+  for (const auto& [id, seconds] : {std::pair("a", 1'000'000'000), {"b", -5}, {"c", 2}}) {
+    wall_clock_s_ = seconds;
+    ASSERT_TRUE(StatusOfCreate(id).ok());
+    const auto session = *registry_->Get("t", absl::StrCat("sessions/", id));
+    EXPECT_EQ(session->Describe().create_time().seconds(), seconds);
+    EXPECT_TRUE(session->Add(1, Rows({0.1}), {}).ok());
+    ASSERT_TRUE(session->IdleTime());
+    EXPECT_LT(*session->IdleTime(), std::chrono::minutes(1));
+    EXPECT_LT(session->Describe().activity().idle_time(), 60);
+  }
+  EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a", "sessions/b", "sessions/c"));
+  Open();
+  EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a", "sessions/b", "sessions/c"));
+  EXPECT_TRUE((*registry_->Get("t", "sessions/b"))->Add(2, Rows({0.2}), {}).ok());
 }
 
 TEST_F(SessionRegistryTest, KeepsWhatItWasWhenTheDiskFails) {
