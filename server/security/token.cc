@@ -26,9 +26,7 @@ std::string MakeToken() {
   return absl::StrCat("polyest_", absl::BytesToHexString(Bytes(secret)));
 }
 
-TokenDigest DigestOf(absl::string_view token) {
-  return Sha256({token.data(), token.size()});
-}
+TokenDigest DigestOf(absl::string_view token) { return Sha256({token.data(), token.size()}); }
 
 std::string ToHex(const TokenDigest& digest) { return absl::BytesToHexString(Bytes(digest)); }
 

@@ -6,8 +6,8 @@
 namespace polyest {
 
 // The one place where the core's status becomes gRPC's, with what it says to programs
-// (polyest/rpc/error_details.proto). A message that would not fit into the trailers of a call is cut
-// and ends with "…".
+// (polyest/rpc/error_details.proto). A message that would not fit into the trailers of a call is
+// cut and ends with "…".
 grpc::Status ToGrpc(const absl::Status& status);
 
 }  // namespace polyest
