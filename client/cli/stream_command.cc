@@ -24,9 +24,14 @@
 #include "client/cpp/data_file.h"
 #include "client/cpp/measurement_stream.h"
 #include "core/common/status.h"
+#include "server/refusal/refusal.h"
 
 namespace polyest {
 namespace {
+
+// From one attempt to open a session to the next.
+constexpr std::chrono::milliseconds kFirstPause{500};
+constexpr std::chrono::milliseconds kLongestPause{5'000};
 
 // Says when a batch is due, by the data's own time.
 class Pace {
@@ -95,11 +100,29 @@ class StreamCommand {
     auto first = reader->Read(arguments_.batch_rows);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(first.status());
-    auto session = OpenSession(client_, problem_, arguments_.session);
+    auto session = WaitForSession();
     if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);
     auto last = Send(*session, *reader, *std::move(first));
     if (!last.ok()) return InFile(last.status(), arguments_.problem_file, name);
     return last;
+  }
+
+  // Opens the session, once the daemon has room for it if that is what it lacks.
+  absl::StatusOr<StreamSession> WaitForSession() {
+    auto session = OpenSession(client_, problem_, arguments_.session);
+    for (std::chrono::milliseconds pause = kFirstPause; !session.ok();
+         pause = std::min(2 * pause, kLongestPause)) {
+      const auto refusal = RefusalOf(session.status());
+      if (!absl::IsResourceExhausted(session.status()) || !refusal || !refusal->retry_delay) break;
+      pause = std::max(pause, *refusal->retry_delay);
+      err_ << absl::StrFormat("polyest: the daemon takes no session now (%s); trying again in %g s",
+                              session.status().message(), static_cast<double>(pause.count()) / 1000)
+           << std::endl;
+      interrupt_.WaitUntil(std::chrono::steady_clock::now() + pause);
+      if (interrupted()) break;
+      session = OpenSession(client_, problem_, arguments_.session);
+    }
+    return session;
   }
 
   LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch) {

@@ -47,12 +47,14 @@ absl::StatusCode CodeOf(int code) {
 
 absl::Status FromSqlite(int code, std::string_view doing) {
   if (code == SQLITE_OK || code == SQLITE_ROW || code == SQLITE_DONE) return absl::OkStatus();
-  const std::string message =
-      absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code);
   if ((code & 0xff) == SQLITE_FULL) {
-    return Refuse(CodeOf(code), message, {.reason = kDiskFull, .retry_delay = kFullDiskDelay});
+    return Refuse(CodeOf(code),
+                  "the disk is full, or the sessions on it are as large as they may be "
+                  "(--max-disk-mb)",
+                  {.reason = kDiskFull, .retry_delay = kFullDiskDelay});
   }
-  return absl::Status(CodeOf(code), message);
+  return absl::Status(CodeOf(code),
+                      absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code));
 }
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(const std::string& file) {

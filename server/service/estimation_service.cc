@@ -53,9 +53,8 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
 }
 
 absl::Status SessionAndProblem(const std::string& session) {
-  return InvalidField(
-      "session",
-      absl::StrCat("\"", session, "\" is given and a problem too: a session has its own"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("session: \"", session, "\" is given and a problem too: a session has its own"));
 }
 
 class EstimationService final : public v1::EstimationService::CallbackService {

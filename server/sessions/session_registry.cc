@@ -55,7 +55,6 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
                                                                  const std::string& id,
                                                                  const v1::Problem& problem) {
   if (!id.empty()) POLYEST_RETURN_IF_ERROR(CheckSessionId(id));
-  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   SessionHead head;
   head.tenant = tenant;
   {
@@ -89,7 +88,6 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
 }
 
 absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
-  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   const std::lock_guard lock(mutex_);
   return CheckFree({tenant, name});
 }
@@ -113,7 +111,7 @@ absl::Status SessionRegistry::CheckFree(const Key& key) const {
                         "one",
                         services_.limits.sessions_per_tenant));
   }
-  return absl::OkStatus();
+  return services_.memory.Check();
 }
 
 std::string SessionRegistry::ChooseName(const std::string& tenant) {

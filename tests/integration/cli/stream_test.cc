@@ -226,6 +226,20 @@ TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
   EXPECT_EQ(estimates.back(), Lines(undisturbed.out).back());
 }
 
+TEST_F(StreamTest, WaitsForRoomForItsSessionUntilItIsInterrupted) {
+  DaemonProcess daemon({"--max-memory-mb", "1"});
+  Process process(
+      {POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server", daemon.address()});
+  process.Write(DemoRows(30));
+  Client client(daemon.address());
+  while (process.Errors().find("takes no session now") == std::string::npos) {
+    ASSERT_TRUE(client.GetStatus({}).ok());
+  }
+  process.Signal(SIGINT);
+  EXPECT_EQ(process.Wait(), 3);
+  EXPECT_THAT(Lines(process.Errors()).back(), HasSubstr("(--max-memory-mb)"));
+}
+
 TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {
   DaemonProcess daemon({"--max-session-rows", "45"});
   const Finished run = Run({"stream", Example("oscillator.json"), "-", "--server", daemon.address(),

@@ -194,6 +194,8 @@ TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoa
   const auto a = *registry_->Get("t", "sessions/a");
   resident_bytes_ = (1 << 20) + 1;
   EXPECT_EQ(RefusalOf(StatusOfCreate("b"))->limit, "--max-memory-mb");
+  // Who asks for it to go on with it learns that it is there.
+  EXPECT_EQ(StatusOfCreate("a").code(), absl::StatusCode::kAlreadyExists);
   EXPECT_TRUE(a->Add(1, Rows({0.1}), {}).ok());
   a->Unload();
   const auto refused = a->Add(2, Rows({0.2}), {});
