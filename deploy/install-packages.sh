@@ -13,7 +13,7 @@ packages=(
   libspdlog-dev prometheus-cpp-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev clang-format python3-yaml openssl sqlite3
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format python3-yaml openssl sqlite3 libfaketime
 )
 fuzz_packages=(
   clang-14 libclang-rt-14-dev
