@@ -1,0 +1,145 @@
+// A daemon that runs for months: a thousand sessions come and go, and nothing is left of them. What
+// cannot be reached any more is found by the leak sanitizer in the build `asan-ubsan`; what can be
+// is found here, as memory that grows.
+
+#include <malloc.h>
+
+#include <thread>
+
+#include "server/daemon/daemon.h"
+#include "server/telemetry/process_info.h"
+#include "tests/integration/daemon_fixture.h"
+#include "tests/testing/test_folder.h"
+
+namespace polyest {
+namespace {
+
+constexpr int kAtATime = 100;
+constexpr int kEstimated = 10;  // one in so many, for an estimate takes most of the time
+constexpr int kRowsABatch = 3;
+
+v1::Problem Tiny() {
+  return ProblemFromJson(R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "fixed": {"m": 1, "x0": 1, "c": 0.17},
+    "uncertain": [{"name": "k", "uniform": {"lower": 31.58, "upper": 47.37}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}],
+    "expansion": {"order": 2, "adaptive": false}
+  })");
+}
+
+class ThousandSessionsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto daemon = Daemon::Start({.listen = {"127.0.0.1", 0},
+                                 .data_dir = data_.path(),
+                                 .unload_after = std::chrono::milliseconds(20)});
+    ASSERT_TRUE(daemon.ok()) << daemon.status();
+    daemon_ = *std::move(daemon);
+    stub_ = v1::EstimationService::NewStub(
+        grpc::CreateChannel(daemon_->address().ToString(), grpc::InsecureChannelCredentials()));
+  }
+
+  // The life of some sessions, from the first to the last call.
+  void LiveThrough() {
+    std::vector<std::string> names(kAtATime);
+    for (std::string& name : names) name = Create();
+    for (int i = 0; i < kAtATime; ++i)
+      Stream(names[static_cast<size_t>(i)], /*to_the_end=*/i % kEstimated == 0);
+    // The housekeeper unloads them meanwhile.
+    while (Status().sessions_loaded() > 0) std::this_thread::yield();
+    for (const std::string& name : names) Add(name);
+    for (int i = 0; i < kAtATime; i += kEstimated) Estimate(names[static_cast<size_t>(i)]);
+    for (const std::string& name : names) Delete(name);
+    ASSERT_EQ(Status().sessions(), 0);
+  }
+
+  std::string Create() {
+    grpc::ClientContext context;
+    v1::CreateSessionRequest request;
+    *request.mutable_problem() = Tiny();
+    v1::Session session;
+    EXPECT_TRUE(stub_->CreateSession(&context, request, &session).ok());
+    return session.name();
+  }
+
+  // One batch; without the end the client goes away.
+  void Stream(const std::string& session, bool to_the_end) {
+    ClientStream stream(*stub_);
+    stream.Send(session, 1, OscillatorRows(0, kRowsABatch),
+                [](auto& request) { request.mutable_estimates()->set_only_last(true); });
+    stream.ExpectAcknowledgement(1);
+    if (!to_the_end) {
+      stream.Cancel();
+      EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
+      return;
+    }
+    stream.HalfClose();
+    v1::Estimate estimate;
+    stream.ExpectEstimate(estimate);
+    EXPECT_TRUE(stream.Finish().ok());
+  }
+
+  // Another batch, which brings the session back from disk.
+  void Add(const std::string& session) {
+    grpc::ClientContext context;
+    v1::AddMeasurementsRequest request;
+    request.set_session(session);
+    request.set_sequence(2);
+    *request.mutable_measurements() = OscillatorRows(kRowsABatch, 2 * kRowsABatch);
+    v1::AddMeasurementsResponse response;
+    EXPECT_TRUE(stub_->AddMeasurements(&context, request, &response).ok());
+    EXPECT_EQ(response.acknowledgement().samples(), 2 * kRowsABatch);
+  }
+
+  void Estimate(const std::string& session) {
+    grpc::ClientContext context;
+    v1::GetEstimateRequest request;
+    request.set_session(session);
+    v1::EstimateResponse response;
+    EXPECT_TRUE(stub_->GetEstimate(&context, request, &response).ok());
+    EXPECT_EQ(response.estimate().samples(), 2 * kRowsABatch);
+  }
+
+  void Delete(const std::string& session) {
+    grpc::ClientContext context;
+    v1::DeleteSessionRequest request;
+    request.set_name(session);
+    google::protobuf::Empty response;
+    EXPECT_TRUE(stub_->DeleteSession(&context, request, &response).ok());
+  }
+
+  v1::DaemonStatus Status() {
+    grpc::ClientContext context;
+    v1::DaemonStatus status;
+    EXPECT_TRUE(stub_->GetStatus(&context, {}, &status).ok());
+    return status;
+  }
+
+  const TestFolder data_;
+  std::unique_ptr<Daemon> daemon_;
+  std::unique_ptr<v1::EstimationService::Stub> stub_;
+};
+
+struct Memory {
+  int64_t allocated = static_cast<int64_t>(mallinfo2().uordblks + mallinfo2().hblkhd);
+  int64_t resident = ResidentMemoryBytes();
+};
+
+TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
+  for (int lived = 0; lived < 500; lived += kAtATime) LiveThrough();
+  const Memory half;
+  for (int lived = 500; lived < 1'000; lived += kAtATime) LiveThrough();
+  const Memory full;
+  RecordProperty("allocated_growth_bytes", std::to_string(full.allocated - half.allocated));
+  RecordProperty("resident_growth_bytes", std::to_string(full.resident - half.resident));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  // A sanitizer's own memory grows with what was freed.
+  EXPECT_LT(full.allocated - half.allocated, 500 * 1'000);
+  EXPECT_LT(full.resident - half.resident, 500 * 16'384);
+#endif
+  daemon_->Stop();
+}
+
+}  // namespace
+}  // namespace polyest
