@@ -52,11 +52,13 @@ void DaemonGauges::CollectSessions(Families& families) const {
   int loaded = 0;
   int behind = 0;
   int64_t waiting = 0;
+  int64_t rows = 0;
   for (const auto& session : sessions_.All()) {
     const v1::Session described = session->Describe();
     const v1::Session::Activity& activity = described.activity();
     ++sessions;
     if (activity.loaded()) ++loaded;
+    rows += session->place().rows;
     // A factor of 0: nothing measured yet.
     const double factor = activity.real_time_factor();
     if (activity.has_writer() && factor > 0 && factor < 1) ++behind;
@@ -64,6 +66,8 @@ void DaemonGauges::CollectSessions(Families& families) const {
   }
   Add(families, "polyest_sessions", "Sessions of all tenants.", sessions);
   Add(families, "polyest_sessions_loaded", "Sessions whose estimator is in memory.", loaded);
+  Add(families, "polyest_stored_rows", "Rows of all sessions of all tenants.",
+      static_cast<double>(rows));
   Add(families, "polyest_sessions_behind_real_time",
       "Sessions with an open stream whose real-time factor is below 1.", behind);
   Add(families, "polyest_journal_waiting_batches", "Batches taken and not yet kept.",

@@ -46,9 +46,7 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
     page.pop_back();
     response.set_next_page_token(page.back()->name());
   }
-  for (const auto& session : page) {
-    *response.add_sessions() = session->Describe();
-  }
+  for (const auto& session : page) *response.add_sessions() = session->Describe();
   return response;
 }
 

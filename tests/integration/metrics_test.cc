@@ -52,6 +52,7 @@ TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   EXPECT_THAT(text, HasSubstr("HTTP/1.1 200 OK"));
   EXPECT_EQ(ValueOf("polyest_batches_acknowledged_total", text), kBatches);
   EXPECT_EQ(ValueOf("polyest_rows_acknowledged_total", text), 10 * kBatches);
+  EXPECT_EQ(ValueOf("polyest_stored_rows", text), 10 * kBatches);
   EXPECT_EQ(ValueOf("polyest_values_acknowledged_total", text), 10 * kBatches);
   // The last of 30 rows, 20 a second from 0.05 s on, is of 1.5 s.
   EXPECT_NEAR(ValueOf("polyest_measured_seconds_total", text), 1.5, 1e-9);
