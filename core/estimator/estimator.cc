@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/common/status.h"
@@ -89,10 +90,12 @@ class Estimator::Implementation {
 
 absl::Status Estimator::Implementation::Append(const Samples& samples) {
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
-  POLYEST_RETURN_IF_ERROR(store_->Append(checked));
+  std::optional<ResolvedProblem> grown;
   if (problem_.per_run() && checked.after.run >= problem_.runs()) {
-    POLYEST_ASSIGN_OR_RETURN(problem_, problem_.WithRuns(checked.after.run + 1));
+    POLYEST_ASSIGN_OR_RETURN(grown, problem_.WithRuns(checked.after.run + 1));
   }
+  POLYEST_RETURN_IF_ERROR(store_->Append(checked));
+  if (grown) problem_ = *std::move(grown);
   checks_.Accept(checked);
   if (snapshot_) checkpoints_.Add(checked.rows);
   return absl::OkStatus();

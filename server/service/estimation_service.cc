@@ -9,6 +9,7 @@
 #include "server/operations/names.h"
 #include "server/operations/operations.h"
 #include "server/operations/pages.h"
+#include "server/service/catch_up.h"
 #include "server/service/daemon_status.h"
 #include "server/service/export_call.h"
 #include "server/service/guarded.h"
@@ -140,8 +141,6 @@ class EstimationService final : public v1::EstimationService::CallbackService {
   // when everything is kept that the work may have seen.
   Unary* OnStrand(Context* context, Method method, const std::string& field,
                   const std::string& session, SessionWork work);
-  // A new estimate for those who watch a session that is fed by unary calls.
-  void EstimateForObservers(const std::shared_ptr<Session>& session);
 
   ServiceContext context_;
 };
@@ -330,21 +329,13 @@ EstimationService::Unary* EstimationService::AddMeasurements(
   return OnStrand(
       context, "AddMeasurements", "session", request->session(),
       [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(session->Load(stop));
         POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
-                                 session->Add(request->sequence(), request->measurements(), stop));
+                                 session->Add(request->sequence(), request->measurements()));
         POLYEST_RETURN_IF_ERROR(session->Process(stop));
-        EstimateForObservers(session);
+        if (session->observed()) CatchUp(session, context_.stop);
         return absl::OkStatus();
       });
-}
-
-void EstimationService::EstimateForObservers(const std::shared_ptr<Session>& session) {
-  if (!session->observed()) return;
-  // Refused, or failed, it is left to the next batch: the observers miss one between.
-  const auto estimate = [session, stop = context_.stop] {
-    Guarded([&] { return session->CurrentEstimate(Stop(stop)).status(); }).IgnoreError();
-  };
-  session->strand().Submit(estimate).IgnoreError();
 }
 
 EstimationService::Unary* EstimationService::GetEstimate(Context* context,

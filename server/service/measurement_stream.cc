@@ -7,6 +7,7 @@
 
 #include "core/common/status.h"
 #include "server/operations/names.h"
+#include "server/service/catch_up.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
@@ -41,12 +42,12 @@ void MeasurementFlow::OnRead(bool ok) {
       End(absl::InvalidArgumentError("session: the first message of a stream must name one"));
     }
   } else if (!draining_ && !end_) {
-    Take(std::move(reading_into_));
+    Accept(std::move(reading_into_));
   }
   Advance();
 }
 
-void MeasurementFlow::Take(v1::StreamMeasurementsRequest request) {
+void MeasurementFlow::Accept(v1::StreamMeasurementsRequest request) {
   const absl::StatusOr<Caller> caller = Authorize();
   if (!caller.ok()) return End(caller.status());
   if (const absl::Status attached = Attach(*caller, request); !attached.ok()) return End(attached);
@@ -105,10 +106,12 @@ void MeasurementFlow::Drain() {
   Advance();
 }
 
-// What was received and not acknowledged is left to the client to send again.
+// What was received and not taken is left to the client to send again.
 void MeasurementFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
   inbox_.clear();
+  left_uncomputed_ = left_uncomputed_ || computing_ || !uncomputed_.empty();
+  uncomputed_.clear();
 }
 
 // As End, when nothing can be sent any more.
@@ -125,31 +128,62 @@ void MeasurementFlow::Advance() {
     writing_ = true;
     reactor_->StartWrite(&outbox_.front().response);
   }
-  StartWork();
-  if (!reading_ && !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox &&
-      outbox_.size() < kOutbox) {
+  StartLoading();
+  StartTaking();
+  StartComputing();
+  if (!reading_ && !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox && HasRoom()) {
     reading_ = true;
     reactor_->StartRead(&reading_into_);
   }
   FinishIfIdle();
 }
 
-void MeasurementFlow::StartWork() {
-  const bool last = half_closed_ || draining_;
-  if (working_ || end_ || outbox_.size() >= kOutbox || (inbox_.empty() && !last)) return;
-  working_ = true;
+bool MeasurementFlow::HasRoom() const {
+  return outbox_.size() < kOutbox && uncomputed_.size() < kMostUncomputed;
+}
+
+bool MeasurementFlow::AllTaken() const {
+  return (half_closed_ || draining_) && stage_ == Stage::kReady && !taking_ && inbox_.empty();
+}
+
+void MeasurementFlow::StartLoading() {
+  if (end_ || session_ == nullptr || stage_ != Stage::kNone) return;
+  stage_ = Stage::kLoading;
   const absl::Status accepted =
-      session_->strand().Submit([flow = shared_from_this()] { flow->Work(); });
+      session_->strand().Submit([flow = shared_from_this()] { flow->Load(); });
   if (accepted.ok()) return;
-  working_ = false;
+  stage_ = Stage::kNone;
+  End(accepted);
+}
+
+void MeasurementFlow::StartTaking() {
+  if (end_ || stage_ != Stage::kReady || taking_ || inbox_.empty() || !HasRoom()) return;
+  taking_ = true;
+  const absl::Status accepted = context_.executor.Submit(
+      session_->tenant() + "/batches", [flow = shared_from_this()] { flow->Take(); });
+  if (accepted.ok()) return;
+  taking_ = false;
+  End(accepted);
+}
+
+void MeasurementFlow::StartComputing() {
+  if (end_ || computing_ || outbox_.size() >= kOutbox) return;
+  if (uncomputed_.empty() && !AllTaken()) return;
+  computing_ = true;
+  const absl::Status accepted =
+      session_->strand().Submit([flow = shared_from_this()] { flow->Compute(); });
+  if (accepted.ok()) return;
+  computing_ = false;
   End(accepted);
 }
 
 void MeasurementFlow::FinishIfIdle() {
-  if (!end_ || working_ || writing_ || !outbox_.empty()) return;
+  const bool working = taking_ || computing_ || stage_ == Stage::kLoading;
+  if (!end_ || working || writing_ || !outbox_.empty()) return;
   finished_ = true;
   // Before the client hears of the end: it may come back at once.
   if (session_ != nullptr) session_->ReleaseWriter(this);
+  if (left_uncomputed_) CatchUp(session_, context_.stop);
   reactor_->Finish(ToGrpc(*end_));
 }
 
@@ -158,54 +192,89 @@ void MeasurementFlow::OnDone() {
   reactor_ = nullptr;
 }
 
-void MeasurementFlow::Work() {
-  std::unique_lock lock(mutex_);
-  // A turn takes what is there, and no more: other sessions wait for theirs.
-  for (size_t turn = 0; turn < kInbox && !end_ && outbox_.size() < kOutbox; ++turn) {
-    const bool last = inbox_.empty();
-    if (last && !half_closed_ && !draining_) break;
-    v1::StreamMeasurementsRequest request;
-    if (!last) {
-      request = std::move(inbox_.front());
-      inbox_.pop_front();
-    }
-    const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
-    lock.unlock();
-    const Stop stop = stop_.Begin();
-    const absl::Status answered =
-        stop_.Name(Guarded([&] { return last ? AnswerLast(stop) : Answer(request, stop); }));
-    lock.lock();
-    if (!answered.ok()) End(answered);
-    if (last) End(at_end);
-    Advance();
-  }
-  working_ = false;
+void MeasurementFlow::Load() {
+  const absl::Status loaded = stop_.Name(Guarded([this] { return session_->Load(stop_.Begin()); }));
+  std::lock_guard lock(mutex_);
+  stage_ = Stage::kReady;
+  if (!loaded.ok()) End(loaded);
   Advance();
 }
 
-absl::Status MeasurementFlow::Answer(const v1::StreamMeasurementsRequest& request,
-                                     const Stop& stop) {
+void MeasurementFlow::Take() {
+  std::unique_lock lock(mutex_);
+  // A turn takes what is there, and no more: other streams wait for theirs.
+  for (size_t turn = 0; turn < kInbox && !end_ && !inbox_.empty() && HasRoom(); ++turn) {
+    const v1::StreamMeasurementsRequest request = std::move(inbox_.front());
+    inbox_.pop_front();
+    lock.unlock();
+    std::optional<Uncomputed> uncomputed;
+    const auto answer = [&]() -> absl::Status {
+      POLYEST_ASSIGN_OR_RETURN(uncomputed, Answer(request));
+      return absl::OkStatus();
+    };
+    const absl::Status answered = Guarded(answer);
+    lock.lock();
+    if (uncomputed) uncomputed_.push_back(*uncomputed);
+    if (!answered.ok()) End(answered);
+    Advance();
+  }
+  taking_ = false;
+  Advance();
+}
+
+absl::StatusOr<std::optional<MeasurementFlow::Uncomputed>> MeasurementFlow::Answer(
+    const v1::StreamMeasurementsRequest& request) {
   if (request.has_estimates()) POLYEST_RETURN_IF_ERROR(schedule_.Set(request.estimates()));
   if (!request.has_measurements()) {
-    if (request.sequence() == 0) return absl::OkStatus();
+    if (request.sequence() == 0) return std::nullopt;
     return absl::InvalidArgumentError(
         absl::StrFormat("measurements: batch %d has none", request.sequence()));
   }
   v1::StreamMeasurementsResponse response;
   POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
-                           session_->Add(request.sequence(), request.measurements(), stop));
+                           session_->Add(request.sequence(), request.measurements()));
   Send(std::move(response), request.sequence());
-  POLYEST_RETURN_IF_ERROR(session_->Process(stop));
-  if (schedule_.Due(EstimateSchedule::Clock::now())) return SendEstimate(stop);
-  return absl::OkStatus();
+  return Uncomputed{request.sequence(), schedule_.Due(EstimateSchedule::Clock::now())};
 }
 
-absl::Status MeasurementFlow::AnswerLast(const Stop& stop) {
-  return session_->taken().samples > 0 ? SendEstimate(stop) : absl::OkStatus();
+// What is computed at once: up to the next estimate, for which no later batch may have been taken
+// into account.
+std::vector<MeasurementFlow::Uncomputed> MeasurementFlow::NextTurn() {
+  std::vector<Uncomputed> turn;
+  while (!uncomputed_.empty() && turn.size() < kTurn && (turn.empty() || !turn.back().estimate)) {
+    turn.push_back(uncomputed_.front());
+    uncomputed_.pop_front();
+  }
+  return turn;
+}
+
+void MeasurementFlow::Compute() {
+  std::unique_lock lock(mutex_);
+  const std::vector<Uncomputed> turn = NextTurn();
+  const bool last = uncomputed_.empty() && AllTaken();
+  const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
+  lock.unlock();
+  const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
+  lock.lock();
+  if (!computed.ok()) End(computed);
+  computing_ = false;
+  if (last) End(at_end);
+  Advance();
+}
+
+absl::Status MeasurementFlow::ComputeTurn(const std::vector<Uncomputed>& turn, bool last) {
+  const Stop stop = stop_.Begin();
+  if (!turn.empty()) {
+    POLYEST_RETURN_IF_ERROR(session_->ProcessUpTo(turn.back().sequence, stop));
+    if (turn.back().estimate) POLYEST_RETURN_IF_ERROR(SendEstimate(stop));
+  }
+  if (!last || session_->taken().samples == 0) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(session_->Process(stop));
+  return SendEstimate(stop);
 }
 
 absl::Status MeasurementFlow::SendEstimate(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->CurrentEstimate(stop));
+  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session_->LatestEstimate(stop));
   v1::StreamMeasurementsResponse response;
   *response.mutable_estimate() = *estimate;
   Send(std::move(response), estimate->sequence());
@@ -229,7 +298,7 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
   } else {
     End(kept);
     // What stands on batches that are lost is not to be told.
-    while (!outbox_.empty() && outbox_.back().sequence > kept_) outbox_.pop_back();
+    outbox_.remove_if([this](const Answered& answered) { return answered.sequence > kept_; });
   }
   Advance();
 }

@@ -2,18 +2,23 @@
 
 // StreamMeasurements: batches in, acknowledgements and estimates out.
 //
-// Reactions only move messages between gRPC and two bounded queues; the session's strand takes them
-// from the one and puts its answers into the other, where they wait for the journal. The next
-// message is read only while both have room, so that HTTP/2's flow control holds back a client that
-// is too fast for the numerics or the disk, or too slow to read.
+// A message goes through two stages, each of one thread at a time. Its batch is taken: checked, and
+// handed to the journal; it is acknowledged when it is kept. Then its numerics are computed on the
+// session's strand, which never delays an acknowledgement. Reactions only move messages between
+// gRPC and bounded queues. The next message is read only while all have room, so that HTTP/2's flow
+// control holds back a client that is too fast for the disk, far too fast for the numerics, or too
+// slow to read.
 
 #include <grpcpp/support/server_callback.h>
 
+#include <cstdint>
 #include <deque>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "polyest/v1/estimation_service.pb.h"
 #include "server/service/call_stop.h"
@@ -52,23 +57,47 @@ class MeasurementFlow final : public SessionObserver,
  private:
   static constexpr size_t kLongestWriter = 64;
   static constexpr size_t kInbox = 8;
-  static constexpr size_t kOutbox = 16;
+  static constexpr size_t kOutbox = 64;
+  // Batches acknowledged before they are computed: enough for the pauses in which an expansion
+  // moves, at the pace of a rig.
+  static constexpr size_t kMostUncomputed = 256;
+  // Of one turn on the strand: other sessions wait for theirs.
+  static constexpr size_t kTurn = 8;
+
+  // A batch taken and to be computed.
+  struct Uncomputed {
+    int64_t sequence = 0;
+    bool estimate = false;  // whether one is due after it
+  };
+  struct Answered {
+    v1::StreamMeasurementsResponse response;
+    int64_t sequence = 0;  // of the batch that must be kept before
+  };
+  enum class Stage { kNone, kLoading, kReady };
 
   // All with the mutex held.
-  void Take(v1::StreamMeasurementsRequest request);
+  void Accept(v1::StreamMeasurementsRequest request);
   absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
   void End(const absl::Status& status);
   void Break(const absl::Status& status);
   // Starts whatever can be started: a write, a read, work, the end.
   void Advance();
-  void StartWork();
+  void StartLoading();
+  void StartTaking();
+  void StartComputing();
   void FinishIfIdle();
+  bool HasRoom() const;
+  // Nothing is left to be taken, and nothing will come.
+  bool AllTaken() const;
+  std::vector<Uncomputed> NextTurn();
 
-  // On the strand, without the mutex.
-  void Work();
-  // One message; the answers go to the outbox.
-  absl::Status Answer(const v1::StreamMeasurementsRequest& request, const Stop& stop);
-  absl::Status AnswerLast(const Stop& stop);
+  // Without the mutex: on the strand, in the lane of the taking, on the strand.
+  void Load();
+  void Take();
+  void Compute();
+  // One message; the acknowledgement goes to the outbox, what it leaves to compute is returned.
+  absl::StatusOr<std::optional<Uncomputed>> Answer(const v1::StreamMeasurementsRequest& request);
+  absl::Status ComputeTurn(const std::vector<Uncomputed>& turn, bool last);
   absl::Status SendEstimate(const Stop& stop);
   // Once everything up to batch `sequence` is kept.
   void Send(v1::StreamMeasurementsResponse response, int64_t sequence);
@@ -78,25 +107,25 @@ class MeasurementFlow final : public SessionObserver,
   grpc::CallbackServerContext& call_;  // until OnDone
   std::stop_source stop_source_;
   const CallStop stop_;
-  EstimateSchedule schedule_;  // the strand's
+  EstimateSchedule schedule_;  // of the taking
 
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;  // set once, before any work
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
-  struct Answered {
-    v1::StreamMeasurementsResponse response;
-    int64_t sequence;  // of the batch that must be kept before
-  };
-  std::deque<Answered> outbox_;  // the first is being written, or next
+  std::deque<Uncomputed> uncomputed_;
+  std::list<Answered> outbox_;  // the first is being written, or next
   int64_t kept_ = 0;
+  Stage stage_ = Stage::kNone;
   bool reading_ = false;
   bool writing_ = false;
-  bool working_ = false;
+  bool taking_ = false;
+  bool computing_ = false;
   bool half_closed_ = false;
   bool draining_ = false;
   bool finished_ = false;
+  bool left_uncomputed_ = false;
   std::optional<absl::Status> end_;  // how the stream ends, once the outbox is empty
 };
 

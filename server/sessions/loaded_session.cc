@@ -1,11 +1,11 @@
 #include "server/sessions/loaded_session.h"
 
-#include <algorithm>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/common/status.h"
 #include "server/convert/estimate.h"
-#include "server/convert/measurements.h"
 #include "server/convert/posterior.h"
 #include "server/convert/regularization.h"
 
@@ -15,7 +15,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
                                                                    const ModelLibrary& models,
                                                                    const ProblemLimits& limits) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models, limits));
-  std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem)));
+  std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem), resolved));
   EstimatorOptions options;
   options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {
     if (session->save_) session->save_(std::move(snapshot));
@@ -27,7 +27,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
 
 void LoadedSession::SaveSnapshots(SessionJournal& journal, int64_t session) {
   save_ = [this, &journal, session](EstimatorSnapshot snapshot) {
-    journal.SaveSnapshot(session, {place_.sequence, snapshot.rows, std::move(snapshot.state)});
+    journal.SaveSnapshot(session, {sequence_, snapshot.rows, std::move(snapshot.state)});
   };
 }
 
@@ -47,56 +47,44 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
   POLYEST_ASSIGN_OR_RETURN(auto loaded, Make(std::move(problem), models));
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    return loaded->Append(batch.measurements);
+    POLYEST_RETURN_IF_ERROR(loaded->intake_.Take(batch.measurements));
+    return loaded->GiveUpTo(batch.sequence);
   };
   POLYEST_RETURN_IF_ERROR(journal.ReadBatches(session, 0, append));
-  if (loaded->place_.sequence != place.sequence || loaded->place_.rows != place.rows) {
+  const SessionPlace reached = loaded->intake_.place();
+  if (reached.sequence != place.sequence || reached.rows != place.rows) {
     return absl::DataLossError("the last batches of the session are missing in the journal");
   }
   loaded->Restore(journal, session);
   return loaded;
 }
 
-LoadedSession::LoadedSession(v1::Problem problem) : problem_(std::move(problem)) {
-  for (const v1::MeasuredOutput& output : problem_.measured()) measured_.insert(output.output());
+LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved)
+    : problem_(std::move(problem)), intake_(resolved) {}
+
+absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+  return estimator_->Process(stop);
 }
 
-absl::Status LoadedSession::Append(const v1::Measurements& batch) {
-  POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(batch));
-  POLYEST_RETURN_IF_ERROR(estimator_->Append(samples));
-  Advance(samples);
+absl::Status LoadedSession::ProcessAll(const Stop& stop) {
+  return ProcessUpTo(std::numeric_limits<int64_t>::max(), stop);
+}
+
+absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
+  while (const std::optional<TakenBatch> batch = intake_.Next(sequence)) {
+    POLYEST_RETURN_IF_ERROR(estimator_->Append(batch->samples));
+    sequence_ = batch->place.sequence;
+    measured_s_ = batch->measured_s;
+  }
   return absl::OkStatus();
 }
 
-void LoadedSession::Advance(const Samples& samples) {
-  ++place_.sequence;
-  place_.samples += CountValues(samples);
-  place_.rows += static_cast<int64_t>(samples.rows());
-  for (size_t row = 0; row < samples.rows(); ++row) {
-    const SampleRow next{samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]};
-    const bool same_run = next.run == place_.last_row.run;
-    measured_s_ += next.time_s - (same_run ? place_.last_row.time_s : 0);
-    place_.last_row = next;
-  }
-}
-
-// Values of measured outputs that are there: what an estimate counts as its samples.
-int64_t LoadedSession::CountValues(const Samples& samples) const {
-  int64_t values = 0;
-  for (const SampleColumn& column : samples.columns) {
-    if (!measured_.contains(column.name)) continue;
-    values += static_cast<int64_t>(column.value.size()) -
-              std::count(column.missing.begin(), column.missing.end(), true);
-  }
-  return values;
-}
-
 absl::StatusOr<SharedEstimate> LoadedSession::CurrentEstimate(const Stop& stop) {
-  if (latest_ != nullptr && latest_->sequence() == place_.sequence) return latest_;
-  POLYEST_RETURN_IF_ERROR(Process(stop));
+  if (latest_ != nullptr && latest_->sequence() == sequence_) return latest_;
   POLYEST_ASSIGN_OR_RETURN(const Estimate estimate, estimator_->CurrentEstimate(stop));
   auto latest = std::make_shared<v1::Estimate>(ToProto(estimate));
-  latest->set_sequence(place_.sequence);
+  latest->set_sequence(sequence_);
   latest_ = std::move(latest);
   return latest_;
 }
@@ -105,10 +93,10 @@ absl::StatusOr<v1::GetPosteriorResponse> LoadedSession::CurrentPosterior(
     const v1::GetPosteriorRequest& request, const Stop& stop) {
   const PosteriorOptions options = ToPosteriorOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
   POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator_->CurrentPosterior(options, stop));
   v1::GetPosteriorResponse response = ToProto(posterior, options);
-  response.set_sequence(place_.sequence);
+  response.set_sequence(sequence_);
   return response;
 }
 
@@ -116,10 +104,10 @@ absl::StatusOr<v1::ProfileCostResponse> LoadedSession::CurrentProfiles(
     const v1::ProfileCostRequest& request, const Stop& stop) {
   const ProfileOptions options = ToProfileOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
   POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator_->CurrentProfiles(options, stop));
   v1::ProfileCostResponse response = ToProto(profiles);
-  response.set_sequence(place_.sequence);
+  response.set_sequence(sequence_);
   return response;
 }
 
@@ -127,11 +115,11 @@ absl::StatusOr<v1::SweepRegularizationResponse> LoadedSession::CurrentRegulariza
     const v1::SweepRegularizationRequest& request, const Stop& stop) {
   const RegularizationOptions options = ToRegularizationOptions(request);
   POLYEST_RETURN_IF_ERROR(options.Validate());
-  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
   POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
                            estimator_->CurrentRegularizationSweep(options, stop));
   v1::SweepRegularizationResponse response = ToProto(sweep);
-  response.set_sequence(place_.sequence);
+  response.set_sequence(sequence_);
   return response;
 }
 

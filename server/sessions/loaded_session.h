@@ -4,9 +4,9 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <functional>
 #include <memory>
-#include <set>
 #include <string>
 
 #include "core/common/stop.h"
@@ -15,12 +15,13 @@
 #include "polyest/v1/estimation_service.pb.h"
 #include "server/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
+#include "server/sessions/batch_intake.h"
 
 namespace polyest {
 
 using SharedEstimate = std::shared_ptr<const v1::Estimate>;
 
-// For one thread at a time.
+// Batches come in from any thread; the estimator is for one thread at a time.
 class LoadedSession {
  public:
   // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
@@ -39,17 +40,21 @@ class LoadedSession {
   void SaveSnapshots(SessionJournal& journal, int64_t session);
 
   const v1::Problem& problem() const { return problem_; }
-  // What the session has taken.
-  const SessionPlace& place() const { return place_; }
-  // Seconds of measurements appended, over all runs.
-  double measured_s() const { return measured_s_; }
-  const ResolvedProblem& resolved() const { return estimator_->problem(); }
-  // Takes the next batch, all of it or nothing; INVALID_ARGUMENT when it is no good. Cheap.
-  absl::Status Append(const v1::Measurements& batch);
+  // Where batches are taken: not yet by the estimator.
+  BatchIntake& intake() { return intake_; }
+  const BatchIntake& intake() const { return intake_; }
 
-  absl::Status Process(const Stop& stop) { return estimator_->Process(stop); }
-  // From everything appended, and made only once for it.
+  // The following each of one thread at a time.
+
+  // Seconds of measurements processed, over all runs.
+  double measured_s() const { return measured_s_; }
+  // The last batch that the estimator has.
+  int64_t sequence() const { return sequence_; }
+  // Brings the estimator up to batch `sequence`, or as far as the batches taken go.
+  absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
+  // From everything processed, and made only once for it.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
+  // These process everything taken before.
   absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
                                                             const Stop& stop);
   absl::StatusOr<v1::ProfileCostResponse> CurrentProfiles(const v1::ProfileCostRequest& request,
@@ -58,16 +63,16 @@ class LoadedSession {
       const v1::SweepRegularizationRequest& request, const Stop& stop);
 
  private:
-  explicit LoadedSession(v1::Problem problem);
+  LoadedSession(v1::Problem problem, const ResolvedProblem& resolved);
   void Restore(const SessionJournal& journal, int64_t session);
-  int64_t CountValues(const Samples& samples) const;
-  void Advance(const Samples& samples);
+  absl::Status ProcessAll(const Stop& stop);
+  absl::Status GiveUpTo(int64_t sequence);
 
   const v1::Problem problem_;
-  std::set<std::string> measured_;
+  BatchIntake intake_;
   std::unique_ptr<Estimator> estimator_;
   std::function<void(EstimatorSnapshot)> save_;
-  SessionPlace place_;
+  int64_t sequence_ = 0;
   double measured_s_ = 0;
   SharedEstimate latest_;
 };

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/common/status.h"
@@ -16,7 +17,7 @@ namespace polyest {
 
 class Session::Computing {
  public:
-  explicit Computing(Session& session) : session_(session) {}
+  Computing(Session& session, const LoadedSession& loaded) : session_(session), loaded_(loaded) {}
   ~Computing() {
     const std::chrono::duration<double> spent = Clock::now() - begin_;
     if (session_.services_.metrics != nullptr) {
@@ -25,7 +26,8 @@ class Session::Computing {
     const std::lock_guard lock(session_.mutex_);
     session_.activity_.set_compute_time(session_.activity_.compute_time() + spent.count());
     session_.computed_s_ += spent.count();
-    session_.measured_s_ = session_.loaded_->measured_s();
+    session_.measured_s_ = loaded_.measured_s() - session_.measured_before_s_;
+    session_.processed_ = loaded_.sequence();
     session_.last_use_ = Clock::now();
   }
   Computing(const Computing&) = delete;
@@ -33,6 +35,7 @@ class Session::Computing {
 
  private:
   Session& session_;
+  const LoadedSession& loaded_;
   const Clock::time_point begin_ = Clock::now();
 };
 
@@ -41,10 +44,10 @@ Session::Session(const SessionServices& services, SessionHead head,
     : services_(services),
       head_(std::move(head)),
       strand_(std::make_shared<Strand>(services.executor, head_.tenant + "/sessions")),
-      ledger_(head_.place),
-      loaded_(std::move(loaded)) {
-  activity_.set_loaded(loaded_ != nullptr);
-  if (loaded_ != nullptr) loaded_->SaveSnapshots(services.journal, number());
+      ledger_(head_.place) {
+  if (loaded == nullptr) return;
+  loaded->SaveSnapshots(services.journal, number());
+  Replace({std::move(loaded), 0});
 }
 
 v1::Session Session::Describe() const {
@@ -62,6 +65,9 @@ v1::Session Session::Describe() const {
   activity.set_has_writer(writer_ != nullptr);
   activity.set_watchers(static_cast<int32_t>(observers_.size()));
   activity.set_batches(place.sequence - head_.place.sequence);
+  if (activity_.loaded()) {
+    activity.set_unprocessed_batches(std::max<int64_t>(0, place.sequence - processed_));
+  }
   if (measured_s_ > 0) activity.set_real_time_factor(measured_s_ / computed_s_);
   const std::chrono::duration<double> idle = Clock::now() - last_use_;
   activity.set_idle_time(idle.count());
@@ -120,28 +126,45 @@ absl::Status Session::CheckOpen() const {
   return absl::OkStatus();
 }
 
-absl::StatusOr<LoadedSession*> Session::Loaded(const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  const uint64_t losses = ledger_.losses();
-  if (loaded_ != nullptr && losses == losses_) return loaded_.get();
-  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
-  loaded_ = nullptr;
-  passed_on_ = nullptr;
-  // After a loss nothing is under way, and only this strand takes more.
-  POLYEST_ASSIGN_OR_RETURN(loaded_, LoadedSession::Load(services_.journal, number(), ledger_.kept(),
-                                                        services_.models, stop));
-  loaded_->SaveSnapshots(services_.journal, number());
-  losses_ = losses;
-  Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
+Session::InMemory Session::Present() const {
   const std::lock_guard lock(mutex_);
-  computed_s_ = 0;
-  activity_.set_loaded(true);
-  return loaded_.get();
+  return in_memory_;
 }
 
-absl::Status Session::TakeRoom(const LoadedSession& loaded, const v1::Measurements& batch) const {
-  POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, loaded.place(), batch));
-  POLYEST_RETURN_IF_ERROR(CheckRuns(services_.limits.problem, loaded.resolved(), batch));
+// What was in memory before is destroyed after the lock.
+void Session::Replace(InMemory in_memory) {
+  const std::lock_guard lock(mutex_);
+  const bool loaded = in_memory.loaded != nullptr;
+  if (loaded) {
+    processed_ = in_memory.loaded->sequence();
+    measured_before_s_ = in_memory.loaded->measured_s();
+  }
+  in_memory_.losses = in_memory.losses;
+  in_memory_.loaded.swap(in_memory.loaded);
+  activity_.set_loaded(loaded);
+  measured_s_ = computed_s_ = 0;
+}
+
+absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  const uint64_t losses = ledger_.losses();
+  const InMemory present = Present();
+  if (present.loaded != nullptr && present.losses == losses) return present.loaded;
+  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
+  Replace({nullptr, present.losses});
+  // Until it is replaced below, no batch is taken.
+  POLYEST_ASSIGN_OR_RETURN(
+      std::shared_ptr<LoadedSession> loaded,
+      LoadedSession::Load(services_.journal, number(), ledger_.kept(), services_.models, stop));
+  loaded->SaveSnapshots(services_.journal, number());
+  Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
+  passed_on_ = nullptr;
+  Replace({loaded, losses});
+  return loaded;
+}
+
+absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const {
+  POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, place, batch));
   if (services_.rows == nullptr) return absl::OkStatus();
   return services_.rows->Take(number(), tenant(), batch.time_size());
 }
@@ -150,40 +173,46 @@ void Session::ReleaseRoom(int64_t rows) const {
   if (services_.rows != nullptr) services_.rows->Release(number(), rows);
 }
 
-absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,
-                                                 const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch) {
   JournalEntry entry;
   entry.session = number();
   entry.measurements = DeterministicBytes(batch);
   entry.digest = Digest(entry.measurements);
+  const std::lock_guard taking(taking_);
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  const InMemory present = Present();
+  if (present.loaded == nullptr)
+    return absl::UnavailableError(name() + " is not loaded; try again");
+  BatchIntake& intake = present.loaded->intake();
   POLYEST_ASSIGN_OR_RETURN(const BatchLedger::Kind kind,
                            ledger_.Check(sequence, entry.digest, [this](int64_t kept) {
                              return services_.journal.ReadDigest(number(), kept);
                            }));
   if (kind == BatchLedger::Kind::kNext) {
-    POLYEST_RETURN_IF_ERROR(TakeRoom(*loaded, batch));
+    const SessionPlace before = intake.place();
+    const double measured_s = intake.measured_s();
+    POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch));
     absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_size()); };
-    const int64_t samples = loaded->place().samples;
-    const double measured_s = loaded->measured_s();
-    POLYEST_RETURN_IF_ERROR(loaded->Append(batch));
-    entry.place = loaded->place();
-    POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, losses_));
-    const int64_t values = entry.place.samples - samples;
+    POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem));
+    entry.place = intake.place();
+    POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, present.losses));
+    const int64_t values = entry.place.samples - before.samples;
     std::move(release_room).Cancel();
-    Keep(std::move(entry), batch.time_size(), values, loaded->measured_s() - measured_s);
+    Keep(std::move(entry), present.losses, batch.time_size(), values,
+         intake.measured_s() - measured_s);
   }
   v1::Acknowledgement acknowledgement;
   acknowledgement.set_sequence(sequence);
-  acknowledgement.set_samples(loaded->place().samples);
+  acknowledgement.set_samples(intake.place().samples);
   return acknowledgement;
 }
 
-void Session::Keep(JournalEntry entry, int64_t rows, int64_t values, double measured_s) {
+void Session::Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values,
+                   double measured_s) {
   const int64_t sequence = entry.place.sequence;
   services_.journal.Append(
-      std::move(entry), [self = shared_from_this(), losses = losses_, sequence, rows, values,
-                         measured_s, begin = Clock::now()](const absl::Status& kept) {
+      std::move(entry), [self = shared_from_this(), losses, sequence, rows, values, measured_s,
+                         begin = Clock::now()](const absl::Status& kept) {
         const std::chrono::duration<double> duration = Clock::now() - begin;
         if (Metrics* const metrics = self->services_.metrics; metrics != nullptr && kept.ok()) {
           metrics->Count(Metrics::Batch{rows, values, measured_s, duration.count()});
@@ -194,17 +223,26 @@ void Session::Keep(JournalEntry entry, int64_t rows, int64_t values, double meas
 }
 
 absl::Status Session::Process(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
-  const Computing computing(*this);
-  return loaded->Process(stop);
+  return ProcessUpTo(std::numeric_limits<int64_t>::max(), stop);
+}
+
+absl::Status Session::ProcessUpTo(int64_t sequence, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
+  const Computing computing(*this, *loaded);
+  return loaded->ProcessUpTo(sequence, stop);
 }
 
 absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
+  POLYEST_RETURN_IF_ERROR(Process(stop));
+  return LatestEstimate(stop);
+}
+
+absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
   SharedEstimate latest;
   const Clock::time_point begin = Clock::now();
   {
-    const Computing computing(*this);
+    const Computing computing(*this, *loaded);
     POLYEST_ASSIGN_OR_RETURN(latest, loaded->CurrentEstimate(stop));
   }
   if (latest == passed_on_) return latest;
@@ -239,22 +277,22 @@ void Session::PassOn(const SharedEstimate& estimate) {
 
 absl::StatusOr<v1::GetPosteriorResponse> Session::CurrentPosterior(
     const v1::GetPosteriorRequest& request, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
-  const Computing computing(*this);
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
+  const Computing computing(*this, *loaded);
   return loaded->CurrentPosterior(request, stop);
 }
 
 absl::StatusOr<v1::ProfileCostResponse> Session::CurrentProfiles(
     const v1::ProfileCostRequest& request, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
-  const Computing computing(*this);
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
+  const Computing computing(*this, *loaded);
   return loaded->CurrentProfiles(request, stop);
 }
 
 absl::StatusOr<v1::SweepRegularizationResponse> Session::CurrentRegularizationSweep(
     const v1::SweepRegularizationRequest& request, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(LoadedSession* const loaded, Loaded(stop));
-  const Computing computing(*this);
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
+  const Computing computing(*this, *loaded);
   return loaded->CurrentRegularizationSweep(request, stop);
 }
 
@@ -285,11 +323,9 @@ bool Session::observed() const {
 
 void Session::Unload() {
   if (!IdleTime()) return;
-  loaded_ = nullptr;
+  Replace({nullptr, Present().losses});
   passed_on_ = nullptr;
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
-  const std::lock_guard lock(mutex_);
-  activity_.set_loaded(false);
 }
 
 }  // namespace polyest

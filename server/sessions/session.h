@@ -102,16 +102,22 @@ class Session : public std::enable_shared_from_this<Session> {
   // How often batches were taken and then not kept.
   uint64_t losses() const { return ledger_.losses(); }
 
+  // Takes the batch, all of it or nothing. It may be acknowledged as the answer says WhenKept its
+  // sequence. No numerics: ProcessUpTo does them. UNAVAILABLE when the session is not loaded.
+  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch);
+
   // The following only on the strand. Each brings the estimator back into memory if it is not
   // there.
 
-  // Takes the batch, all of it or nothing. It may be acknowledged as the answer says WhenKept its
-  // sequence. No numerics: Process does them.
-  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch,
-                                          const Stop& stop);
+  // As it stays at least as long as there is a writer.
+  absl::Status Load(const Stop& stop) { return Loaded(stop).status(); }
+  // Everything added, or what of it was added up to batch `sequence`.
   absl::Status Process(const Stop& stop);
-  // The estimate from everything added; it may be told WhenKept its sequence. A new one is passed
-  // on to the observers then.
+  absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
+  // The estimate from everything processed; it may be told WhenKept its sequence. A new one is
+  // passed on to the observers then.
+  absl::StatusOr<SharedEstimate> LatestEstimate(const Stop& stop);
+  // The same from everything added.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
   // The posterior in detail, from everything added.
   absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
@@ -130,16 +136,23 @@ class Session : public std::enable_shared_from_this<Session> {
  private:
   // Times what is computed.
   class Computing;
+  // What is in memory of it, and the losses of batches that this knows of.
+  struct InMemory {
+    std::shared_ptr<LoadedSession> loaded;  // null: nothing
+    uint64_t losses = 0;
+  };
 
   absl::Status CheckOpen() const;
   // Whether the next batch keeps to the limits; its rows are taken then.
-  absl::Status TakeRoom(const LoadedSession& loaded, const v1::Measurements& batch) const;
+  absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const;
   void ReleaseRoom(int64_t rows) const;
   // The estimator as it is after every batch taken.
-  absl::StatusOr<LoadedSession*> Loaded(const Stop& stop);
+  absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);
   void PassOn(const SharedEstimate& estimate);
   // In the journal, with what is to be counted once it is there.
-  void Keep(JournalEntry entry, int64_t rows, int64_t values, double measured_s);
+  void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
+  InMemory Present() const;
+  void Replace(InMemory in_memory);
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
   const SessionServices services_;
@@ -147,21 +160,23 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::shared_ptr<Strand> strand_;
   BatchLedger ledger_;
 
-  // The strand's own.
-  std::unique_ptr<LoadedSession> loaded_;
-  uint64_t losses_ = 0;  // of batches that `loaded_` knows of
-  SharedEstimate passed_on_;
+  SharedEstimate passed_on_;  // the strand's own
+
+  std::mutex taking_;  // held while a batch is taken
 
   mutable std::mutex mutex_;
+  InMemory in_memory_;  // changed on the strand only
   bool closed_ = false;
   std::shared_ptr<SessionObserver> writer_;
   std::string writer_id_;
   std::vector<std::shared_ptr<SessionObserver>> observers_;
   Clock::time_point last_use_ = Clock::now();
   v1::Session::Activity activity_;
-  // Seconds of measurements, and computed for them, since the estimator is in memory.
+  // Seconds of measurements processed, and computed for them, since the estimator is in memory.
   double measured_s_ = 0;
   double computed_s_ = 0;
+  double measured_before_s_ = 0;  // and before that
+  int64_t processed_ = 0;         // the last batch
 };
 
 }  // namespace polyest

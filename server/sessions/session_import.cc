@@ -65,24 +65,23 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   if (loaded_ == nullptr) {
     return absl::InvalidArgumentError("record: the first must be a session's head");
   }
-  const int64_t next = loaded_->place().sequence + 1;
+  const int64_t next = loaded_->intake().place().sequence + 1;
   if (batch.sequence() != next || next > promised_) {
     return absl::InvalidArgumentError(
         absl::StrFormat("record.batch.sequence: %d must be %d, and the head promises %d batches",
                         batch.sequence(), next, promised_));
   }
   const SessionServices& services = registry_.services();
-  POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, loaded_->place(), batch.measurements()));
-  POLYEST_RETURN_IF_ERROR(
-      CheckRuns(services.limits.problem, loaded_->resolved(), batch.measurements()));
+  BatchIntake& intake = loaded_->intake();
+  POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, intake.place(), batch.measurements()));
   POLYEST_RETURN_IF_ERROR(
       services.rows->Take(head_.number, head_.tenant, batch.measurements().time_size()));
-  POLYEST_RETURN_IF_ERROR(loaded_->Append(batch.measurements()));
+  POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements(), services.limits.problem));
   JournalEntry entry;
   entry.session = head_.number;
   entry.measurements = DeterministicBytes(batch.measurements());
   entry.digest = Digest(entry.measurements);
-  entry.place = loaded_->place();
+  entry.place = intake.place();
   std::promise<absl::Status> kept;
   services.journal.Append(std::move(entry),
                           [&](const absl::Status& status) { kept.set_value(status); });
@@ -90,7 +89,7 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
-  const int64_t batches = loaded_ == nullptr ? 0 : loaded_->place().sequence;
+  const int64_t batches = loaded_ == nullptr ? 0 : loaded_->intake().place().sequence;
   if (loaded_ == nullptr || batches < promised_) {
     return absl::InvalidArgumentError(
         absl::StrFormat("record: the session breaks off after batch %d of %d", batches, promised_));
@@ -101,7 +100,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
         absl::StrFormat("there is a session \"%s\" already", head_.name));
   }
   POLYEST_RETURN_IF_ERROR(shown);
-  head_.place = loaded_->place();
+  head_.place = loaded_->intake().place();
   return registry_.Adopt(std::move(head_), std::move(loaded_));
 }
 

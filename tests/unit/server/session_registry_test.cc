@@ -143,7 +143,7 @@ TEST_F(SessionRegistryTest, FindsWhatTheJournalHas) {
   batch.add_time(0.25);
   batch.add_channels()->set_name("x");
   batch.mutable_channels(0)->add_values(0.1);
-  ASSERT_TRUE(session->Add(1, batch, {}).ok());
+  ASSERT_TRUE(session->Add(1, batch).ok());
   Open();
   const v1::Session again = (*registry_->Get("t", "sessions/a"))->Describe();
   EXPECT_EQ(again.create_time().seconds(), 42);

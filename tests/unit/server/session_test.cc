@@ -47,7 +47,9 @@ class SessionTest : public testing::Test {
                                          journal_.Heads()->front());
   }
   absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch) {
-    return session_->Add(sequence, batch, {});
+    const absl::Status loaded = session_->Load({});
+    if (!loaded.ok()) return loaded;
+    return session_->Add(sequence, batch);
   }
   // What is known so far of whether the batch is kept.
   std::shared_ptr<std::optional<absl::Status>> Kept(int64_t sequence) {
@@ -108,6 +110,32 @@ TEST_F(SessionTest, EstimatesOnceForAllWhoAskUntilThereIsMore) {
   const auto second = session_->CurrentEstimate({});
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ((*second)->sequence(), 2);
+}
+
+TEST_F(SessionTest, TakesBatchesLongBeforeItProcessesThem) {
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
+  ASSERT_TRUE(Add(2, Batch({0.3})).ok());
+  ASSERT_TRUE(Add(3, Batch({0.4})).ok());
+  EXPECT_EQ(session_->Describe().last_sequence(), 3);
+  EXPECT_EQ(session_->Describe().activity().unprocessed_batches(), 3);
+  ASSERT_TRUE(session_->ProcessUpTo(2, {}).ok());
+  EXPECT_EQ(session_->Describe().activity().unprocessed_batches(), 1);
+  const auto of_two = session_->LatestEstimate({});
+  ASSERT_TRUE(of_two.ok()) << of_two.status();
+  EXPECT_EQ((*of_two)->sequence(), 2);
+  EXPECT_EQ((*of_two)->samples(), 3);
+  const auto of_all = session_->CurrentEstimate({});
+  ASSERT_TRUE(of_all.ok()) << of_all.status();
+  EXPECT_EQ((*of_all)->sequence(), 3);
+  EXPECT_EQ((*of_all)->samples(), 4);
+  EXPECT_EQ(session_->Describe().activity().unprocessed_batches(), 0);
+}
+
+TEST_F(SessionTest, TakesNothingWhileItIsNotInMemory) {
+  EXPECT_EQ(session_->Add(1, Batch({0.1})).status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(session_->taken().sequence, 0);
+  ASSERT_TRUE(session_->Load({}).ok());
+  EXPECT_TRUE(session_->Add(1, Batch({0.1})).ok());
 }
 
 TEST_F(SessionTest, PassesThePresentEstimateAndEveryNewOneToObservers) {

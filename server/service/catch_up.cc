@@ -1,0 +1,17 @@
+#include "server/service/catch_up.h"
+
+#include "core/common/status.h"
+#include "server/service/guarded.h"
+
+namespace polyest {
+
+void CatchUp(const std::shared_ptr<Session>& session, const std::stop_token& stop) {
+  const auto compute = [session, stop]() -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(session->Process(Stop(stop)));
+    return session->observed() ? session->LatestEstimate(Stop(stop)).status() : absl::OkStatus();
+  };
+  // Refused, or failed, it is left to whoever asks next.
+  session->strand().Submit([compute] { Guarded(compute).IgnoreError(); }).IgnoreError();
+}
+
+}  // namespace polyest

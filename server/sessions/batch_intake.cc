@@ -1,0 +1,77 @@
+#include "server/sessions/batch_intake.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/status.h"
+#include "server/convert/measurements.h"
+
+namespace polyest {
+
+BatchIntake::BatchIntake(ResolvedProblem problem)
+    : problem_(std::move(problem)), checks_(problem_), runs_(problem_.runs()) {
+  for (const MeasuredOutput& output : problem_.problem().measured) measured_.insert(output.output);
+}
+
+SessionPlace BatchIntake::place() const {
+  const std::lock_guard lock(mutex_);
+  return place_;
+}
+
+double BatchIntake::measured_s() const {
+  const std::lock_guard lock(mutex_);
+  return measured_s_;
+}
+
+absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch));
+  const std::lock_guard lock(mutex_);
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
+  POLYEST_RETURN_IF_ERROR(CheckRuns(checked.after.run + 1, limits));
+  checks_.Accept(checked);
+  Advance(samples);
+  waiting_.push_back({std::move(samples), place_, measured_s_});
+  return absl::OkStatus();
+}
+
+// Where runs bring parameters of their own the problem must bear them.
+absl::Status BatchIntake::CheckRuns(int runs, const ProblemLimits& limits) {
+  if (!problem_.per_run() || runs <= runs_) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem_.WithRuns(runs));
+  POLYEST_RETURN_IF_ERROR(CheckLimits(limits, grown));
+  runs_ = runs;
+  return absl::OkStatus();
+}
+
+std::optional<TakenBatch> BatchIntake::Next(int64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  if (waiting_.empty() || waiting_.front().place.sequence > sequence) return std::nullopt;
+  TakenBatch next = std::move(waiting_.front());
+  waiting_.pop_front();
+  return next;
+}
+
+void BatchIntake::Advance(const Samples& samples) {
+  ++place_.sequence;
+  place_.samples += CountValues(samples);
+  place_.rows += static_cast<int64_t>(samples.rows());
+  for (size_t row = 0; row < samples.rows(); ++row) {
+    const SampleRow next{samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]};
+    const bool same_run = next.run == place_.last_row.run;
+    measured_s_ += next.time_s - (same_run ? place_.last_row.time_s : 0);
+    place_.last_row = next;
+  }
+}
+
+// Values of measured outputs that are there: what an estimate counts as its samples.
+int64_t BatchIntake::CountValues(const Samples& samples) const {
+  int64_t values = 0;
+  for (const SampleColumn& column : samples.columns) {
+    if (!measured_.contains(column.name)) continue;
+    values += static_cast<int64_t>(column.value.size()) -
+              std::count(column.missing.begin(), column.missing.end(), true);
+  }
+  return values;
+}
+
+}  // namespace polyest
