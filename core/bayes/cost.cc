@@ -104,6 +104,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   thread_local Matrix difference;  // D = Φ − 1 φ_0ᵀ
   thread_local Matrix product;
   thread_local Matrix xis;
+  thread_local Vector xi;
   totals.resize(etas.rows());
   for (Eigen::Index first = 0; first < etas.rows(); first += kBlock) {
     const Eigen::Index count = std::min(kBlock, etas.rows() - first);
@@ -116,9 +117,9 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
     xis.rowwise() += region_.centre().transpose();
     for (Eigen::Index i = 0; i < count; ++i) {
       double& total = totals[first + i];
-      const double prior = prior_.NegativeLogDensity(xis.row(i).transpose());
-      total = prior_.Contains(xis.row(i).transpose()) ? Total(total, prior, regularization_)
-                                                      : kInfinity;
+      xi = xis.row(i).transpose();
+      const double prior = prior_.NegativeLogDensity(xi);
+      total = prior_.Contains(xi) ? Total(total, prior, regularization_) : kInfinity;
     }
   }
 }

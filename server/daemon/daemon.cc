@@ -34,6 +34,11 @@ constexpr int kWaitingTasks = 20'000;
 // Lanes of the executor that may be busy with long tasks before another lane has to wait: a tenant
 // has two, one for the streams of its sessions and one for all other calls.
 constexpr int kBusyLanes = 8;
+// What is computed gives way to what is acknowledged where both want a core: to a third of its
+// share, not more, for other processes gain by it, too.
+constexpr int kNiceness = 5;
+// Threads that take batches: they wait for nothing but, now and then, the journal.
+constexpr int kIntakeThreads = 4;
 // From a change of tokens or certificates to its notice, twice that until it is settled.
 constexpr std::chrono::seconds kWatchInterval{1};
 // What the last bytes of calls already ended may take.
@@ -75,7 +80,12 @@ Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
       executor_({.threads_per_lane = Threads(options.threads),
                  .threads = kBusyLanes * Threads(options.threads),
                  .capacity = kWaitingTasks,
-                 .capacity_per_lane = kWaitingTasks / 2}) {}
+                 .capacity_per_lane = kWaitingTasks / 2,
+                 .niceness = kNiceness}),
+      intake_({.threads_per_lane = kIntakeThreads / 2,
+               .threads = kIntakeThreads,
+               .capacity = kWaitingTasks,
+               .capacity_per_lane = kWaitingTasks / 2}) {}
 
 absl::Status Daemon::OpenJournal() {
   if (options_.data_dir.empty()) {
@@ -98,8 +108,9 @@ absl::Status Daemon::OpenSessions() {
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
-  service_ = MakeEstimationService({executor_, *sessions_, calls_, *access_, stop_.get_token(),
-                                    models_, std::chrono::seconds(options_.most_computing_s)});
+  service_ =
+      MakeEstimationService({executor_, intake_, *sessions_, calls_, *access_, stop_.get_token(),
+                             models_, std::chrono::seconds(options_.most_computing_s)});
   return absl::OkStatus();
 }
 

@@ -87,10 +87,11 @@ class Daemon {
   OpenCalls calls_;
   Metrics metrics_;
   Readiness readiness_;
-  // In the order in which they need each other: the executor finishes its tasks, which use the
+  // In the order in which they need each other: the executors finish their tasks, which use the
   // journal, before the journal goes.
   std::unique_ptr<SessionJournal> journal_;
   Executor executor_;
+  Executor intake_;
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
   std::unique_ptr<grpc::Service> service_;

@@ -1,6 +1,7 @@
 #include "server/execution/executor.h"
 
 #include <absl/strings/str_cat.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <utility>
@@ -19,7 +20,7 @@ constexpr std::chrono::seconds kBusyDelay{1};
 
 Executor::Executor(const ExecutorOptions& options) : options_(options) {
   POLYEST_CHECK(options.threads_per_lane >= 1 && options.threads >= options.threads_per_lane &&
-                options.capacity >= 1 && options.capacity_per_lane >= 1);
+                options.capacity >= 1 && options.capacity_per_lane >= 1 && options.niceness >= 0);
   for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { Run(); });
 }
 
@@ -91,6 +92,10 @@ void Executor::GiveTurn(const std::string& name, Lane& lane) {
 }
 
 void Executor::Run() {
+  // On Linux a priority is a thread's own, and 0 the thread that calls.
+  if (options_.niceness > 0) {
+    setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + options_.niceness);
+  }
   std::unique_lock lock(mutex_);
   while (true) {
     // A strand's running task may bring its next one, so the end waits for all that was accepted.

@@ -24,6 +24,7 @@ struct ExecutorOptions {
   int threads = 1;            // in all, ≥ threads_per_lane
   int capacity = 1;           // tasks that wait or run, those of strands among them, ≥ 1
   int capacity_per_lane = 1;  // of these, one lane's, ≥ 1
+  int niceness = 0;           // of its threads, ≥ 0: how much they give way to others
 };
 
 // Every task belongs to a lane. Lanes take turns, and no lane runs on more than threads_per_lane

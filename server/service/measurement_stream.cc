@@ -159,8 +159,8 @@ void MeasurementFlow::StartLoading() {
 void MeasurementFlow::StartTaking() {
   if (end_ || stage_ != Stage::kReady || taking_ || inbox_.empty() || !HasRoom()) return;
   taking_ = true;
-  const absl::Status accepted = context_.executor.Submit(
-      session_->tenant() + "/batches", [flow = shared_from_this()] { flow->Take(); });
+  const absl::Status accepted =
+      context_.intake.Submit(session_->tenant(), [flow = shared_from_this()] { flow->Take(); });
   if (accepted.ok()) return;
   taking_ = false;
   End(accepted);

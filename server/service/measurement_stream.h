@@ -91,7 +91,7 @@ class MeasurementFlow final : public SessionObserver,
   bool AllTaken() const;
   std::vector<Uncomputed> NextTurn();
 
-  // Without the mutex: on the strand, in the lane of the taking, on the strand.
+  // Without the mutex: on the strand, on the intake's threads, on the strand.
   void Load();
   void Take();
   void Compute();

@@ -13,7 +13,8 @@ namespace polyest {
 
 // What the service's calls share; outlives them all.
 struct ServiceContext {
-  Executor& executor;
+  Executor& executor;  // numerics, and whatever may take long
+  Executor& intake;    // the taking of batches
   SessionRegistry& sessions;
   OpenCalls& calls;
   const AccessControl& access;

@@ -1,7 +1,9 @@
 #include "server/execution/executor.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <atomic>
 #include <latch>
 #include <vector>
@@ -15,7 +17,8 @@ ExecutorOptions OneLane(int threads, int capacity) {
   return {.threads_per_lane = threads,
           .threads = threads,
           .capacity = capacity,
-          .capacity_per_lane = capacity};
+          .capacity_per_lane = capacity,
+          .niceness = 0};
 }
 
 TEST(Executor, RunsEverythingAcceptedBeforeItEnds) {
@@ -25,6 +28,19 @@ TEST(Executor, RunsEverythingAcceptedBeforeItEnds) {
     for (int i = 0; i < 100; ++i) ASSERT_TRUE(executor.Submit(kLane, [&] { ++ran; }).ok());
   }
   EXPECT_EQ(ran, 100);
+}
+
+TEST(Executor, GivesWayToOtherThreadsWhenItIsTold) {
+  ExecutorOptions options = OneLane(1, 1);
+  options.niceness = 7;
+  int niceness = 0;
+  const int own = getpriority(PRIO_PROCESS, 0);
+  {
+    Executor executor(options);
+    ASSERT_TRUE(executor.Submit(kLane, [&] { niceness = getpriority(PRIO_PROCESS, 0); }).ok());
+  }
+  EXPECT_EQ(niceness, std::min(own + 7, 19));
+  EXPECT_EQ(getpriority(PRIO_PROCESS, 0), own);
 }
 
 TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
