@@ -63,7 +63,7 @@ std::string FormatBytes(int64_t bytes) {
 void PrintTop(const DaemonView& now, const DaemonView* before, std::ostream& out) {
   PrintHeader(now.status, out);
   TextTable table({"session", "batches", "samples", "samples/s", "estimates", "re-expansions",
-                   "real-time", "writer", "watchers", "loaded", "idle"});
+                   "real-time", "unprocessed", "writer", "watchers", "loaded", "idle"});
   for (const v1::Session& session : now.sessions) {
     const v1::Session::Activity& activity = session.activity();
     const double factor = activity.real_time_factor();
@@ -72,6 +72,7 @@ void PrintTop(const DaemonView& now, const DaemonView* before, std::ostream& out
                   SampleRate(session, now, before), absl::StrCat(activity.estimates()),
                   absl::StrCat(activity.reexpansions()),
                   factor > 0 ? FormatNumber(factor, 3) : kUnknown,
+                  absl::StrCat(activity.unprocessed_batches()),
                   activity.has_writer() ? "yes" : kUnknown, absl::StrCat(activity.watchers()),
                   activity.loaded() ? "yes" : kUnknown, FormatDuration(activity.idle_time())});
   }

@@ -53,6 +53,7 @@ void DaemonGauges::CollectSessions(Families& families) const {
   int behind = 0;
   int64_t waiting = 0;
   int64_t rows = 0;
+  int64_t unprocessed = 0;
   for (const auto& session : sessions_.All()) {
     const v1::Session described = session->Describe();
     const v1::Session::Activity& activity = described.activity();
@@ -62,6 +63,7 @@ void DaemonGauges::CollectSessions(Families& families) const {
     // A factor of 0: nothing measured yet.
     const double factor = activity.real_time_factor();
     if (activity.has_writer() && factor > 0 && factor < 1) ++behind;
+    unprocessed += activity.unprocessed_batches();
     waiting += std::max<int64_t>(0, session->taken().sequence - described.last_sequence());
   }
   Add(families, "polyest_sessions", "Sessions of all tenants.", sessions);
@@ -72,6 +74,8 @@ void DaemonGauges::CollectSessions(Families& families) const {
       "Sessions with an open stream whose real-time factor is below 1.", behind);
   Add(families, "polyest_journal_waiting_batches", "Batches taken and not yet kept.",
       static_cast<double>(waiting));
+  Add(families, "polyest_unprocessed_batches",
+      "Batches of loaded sessions that wait for the numerics.", static_cast<double>(unprocessed));
 }
 
 void DaemonGauges::CollectDisk(Families& families) const {

@@ -43,6 +43,7 @@ TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   const std::string open = Scrape(port_);
   EXPECT_EQ(ValueOf("polyest_writers", open), 1);
   EXPECT_EQ(ValueOf("polyest_journal_waiting_batches", open), 0);
+  EXPECT_EQ(ValueOf("polyest_unprocessed_batches", open), 0);
   stream.HalfClose();
   v1::Estimate last;
   stream.ExpectEstimate(last);
