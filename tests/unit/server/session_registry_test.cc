@@ -12,6 +12,14 @@
 namespace polyest {
 namespace {
 
+// What the strand does of a call that adds a batch.
+absl::StatusOr<v1::Acknowledgement> Add(const std::shared_ptr<Session>& session, int64_t sequence,
+                                        const v1::Measurements& batch) {
+  const absl::Status loaded = session->Load({});
+  if (!loaded.ok()) return loaded;
+  return session->Add(sequence, batch);
+}
+
 class SessionRegistryTest : public testing::Test {
  protected:
   absl::Status StatusOfCreate(const std::string& id) {
@@ -158,14 +166,14 @@ TEST_F(SessionRegistryTest, HoldsNoMoreRowsThanATenantMayHaveAlsoAfterARestart) 
   Open();
   ASSERT_TRUE(StatusOfCreate("a").ok());
   ASSERT_TRUE(StatusOfCreate("b").ok());
-  ASSERT_TRUE((*registry_->Get("t", "sessions/a"))->Add(1, Rows({0.1, 0.2}), {}).ok());
+  ASSERT_TRUE(Add(*registry_->Get("t", "sessions/a"), 1, Rows({0.1, 0.2})).ok());
   Open();
   const auto b = *registry_->Get("t", "sessions/b");
-  const auto refused = b->Add(1, Rows({0.1, 0.2}), {});
+  const auto refused = Add(b, 1, Rows({0.1, 0.2}));
   EXPECT_EQ(RefusalOf(refused.status())->limit, "--max-tenant-rows");
-  EXPECT_TRUE(b->Add(1, Rows({0.1}), {}).ok());
+  EXPECT_TRUE(Add(b, 1, Rows({0.1})).ok());
   ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
-  EXPECT_TRUE(b->Add(2, Rows({0.2, 0.3}), {}).ok());
+  EXPECT_TRUE(Add(b, 2, Rows({0.2, 0.3})).ok());
 }
 
 TEST_F(SessionRegistryTest, CountsNoRowsThatWereRefused) {
@@ -173,11 +181,11 @@ TEST_F(SessionRegistryTest, CountsNoRowsThatWereRefused) {
   Open();
   ASSERT_TRUE(StatusOfCreate("a").ok());
   const auto a = *registry_->Get("t", "sessions/a");
-  EXPECT_FALSE(a->Add(1, Rows({0.2, 0.1}), {}).ok());
+  EXPECT_FALSE(Add(a, 1, Rows({0.2, 0.1})).ok());
   journal_.Fail(absl::ResourceExhaustedError("full"));
-  EXPECT_TRUE(a->Add(1, Rows({0.1, 0.2}), {}).ok());  // and is not kept
+  EXPECT_TRUE(Add(a, 1, Rows({0.1, 0.2})).ok());  // and is not kept
   journal_.Fail(absl::OkStatus());
-  EXPECT_TRUE(a->Add(1, Rows({0.1, 0.2}), {}).ok());
+  EXPECT_TRUE(Add(a, 1, Rows({0.1, 0.2})).ok());
 }
 
 TEST_F(SessionRegistryTest, TakesOnlyProblemsWithinItsLimits) {
@@ -186,7 +194,7 @@ TEST_F(SessionRegistryTest, TakesOnlyProblemsWithinItsLimits) {
   Open();
   EXPECT_EQ(RefusalOf(StatusOfCreate("after"))->limit, "--max-states");
   // What is there stays.
-  EXPECT_TRUE((*registry_->Get("t", "sessions/before"))->Add(1, Rows({0.1}), {}).ok());
+  EXPECT_TRUE(Add(*registry_->Get("t", "sessions/before"), 1, Rows({0.1})).ok());
 }
 
 TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoaded) {
@@ -196,13 +204,13 @@ TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoa
   EXPECT_EQ(RefusalOf(StatusOfCreate("b"))->limit, "--max-memory-mb");
   // Who asks for it to go on with it learns that it is there.
   EXPECT_EQ(StatusOfCreate("a").code(), absl::StatusCode::kAlreadyExists);
-  EXPECT_TRUE(a->Add(1, Rows({0.1}), {}).ok());
+  EXPECT_TRUE(Add(a, 1, Rows({0.1})).ok());
   a->Unload();
-  const auto refused = a->Add(2, Rows({0.2}), {});
+  const auto refused = Add(a, 2, Rows({0.2}));
   EXPECT_EQ(RefusalOf(refused.status())->limit, "--max-memory-mb");
   EXPECT_TRUE(RefusalOf(refused.status())->retry_delay);
   resident_bytes_ = 1 << 20;
-  EXPECT_TRUE(a->Add(2, Rows({0.2}), {}).ok());
+  EXPECT_TRUE(Add(a, 2, Rows({0.2})).ok());
 }
 
 TEST_F(SessionRegistryTest, OnlyShowsTheClockOnTheWallWhichMayJump) {
@@ -211,7 +219,7 @@ TEST_F(SessionRegistryTest, OnlyShowsTheClockOnTheWallWhichMayJump) {
     ASSERT_TRUE(StatusOfCreate(id).ok());
     const auto session = *registry_->Get("t", absl::StrCat("sessions/", id));
     EXPECT_EQ(session->Describe().create_time().seconds(), seconds);
-    EXPECT_TRUE(session->Add(1, Rows({0.1}), {}).ok());
+    EXPECT_TRUE(Add(session, 1, Rows({0.1})).ok());
     ASSERT_TRUE(session->IdleTime());
     EXPECT_LT(*session->IdleTime(), std::chrono::minutes(1));
     EXPECT_LT(session->Describe().activity().idle_time(), 60);
@@ -219,7 +227,7 @@ TEST_F(SessionRegistryTest, OnlyShowsTheClockOnTheWallWhichMayJump) {
   EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a", "sessions/b", "sessions/c"));
   Open();
   EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a", "sessions/b", "sessions/c"));
-  EXPECT_TRUE((*registry_->Get("t", "sessions/b"))->Add(2, Rows({0.2}), {}).ok());
+  EXPECT_TRUE(Add(*registry_->Get("t", "sessions/b"), 2, Rows({0.2})).ok());
 }
 
 TEST_F(SessionRegistryTest, KeepsWhatItWasWhenTheDiskFails) {
