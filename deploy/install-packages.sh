@@ -15,8 +15,9 @@ packages=(
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format python3-yaml openssl sqlite3 libfaketime
 )
+# SUNDIALS' CMake configuration wants OpenMP of whatever compiler there is.
 fuzz_packages=(
-  clang-14 libclang-rt-14-dev
+  clang-14 libclang-rt-14-dev libomp-14-dev
 )
 
 say() { echo "install-packages: $*" >&2; }

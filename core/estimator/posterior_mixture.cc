@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <ranges>
 #include <utility>
 
 #include "core/common/status.h"
@@ -200,7 +199,7 @@ std::vector<size_t> KeepSameProblem(std::vector<AssessmentRequest>& requests) {
   const auto dimension = [](const AssessmentRequest& request) {
     return request.problem->dimension();
   };
-  const int least = std::ranges::min(requests | std::views::transform(dimension));
+  const int least = dimension(std::ranges::min(requests, {}, dimension));
   std::erase_if(places, [&](size_t k) { return dimension(requests[k]) > least; });
   std::erase_if(requests, [&](const AssessmentRequest& one) { return dimension(one) > least; });
   return places;

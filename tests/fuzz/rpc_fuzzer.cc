@@ -1,0 +1,188 @@
+// Arbitrary requests to every call of the service, several in a row and on streams, against a
+// daemon in the same process: none may crash it, hang it, make it answer with a fault of its own,
+// or leave anything behind. An input is a script, see rpc_script.h.
+
+#include <google/protobuf/stubs/logging.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/common/check.h"
+#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/daemon/daemon.h"
+#include "tests/fuzz/message_mutation.h"
+#include "tests/fuzz/open_rpc.h"
+#include "tests/fuzz/rpc_script.h"
+
+extern "C" size_t LLVMFuzzerMutate(uint8_t* data, size_t size, size_t most);
+
+namespace polyest {
+namespace {
+
+constexpr size_t kMostCalls = 12;
+// What is computed for one call. Whoever does not stop at it holds up the next input, until
+// libFuzzer finds that it hangs.
+constexpr std::chrono::milliseconds kDeadline{100};
+
+// A daemon that keeps nothing on disk, with one thread for each kind of call, so that what happens
+// is the same every time.
+class Server {
+ public:
+  Server() {
+    google::protobuf::SetLogHandler(nullptr);
+    spdlog::set_level(spdlog::level::off);
+    DaemonOptions options;
+    options.listen = {"127.0.0.1", 0};
+    options.threads = 1;
+    options.most_message_mb = 1;
+    options.limits = {.sessions = 8, .sessions_per_tenant = 8, .batch_rows = 1'000, .rows = 10'000};
+    auto daemon = Daemon::Start(options);
+    POLYEST_CHECK(daemon.ok());
+    daemon_ = *std::move(daemon);
+    channel_ =
+        grpc::CreateChannel(daemon_->address().ToString(), grpc::InsecureChannelCredentials());
+    generic_ = std::make_unique<grpc::GenericStub>(channel_);
+    stub_ = v1::EstimationService::NewStub(channel_);
+  }
+
+  void Run(const RpcScript& script) {
+    std::vector<std::unique_ptr<OpenRpc>> calls;
+    for (const ScriptCall& call : script) {
+      if (calls.size() == kMostCalls) break;
+      calls.push_back(std::make_unique<OpenRpc>(*generic_, call, kDeadline));
+      calls.back()->Await();
+    }
+    calls.clear();
+    Clean();
+  }
+
+ private:
+  // The next input finds the daemon as this one did.
+  void Clean() {
+    AwaitCalls();
+    const v1::ListSessionsResponse left = List();
+    for (const v1::Session& session : left.sessions()) {
+      grpc::ClientContext context;
+      v1::DeleteSessionRequest request;
+      request.set_name(session.name());
+      google::protobuf::Empty response;
+      POLYEST_CHECK(stub_->DeleteSession(&context, request, &response).ok());
+    }
+    AwaitCalls();
+    POLYEST_CHECK(List().sessions().empty());
+  }
+
+  v1::ListSessionsResponse List() {
+    grpc::ClientContext context;
+    v1::ListSessionsResponse response;
+    POLYEST_CHECK(stub_->ListSessions(&context, {}, &response).ok());
+    return response;
+  }
+
+  // One call in each lane of the executor comes after all that were cancelled there.
+  void AwaitCalls() {
+    grpc::ClientContext of_models, of_sessions;
+    v1::ListModelsResponse models;
+    POLYEST_CHECK(stub_->ListModels(&of_models, {}, &models).ok());
+    v1::GetSessionRequest none;
+    none.set_name("sessions/none");
+    v1::Session session;
+    stub_->GetSession(&of_sessions, none, &session);
+  }
+
+  std::unique_ptr<Daemon> daemon_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<grpc::GenericStub> generic_;
+  std::unique_ptr<v1::EstimationService::Stub> stub_;
+};
+
+// Another call, with a request of nothing, or one that is there once more.
+void AddCall(RpcScript& script, MessageMutation& mutation) {
+  const auto& service = FuzzedService();
+  const auto method = mutation.Choose(static_cast<size_t>(service.method_count()));
+  ScriptCall call{.method = service.method(static_cast<int>(method)), .requests = {}};
+  call.requests.push_back({MakeMessage(*call.method->input_type()), ""});
+  const size_t at = mutation.Choose(script.size() + 1);
+  script.insert(script.begin() + static_cast<std::ptrdiff_t>(at), std::move(call));
+}
+
+void MutateCall(RpcScript& script, MessageMutation& mutation) {
+  const size_t chosen = mutation.Choose(script.size());
+  ScriptCall& call = script[chosen];
+  ScriptRequest& request = call.requests[mutation.Choose(call.requests.size())];
+  switch (mutation.Choose(16)) {
+    case 0:
+      script.erase(script.begin() + static_cast<std::ptrdiff_t>(chosen));
+      return;
+    case 1:
+      std::swap(call, script[mutation.Choose(script.size())]);
+      return;
+    case 2:
+      call.cancelled = !call.cancelled;
+      return;
+    case 3:
+      // On the wire from here on.
+      request.bytes = request.Wire();
+      request.message = nullptr;
+      return mutation.MutateBytesOf(request.bytes);
+    case 4:
+    case 5:
+      call.requests.push_back({nullptr, request.bytes});
+      if (call.requests.front().message != nullptr) {
+        call.requests.back().message = MakeMessage(*call.method->input_type());
+        mutation.Replace(*call.requests.back().message);
+      }
+      return;
+    default:
+      if (request.message == nullptr) return mutation.MutateBytesOf(request.bytes);
+      return mutation.Mutate(*request.message);
+  }
+}
+
+std::string MutateScript(std::string_view text, unsigned seed) {
+  MessageMutation mutation(seed, LLVMFuzzerMutate);
+  const RpcScript known = ParseScript(text);
+  for (const ScriptCall& call : known) {
+    for (const ScriptRequest& request : call.requests) {
+      if (request.message != nullptr) mutation.Learn(*request.message);
+    }
+  }
+  RpcScript script = ParseScript(text);
+  for (size_t changes = 1 + mutation.Choose(4); changes > 0; --changes) {
+    if (script.empty() || mutation.Choose(24) == 0) {
+      AddCall(script, mutation);
+    } else {
+      MutateCall(script, mutation);
+    }
+  }
+  return PrintScript(script);
+}
+
+}  // namespace
+}  // namespace polyest
+
+// OpenSSL keeps the errors of a thread where the leak sanitizer does not look.
+extern "C" const char* __lsan_default_suppressions() { return "leak:CRYPTO_zalloc"; }
+
+extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t most, unsigned seed) {
+  const std::string text = polyest::MutateScript({reinterpret_cast<const char*>(data), size}, seed);
+  // Too long to be kept whole: as the bytes that it is.
+  if (text.size() > most || seed % 16 == 0) return LLVMFuzzerMutate(data, size, most);
+  std::memcpy(data, text.data(), text.size());
+  return text.size();
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  static polyest::Server server;
+  server.Run(polyest::ParseScript({reinterpret_cast<const char*>(data), size}));
+  return 0;
+}
