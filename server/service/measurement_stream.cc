@@ -183,7 +183,7 @@ void MeasurementFlow::FinishIfIdle() {
   finished_ = true;
   // Before the client hears of the end: it may come back at once.
   if (session_ != nullptr) session_->ReleaseWriter(this);
-  if (left_uncomputed_) CatchUp(session_, context_.stop);
+  if (left_uncomputed_ || !uncomputed_.empty()) CatchUp(session_, context_.stop);
   reactor_->Finish(ToGrpc(*end_));
 }
 
