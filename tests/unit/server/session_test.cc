@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <thread>
 
 #include "tests/testing/faulty_journal.h"
 #include "tests/unit/server/problem_json.h"
@@ -129,6 +131,30 @@ TEST_F(SessionTest, TakesBatchesLongBeforeItProcessesThem) {
   EXPECT_EQ((*of_all)->sequence(), 3);
   EXPECT_EQ((*of_all)->samples(), 4);
   EXPECT_EQ(session_->Describe().activity().unprocessed_batches(), 0);
+}
+
+TEST_F(SessionTest, TakesBatchesWhileOthersAreComputedAndLosesNoneAndNoBit) {
+  constexpr int kBatches = 200;
+  limits_.rows = kBatches;
+  Restart();
+  ASSERT_TRUE(session_->Load({}).ok());
+  std::atomic<bool> refused = false;
+  const std::jthread writer([&] {
+    for (int batch = 1; batch <= kBatches && !refused; ++batch) {
+      refused = !session_->Add(batch, Batch({0.01 * batch})).ok();
+    }
+  });
+  while (session_->taken().sequence < kBatches) {
+    ASSERT_FALSE(refused);
+    ASSERT_TRUE(session_->Process({}).ok());
+  }
+  const auto estimate = session_->CurrentEstimate({});
+  ASSERT_TRUE(estimate.ok()) << estimate.status();
+  EXPECT_EQ((*estimate)->sequence(), kBatches);
+  Restart();
+  const auto again = session_->CurrentEstimate({});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ((*estimate)->SerializeAsString(), (*again)->SerializeAsString());
 }
 
 TEST_F(SessionTest, TakesNothingWhileItIsNotInMemory) {
