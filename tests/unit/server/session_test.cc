@@ -138,15 +138,17 @@ TEST_F(SessionTest, TakesBatchesWhileOthersAreComputedAndLosesNoneAndNoBit) {
   limits_.rows = kBatches;
   Restart();
   ASSERT_TRUE(session_->Load({}).ok());
-  std::atomic<bool> refused = false;
-  const std::jthread writer([&] {
-    for (int batch = 1; batch <= kBatches && !refused; ++batch) {
-      refused = !session_->Add(batch, Batch({0.01 * batch})).ok();
+  {
+    std::atomic<bool> refused = false;
+    const std::jthread writer([&] {
+      for (int batch = 1; batch <= kBatches && !refused; ++batch) {
+        refused = !session_->Add(batch, Batch({0.01 * batch})).ok();
+      }
+    });
+    while (session_->taken().sequence < kBatches) {
+      ASSERT_FALSE(refused);
+      ASSERT_TRUE(session_->Process({}).ok());
     }
-  });
-  while (session_->taken().sequence < kBatches) {
-    ASSERT_FALSE(refused);
-    ASSERT_TRUE(session_->Process({}).ok());
   }
   const auto estimate = session_->CurrentEstimate({});
   ASSERT_TRUE(estimate.ok()) << estimate.status();
