@@ -72,7 +72,7 @@ void PrintTop(const DaemonView& now, const DaemonView* before, std::ostream& out
                   SampleRate(session, now, before), absl::StrCat(activity.estimates()),
                   absl::StrCat(activity.reexpansions()),
                   factor > 0 ? FormatNumber(factor, 3) : kUnknown,
-                  absl::StrCat(activity.unprocessed_batches()),
+                  activity.loaded() ? absl::StrCat(activity.unprocessed_batches()) : kUnknown,
                   activity.has_writer() ? "yes" : kUnknown, absl::StrCat(activity.watchers()),
                   activity.loaded() ? "yes" : kUnknown, FormatDuration(activity.idle_time())});
   }

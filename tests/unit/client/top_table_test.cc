@@ -51,6 +51,7 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   activity.set_estimates(6);
   activity.set_reexpansions(2);
   activity.set_real_time_factor(12.5);
+  activity.set_unprocessed_batches(4);
   activity.set_has_writer(true);
   activity.set_watchers(3);
   activity.set_loaded(true);
@@ -58,13 +59,14 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   const std::string text = Print(view);
   EXPECT_THAT(text, HasSubstr("polyestd 1.2.3, up 2.0 h, 3.0 MiB, sessions on disk\n"));
   EXPECT_THAT(text, HasSubstr("5 sessions, 1 of them loaded; 0 writers"));
-  EXPECT_EQ(LastRow(text), (std::vector<std::string>{"rig", "7", "1200", "-", "6", "2", "12.5",
+  EXPECT_EQ(LastRow(text), (std::vector<std::string>{"rig", "7", "1200", "-", "6", "2", "12.5", "4",
                                                      "yes", "3", "yes", "2", "min"}));
 }
 
 TEST(TopTableTest, SaysNothingWhereNothingIsKnown) {
-  EXPECT_EQ(LastRow(Print(ViewOf(0, 0))), (std::vector<std::string>{"rig", "7", "0", "-", "0", "0",
-                                                                    "-", "-", "0", "-", "0", "s"}));
+  EXPECT_EQ(LastRow(Print(ViewOf(0, 0))),
+            (std::vector<std::string>{"rig", "7", "0", "-", "0", "0", "-", "-", "-", "0", "-", "0",
+                                      "s"}));
 }
 
 TEST(TopTableTest, DerivesTheRateFromAnEarlierLook) {
