@@ -1,7 +1,7 @@
 #pragma once
 
-// Where numerics run: threads behind a bounded queue, shared fairly, and strands, which run their
-// own tasks in order and one at a time whatever the number of threads.
+// Where work runs, numerics above all: threads behind a bounded queue, shared fairly, and strands,
+// which run their own tasks in order and one at a time whatever the number of threads.
 
 #include <absl/status/status.h>
 

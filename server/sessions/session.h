@@ -146,7 +146,7 @@ class Session : public std::enable_shared_from_this<Session> {
   // Whether the next batch keeps to the limits; its rows are taken then.
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const;
   void ReleaseRoom(int64_t rows) const;
-  // The estimator as it is after every batch taken.
+  // What is in memory, brought there if need be; batches taken may wait in it for the numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);
   void PassOn(const SharedEstimate& estimate);
   // In the journal, with what is to be counted once it is there.
