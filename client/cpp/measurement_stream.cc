@@ -211,7 +211,10 @@ absl::Status MeasurementStream::Connect() {
 
 absl::Status MeasurementStream::Open() {
   POLYEST_CHECK(!connection_);
-  return Connect();
+  const absl::Status status = Connect();
+  if (status.ok()) return status;
+  Lock lock(mutex_);
+  return ConnectAgain(lock, status);
 }
 
 // Locked.
@@ -221,7 +224,7 @@ bool MeasurementStream::MayRecover(const absl::Status& status) const {
   if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.most_attempts;
   // The daemon may have the new one a moment later.
   if (absl::IsUnauthenticated(status)) {
-    return attempts_ < options_.most_attempts && connection_->Outdated();
+    return attempts_ < options_.most_attempts && connection_ && connection_->Outdated();
   }
   return DelayOfRefusal(status).has_value();
 }
@@ -235,30 +238,38 @@ std::string MeasurementStream::CountAttempt(const absl::Status& status) {
     return "the daemon takes no batches now";
   }
   ++attempts_;
-  return absl::IsUnauthenticated(status) ? "the token is good no more, there is a new one"
-                                         : "connection lost";
+  if (absl::IsUnauthenticated(status)) return "the token is good no more, there is a new one";
+  return connection_ ? "connection lost" : "no connection";
 }
 
-// Locked, with a connection that is done: connects again or says why not.
-absl::Status MeasurementStream::Recover(Lock& lock) {
-  absl::Status status = connection_->status();
-  if (status.ok()) return absl::InternalError("the daemon ended the stream before its end");
+// Locked, with a connection that is done or none yet: connects after what has just failed, for as
+// long as that may help.
+absl::Status MeasurementStream::ConnectAgain(Lock& lock, absl::Status status) {
   while (MayRecover(status)) {
     const int before = std::min(attempts_ + refusals_, 20);
     const auto delay =
         std::max(std::min(options_.longest_delay, options_.first_delay * (1 << before)),
                  DelayOfRefusal(status).value_or(std::chrono::milliseconds(0)));
     const std::string what = CountAttempt(status);
+    const char* const back = connection_ ? "connected again" : "connected";
     lock.unlock();
     Tell(absl::StrFormat("%s (%s); trying again in %g s", what, status.message(),
                          static_cast<double>(delay.count()) / 1000));
     const bool lost = !DelayOfRefusal(status);
     const bool waited = Wait(delay);
     if (waited) status = Connect();
-    if (waited && status.ok() && lost) Tell("connected again");
+    if (waited && status.ok() && lost) Tell(back);
     lock.lock();
     if (!waited) return status;
   }
+  return status;
+}
+
+// Locked, with a connection that is done: connects again or says why not.
+absl::Status MeasurementStream::Recover(Lock& lock) {
+  const absl::Status lost = connection_->status();
+  if (lost.ok()) return absl::InternalError("the daemon ended the stream before its end");
+  const absl::Status status = ConnectAgain(lock, lost);
   if (absl::IsNotFound(status)) {
     return absl::DataLossError(absl::StrCat(
         "the daemon has lost ", session_, " and the batches it had acknowledged, up to number ",

@@ -39,11 +39,12 @@ struct MeasurementStreamOptions {
   std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };
 
-// Called from a thread of gRPC, one at a time, except `connection`: from within Send and Finish.
+// Called from a thread of gRPC, one at a time, except `connection`: from within Open,
+// Send and Finish.
 struct MeasurementStreamCallbacks {
   std::function<void(const v1::Estimate&)> estimate;
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
-  // One sentence on a connection that was lost or is back, or a daemon that has no room, or again.
+  // One sentence on a connection that fails or is back, or a daemon that has no room, or again.
   std::function<void(const std::string&)> connection;
 };
 
@@ -59,6 +60,7 @@ class MeasurementStream {
   MeasurementStream& operator=(const MeasurementStream&) = delete;
 
   // Connects; once, before anything else. Batches are numbered on from the session's last.
+  // NOT_FOUND: no such session. UNAVAILABLE: no connection after all attempts.
   absl::Status Open();
   // Hands over one batch; waits while too many are not acknowledged. DATA_LOSS: the daemon has lost
   // the session. UNAVAILABLE: no connection after all attempts.
@@ -72,6 +74,7 @@ class MeasurementStream {
   using Lock = std::unique_lock<std::mutex>;
 
   absl::Status Connect();
+  absl::Status ConnectAgain(Lock& lock, absl::Status status);
   absl::Status Recover(Lock& lock);
   bool MayRecover(const absl::Status& status) const;
   std::string CountAttempt(const absl::Status& status);

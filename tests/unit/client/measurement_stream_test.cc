@@ -18,6 +18,7 @@
 namespace polyest {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -43,6 +44,7 @@ class FakeDaemon : public v1::EstimationService::Service {
                           v1::Session* session) override {
     if (!Knows(*context)) return {grpc::StatusCode::UNAUTHENTICATED, "the token is not known"};
     if (lost) return {grpc::StatusCode::NOT_FOUND, "no such session"};
+    if (absences-- > 0) return {grpc::StatusCode::UNAVAILABLE, "it is just starting"};
     session->set_name(request->name());
     session->set_last_sequence(last_sequence);
     return grpc::Status::OK;
@@ -78,6 +80,7 @@ class FakeDaemon : public v1::EstimationService::Service {
   int breaks = 0;  // so many connections break after three batches
   int acknowledge_every = 1;
   std::atomic<bool> lost = false;
+  std::atomic<int> absences = 0;        // so often GetSession does not reach it
   std::optional<grpc::Status> refusal;  // of the first streams,
   int refusals = 1;                     // so many
   std::string authorization;            // asked for; empty: none
@@ -349,6 +352,26 @@ TEST_F(MeasurementStreamTest, MayBeDroppedInMidstream) {
   MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
   ASSERT_TRUE(stream.Open().ok());
   ASSERT_TRUE(stream.Send(Batch(1)).ok());
+}
+
+TEST_F(MeasurementStreamTest, OpensOnceTheDaemonIsThere) {
+  daemon_.absences = 2;
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  ASSERT_TRUE(SendBatches(stream, 2).ok());
+  ASSERT_TRUE(stream.Finish().ok());
+  EXPECT_EQ(daemon_.last_sequence, 2);
+  EXPECT_THAT(told_, ElementsAre("no connection (it is just starting); trying again in 0.001 s",
+                                 "no connection (it is just starting); trying again in 0.002 s",
+                                 "connected"));
+}
+
+TEST_F(MeasurementStreamTest, DoesNotOpenWhenTheDaemonStaysAway) {
+  options_.most_attempts = 3;
+  daemon_.absences = 100;
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  EXPECT_EQ(stream.Open(), absl::UnavailableError("it is just starting"));
+  EXPECT_EQ(told_.size(), 3);
 }
 
 TEST_F(MeasurementStreamTest, CannotOpenASessionThatThereIsNot) {
