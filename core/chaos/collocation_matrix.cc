@@ -2,8 +2,8 @@
 
 #include <absl/strings/str_format.h>
 
-#include <Eigen/Eigenvalues>
-#include <algorithm>
+#include <Eigen/QR>
+#include <Eigen/SVD>
 #include <limits>
 
 #include "core/common/check.h"
@@ -11,17 +11,22 @@
 namespace polyest {
 namespace {
 
-// Largest over smallest singular value of the triangular factor R, which has those of A. They are
-// the upper half of the eigenvalues of [0 R; Rᵀ 0], found without squaring the condition number.
-double Condition(const Matrix& triangular) {
-  const Eigen::Index terms = triangular.cols();
-  Matrix bordered = Matrix::Zero(2 * terms, 2 * terms);
-  bordered.topRightCorner(terms, terms) = triangular;
-  bordered.bottomLeftCorner(terms, terms) = triangular.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(bordered, Eigen::EigenvaluesOnly);
-  const double smallest = solver.eigenvalues()[terms],
-               largest = solver.eigenvalues()[2 * terms - 1];
-  return smallest > 0 ? largest / smallest : std::numeric_limits<double>::infinity();
+struct Conditioning {
+  Eigen::Index rank = 0;
+  double number = std::numeric_limits<double>::infinity();
+};
+
+// Of A, from its triangular factor, which has the same singular values: so no column has to be
+// pivoted. Of what is not finite: the worst.
+Conditioning ConditioningOf(const Matrix& triangular) {
+  const Eigen::BDCSVD<Matrix> svd(triangular);
+  Conditioning result;
+  if (svd.info() != Eigen::Success) return result;
+  result.rank = svd.rank();
+  const Vector& values = svd.singularValues();
+  const double smallest = values[values.size() - 1];
+  if (smallest > 0) result.number = values[0] / smallest;
+  return result;
 }
 
 }  // namespace
@@ -40,17 +45,17 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   POLYEST_CHECK(points.allFinite());
   CollocationMatrix result;
   basis.EvaluateMany(points, result.matrix_);
-  const Eigen::ColPivHouseholderQR<Matrix> qr(result.matrix_);
+  const Eigen::HouseholderQR<Matrix> qr(result.matrix_);
   result.thin_q_ = qr.householderQ() * Matrix::Identity(points.rows(), terms);
-  result.triangular_ = qr.matrixR().topRows(terms).triangularView<Eigen::Upper>();
-  result.permutation_ = qr.colsPermutation().indices();
-  result.workspace_.resize(points.rows(), 1);
-  result.condition_ = Condition(result.triangular_);
-  if (qr.rank() < terms || !(result.condition_ <= most_condition)) {
+  result.triangular_ = qr.matrixQR().topRows(terms).triangularView<Eigen::Upper>();
+  result.workspace_.resize(points.rows());
+  const Conditioning conditioning = ConditioningOf(result.triangular_);
+  result.condition_ = conditioning.number;
+  if (conditioning.rank < terms || !(result.condition_ <= most_condition)) {
     return absl::FailedPreconditionError(absl::StrFormat(
         "collocation: %d points do not determine the %d terms of order %d (rank %d, condition "
         "number %.3g, at most %.3g allowed); use more points or a lower order",
-        points.rows(), terms, basis.order(), qr.rank(), result.condition_, most_condition));
+        points.rows(), terms, basis.order(), conditioning.rank, result.condition_, most_condition));
   }
   return result;
 }
@@ -62,20 +67,17 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
   const int freedom = points() - terms();
   // One column at a time: matrix-vector products need no buffers, unlike products of matrices.
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
-    // A Π = Q R, so R (Πᵀ c) = Qᵀ Y
-    auto permuted = workspace_.col(0).head(terms());
-    permuted.noalias() = thin_q_.transpose() * values.col(j);
-    triangular_.triangularView<Eigen::Upper>().solveInPlace(permuted);
-    for (int i = 0; i < terms(); ++i) coefficients(permutation_[i], j) = permuted[i];
+    auto solution = coefficients.col(j);
+    solution.noalias() = thin_q_.transpose() * values.col(j);
+    triangular_.triangularView<Eigen::Upper>().solveInPlace(solution);
     if (freedom == 0) {
       residual_variance[j] = 0;
       continue;
     }
     // ‖Y − A c‖² / (Q − S)
-    auto residual = workspace_.col(0);
-    residual = values.col(j);
-    residual.noalias() -= matrix_ * coefficients.col(j);
-    residual_variance[j] = residual.squaredNorm() / freedom;
+    workspace_ = values.col(j);
+    workspace_.noalias() -= matrix_ * coefficients.col(j);
+    residual_variance[j] = workspace_.squaredNorm() / freedom;
   }
 }
 

@@ -1,11 +1,9 @@
 #pragma once
 
-// The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by column-pivoted Householder QR; the
+// The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by Householder QR; the
 // coefficients c = A⁺ Y of (10) come from the factors and never from an inverse.
 
 #include <absl/status/statusor.h>
-
-#include <Eigen/QR>
 
 #include "core/chaos/basis.h"
 #include "core/common/types.h"
@@ -35,8 +33,7 @@ class CollocationMatrix {
   Matrix matrix_;
   Matrix thin_q_;      // Q × S
   Matrix triangular_;  // S × S, upper
-  Eigen::VectorXi permutation_;
-  Matrix workspace_;
+  Vector workspace_;   // Q
   double condition_ = 0;
 };
 

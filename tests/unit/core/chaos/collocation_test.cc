@@ -146,6 +146,17 @@ TEST(CollocationMatrix, InterpolationShowsNoResidual) {
   EXPECT_TRUE((matrix->matrix() * coefficients).isApprox(Vector{{1, -1, 5}}, 1e-14));
 }
 
+TEST(CollocationMatrix, PointsAtWhichTheBasisOverflowsAreRefused) {
+  // With few terms and with many, of which the singular values are found in other ways.
+  for (const int order : {3, 30}) {
+    const Basis basis({Germ::Normal()}, order);
+    const Vector points = 1e150 * Vector::LinSpaced(2 * basis.size(), -1, 1);
+    const auto matrix = CollocationMatrix::Factor(basis, points);
+    EXPECT_EQ(matrix.status().code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_THAT(matrix.status().message(), HasSubstr("(rank 0, condition number inf,"));
+  }
+}
+
 TEST(CollocationMatrix, RepeatedPointsAreRefusedWithOrderTermsAndPoints) {
   const Basis basis({Germ::Uniform(), Germ::Uniform()}, 3);
   Matrix points = UnitCubePoints(PointSet::kHalton, 2, 20);
