@@ -53,7 +53,7 @@ class Encoder {
   template <class... Alternatives>
   void Put(const std::variant<Alternatives...>& variant) {
     Put(static_cast<uint64_t>(variant.index()));
-    std::visit([this](const auto& value) { Put(value); }, variant);
+    std::visit([this](const auto& value) { this->Put(value); }, variant);
   }
   template <class T>
   requires std::is_class_v<T>
