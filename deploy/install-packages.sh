@@ -4,6 +4,7 @@
 #   deploy/install-packages.sh            to build and run
 #   deploy/install-packages.sh --tests    to test, benchmark and check the formatting as well
 #   deploy/install-packages.sh --fuzz     to fuzz as well: libFuzzer comes with Clang
+#   deploy/install-packages.sh --threads  to look for races as well
 set -euo pipefail
 
 packages=(
@@ -18,6 +19,11 @@ test_packages=(
 # SUNDIALS' CMake configuration wants OpenMP of whatever compiler there is.
 fuzz_packages=(
   clang-14 libclang-rt-14-dev libomp-14-dev
+)
+
+# gRPC's CMake project asks for libprotoc, whether or not it is used.
+thread_packages=(
+  libprotoc-dev
 )
 
 say() { echo "install-packages: $*" >&2; }
@@ -59,8 +65,9 @@ for argument in "$@"; do
   case "$argument" in
     --tests) packages+=("${test_packages[@]}") ;;
     --fuzz) packages+=("${fuzz_packages[@]}") ;;
+    --threads) packages+=("${thread_packages[@]}") ;;
     *)
-      say "unknown argument '$argument'; there are --tests and --fuzz"
+      say "unknown argument '$argument'; there are --tests, --fuzz and --threads"
       exit 2
       ;;
   esac

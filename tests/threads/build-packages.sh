@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Builds Debian's own Abseil, Protocol Buffers and gRPC once more, with the thread sanitizer in them.
+# Without it, it does not see how gRPC's threads meet, and takes what one leaves to another for a
+# race; and messages compiled for it have members that those in Debian's library do not.
+#   tests/threads/build-packages.sh FOLDER
+# FOLDER/lib then has the libraries, by the names of those installed. Takes half an hour or so on two
+# cores the first time, then nothing.
+set -euo pipefail
+here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
+folder="$(realpath -m "${1:?FOLDER}")"
+[[ ! -e "$folder/complete" ]] || exit 0
+
+say() { echo "build-packages: $*" >&2; }
+
+# The sources of the packages installed, fetched and verified by apt, with Debian's patches.
+fetch() {
+  rm -rf "$folder/sources"
+  mkdir -p "$folder/sources/lists/partial" "$folder/lib"
+  cd "$folder/sources"
+  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg]" \
+    "http://deb.debian.org/debian bookworm main" >sources.list
+  local apt_get=(apt-get --quiet --quiet --option Dir::Etc::SourceList="$PWD/sources.list"
+    --option Dir::Etc::SourceParts=/dev/null --option Dir::State::Lists="$PWD/lists")
+  say "fetching the sources"
+  "${apt_get[@]}" update
+  "${apt_get[@]}" source abseil protobuf grpc
+}
+
+# build PACKAGE TARGET [OPTION-OF-CMAKE]...
+build() {
+  local package=$1 target=$2 flags="-O1 -fsanitize=thread -fno-omit-frame-pointer"
+  say "building $package"
+  # GCC: the sanitizer does not see fences.
+  cmake -G Ninja -S "$folder/sources/$package"-*/ -B "$folder/$package" -DCMAKE_BUILD_TYPE=None \
+    -DBUILD_SHARED_LIBS=ON -DCMAKE_CXX_STANDARD=17 -DCMAKE_INSTALL_PREFIX="$folder" \
+    -DCMAKE_INSTALL_LIBDIR=lib -DCMAKE_C_FLAGS="$flags" -DCMAKE_CXX_FLAGS="$flags -Wno-tsan" \
+    -DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "${@:3}"
+  cmake --build "$folder/$package" --target "$target"
+}
+
+fetch
+build abseil install -DBUILD_TESTING=OFF
+build protobuf libprotobuf -Dprotobuf_BUILD_TESTS=OFF -Dprotobuf_BUILD_PROTOC_BINARIES=OFF
+cp --no-dereference "$folder"/protobuf/lib*.so* "$folder/lib"
+providers=()
+for provider in ABSL CARES PROTOBUF RE2 SSL ZLIB; do
+  providers+=("-DgRPC_${provider}_PROVIDER=package")
+done
+build grpc grpc++ "${providers[@]}" -DgRPC_BUILD_TESTS=OFF -DgRPC_BUILD_CODEGEN=OFF \
+  -DgRPC_INSTALL=OFF -DCMAKE_PREFIX_PATH="$folder" \
+  -DCMAKE_PROJECT_INCLUDE="$here/grpc_headers.cmake"
+cp --no-dereference "$folder"/grpc/lib*.so* "$folder/lib"
+touch "$folder/complete"

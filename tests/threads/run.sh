@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Looks for races: runs the tests in which threads meet (label threads) under the thread sanitizer,
+# with the libraries between them built for it as well.
+#   tests/threads/run.sh [CTEST-ARGUMENT...]
+# A race fails it, in whichever process it is found; the reports stay in build/tsan/reports.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+deploy/install-packages.sh --tests --threads
+tests/threads/build-packages.sh build/tsan-packages
+cmake --preset tsan
+cmake --build --preset tsan --parallel "$(nproc)" --target polyest_threads_tests
+
+reports="$PWD/build/tsan/reports"
+rm -rf "$reports"
+mkdir -p "$reports"
+options="log_path=$reports/race second_deadlock_stack=1"
+options+=" suppressions=$PWD/tests/threads/suppressions.txt print_suppressions=0"
+options+=" handle_segv=0"  # an FMU of the tests crashes its worker on purpose
+status=0
+# Everything is tens of times slower: so the daemon is killed less often, and what takes longest to
+# compute is left out, whose threads are those of other tests.
+TSAN_OPTIONS="$options" POLYEST_TEST_CRASHES="${POLYEST_TEST_CRASHES:-5}" \
+  GTEST_FILTER="-StreamTest.TakesTheLastRowsOfASmoothInputToo" \
+  ctest --preset tsan --label-regex '^threads$' "$@" || status=$?
+found="$(find "$reports" -type f | wc -l)"
+if [[ $found -gt 0 ]]; then
+  cat "$reports"/* >&2
+  echo "tests/threads/run.sh: reports of $found processes, see $reports" >&2
+  exit 1
+fi
+exit "$status"
