@@ -30,7 +30,7 @@ fetch() {
 build() {
   local package=$1 target=$2 flags="-O1 -fsanitize=thread -fno-omit-frame-pointer"
   say "building $package"
-  # GCC: the sanitizer does not see fences.
+  # GCC warns that the sanitizer does not see fences.
   cmake -G Ninja -S "$folder/sources/$package"-*/ -B "$folder/$package" -DCMAKE_BUILD_TYPE=None \
     -DBUILD_SHARED_LIBS=ON -DCMAKE_CXX_STANDARD=17 -DCMAKE_INSTALL_PREFIX="$folder" \
     -DCMAKE_INSTALL_LIBDIR=lib -DCMAKE_C_FLAGS="$flags" -DCMAKE_CXX_FLAGS="$flags -Wno-tsan" \
