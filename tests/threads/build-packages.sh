@@ -3,7 +3,7 @@
 # Without it, it does not see how gRPC's threads meet, and takes what one leaves to another for a
 # race; and messages compiled for it have members that those in Debian's library do not.
 #   tests/threads/build-packages.sh FOLDER
-# FOLDER/lib then has the libraries, by the names of those installed. Takes half an hour or so on two
+# FOLDER/lib then has the libraries, by the names of those installed. Takes a quarter of an hour on two
 # cores the first time, then nothing.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
