@@ -6,6 +6,7 @@
 // or Finish connects again, asks for the last batch that the session has, and sends what came
 // after. So nothing is lost and nothing is counted twice. The same when the daemon has no room now
 // but says that it may have later (its disk is full, it is busy), and when the token was exchanged.
+// Open, too, tries again while the daemon is not reached.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>

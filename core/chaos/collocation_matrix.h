@@ -1,7 +1,7 @@
 #pragma once
 
-// The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by Householder QR; the
-// coefficients c = A⁺ Y of (10) come from the factors and never from an inverse.
+// The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by Householder QR; the coefficients
+// c = A⁺ Y of (10) come from the factors and never from an inverse.
 
 #include <absl/status/statusor.h>
 

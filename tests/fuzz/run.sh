@@ -23,7 +23,7 @@ for fuzzer in "${fuzzers[@]}"; do
     # A call is cut off after 0.1 s, and an input has at most 12. Without the entropic schedule, which
     # takes longer than the calls; leaks are looked for at the end, for what a daemon at work holds
     # is different after each input.
-    rpc) options=(-max_len=16384 -rss_limit_mb=2048 -timeout=40 -entropic=0 -detect_leaks=0) ;;
+    rpc) options=(-max_len=16384 -rss_limit_mb=2048 -timeout=20 -entropic=0 -detect_leaks=0) ;;
   esac
   corpus="build/fuzz/${fuzzer}_corpus"
   mkdir -p "$corpus"

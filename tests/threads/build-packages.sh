@@ -7,7 +7,11 @@
 # cores the first time, then nothing.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
-folder="$(realpath -m "${1:?FOLDER}")"
+if [[ $# -ne 1 || $1 == -* ]]; then
+  echo "tests/threads/build-packages.sh: names one folder, for the libraries" >&2
+  exit 2
+fi
+folder="$(realpath -m "$1")"
 [[ ! -e "$folder/complete" ]] || exit 0
 
 say() { echo "build-packages: $*" >&2; }

@@ -4,6 +4,10 @@
 #   tests/threads/run.sh [CTEST-ARGUMENT...]
 # A race fails it, in whichever process it is found; the reports stay in build/tsan/reports.
 set -euo pipefail
+if [[ "${1:-}" == --help ]]; then
+  sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+  exit 0
+fi
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 deploy/install-packages.sh --tests --threads
