@@ -1,0 +1,165 @@
+// Snapshots that are cut off, changed, or of something else: each is refused by name, and none
+// crashes an estimator or leaves anything in it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <string>
+
+#include "core/estimator/snapshot.h"
+#include "tests/unit/core/estimator/snapshot_session.h"
+
+namespace polyest {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Everything that may be wrong with a snapshot, on a problem made small.
+class BadSnapshot : public ::testing::Test {
+ protected:
+  BadSnapshot() : problem_(OscillatorProblem()), samples_(OscillatorRecord(40)) {
+    problem_.integration.samples_between_checkpoints = kInterval;
+    Session session(problem_);
+    session.Take(samples_);
+    good_ = session.last;
+    estimate_ = session.Current();
+  }
+
+  // Of an estimator to which the samples have been appended.
+  absl::Status Restored(const EstimatorSnapshot& snapshot, const Problem& problem) const {
+    const auto estimator = MakeEstimator(problem);
+    EXPECT_TRUE(estimator->Append(samples_).ok());
+    return estimator->Restore(snapshot);
+  }
+  absl::Status Restored(const std::string& state) const {
+    return Restored({good_.rows, state}, problem_);
+  }
+
+  // With a checksum that is right.
+  static std::string Sealed(std::string body) {
+    const auto checksum =
+        static_cast<uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size()));
+    for (int shift = 0; shift < 32; shift += 8) {
+      body.push_back(static_cast<char>(checksum >> shift & 0xff));
+    }
+    return body;
+  }
+  std::string Body() const { return good_.state.substr(0, good_.state.size() - 4); }
+
+  Problem problem_;
+  Samples samples_;
+  EstimatorSnapshot good_;
+  Estimate estimate_;
+};
+
+TEST_F(BadSnapshot, IsRefusedWhenCutOff) {
+  ASSERT_TRUE(Restored(Sealed(Body())).ok());
+  for (size_t size = 0; size < good_.state.size(); size += 1 + size / 20) {
+    EXPECT_TRUE(absl::IsDataLoss(Restored(good_.state.substr(0, size)))) << size;
+    // The same where the checksum is right.
+    EXPECT_TRUE(absl::IsDataLoss(Restored(Sealed(Body().substr(0, size))))) << size;
+  }
+}
+
+TEST_F(BadSnapshot, IsRefusedWithAnyByteChanged) {
+  for (size_t i = 0; i < good_.state.size(); i += 1 + i / 20) {
+    std::string state = good_.state;
+    state[i] = static_cast<char>(state[i] ^ 0x40);
+    EXPECT_TRUE(absl::IsDataLoss(Restored(state))) << i;
+  }
+}
+
+// Even one who seals what has been changed makes nothing crash or take the memory: sizes without
+// bounds, indices out of range, numbers that are none.
+TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
+  std::mt19937_64 random(3);
+  int refused = 0;
+  constexpr int kTrials = 300;
+  const size_t size = Body().size();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::string body = Body();
+    // The beginning has most of the sizes; the end, most of the counters.
+    const size_t near_end = trial % 3 == 0 ? size : std::min<size_t>(size, 600);
+    const size_t at = trial % 3 == 2 ? size - 1 - random() % near_end : random() % near_end;
+    for (size_t i = at; i < std::min(size, at + 1 + random() % 8); ++i) {
+      body[i] = static_cast<char>(trial % 2 == 0 ? 0xff : random());
+    }
+    const auto estimator = MakeEstimator(problem_);
+    ASSERT_TRUE(estimator->Append(samples_).ok());
+    const absl::Status status = estimator->Restore({good_.rows, Sealed(body)});
+    if (status.ok()) {  // whatever it says now
+      estimator->Process().IgnoreError();
+      estimator->CurrentEstimate().status().IgnoreError();
+      continue;
+    }
+    ++refused;
+    EXPECT_TRUE(absl::IsDataLoss(status) || absl::IsFailedPrecondition(status)) << status;
+    EXPECT_EQ(estimator->rows_processed(), 0);
+  }
+  EXPECT_GT(refused, kTrials / 4);
+}
+
+TEST_F(BadSnapshot, LeavesTheEstimatorToProcessTheRowsItself) {
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(samples_).ok());
+  ASSERT_FALSE(estimator->Restore({good_.rows, "anything"}).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  ExpectSame(estimator->CurrentEstimate().value(), estimate_);
+}
+
+TEST_F(BadSnapshot, IsOneOfAnotherProblem) {
+  const auto refused = [&](const auto& change) {
+    Problem problem = problem_;
+    change(problem);
+    const absl::Status status = Restored(good_, problem);
+    return absl::IsFailedPrecondition(status) &&
+           status.message() == "the snapshot is of another problem";
+  };
+  EXPECT_FALSE(refused([](Problem&) {}));
+  EXPECT_TRUE(refused([](Problem& p) { p.fixed["c"] = 0.11; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.uncertain[0].scale *= 1.01; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.measured[0].noise.absolute = 0.021; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.inputs = {{"force", ConstantInput{0}}}; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.expansion.order = 4; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.regularization = 2; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.integration.relative_tolerance = 1e-6; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.integration.samples_between_checkpoints = 31; }));
+  EXPECT_TRUE(refused([](Problem& p) { p.derived = {{"v0", "0 * k"}}; }));
+}
+
+TEST_F(BadSnapshot, IsOneOfAnotherVersion) {
+  std::string body = Body();
+  // After cereal's mark of endianness, the size of the name and the name.
+  const size_t version = 1 + 8 + std::string("polyest estimator").size();
+  ASSERT_EQ(body[version], static_cast<char>(kSnapshotVersion));
+  body[version] = static_cast<char>(kSnapshotVersion + 1);
+  const absl::Status status = Restored(Sealed(body));
+  EXPECT_TRUE(absl::IsFailedPrecondition(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("version 2"));
+}
+
+TEST_F(BadSnapshot, IsOneOfOtherRows) {
+  EXPECT_TRUE(absl::IsDataLoss(Restored({good_.rows - 1, good_.state}, problem_)));
+  Samples later = samples_;
+  for (double& t : later.time_s) t += 0.01;
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(later).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+}
+
+TEST_F(BadSnapshot, IsOneForWhichTheRowsAreNotThereOrTaken) {
+  const auto estimator = MakeEstimator(problem_);
+  ASSERT_TRUE(estimator->Append(Rows(samples_, 0, 20)).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+  ASSERT_TRUE(estimator->Append(Rows(samples_, 20, 40)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
+}
+
+}  // namespace
+}  // namespace polyest
