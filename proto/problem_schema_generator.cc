@@ -27,7 +27,6 @@ namespace {
 
 using google::protobuf::Descriptor;
 using google::protobuf::EnumDescriptor;
-using google::protobuf::EnumValueDescriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::OneofDescriptor;
 using google::protobuf::Struct;
@@ -35,6 +34,8 @@ using google::protobuf::Value;
 
 constexpr char kPackage[] = "polyest.v1.";
 constexpr char kRoot[] = "polyest.v1.Problem";
+// A number for which files may also say AUTO (proto/wire/transport/automatic_order.h).
+constexpr char kOrder[] = "polyest.v1.ExpansionOptions.order";
 
 [[noreturn]] void Fail(const std::string& message) {
   std::cerr << "problem_schema_generator: " << message << std::endl;
@@ -125,7 +126,11 @@ class Generator {
       const FieldDescriptor& field = *message.field(i);
       Struct& property = Object(properties, field.json_name());
       Describe(field, property);
-      AddField(field, property);
+      if (field.full_name() == kOrder) {
+        AddOrder(property);
+      } else {
+        AddField(field, property);
+      }
       if (IsRequired(field)) AddText(schema, "required", field.json_name());
     }
     for (int i = 0; i < message.real_oneof_decl_count(); ++i) {
@@ -141,6 +146,13 @@ class Generator {
       AddText(AddObject(none, "anyOf"), "required", oneof.field(i)->json_name());
     }
     if (!IsRequired(oneof)) Object(AddObject(schema, "oneOf"), "not") = none;
+  }
+
+  static void AddOrder(Struct& schema) {
+    Struct& number = AddObject(schema, "anyOf");
+    SetText(number, "type", "integer");
+    Member(number, "minimum").set_number_value(1);
+    SetText(AddObject(schema, "anyOf"), "const", "AUTO");
   }
 
   void AddField(const FieldDescriptor& field, Struct& schema) {
@@ -184,18 +196,9 @@ class Generator {
     }
   }
 
-  // Without its zero, which stands for a field that is left out. One that has a name for its zero
-  // is of numbers, of which only some have names.
+  // Without its zero, which stands for a field that is left out.
   static void AddEnumeration(const EnumDescriptor& enumeration, Struct& schema) {
     Describe(enumeration, schema);
-    const EnumValueDescriptor& zero = *enumeration.FindValueByNumber(0);
-    if (!zero.name().ends_with("_UNSPECIFIED")) {
-      SetText(AddObject(schema, "anyOf"), "type", "integer");
-      for (int i = 0; i < enumeration.value_count(); ++i) {
-        SetText(AddObject(schema, "anyOf"), "const", enumeration.value(i)->name());
-      }
-      return;
-    }
     for (int i = 0; i < enumeration.value_count(); ++i) {
       if (enumeration.value(i)->number() == 0) continue;
       AddText(schema, "enum", enumeration.value(i)->name());
@@ -251,8 +254,8 @@ int main(int argc, char** argv) {
   const std::string json = ToJson(Generator().Schema(*root));
   Write(argv[2], json);
   Write(argv[3],
-        "#include \"proto/problem_schema.h\"\n\nnamespace polyest {\n\n"
+        "#include \"proto/problem_schema.h\"\n\nnamespace polyest::internal {\n\n"
         "const char kProblemSchema[] = R\"schema(" +
-            json + ")schema\";\n\n}  // namespace polyest\n");
+            json + ")schema\";\n\n}  // namespace polyest::internal\n");
   return EXIT_SUCCESS;
 }

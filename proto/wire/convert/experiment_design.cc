@@ -1,0 +1,69 @@
+#include "proto/wire/convert/experiment_design.h"
+
+#include "proto/wire/convert/estimate.h"
+#include "proto/wire/convert/expansion_used.h"
+
+namespace polyest::internal {
+namespace {
+
+void ToProto(const InformationGain& gain, v1::ComputeExperimentDesignResponse::Gain& proto) {
+  proto.set_bits(gain.bits);
+  proto.mutable_std_dev()->Add(gain.standard_deviation.begin(), gain.standard_deviation.end());
+}
+
+void ToProto(const OutputGain& output, v1::ComputeExperimentDesignResponse::Output& proto) {
+  proto.set_name(output.output);
+  proto.set_unit(output.unit);
+  proto.set_noise_std_dev(output.noise);
+  proto.set_measured(output.measured);
+  ToProto(output.alone, *proto.mutable_alone());
+  ToProto(output.together, *proto.mutable_together());
+}
+
+}  // namespace
+
+ExperimentOptions ToExperimentOptions(const v1::ComputeExperimentDesignRequest& request) {
+  ExperimentOptions options;
+  options.until_s = request.until_s();
+  options.step_s = request.step_s() != 0 ? request.step_s() : request.until_s() / 100;
+  if (request.sample_count() != 0) options.samples = request.sample_count();
+  for (const v1::MeasuredOutput& possible : request.possible()) {
+    const auto& noise = possible.noise();
+    options.possible.push_back({possible.output(),
+                                {.absolute = noise.absolute(),
+                                 .relative = noise.relative(),
+                                 .relative_to_max = noise.relative_to_max()}});
+  }
+  return options;
+}
+
+v1::ComputeExperimentDesignResponse::Candidate ToProto(const ExperimentDesign& design) {
+  v1::ComputeExperimentDesignResponse::Candidate proto;
+  ToProto(design.gain, *proto.mutable_gain());
+  for (const OutputGain& output : design.outputs) ToProto(output, *proto.add_outputs());
+  for (const SampleTime& sample : design.samples) {
+    v1::ComputeExperimentDesignResponse::SampleTime& added = *proto.add_samples();
+    added.set_time_s(sample.time_s);
+    ToProto(sample.gain, *added.mutable_gain());
+  }
+  *proto.mutable_expansion() = ToExpansionUsed(design);
+  for (const Diagnostic& diagnostic : design.diagnostics) {
+    *proto.add_diagnostics() = ToProto(diagnostic);
+  }
+  return proto;
+}
+
+void AddParameters(const ResolvedProblem& problem, v1::ComputeExperimentDesignResponse& response) {
+  const Vector mean = problem.prior().Mean();
+  const Vector std_dev = problem.prior().StandardDeviation();
+  for (int i = 0; i < problem.dimension(); ++i) {
+    const auto index = static_cast<size_t>(i);
+    v1::ComputeExperimentDesignResponse::Parameter& parameter = *response.add_parameters();
+    parameter.set_name(problem.prior().parameters()[index].name);
+    parameter.set_unit(problem.units()[index]);
+    parameter.set_mean(mean[i]);
+    parameter.set_std_dev(std_dev[i]);
+  }
+}
+
+}  // namespace polyest::internal

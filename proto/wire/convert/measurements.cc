@@ -1,0 +1,127 @@
+#include "proto/wire/convert/measurements.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "proto/wire/convert/annotate.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::Status CheckTime(const v1::Measurements& measurements) {
+  for (int row = 0; row < measurements.time_s_size(); ++row) {
+    if (!std::isfinite(measurements.time_s(row))) {
+      return InvalidField(FieldPath{"measurements", "timeS", row},
+                          absl::StrFormat("%g must be finite", measurements.time_s(row)));
+    }
+  }
+  if (measurements.run_size() != 0 && measurements.run_size() != measurements.time_s_size()) {
+    return InvalidField("measurements.run",
+                        absl::StrFormat("%d entries for %d rows; must be one a row, or none",
+                                        measurements.run_size(), measurements.time_s_size()));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<bool>> ToMissing(const v1::Measurements::Channel& channel, int rows,
+                                            const std::string& path) {
+  if (channel.missing().empty()) return std::vector<bool>();
+  std::vector<bool> missing(static_cast<size_t>(rows), false);
+  int previous = -1;
+  for (int i = 0; i < channel.missing_size(); ++i) {
+    const int row = channel.missing(i);
+    if (row <= previous || row >= rows) {
+      return InvalidField(
+          absl::StrFormat("%s.missing[%d]", path, i),
+          absl::StrFormat("row %d of %s must be above %d and below the number of rows, %d", row,
+                          channel.name(), previous, rows));
+    }
+    missing[static_cast<size_t>(row)] = true;
+    previous = row;
+  }
+  return missing;
+}
+
+absl::StatusOr<SampleColumn> ToColumn(const v1::Measurements::Channel& channel, int rows,
+                                      const std::string& path) {
+  if (channel.name().empty()) return InvalidField(path + ".name", "must not be empty");
+  if (channel.values_size() != rows) {
+    return InvalidField(path + ".values",
+                        absl::StrFormat("%d values of %s for %d rows; must be one a row",
+                                        channel.values_size(), channel.name(), rows));
+  }
+  SampleColumn column;
+  column.name = channel.name();
+  POLYEST_ASSIGN_OR_RETURN(column.missing, ToMissing(channel, rows, path));
+  column.value.assign(channel.values().begin(), channel.values().end());
+  for (size_t row = 0; row < column.value.size(); ++row) {
+    const bool missing = !column.missing.empty() && column.missing[row];
+    if (!missing && !std::isfinite(column.value[row])) {
+      return InvalidField(absl::StrFormat("%s.values[%d]", path, row),
+                          absl::StrFormat("%g of %s must be finite, or its row listed in missing",
+                                          column.value[row], channel.name()));
+    }
+  }
+  return column;
+}
+
+v1::Measurements::Channel& ChannelOf(const std::string& name, v1::Measurements& measurements) {
+  for (v1::Measurements::Channel& channel : *measurements.mutable_channels()) {
+    if (channel.name() == name) return channel;
+  }
+  v1::Measurements::Channel& added = *measurements.add_channels();
+  added.set_name(name);
+  return added;
+}
+
+// Adds rows without a sample until there are so many.
+void FillUp(int rows, v1::Measurements::Channel& channel) {
+  for (int row = channel.values_size(); row < rows; ++row) {
+    channel.add_values(0);
+    channel.add_missing(row);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements) {
+  POLYEST_RETURN_IF_ERROR(CheckTime(measurements));
+  Samples samples;
+  samples.time_s.assign(measurements.time_s().begin(), measurements.time_s().end());
+  samples.run.assign(measurements.run().begin(), measurements.run().end());
+  samples.end_of_run = measurements.end_of_run();
+  samples.columns.reserve(static_cast<size_t>(measurements.channels_size()));
+  for (int i = 0; i < measurements.channels_size(); ++i) {
+    POLYEST_ASSIGN_OR_RETURN(SampleColumn column,
+                             ToColumn(measurements.channels(i), measurements.time_s_size(),
+                                      absl::StrFormat("measurements.channels[%d]", i)));
+    samples.columns.push_back(std::move(column));
+  }
+  return samples;
+}
+
+void AppendRows(const v1::Measurements& batch, v1::Measurements& all) {
+  const int before = all.time_s_size();
+  if (batch.run_size() != 0 || all.run_size() != 0) {
+    all.mutable_run()->Resize(before, 0);
+    all.mutable_run()->MergeFrom(batch.run());
+    all.mutable_run()->Resize(before + batch.time_s_size(), 0);
+  }
+  all.mutable_time_s()->MergeFrom(batch.time_s());
+  all.set_end_of_run(batch.end_of_run());
+  for (const v1::Measurements::Channel& channel : batch.channels()) {
+    v1::Measurements::Channel& added = ChannelOf(channel.name(), all);
+    FillUp(before, added);
+    added.mutable_values()->MergeFrom(channel.values());
+    for (const int row : channel.missing()) added.add_missing(before + row);
+  }
+  for (v1::Measurements::Channel& channel : *all.mutable_channels()) {
+    FillUp(all.time_s_size(), channel);
+  }
+}
+
+}  // namespace polyest::internal

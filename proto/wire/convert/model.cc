@@ -1,0 +1,39 @@
+#include "proto/wire/convert/model.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "core/fmu/fmu_model.h"
+
+namespace polyest::internal {
+namespace {
+
+void AddQuantities(const std::vector<Quantity>& quantities,
+                   google::protobuf::RepeatedPtrField<v1::Model::Quantity>& added) {
+  for (const Quantity& quantity : quantities) {
+    v1::Model::Quantity& proto = *added.Add();
+    proto.set_name(quantity.name);
+    proto.set_unit(quantity.unit);
+    proto.set_meaning(quantity.meaning);
+    proto.set_default_value(quantity.default_value);
+  }
+}
+
+}  // namespace
+
+v1::Model ToProto(const Model& model) {
+  const ModelDescription& description = model.description();
+  const auto* const fmu = dynamic_cast<const FmuModel*>(&model);
+  v1::Model proto;
+  proto.set_name(absl::StrCat("models/", description.name));
+  proto.set_kind(fmu == nullptr ? "built-in" : KindInWords(fmu->interface()));
+  proto.set_summary(description.summary);
+  proto.set_equations(description.equations);
+  proto.set_source(description.source);
+  AddQuantities(description.states, *proto.mutable_states());
+  AddQuantities(description.parameters, *proto.mutable_parameters());
+  AddQuantities(description.inputs, *proto.mutable_inputs());
+  AddQuantities(description.outputs, *proto.mutable_outputs());
+  return proto;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "polyest/model.h"
+#include "polyest/v1/model_service.pb.h"
+
+namespace polyest::internal {
+
+// Named `models/{name}`.
+v1::Model ToProto(const Model& model);
+
+}  // namespace polyest::internal

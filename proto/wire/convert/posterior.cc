@@ -1,0 +1,119 @@
+#include "proto/wire/convert/posterior.h"
+
+#include "core/common/check.h"
+#include "proto/wire/convert/estimate.h"
+
+namespace polyest::internal {
+namespace {
+
+using Doubles = google::protobuf::RepeatedField<double>;
+
+void Append(const Vector& values, Doubles& added) {
+  added.Add(values.data(), values.data() + values.size());
+}
+
+// Row-major, whatever the matrix is.
+void Append(const Matrix& values, Doubles& added) {
+  added.Reserve(static_cast<int>(values.size()));
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+      added.Add(values(row, column));
+    }
+  }
+}
+
+v1::ComputePosteriorResponse::Method ToProto(PosteriorMethod method) {
+  switch (method) {
+    case PosteriorMethod::kImportanceSampling:
+      return v1::ComputePosteriorResponse::IMPORTANCE_SAMPLING;
+    case PosteriorMethod::kMarkovChains:
+      return v1::ComputePosteriorResponse::MARKOV_CHAINS;
+  }
+  POLYEST_CHECK(false);
+}
+
+void ToProto(const PosteriorMarginal& marginal, v1::ComputePosteriorResponse::Marginal& proto) {
+  proto.set_name(marginal.parameter);
+  proto.set_unit(marginal.unit);
+  proto.set_mean(marginal.mean);
+  proto.set_std_dev(marginal.std_dev);
+  Append(marginal.quantiles, *proto.mutable_quantiles());
+  Append(marginal.density.value, *proto.mutable_value());
+  Append(marginal.density.density, *proto.mutable_density());
+  proto.set_effective_sample_size(marginal.effective_size);
+  proto.set_r_hat(marginal.r_hat);
+}
+
+}  // namespace
+
+PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request) {
+  PosteriorOptions options;
+  if (!request.probabilities().empty()) {
+    options.probabilities.assign(request.probabilities().begin(), request.probabilities().end());
+  }
+  if (request.density_bin_count() != 0) options.density_bins = request.density_bin_count();
+  for (const auto& pair : request.joints())
+    options.joints.emplace_back(pair.first(), pair.second());
+  if (request.joint_bin_count() != 0) options.joint_bins = request.joint_bin_count();
+  options.samples = request.sample_count();
+  return options;
+}
+
+v1::ComputePosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options) {
+  v1::ComputePosteriorResponse response;
+  for (const PosteriorMarginal& marginal : posterior.marginals) {
+    ToProto(marginal, *response.add_parameters());
+  }
+  response.mutable_probabilities()->Add(options.probabilities.begin(), options.probabilities.end());
+  for (const PosteriorJoint& joint : posterior.joints) {
+    v1::ComputePosteriorResponse::Joint& added = *response.add_joints();
+    added.set_first(joint.first);
+    added.set_second(joint.second);
+    Append(joint.density.first, *added.mutable_first_value());
+    Append(joint.density.second, *added.mutable_second_value());
+    Append(joint.density.density, *added.mutable_density());
+  }
+  Append(posterior.samples, *response.mutable_samples());
+  response.set_method(ToProto(posterior.method));
+  response.set_draw_count(posterior.draws);
+  response.set_effective_sample_size(posterior.effective_size);
+  response.set_r_hat(posterior.r_hat);
+  for (const Diagnostic& diagnostic : posterior.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
+  }
+  response.set_time_s(posterior.time_s);
+  response.set_measured_value_count(posterior.sample_values);
+  return response;
+}
+
+ProfileOptions ToProfileOptions(const v1::ComputeCostProfilesRequest& request) {
+  ProfileOptions options;
+  options.parameters.assign(request.parameters().begin(), request.parameters().end());
+  if (request.point_count() != 0) options.points = request.point_count();
+  return options;
+}
+
+v1::ComputeCostProfilesResponse ToProto(const CostProfiles& profiles) {
+  v1::ComputeCostProfilesResponse response;
+  for (const CostProfile& profile : profiles.profiles) {
+    v1::ComputeCostProfilesResponse::Profile& added = *response.add_profiles();
+    added.set_parameter(profile.parameter);
+    added.set_unit(profile.unit);
+    Append(profile.value, *added.mutable_value());
+    Append(profile.total, *added.mutable_total());
+    Append(profile.mismatch, *added.mutable_mismatch());
+    Append(profile.prior, *added.mutable_prior());
+    Append(profile.at, *added.mutable_minima());
+    for (const bool converged : profile.converged) added.add_converged(converged);
+  }
+  response.mutable_parameters()->Add(profiles.parameters.begin(), profiles.parameters.end());
+  response.mutable_least()->set_total(profiles.least.total);
+  response.mutable_least()->set_mismatch(profiles.least.mismatch);
+  response.mutable_least()->set_prior(profiles.least.prior);
+  for (const Diagnostic& diagnostic : profiles.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
+  }
+  return response;
+}
+
+}  // namespace polyest::internal

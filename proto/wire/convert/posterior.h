@@ -1,0 +1,19 @@
+#pragma once
+
+// Requests and answers of ComputePosterior and ComputeCostProfiles.
+
+#include "core/estimator/studies/cost_profile.h"
+#include "core/estimator/studies/posterior_study.h"
+#include "polyest/v1/study_service.pb.h"
+
+namespace polyest::internal {
+
+PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request);
+// options: those used. `sequence` stays 0.
+v1::ComputePosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options);
+
+ProfileOptions ToProfileOptions(const v1::ComputeCostProfilesRequest& request);
+// `sequence` stays 0.
+v1::ComputeCostProfilesResponse ToProto(const CostProfiles& profiles);
+
+}  // namespace polyest::internal

@@ -1,0 +1,370 @@
+#include "proto/wire/convert/problem.h"
+
+#include <absl/strings/str_format.h>
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/model/equations/equation_model.h"
+#include "polyest/catalogue.h"
+#include "proto/wire/convert/annotate.h"
+#include "proto/wire/convert/wire_fields.h"
+
+namespace polyest::internal {
+namespace {
+
+EquationSpecification ToEquations(const v1::Equations& given) {
+  EquationSpecification equations;
+  equations.states = {given.states().begin(), given.states().end()};
+  equations.outputs = {given.outputs().begin(), given.outputs().end()};
+  equations.intermediates = {given.intermediates().begin(), given.intermediates().end()};
+  equations.parameters = {given.parameters().begin(), given.parameters().end()};
+  equations.inputs = {given.inputs().begin(), given.inputs().end()};
+  equations.units = {given.units().begin(), given.units().end()};
+  for (const auto& [name, table] : given.tables()) {
+    equations.tables[name] = {.x = {table.x().begin(), table.x().end()},
+                              .y = {table.y().begin(), table.y().end()},
+                              .value = {table.value().begin(), table.value().end()},
+                              .spline = table.spline()};
+  }
+  return equations;
+}
+
+// All that is wrong with a problem, as far as it is read.
+using Refusals = std::vector<absl::Status>;
+
+// The value, or else `instead`, which has nothing wrong with it that the refusal has not said.
+template <typename Value>
+Value ValueOr(absl::StatusOr<Value> value, Value instead, Refusals& refusals) {
+  if (value.ok()) return *std::move(value);
+  refusals.push_back(value.status());
+  return instead;
+}
+
+std::shared_ptr<const Model> ToEquationModel(const v1::Equations& given, Refusals& refusals) {
+  const EquationSpecification equations = ToEquations(given);
+  auto model = MakeEquationModel(equations);
+  if (model.ok()) return *std::move(model);
+  for (absl::Status& refusal : CheckEquations(equations)) refusals.push_back(std::move(refusal));
+  return nullptr;
+}
+
+// Null if there is none.
+std::shared_ptr<const Model> ToModel(const v1::Problem& problem, const ModelLibrary& models,
+                                     Refusals& refusals) {
+  switch (problem.model().source_case()) {
+    case v1::Problem::Model::kBuiltin: {
+      auto model = FindBuiltinModel(problem.model().builtin());
+      if (model.ok()) return *std::move(model);
+      // A name that does not exist is here a wrong field of the request, not a missing resource.
+      refusals.push_back(InvalidField("model.builtin", model.status().message()));
+      return nullptr;
+    }
+    case v1::Problem::Model::kEquations:
+      return ToEquationModel(problem.model().equations(), refusals);
+    case v1::Problem::Model::kFmu: {
+      auto model = models.FindFmu(problem.model().fmu());
+      if (model.ok()) return *std::move(model);
+      refusals.push_back(InvalidField("model.fmu", model.status().message()));
+      return nullptr;
+    }
+    case v1::Problem::Model::SOURCE_NOT_SET:
+      break;
+  }
+  refusals.push_back(
+      InvalidField("model", "a model must be named, as in {\"builtin\": \"duffing\"}"));
+  return nullptr;
+}
+
+absl::StatusOr<UncertainParameter> ToTruncatedNormal(
+    const std::string& name, const v1::UncertainParameter::TruncatedNormalPrior& prior) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!prior.has_lower() && !prior.has_upper()) {
+    return InvalidField("truncated_normal", "lower or upper must be given");
+  }
+  return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
+                                             prior.has_lower() ? prior.lower() : -kInfinity,
+                                             prior.has_upper() ? prior.upper() : kInfinity);
+}
+
+absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& parameter) {
+  const std::string& name = parameter.name();
+  switch (parameter.prior_case()) {
+    case v1::UncertainParameter::kUniform: {
+      const auto& prior = parameter.uniform();
+      return UncertainParameter::Uniform(name, prior.lower(), prior.upper());
+    }
+    case v1::UncertainParameter::kNormal: {
+      const auto& prior = parameter.normal();
+      return UncertainParameter::Normal(name, prior.mean(), prior.std_dev());
+    }
+    case v1::UncertainParameter::kBeta: {
+      const auto& prior = parameter.beta();
+      return UncertainParameter::Beta(name, prior.alpha(), prior.beta(), prior.lower(),
+                                      prior.upper());
+    }
+    case v1::UncertainParameter::kGamma: {
+      const auto& prior = parameter.gamma();
+      return UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift());
+    }
+    case v1::UncertainParameter::kLognormal: {
+      const auto& prior = parameter.lognormal();
+      return UncertainParameter::Lognormal(name, prior.mean(), prior.std_dev());
+    }
+    case v1::UncertainParameter::kTruncatedNormal:
+      return ToTruncatedNormal(name, parameter.truncated_normal());
+    case v1::UncertainParameter::PRIOR_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s needs a prior: uniform, normal, beta, gamma, lognormal or truncatedNormal",
+      name.empty() ? "it" : name));
+}
+
+std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals& refusals) {
+  std::vector<UncertainParameter> uncertain;
+  for (int i = 0; i < problem.uncertain_size(); ++i) {
+    const std::string& name = problem.uncertain(i).name();
+    // Instead of a bad one, half a line, which suits every quantity.
+    uncertain.push_back(ValueOr(Within({"uncertain", i}, ToPrior(problem.uncertain(i))),
+                                {name, Germ::Gamma(1)}, refusals));
+    uncertain.back().per_run = problem.uncertain(i).per_run();
+  }
+  return uncertain;
+}
+
+std::vector<Correlation> ToCorrelations(const v1::Problem& problem) {
+  std::vector<Correlation> correlations;
+  for (const v1::Correlation& pair : problem.correlations()) {
+    correlations.push_back({pair.first(), pair.second(), pair.coefficient()});
+  }
+  return correlations;
+}
+
+// `path` is that of a table or a streamed signal.
+absl::StatusOr<Interpolation> ToInterpolation(bool hold, v1::Input::Interpolation given,
+                                              Interpolation preset, const FieldPath& path) {
+  if (hold && given != v1::Input::INTERPOLATION_UNSPECIFIED) {
+    return InvalidField(path, "hold and interpolation exclude each other");
+  }
+  switch (given) {
+    case v1::Input::INTERPOLATION_UNSPECIFIED:
+      return hold ? Interpolation::kHold : preset;
+    case v1::Input::LINEAR:
+      return Interpolation::kLinear;
+    case v1::Input::CUBIC:
+      return Interpolation::kCubic;
+    case v1::Input::SHAPE_PRESERVING:
+      return Interpolation::kShapePreserving;
+    default:
+      return UnknownEnumerator(path.Then("interpolation"), given);
+  }
+}
+
+absl::StatusOr<InputSpecification> ToTable(const v1::Input::Table& table) {
+  POLYEST_ASSIGN_OR_RETURN(
+      const Interpolation interpolation,
+      ToInterpolation(table.hold(), table.interpolation(), Interpolation::kLinear, "table"));
+  return TableInput{.time_s = {table.time_s().begin(), table.time_s().end()},
+                    .value = {table.value().begin(), table.value().end()},
+                    .interpolation = interpolation,
+                    .amplitude = table.has_amplitude() ? table.amplitude() : 1};
+}
+
+absl::StatusOr<InputSpecification> ToStreamed(const v1::Input::Streamed& streamed) {
+  POLYEST_ASSIGN_OR_RETURN(const Interpolation interpolation,
+                           ToInterpolation(streamed.hold(), streamed.interpolation(),
+                                           Interpolation::kCubic, "streamed"));
+  return StreamedInput{interpolation, streamed.has_amplitude() ? streamed.amplitude() : 1};
+}
+
+ChirpInput ToChirp(const v1::Input::Chirp& chirp) {
+  return {.amplitude = chirp.amplitude(),
+          .start_frequency_hz = chirp.start_frequency_hz(),
+          .end_frequency_hz = chirp.end_frequency_hz(),
+          .start_s = chirp.start_s(),
+          .duration_s = chirp.duration_s(),
+          .phase_rad = chirp.phase_rad()};
+}
+
+absl::StatusOr<InputSpecification> ToSignal(const v1::Input& input) {
+  switch (input.signal_case()) {
+    case v1::Input::kConstant:
+      return ConstantInput{input.constant().amplitude()};
+    case v1::Input::kStep:
+      return StepInput{input.step().amplitude(), input.step().time_s()};
+    case v1::Input::kSinusoid: {
+      const auto& sinusoid = input.sinusoid();
+      return SinusoidInput{sinusoid.amplitude(), sinusoid.frequency_hz(), sinusoid.phase_rad()};
+    }
+    case v1::Input::kChirp:
+      return ToChirp(input.chirp());
+    case v1::Input::kHalfSineBump: {
+      const auto& bump = input.half_sine_bump();
+      return HalfSineBumpInput{bump.amplitude(), bump.start_s(), bump.duration_s()};
+    }
+    case v1::Input::kTable:
+      return ToTable(input.table());
+    case v1::Input::kStreamed:
+      return ToStreamed(input.streamed());
+    case v1::Input::SIGNAL_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s needs a signal: constant, step, sinusoid, chirp, halfSineBump, table or streamed",
+      input.name().empty() ? "it" : input.name()));
+}
+
+std::vector<NamedInput> ToInputs(const v1::Problem& problem, Refusals& refusals) {
+  std::vector<NamedInput> inputs;
+  for (int i = 0; i < problem.inputs_size(); ++i) {
+    auto signal = Within({"inputs", i}, ToSignal(problem.inputs(i)));
+    inputs.push_back({problem.inputs(i).name(),
+                      ValueOr<InputSpecification>(std::move(signal), ConstantInput{}, refusals)});
+  }
+  return inputs;
+}
+
+absl::StatusOr<OutlierHandling> ToOutlierHandling(const v1::MeasuredOutput::Noise& noise) {
+  switch (noise.outliers()) {
+    case v1::MeasuredOutput::Noise::OUTLIERS_UNSPECIFIED:
+    case v1::MeasuredOutput::Noise::NONE:
+      return OutlierHandling::kNone;
+    case v1::MeasuredOutput::Noise::STUDENT_T:
+      return OutlierHandling::kStudentT;
+    case v1::MeasuredOutput::Noise::HUBER:
+      return OutlierHandling::kHuber;
+    default:
+      return UnknownEnumerator("noise.outliers", noise.outliers());
+  }
+}
+
+absl::StatusOr<NoiseModel> ToNoise(const v1::MeasuredOutput::Noise& given) {
+  NoiseModel noise{given.absolute(), given.relative(), given.relative_to_max(), given.unknown()};
+  const auto& correlation = given.correlation();
+  if (correlation.has_time_constant_s()) {
+    noise.correlation = NoiseCorrelation::kKnown;
+    noise.time_constant_s = correlation.time_constant_s();
+  } else if (correlation.auto_()) {
+    noise.correlation = NoiseCorrelation::kUnknown;
+  }
+  POLYEST_ASSIGN_OR_RETURN(noise.outliers, ToOutlierHandling(given));
+  return noise;
+}
+
+std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem, Refusals& refusals) {
+  std::vector<MeasuredOutput> measured;
+  for (int i = 0; i < problem.measured_size(); ++i) {
+    const v1::MeasuredOutput& output = problem.measured(i);
+    auto noise = Within({"measured", i}, ToNoise(output.noise()));
+    measured.push_back(
+        {output.output(), ValueOr<NoiseModel>(std::move(noise), NoiseModel(), refusals)});
+  }
+  return measured;
+}
+
+absl::StatusOr<ExpansionOptions> ToExpansion(const v1::ExpansionOptions& given) {
+  ExpansionOptions options;
+  if (given.has_order()) options.order = given.order();
+  if (given.has_hyperbolic_exponent()) options.hyperbolic_exponent = given.hyperbolic_exponent();
+  if (given.points_per_term() != 0) options.points_per_term = given.points_per_term();
+  if (given.has_adaptive()) options.adaptive = given.adaptive();
+  switch (given.points()) {
+    case v1::ExpansionOptions::POINTS_UNSPECIFIED:
+      return options;
+    case v1::ExpansionOptions::HALTON:
+      options.points = PointSet::kHalton;
+      return options;
+    case v1::ExpansionOptions::HAMMERSLEY:
+      options.points = PointSet::kHammersley;
+      return options;
+    case v1::ExpansionOptions::GAUSS_TENSOR:
+      options.points = PointSet::kGaussTensor;
+      return options;
+    default:
+      return UnknownEnumerator("expansion.points", given.points());
+  }
+}
+
+absl::StatusOr<IntegrationOptions> ToIntegration(const v1::IntegrationOptions& given) {
+  IntegrationOptions options;
+  if (given.has_relative_tolerance()) options.relative_tolerance = given.relative_tolerance();
+  if (given.has_max_steps()) options.max_steps = given.max_steps();
+  switch (given.method()) {
+    case v1::IntegrationOptions::METHOD_UNSPECIFIED:
+    case v1::IntegrationOptions::AUTO:
+      options.method = IntegrationMethod::kAuto;
+      return options;
+    case v1::IntegrationOptions::EXPLICIT:
+      options.method = IntegrationMethod::kExplicit;
+      return options;
+    case v1::IntegrationOptions::STIFF:
+      options.method = IntegrationMethod::kStiff;
+      return options;
+    default:
+      return UnknownEnumerator("integration.method", given.method());
+  }
+}
+
+absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::RegularizationMode mode) {
+  switch (mode) {
+    case v1::Problem::REGULARIZATION_MODE_UNSPECIFIED:
+    case v1::Problem::FIXED:
+      return RegularizationMode::kFixed;
+    case v1::Problem::L_CURVE:
+      return RegularizationMode::kLCurve;
+    case v1::Problem::DISCREPANCY:
+      return RegularizationMode::kDiscrepancy;
+    case v1::Problem::EVIDENCE:
+      return RegularizationMode::kEvidence;
+    default:
+      return UnknownEnumerator("regularizationMode", mode);
+  }
+}
+
+// The problem as far as it can be understood.
+Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& refusals) {
+  Problem problem;
+  problem.model = ToModel(given, models, refusals);
+  problem.fixed = {given.fixed().begin(), given.fixed().end()};
+  problem.uncertain = ToUncertain(given, refusals);
+  problem.correlations = ToCorrelations(given);
+  problem.derived = {given.derived().begin(), given.derived().end()};
+  problem.inputs = ToInputs(given, refusals);
+  problem.measured = ToMeasured(given, refusals);
+  problem.expansion = ValueOr(ToExpansion(given.expansion()), {}, refusals);
+  if (given.has_regularization()) problem.regularization = given.regularization();
+  problem.regularization_mode = ValueOr(ToRegularizationMode(given.regularization_mode()),
+                                        RegularizationMode::kFixed, refusals);
+  problem.integration = ValueOr(ToIntegration(given.integration()), {}, refusals);
+  problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
+  return problem;
+}
+
+}  // namespace
+
+absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {
+  Refusals refusals;
+  Problem problem = Convert(given, models, refusals);
+  if (!refusals.empty()) return WireFields(refusals.front());
+  return WireFields(ResolvedProblem::Make(std::move(problem)));
+}
+
+std::vector<absl::Status> CheckProblem(const v1::Problem& given, const ModelLibrary& models) {
+  Refusals refusals;
+  Problem problem = Convert(given, models, refusals);
+  const bool has_model = problem.model != nullptr;
+  for (absl::Status& refusal : ResolvedProblem::Check(std::move(problem))) {
+    // Why there is no model has been said.
+    if (!has_model && FieldOf(refusal) == FieldPath("model")) continue;
+    refusals.push_back(std::move(refusal));
+  }
+  for (absl::Status& refusal : refusals) refusal = WireFields(refusal);
+  return refusals;
+}
+
+}  // namespace polyest::internal

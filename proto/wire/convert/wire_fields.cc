@@ -1,0 +1,58 @@
+#include "proto/wire/convert/wire_fields.h"
+
+#include <absl/strings/ascii.h>
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/common/field_error.h"
+
+namespace polyest::internal {
+namespace {
+
+using Names = std::map<std::string, std::string>;
+
+// Where the wire's name is another one than the core's in camel case: in a request itself, where
+// counts are named as such, and in measurements. Structures inside of a request, such as
+// `expansion.points`, have the core's names.
+const Names kNamesOfRequests{{"density_bins", "densityBinCount"},
+                             {"grid_points", "pointCount"},
+                             {"joint_bins", "jointBinCount"},
+                             {"points", "pointCount"},
+                             {"samples", "sampleCount"}};
+const Names kNamesOfMeasurements{{"columns", "channels"}, {"value", "values"}};
+const Names kNoOtherNames;
+
+const Names& OtherNames(const FieldPath& field) {
+  if (field.steps().front() == FieldStep("measurements")) return kNamesOfMeasurements;
+  return field.steps().size() == 1 ? kNamesOfRequests : kNoOtherNames;
+}
+
+std::string CamelCase(const std::string& name) {
+  std::string camel;
+  bool upper = false;
+  for (const char c : name) {
+    if (c == '_') {
+      upper = true;
+      continue;
+    }
+    camel += upper ? absl::ascii_toupper(static_cast<unsigned char>(c)) : c;
+    upper = false;
+  }
+  return camel;
+}
+
+}  // namespace
+
+absl::Status WireFields(const absl::Status& status) {
+  const std::optional<FieldPath> field = FieldOf(status);
+  if (!field || field->empty()) return status;
+  const Names& others = OtherNames(*field);
+  return RenameFields(status, [&others](const std::string& name) {
+    const auto other = others.find(name);
+    return other == others.end() ? CamelCase(name) : other->second;
+  });
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,269 @@
+#include "proto/wire/operations/operations.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/common/status.h"
+#include "core/estimator/estimator_access.h"
+#include "core/estimator/studies/cost_grid.h"
+#include "core/estimator/studies/prior_propagation.h"
+#include "polyest/estimator.h"
+#include "proto/wire/convert/annotate.h"
+#include "proto/wire/convert/estimate.h"
+#include "proto/wire/convert/experiment_design.h"
+#include "proto/wire/convert/measurements.h"
+#include "proto/wire/convert/model.h"
+#include "proto/wire/convert/posterior.h"
+#include "proto/wire/convert/problem_limits.h"
+#include "proto/wire/convert/regularization.h"
+#include "proto/wire/convert/studies.h"
+#include "proto/wire/convert/wire_fields.h"
+#include "proto/wire/operations/names.h"
+#include "proto/wire/operations/pages.h"
+
+namespace polyest::internal {
+namespace {
+
+// The experiment of a request. What a session is belongs to a daemon: it answers those itself.
+absl::StatusOr<const v1::Experiment*> ExperimentOf(const v1::Subject& subject) {
+  if (subject.has_experiment()) return &subject.experiment();
+  if (subject.has_session()) {
+    return InvalidField("subject.session",
+                        absl::StrCat("\"", subject.session(), "\" needs a daemon that has it"));
+  }
+  return InvalidField("subject", "must be given: a session, or an experiment with its problem");
+}
+
+// An estimator of an experiment that holds all its measurements, not yet processed.
+absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const v1::Experiment& experiment, int threads,
+                                                   const ModelLibrary& models,
+                                                   const ProblemLimits& limits,
+                                                   std::shared_ptr<SampleStore> store = nullptr) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
+                           ToProblem(experiment.problem(), models, limits));
+  POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, experiment.measurements()));
+  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(experiment.measurements()));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto estimator,
+      EstimatorAccess::Make(std::move(problem),
+                            {.threads = threads, .store = std::move(store), .snapshot = {}}));
+  samples.end_of_run = true;
+  POLYEST_RETURN_IF_ERROR(WireFields(estimator->Append(samples)));
+  return estimator;
+}
+
+// What the measurements of an experiment have told, if there are any.
+absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::Experiment& experiment, int threads,
+                                                      const Stop& stop, const ModelLibrary& models,
+                                                      const ProblemLimits& limits) {
+  if (experiment.measurements().time_s().empty()) return std::optional<Estimate>();
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(experiment, threads, models, limits));
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  return estimator->CurrentEstimate(stop);
+}
+
+// The next experiment with the inputs of a candidate.
+absl::StatusOr<ResolvedProblem> NextExperiment(
+    const v1::Problem& given, const v1::ComputeExperimentDesignRequest::Candidate& candidate,
+    const std::optional<Estimate>& known, const ModelLibrary& models, const ProblemLimits& limits) {
+  v1::Problem next = given;
+  *next.mutable_inputs() = candidate.inputs();
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ToProblem(next, models, limits));
+  if (known) return WithEstimateAsPrior(problem, *known);
+  return problem;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
+    const v1::ComputeEstimateRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
+  v1::ComputeEstimateResponse response;
+  *response.mutable_estimate() = ToProto(estimate);
+  return response;
+}
+
+absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
+    const v1::ComputePropagationRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
+                           ToProblem(experiment->problem(), models, limits));
+  PropagationOptions options = ToPropagationOptions(request);
+  options.threads = threads;
+  POLYEST_ASSIGN_OR_RETURN(Propagation propagation,
+                           WireFields(PropagatePrior(problem, options, stop)));
+  return ToProto(propagation, options.probabilities);
+}
+
+absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
+    const v1::ComputeCostGridRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
+                           ToProblem(experiment->problem(), models, limits));
+  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(experiment->measurements()));
+  CostGridOptions options = ToCostGridOptions(request);
+  options.threads = threads;
+  if (problem.problem().regularization_mode != RegularizationMode::kFixed) {
+    POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(*experiment, threads, models, limits));
+    POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
+    POLYEST_ASSIGN_OR_RETURN(const Estimate estimate, estimator->CurrentEstimate(stop));
+    options.regularization = estimate.regularization;
+  }
+  POLYEST_ASSIGN_OR_RETURN(CostGrid grid,
+                           WireFields(EvaluateCostGrid(problem, samples, options, stop)));
+  return ToProto(grid, problem);
+}
+
+absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
+    const v1::ComputeSensitivityRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
+                           ToProblem(experiment->problem(), models, limits));
+  SensitivityOptions options = ToSensitivityOptions(request);
+  options.threads = threads;
+  POLYEST_ASSIGN_OR_RETURN(SensitivityAnalysis analysis,
+                           WireFields(AnalyzeSensitivity(problem, options, stop)));
+  return ToProto(analysis);
+}
+
+absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
+    const v1::ComputeExperimentDesignRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_RETURN_IF_ERROR(WireFields(ToExperimentOptions(request).Validate()));
+  POLYEST_ASSIGN_OR_RETURN(const std::optional<Estimate> known,
+                           EstimateSoFar(*experiment, threads, stop, models, limits));
+  return ComputeExperimentDesign(request, experiment->problem(), known, threads, stop, models,
+                                 limits);
+}
+
+absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
+    const v1::ComputeExperimentDesignRequest& request, const v1::Problem& given,
+    const std::optional<Estimate>& known, int threads, const Stop& stop, const ModelLibrary& models,
+    const ProblemLimits& limits) {
+  ExperimentOptions options = ToExperimentOptions(request);
+  options.threads = threads;
+  POLYEST_RETURN_IF_ERROR(WireFields(options.Validate()));
+  v1::ComputeExperimentDesignRequest::Candidate own;
+  *own.mutable_inputs() = given.inputs();
+  v1::ComputeExperimentDesignResponse response;
+  for (int i = 0; i < std::max(1, request.candidates_size()); ++i) {
+    const bool is_own = request.candidates().empty();
+    const auto& candidate = is_own ? own : request.candidates(i);
+    const auto problem = NextExperiment(given, candidate, known, models, limits);
+    auto design =
+        WireFields(problem.ok() ? DesignExperiment(*problem, options, stop) : problem.status());
+    if (!design.ok()) {
+      if (is_own || !absl::IsInvalidArgument(design.status())) return design.status();
+      return Within({"candidates", i}, design.status());
+    }
+    if (i == 0) AddParameters(*problem, response);
+    *response.add_candidates() = ToProto(*design);
+    response.mutable_candidates()->rbegin()->set_name(candidate.name());
+  }
+  std::stable_sort(response.mutable_candidates()->begin(), response.mutable_candidates()->end(),
+                   [](const auto& a, const auto& b) { return a.gain().bits() > b.gain().bits(); });
+  if (known) {
+    for (const Diagnostic& diagnostic : known->diagnostics) {
+      *response.add_diagnostics() = ToProto(diagnostic);
+    }
+  }
+  return response;
+}
+
+absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
+    const v1::ComputePosteriorRequest& request, Estimator& estimator, const Stop& stop) {
+  const PosteriorOptions options = ToPosteriorOptions(request);
+  POLYEST_RETURN_IF_ERROR(
+      WireFields(Validate(options, EstimatorAccess::ProblemOf(estimator).prior())));
+  POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator.CurrentPosterior(options, stop));
+  return ToProto(posterior, options);
+}
+
+absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
+    const v1::ComputePosteriorRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  return ComputePosterior(request, *estimator, stop);
+}
+
+absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
+    const v1::ComputeCostProfilesRequest& request, Estimator& estimator, const Stop& stop) {
+  const ProfileOptions options = ToProfileOptions(request);
+  POLYEST_RETURN_IF_ERROR(
+      WireFields(Validate(options, EstimatorAccess::ProblemOf(estimator).prior())));
+  POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator.CurrentProfiles(options, stop));
+  return ToProto(profiles);
+}
+
+absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
+    const v1::ComputeCostProfilesRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  return ComputeCostProfiles(request, *estimator, stop);
+}
+
+absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
+    const v1::ComputeRegularizationSweepRequest& request, Estimator& estimator, const Stop& stop) {
+  const RegularizationOptions options = ToRegularizationOptions(request);
+  POLYEST_RETURN_IF_ERROR(WireFields(options.Validate()));
+  POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
+                           estimator.CurrentRegularizationSweep(options, stop));
+  return ToProto(sweep);
+}
+
+absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
+    const v1::ComputeRegularizationSweepRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  return ComputeRegularizationSweep(request, *estimator, stop);
+}
+
+absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,
+                                                  const ModelLibrary& library) {
+  POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+  const std::vector<std::shared_ptr<const Model>> models = library.Models();
+  size_t first = 0;
+  if (!request.page_token().empty()) {
+    // A page's token is the name of its last model.
+    while (first < models.size() && models[first]->description().name != request.page_token()) {
+      ++first;
+    }
+    if (first == models.size()) return UnknownPageToken(request.page_token());
+    ++first;
+  }
+  v1::ListModelsResponse response;
+  const size_t last = std::min(models.size(), first + page_size);
+  for (size_t i = first; i < last; ++i) *response.add_models() = ToProto(*models[i]);
+  if (last < models.size()) response.set_next_page_token(models[last - 1]->description().name);
+  return response;
+}
+
+absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request, const ModelLibrary& models) {
+  POLYEST_ASSIGN_OR_RETURN(const std::string id, ResourceId("name", "models", request.name()));
+  POLYEST_ASSIGN_OR_RETURN(const auto model, models.Find(id));
+  return ToProto(*model);
+}
+
+}  // namespace polyest::internal
