@@ -8,7 +8,7 @@
 #include "core/chaos/germ.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 double Variance(const Vector& values) {
@@ -93,4 +93,4 @@ double EffectiveSize(const ConstMatrixRef& normalized) {
   return std::min(all, all / std::max(time, 1.0));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,21 +3,18 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <set>
 #include <utility>
 
+#include "core/common/field_error.h"
+#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kLeastEigenvalue = 1e-8;
-
-absl::Status Invalid(const std::string& field, const std::string& rule) {
-  return absl::InvalidArgumentError(absl::StrFormat("%s: %s", field, rule));
-}
+constexpr double kMinEigenvalue = 1e-8;
 
 absl::StatusOr<Eigen::Index> Find(const std::vector<UncertainParameter>& parameters,
                                   const std::string& field, const std::string& name) {
@@ -25,24 +22,24 @@ absl::StatusOr<Eigen::Index> Find(const std::vector<UncertainParameter>& paramet
   for (const UncertainParameter& parameter : parameters) names.push_back(parameter.name);
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return found - names.begin();
-  return Invalid(field, absl::StrFormat("unknown parameter \"%s\"; uncertain are %s", name,
-                                        absl::StrJoin(names, ", ")));
+  return InvalidField(field, absl::StrFormat("unknown parameter \"%s\"; uncertain are %s", name,
+                                             absl::StrJoin(names, ", ")));
 }
 
 absl::Status CheckPositiveDefinite(const Matrix& matrix,
                                    const std::vector<Correlation>& correlations) {
-  const double least =
-      Eigen::SelfAdjointEigenSolver<Matrix>(matrix, Eigen::EigenvaluesOnly).eigenvalues()[0];
-  if (least >= kLeastEigenvalue) return absl::OkStatus();
+  const double least = SymmetricEigenvalues(matrix)[0];
+  if (least >= kMinEigenvalue) return absl::OkStatus();
   std::vector<std::string> pairs;
   for (const Correlation& pair : correlations) {
     pairs.push_back(absl::StrFormat("%s and %s %g", pair.first, pair.second, pair.coefficient));
   }
-  return Invalid("correlations",
-                 absl::StrFormat("%s: no parameters can be correlated like this together; the "
-                                 "matrix of the coefficients has the eigenvalue %.3g and must be "
-                                 "positive definite, with none below %g",
-                                 absl::StrJoin(pairs, ", "), least, kLeastEigenvalue));
+  return InvalidField(
+      "correlations",
+      absl::StrFormat("%s: no parameters can be correlated like this together; the "
+                      "matrix of the coefficients has the eigenvalue %.3g and must be "
+                      "positive definite, with none below %g",
+                      absl::StrJoin(pairs, ", "), least, kMinEigenvalue));
 }
 
 }  // namespace
@@ -58,14 +55,17 @@ absl::StatusOr<Matrix> CorrelationMatrix(const std::vector<UncertainParameter>& 
     POLYEST_ASSIGN_OR_RETURN(const Eigen::Index i, Find(parameters, field, pair.first));
     POLYEST_ASSIGN_OR_RETURN(const Eigen::Index j, Find(parameters, field, pair.second));
     if (i == j) {
-      return Invalid(field, absl::StrFormat("%s cannot be correlated with itself", pair.first));
+      return InvalidField(field,
+                          absl::StrFormat("%s cannot be correlated with itself", pair.first));
     }
     if (!seen.insert(std::minmax({i, j})).second) {
-      return Invalid(field, absl::StrFormat("%s and %s are given twice", pair.first, pair.second));
+      return InvalidField(field,
+                          absl::StrFormat("%s and %s are given twice", pair.first, pair.second));
     }
     if (!(pair.coefficient > -1 && pair.coefficient < 1)) {
-      return Invalid(field, absl::StrFormat("coefficient %g of %s and %s must lie between -1 and 1",
-                                            pair.coefficient, pair.first, pair.second));
+      return InvalidField(field,
+                          absl::StrFormat("coefficient %g of %s and %s must lie between -1 and 1",
+                                          pair.coefficient, pair.first, pair.second));
     }
     matrix(i, j) = matrix(j, i) = pair.coefficient;
   }
@@ -73,4 +73,4 @@ absl::StatusOr<Matrix> CorrelationMatrix(const std::vector<UncertainParameter>& 
   return matrix;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

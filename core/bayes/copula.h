@@ -2,29 +2,25 @@
 
 // Correlated priors by a Gaussian copula (R. Nelsen, An Introduction to Copulas, Springer 2006):
 // the correlated parameters' scores z are jointly normal with unit variances and the correlation
-// matrix P, and each is mapped to the parameter of the same cumulative probability. So marginal
-// densities stay what they are, and a coefficient is that of the scores (for two normal
-// parameters, or of two lognormal ones' logarithms, their own); Spearman's is (6/π) asin(P_ij/2).
+// matrix P, and each is mapped to the parameter of equal cumulative probability. Marginal densities
+// therefore do not change. A coefficient is that of the scores, which for two normal parameters, or
+// the logarithms of two lognormal ones, is their own; Spearman's coefficient is (6/π) asin(P_ij/2).
 
 #include <absl/status/statusor.h>
 
 #include <string>
 #include <vector>
 
-#include "core/bayes/uncertain_parameter.h"
 #include "core/common/types.h"
+#include "polyest/uncertain_parameter.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-struct Correlation {
-  std::string first, second;  // names of two uncertain parameters
-  double coefficient = 0;     // −1 < coefficient < 1
-};
-
-// P: pairs not listed have 0. INVALID_ARGUMENT names the pair and the rule: names that are
-// uncertain parameters and differ, each pair once, coefficients between −1 and 1, a matrix P with
-// no eigenvalue below 10⁻⁸ (positive definite, and by more than rounding).
+// Returns P; pairs that are not listed have 0. Returns INVALID_ARGUMENT, naming the pair and the
+// rule, unless the names of each pair are those of two different uncertain parameters, each pair
+// occurs once, coefficients lie between −1 and 1, and no eigenvalue of P is below 10⁻⁸ (positive
+// definite by more than rounding).
 absl::StatusOr<Matrix> CorrelationMatrix(const std::vector<UncertainParameter>& parameters,
                                          const std::vector<Correlation>& correlations);
 
-}  // namespace polyest
+}  // namespace polyest::internal

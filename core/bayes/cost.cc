@@ -1,17 +1,14 @@
 #include "core/bayes/cost.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Points whose matrices are worked on together: they stay in the cache.
+// Number of points whose matrices are computed together, so that they stay in the cache.
 constexpr Eigen::Index kBlock = 128;
 
 // J_mismatch + α² J_apriori; without a weight an infinite prior term does not enter.
@@ -124,4 +121,4 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,18 +11,14 @@
 #include "core/bayes/prior.h"
 #include "core/bayes/region.h"
 #include "core/chaos/basis.h"
+#include "polyest/estimate.h"
 
-namespace polyest {
-
-struct CostValue {
-  double mismatch = 0;
-  double prior = 0;  // J_apriori, not yet weighted; +∞ outside Ω
-  double total = 0;  // mismatch + α² prior
-};
+namespace polyest::internal {
 
 class Cost {
  public:
-  // mismatch's sums taken about reference (η_0). regularization = α² ≥ 0.
+  // Requires that the sums of `mismatch` are taken about `reference` (η_0), and that
+  // `regularization` = α² ≥ 0.
   Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, Mismatch mismatch,
        Prior prior, double regularization);
 
@@ -32,16 +28,17 @@ class Cost {
   double regularization() const { return regularization_; }
 
   CostValue Evaluate(const ConstVectorRef& eta) const;
-  // gradient is n, with respect to η.
+  // `gradient` (n) is with respect to η.
   CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
-  // n × n, with respect to η. Where a noise scale is unknown the likelihood is a Student's t in the
-  // parameters, whose curvature at the mode is that of a Gaussian too narrow: `spent` degrees of
-  // freedom (parameters fitted, plus 2) less make it that of a Gaussian of the t's variance.
+  // Returns the Hessian (n × n) of J_mismatch with respect to η. If a noise scale is unknown, the
+  // likelihood is a Student's t in the parameters, whose curvature at the mode is that of too
+  // narrow a Gaussian; subtracting `spent` degrees of freedom (parameters fitted, plus 2) gives the
+  // curvature of a Gaussian with the variance of the t.
   Matrix MismatchHessian(const ConstVectorRef& eta, double spent = 0) const;
   Matrix Hessian(const ConstVectorRef& eta, double spent = 0) const;  // of the total
-  // total at W points (W × n) at once by matrix products; +∞ outside Ω. totals is W (resized).
+  // Writes the total at W points (W × n) into `totals` (resized) by matrix products; +∞ outside Ω.
   void EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const;
-  // d = φ(η) − φ(η_0), for the sums of single channels.
+  // Returns d = φ(η) − φ(η_0), for the sums of single channels.
   Vector BasisDifference(const ConstVectorRef& eta) const;
 
  private:
@@ -53,4 +50,4 @@ class Cost {
   double regularization_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

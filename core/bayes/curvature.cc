@@ -1,15 +1,15 @@
 #include "core/bayes/curvature.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "core/bayes/parameter_covariance.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// A direction in which the total curvature is the prior's own to this much counts as limited by
-// the prior, so that rounding does not decide.
+// Tolerance within which the total curvature of a direction counts as the prior's own, and the
+// direction as limited by the prior, so that rounding does not decide.
 constexpr double kSlack = 1e-9;
 
 }  // namespace
@@ -23,13 +23,13 @@ Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& pr
   Vector variance = Vector::Ones(n);
   Matrix directions = Matrix::Identity(n, n);
   Curvature result;
-  // A curvature that is no number knows nothing: the prior's own is kept.
+  // A curvature that is not finite says nothing: the prior's is kept.
   result.limited_by_prior = !scaled.allFinite();
   if (!result.limited_by_prior) {
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen((scaled + scaled.transpose()) / 2);
-    directions = eigen.eigenvectors();
+    const SymmetricEigen eigen = DecomposeSymmetric((scaled + scaled.transpose()) / 2);
+    directions = eigen.vectors;
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double curvature = eigen.eigenvalues()[i];
+      const double curvature = eigen.values[i];
       if (curvature > 1) variance[i] = 1 / curvature;
       if (!(curvature > 1 + kSlack)) result.limited_by_prior = true;
     }
@@ -44,4 +44,4 @@ Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& pr
   return result;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

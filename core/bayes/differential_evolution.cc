@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
@@ -65,4 +65,4 @@ Eigen::Index DifferentialEvolution::Draw(Eigen::Index count) {
   return std::min(static_cast<Eigen::Index>(Uniform() * static_cast<double>(count)), count - 1);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

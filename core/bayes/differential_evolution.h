@@ -1,11 +1,10 @@
 #pragma once
 
-// Moves that leave a density ∝ e^{−βJ} invariant, without any tuning, from a population of
-// particles: differential evolution (C. ter Braak, Statistics and Computing 16, 2006),
+// Differential evolution (C. ter Braak, Statistics and Computing 16, 2006): moves of a population
+// of particles that leave a density ∝ e^{−βJ} invariant and need no tuning,
 //   η_i + γ (η_j − η_k),   γ = 2.38/√(2n) times a lognormal factor, now and then γ = 1
-// to jump between separate pieces, accepted by Metropolis' rule. Each half of a population is moved
-// by differences within the other, which leaves the density invariant though all of a half move at
-// once.
+// to jump between modes, accepted by Metropolis' rule. Differences within one half of a population
+// move the other half, which leaves the density invariant although a whole half moves at once.
 
 #include <cstdint>
 #include <random>
@@ -13,7 +12,7 @@
 #include "core/bayes/cost.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct Particles {
   Matrix etas;   // particles × n, in the cost's local coordinates
@@ -22,13 +21,14 @@ struct Particles {
 
 class DifferentialEvolution {
  public:
-  // lower, upper: the box (n) that particles must not leave. All must outlive it. What it does is
-  // a function of its arguments alone.
+  // `lower` and `upper` (n) bound the box that particles must not leave. All arguments must outlive
+  // the object. The moves depend on the arguments alone.
   DifferentialEvolution(const Cost& cost, const Vector& lower, const Vector& upper, uint64_t seed);
 
-  // J at each row; +∞ outside the box.
+  // Writes J at each row of `etas` into `costs`; +∞ outside the box.
   void Evaluate(const Matrix& etas, Vector& costs) const;
-  // One move of each of the rows [first, first + count), a population of its own of at least two.
+  // Moves each of the rows [first, first + count) once; they are a population of their own of at
+  // least two particles.
   void Sweep(double beta, Eigen::Index first, Eigen::Index count, Particles& particles);
 
   double Uniform() { return uniform_(generator_); }  // in [0, 1)
@@ -48,4 +48,4 @@ class DifferentialEvolution {
   Vector proposal_costs_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,5 @@
 #include "core/bayes/evidence.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,13 +8,14 @@
 
 #include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kPoints = 8192;  // of each density
 constexpr double kWider = 1.2;
-constexpr int kMostIterations = 200;
+constexpr int kMaxIterations = 200;
 constexpr double kSettled = 1e-10;  // of log Z
 
 // N(mean, factor factorᵀ)
@@ -25,8 +25,8 @@ struct Gaussian {
 
   Vector LogDensityAt(const Matrix& points) const {
     const auto n = static_cast<double>(mean.size());
-    const Matrix scaled = factor.triangularView<Eigen::Lower>().solve(
-        (points.rowwise() - mean.transpose()).transpose());
+    const Matrix scaled =
+        SolveLower(factor, Matrix((points.rowwise() - mean.transpose()).transpose()));
     const double constant =
         -0.5 * n * std::log(2 * std::numbers::pi) - factor.diagonal().array().log().sum();
     return constant - 0.5 * scaled.colwise().squaredNorm().transpose().array();
@@ -42,7 +42,7 @@ struct Gaussian {
 // log Z from log(p/g) at points of p and at points of g.
 double Bridge(const Vector& at_draws, const Vector& at_points) {
   double log_z = at_draws.mean();
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMaxIterations; ++i) {
     // With l = p/(g Z): Z ← Z · mean_g[l/(l + 1)] / mean_p[1/(l + 1)], neither of which overflows.
     const auto logistic = [&](double log_l) { return 1 / (1 + std::exp(log_z - log_l)); };
     const double of_points = at_points.unaryExpr(logistic).mean();
@@ -62,9 +62,9 @@ double LogEvidence(const LogDensity& density, const Matrix& draws, const Vector&
   Gaussian gaussian;
   gaussian.mean = chosen.colwise().mean().transpose();
   const Matrix centred = chosen.rowwise() - gaussian.mean.transpose();
-  const Eigen::LLT<Matrix> cholesky(kWider * kWider / kPoints * (centred.transpose() * centred));
-  if (cholesky.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
-  gaussian.factor = cholesky.matrixL();
+  const CholeskyFactor cholesky(kWider * kWider / kPoints * (centred.transpose() * centred));
+  if (!cholesky.positive_definite()) return -std::numeric_limits<double>::infinity();
+  gaussian.factor = cholesky.Lower();
   const Matrix points = gaussian.Draw(kPoints);
   Vector at_draws, at_points;
   density(chosen, at_draws);
@@ -73,4 +73,4 @@ double LogEvidence(const LogDensity& density, const Matrix& draws, const Vector&
                 at_points - gaussian.LogDensityAt(points));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,12 +1,12 @@
 #pragma once
 
-// The evidence Z = ∫ p of a density p known up to that constant, from draws of it, by bridge
-// sampling with a Gaussian g of the draws' mean and covariance (a little wider):
+// The evidence Z = ∫ p of an unnormalized density p, from draws of it, by bridge sampling with a
+// Gaussian g with the draws' mean and covariance (a little wider):
 //
 //   Z = E_g[h p] / E_p[h g],   h = 1/(p/Z + g),
 //
-// a fixed point in Z; the points of g are quasi-random. Its relative error is about
-// √((1/B − 1)/N) with B the overlap of the two, 10⁻² or better from 10⁴ of each.
+// a fixed point in Z; the points of g are quasi-random. The relative error is about √((1/B − 1)/N),
+// with B the overlap of p and g: 10⁻² or better with 10⁴ points of each.
 //
 // Source: X.-L. Meng, W. H. Wong, Statistica Sinica 6 (1996).
 
@@ -14,14 +14,14 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// log p at each row of points (W × n); −∞ where p is 0. values is W (resized).
+// Writes log p at each row of `points` (W × n) into `values` (resized to W); −∞ where p is 0.
 using LogDensity = std::function<void(const Matrix& points, Vector& values)>;
 
-// log Z. draws is W × n, W ≥ 1, with weights ≥ 0 of a positive sum; log p must be finite where they
-// are positive. The measure is that of the draws' own coordinates. −∞ when the draws do not spread
-// over all dimensions.
+// Returns log Z; −∞ if the draws do not spread over all dimensions. `draws` is W × n, W ≥ 1; the
+// weights are ≥ 0 with a positive sum, and log p must be finite where they are positive. The
+// measure is that of the draws' coordinates.
 double LogEvidence(const LogDensity& density, const Matrix& draws, const Vector& weights);
 
-}  // namespace polyest
+}  // namespace polyest::internal

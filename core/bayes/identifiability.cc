@@ -1,15 +1,15 @@
 #include "core/bayes/identifiability.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// Coefficients that differ by less are the same size when a direction's sign is chosen.
+// Coefficients that differ by less count as equal when a direction's sign is chosen.
 constexpr double kSameSize = 1e-9;
 
 Vector WithPositiveLargest(Vector direction) {
@@ -34,14 +34,14 @@ std::vector<Direction> Directions(const ConstMatrixRef& mismatch_hessian, const 
   // Lᵀ H_mismatch L, L = diag(prior standard deviations of ξ)
   const Vector deviation = prior.GermStandardDeviation();
   const Matrix scaled = deviation.asDiagonal() * mismatch_hessian * deviation.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen((scaled + scaled.transpose()) / 2);
+  const SymmetricEigen eigen = DecomposeSymmetric((scaled + scaled.transpose()) / 2);
   std::vector<Direction> directions;
   for (Eigen::Index i = scaled.rows() - 1; i >= 0; --i) {  // eigenvalues come in increasing order
     Direction direction;
-    direction.information = std::max(0.0, eigen.eigenvalues()[i]);
+    direction.information = std::max(0.0, eigen.values[i]);
     // A step v of the scaled germs moves the scores by F v (D⁻¹ F D = F, D being 1 where F is not
     // the identity).
-    Vector coefficients = eigen.eigenvectors().col(i);
+    Vector coefficients = eigen.vectors.col(i);
     if (prior.correlated()) coefficients = prior.ToScores(coefficients).normalized();
     direction.coefficients = WithPositiveLargest(std::move(coefficients));
     direction.verdict = VerdictOfInformation(direction.information);
@@ -55,4 +55,4 @@ Verdict VerdictOfContraction(double contraction) {
   return contraction >= kNotIdentifiedContraction ? Verdict::kNotIdentified : Verdict::kWeak;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,43 +1,34 @@
 #pragma once
 
-// What the data say beside the prior. Eigen-decompose the prior-preconditioned mismatch Hessian,
-// Lᵀ H_mismatch L with L Lᵀ = prior covariance: an eigenvalue λ is the data's information in that
-// direction in units of the prior's.
+// Identifiability: what the data say beside the prior. The eigenvalues λ of the
+// prior-preconditioned mismatch Hessian, Lᵀ H_mismatch L with L Lᵀ = prior covariance, are the
+// data's information in the directions of the eigenvectors, in units of the prior's.
 //
-// A parameter's verdict compares the posterior of its score z with its prior marginal. So one on
-// which the data are silent is IDENTIFIED all the same when it is correlated a priori with one that
-// they know: what is known of it then rests on that correlation, but known it is. The directions
-// show the difference: they count the data's information alone.
+// A parameter's verdict compares the posterior of its score z with its prior marginal. A parameter
+// on which the data say nothing is therefore IDENTIFIED if it is correlated a priori with one that
+// they identify: its value is then known because of that correlation. The directions show the
+// difference: they count the data's information alone.
 
 #include <vector>
 
 #include "core/bayes/prior.h"
 #include "core/common/types.h"
+#include "polyest/estimate.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-enum class Verdict { kIdentified, kWeak, kNotIdentified };
-
-struct Direction {
-  double information = 0;  // λ ≥ 0 (a negative curvature of the mismatch counts as none)
-  // Unit vector over the parameters, each in units of the prior standard deviation of its score.
-  // Correlated parameters move together in a direction on which the data are silent for one.
-  Vector coefficients;
-  Verdict verdict = Verdict::kNotIdentified;
-};
-
-// A direction is IDENTIFIED when the data know it ten times better than the prior (in variance),
-// NOT_IDENTIFIED when they know less than the prior, WEAK between.
+// A direction is IDENTIFIED if the data's information is ten times the prior's, NOT_IDENTIFIED if
+// it is less than the prior's, and WEAK in between.
 inline constexpr double kIdentifiedInformation = 10;
 inline constexpr double kWeakInformation = 1;
-// A parameter's verdict by contraction = posterior ÷ prior standard deviation.
+// Limits of contraction = posterior ÷ prior standard deviation for a parameter's verdict.
 inline constexpr double kIdentifiedContraction = 0.5;
 inline constexpr double kNotIdentifiedContraction = 0.9;
 
-// mismatch_hessian: with respect to the germ ξ. Most informed first; the sign of a direction is
-// such that its largest coefficient is positive.
+// Returns the directions, most informed first, each with the sign that makes its largest
+// coefficient positive. `mismatch_hessian` is with respect to the germ ξ.
 std::vector<Direction> Directions(const ConstMatrixRef& mismatch_hessian, const Prior& prior);
 
 Verdict VerdictOfContraction(double contraction);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,8 +6,9 @@
 #include "core/bayes/differential_evolution.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 struct Component {
@@ -48,10 +49,7 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   const int n = cost.dimension();
   const Matrix normal = MixturePoints(n, points);
   // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
-  Matrix etas = hessian_factor.triangularView<Eigen::Lower>()
-                    .transpose()
-                    .solve(normal.transpose())
-                    .transpose();
+  Matrix etas = SolveLowerTransposedRows(hessian_factor, normal);
   etas.rowwise() += minimum.transpose();
   WeightedDraws draws;
   Vector costs;
@@ -80,4 +78,4 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   return draws;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

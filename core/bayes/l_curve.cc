@@ -4,15 +4,15 @@
 #include <cmath>
 #include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// Below this part of the largest one a term is what rounding left of it.
+// A term below this part of its largest value is rounding error.
 constexpr double kResolved = 1e-10;
 // Each leg of the L must be as long as a doubling.
-const double kLeastLeg = std::log(2.0);
+const double kMinLeg = std::log(2.0);
 
-// A point of the curve, its logarithms; both legs are functions of τ = log α².
+// A point of the curve in logarithms; both coordinates are functions of τ = log α².
 struct LogPoint {
   size_t index;
   double tau;
@@ -28,18 +28,18 @@ double PriorAtModes(const Prior& prior) {
 }
 
 std::vector<LogPoint> ResolvedPoints(const std::vector<RegularizedMinimum>& points,
-                                     double least_prior) {
+                                     double min_prior) {
   double largest_mismatch = 0;
   double largest_prior = 0;
   for (const RegularizedMinimum& point : points) {
     if (!std::isfinite(point.cost.mismatch) || !std::isfinite(point.cost.prior)) continue;
     largest_mismatch = std::max(largest_mismatch, point.cost.mismatch);
-    largest_prior = std::max(largest_prior, point.cost.prior - least_prior);
+    largest_prior = std::max(largest_prior, point.cost.prior - min_prior);
   }
   std::vector<LogPoint> resolved;
   for (size_t i = 0; i < points.size(); ++i) {
     const CostValue& cost = points[i].cost;
-    const double prior = cost.prior - least_prior;
+    const double prior = cost.prior - min_prior;
     if (!std::isfinite(cost.mismatch) || !std::isfinite(prior)) continue;
     if (!(cost.mismatch > kResolved * largest_mismatch)) continue;
     if (!(prior > kResolved * largest_prior)) continue;
@@ -78,7 +78,7 @@ RegularizationChoice ChooseByLCurve(const std::vector<RegularizedMinimum>& minim
   for (size_t i = 1; i + 1 < points.size(); ++i) {
     const double upright = points.front().prior - points[i].prior;
     const double lying = points.back().mismatch - points[i].mismatch;
-    if (upright < kLeastLeg || lying < kLeastLeg) continue;
+    if (upright < kMinLeg || lying < kMinLeg) continue;
     const double bend = BendAt(points[i - 1], points[i], points[i + 1]);
     if (!(bend > sharpest)) continue;
     sharpest = bend;
@@ -92,4 +92,4 @@ RegularizationChoice ChooseByLCurve(const std::vector<RegularizedMinimum>& minim
   return choice;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,14 +1,14 @@
 #pragma once
 
 // Choice of the regularization weight α² of (56) by the L-curve (Hansen 1992): the corner of the
-// curve of the prior term against the mismatch, both on logarithmic axes, where more weight begins
-// to cost mismatch and less weight begins to cost distance from the prior's most likely value.
+// curve of the prior term against the mismatch, both on logarithmic axes. Beyond the corner more
+// weight increases the mismatch, and less weight the distance from the prior's mode.
 //
 // α² runs over the values of RangeOfChoice(). The corner is the value of greatest curvature of
 //   ( log J_mismatch, log (J_apriori − min J_apriori) )
-// that bends as an L does and has both its legs: below it the prior term at least doubles, above
-// it the mismatch does. Values at which either term is no more than rounding (10⁻¹⁰ of its
-// largest) are left out. There is no corner where the data determine everything or can be met
+// where the curve bends as an L does and has both legs: below the corner the prior term at least
+// doubles, above it the mismatch does. Values at which either term is mere rounding (10⁻¹⁰ of its
+// largest) are left out. There is no corner if the data determine everything or can be fitted
 // exactly, as in §3.4 without noise.
 
 #include <vector>
@@ -16,10 +16,10 @@
 #include "core/bayes/prior.h"
 #include "core/bayes/regularization.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// `minima`: the sweep over RangeOfChoice(), one of which is chosen.
+// Chooses among `minima`, the sweep over RangeOfChoice().
 RegularizationChoice ChooseByLCurve(const std::vector<RegularizedMinimum>& minima,
                                     const Prior& prior);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,13 +7,13 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr int kMostTimes = 64;     // kept; when full every second is dropped
+constexpr int kMaxTimes = 64;      // kept; when full every second is dropped
 constexpr int kFirstInterval = 2;  // sweeps from one time kept to the next
 constexpr int kFirstSweeps = 64;   // before convergence is looked at, and the least added later
-constexpr Eigen::Index kLeastInGroup = 8;
+constexpr Eigen::Index kMinInGroup = 8;
 
 class ChainRunner {
  public:
@@ -25,13 +25,13 @@ class ChainRunner {
         chains_(in_group_ * options.groups),
         state_{particles.etas.topRows(chains_), particles.costs.head(chains_)},
         moves_(cost, lower, upper, options.seed),
-        etas_(kMostTimes * chains_, particles.etas.cols()),
-        costs_(kMostTimes * chains_) {
-    POLYEST_CHECK(options.groups >= 2 && in_group_ >= kLeastInGroup);
+        etas_(kMaxTimes * chains_, particles.etas.cols()),
+        costs_(kMaxTimes * chains_) {
+    POLYEST_CHECK(options.groups >= 2 && in_group_ >= kMinInGroup);
   }
 
   absl::StatusOr<Chains> Run(const Stop& stop) {
-    int sweeps = std::min(kFirstSweeps, options_.most_sweeps);
+    int sweeps = std::min(kFirstSweeps, options_.max_sweeps);
     int done = 0;
     while (true) {
       for (; done < sweeps; ++done) {
@@ -43,12 +43,11 @@ class ChainRunner {
       }
       Judge();
       const double effective = result_.effective_size.minCoeff();
-      if (effective >= options_.effective_size || done >= options_.most_sweeps) break;
-      // In proportion, and a little more.
+      if (effective >= options_.effective_size || done >= options_.max_sweeps) break;
+      // Raises the number of sweeps in proportion, and a little more.
       const double more = 1.1 * done * (options_.effective_size / effective - 1);
-      sweeps =
-          done + static_cast<int>(std::clamp(more, static_cast<double>(kFirstSweeps),
-                                             static_cast<double>(options_.most_sweeps - done)));
+      sweeps = done + static_cast<int>(std::clamp(more, static_cast<double>(kFirstSweeps),
+                                                  static_cast<double>(options_.max_sweeps - done)));
     }
     result_.etas = etas_.topRows(times_ * chains_);
     result_.costs = costs_.head(times_ * chains_);
@@ -57,8 +56,8 @@ class ChainRunner {
 
  private:
   void Keep() {
-    if (times_ == kMostTimes) {
-      for (int t = 1; 2 * t < kMostTimes + 1; ++t) {
+    if (times_ == kMaxTimes) {
+      for (int t = 1; 2 * t < kMaxTimes + 1; ++t) {
         Copy(2 * t - 1, t - 1);
       }
       times_ /= 2;
@@ -108,4 +107,4 @@ absl::StatusOr<Chains> RunChains(const Cost& cost, const Vector& lower, const Ve
   return ChainRunner(cost, lower, upper, particles, quantities, options).Run(stop);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,11 +1,8 @@
 #include "core/bayes/minimizer.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <limits>
 #include <new>
 #include <nlopt.hpp>
 #include <stdexcept>
@@ -13,17 +10,17 @@
 
 #include "core/bayes/unit_problem.h"
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// What the solver sees instead of +∞: far above anything else once the function is scaled.
+// Replaces +∞ for the solver: far above any other value once the function is scaled.
 constexpr double kHuge = 1e20;
 constexpr double kActive = UnitProblem::kActive;
-// SLSQP is started again from its result, with fresh curvature, at most so often.
-constexpr int kMostRestarts = 8;
-constexpr int kMostNewtonSteps = 6;
+// Largest number of times that SLSQP is restarted from its result with fresh curvature.
+constexpr int kMaxRestarts = 8;
+constexpr int kMaxNewtonSteps = 6;
 
 std::string InWords(int code) {
   switch (code) {
@@ -86,7 +83,7 @@ struct Run {
   int code = nlopt::FAILURE;
 };
 
-// One run of SLSQP.
+// Runs SLSQP once.
 Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions& options) {
   std::vector<double> u(start.data(), start.data() + start.size());
   Run run{start};
@@ -104,7 +101,7 @@ Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions&
     solver.set_xtol_abs(options.relative_step);
     solver.set_xtol_rel(0);
     solver.set_ftol_rel(0);
-    solver.set_maxeval(std::max(1, options.most_evaluations));
+    solver.set_maxeval(std::max(1, options.max_evaluations));
     double value = 0;
     try {
       run.code = solver.optimize(u, value);
@@ -143,12 +140,11 @@ Matrix FreeDirections(const UnitProblem& problem, const Vector& u, const Vector&
     Matrix active(n, static_cast<Eigen::Index>(normals.size()));
     for (size_t i = 0; i < normals.size(); ++i)
       active.col(static_cast<Eigen::Index>(i)) = normals[i];
-    Eigen::ColPivHouseholderQR<Matrix> factors(active);
-    const Vector multipliers = factors.solve(-gradient);  // gradient + active · multipliers = 0
+    const PivotedQr factors = SolveByPivotedQr(active, -gradient);
+    const Vector& multipliers = factors.solution;  // gradient + active · multipliers = 0
     Eigen::Index worst = 0;
     if (multipliers.minCoeff(&worst) >= 0) {
-      const Matrix q = factors.householderQ() * Matrix::Identity(n, n);
-      return q.rightCols(n - factors.rank());
+      return factors.q.rightCols(n - factors.rank);
     }
     normals.erase(normals.begin() + worst);
   }
@@ -184,22 +180,21 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector
   constexpr double kKick = 1e-3;
   Vector gradient(u.size());
   double value = problem.Value(u, &gradient);
-  for (int step = 0; step < kMostNewtonSteps && std::isfinite(value); ++step) {
+  for (int step = 0; step < kMaxNewtonSteps && std::isfinite(value); ++step) {
     const Matrix z = FreeDirections(problem, u, gradient);
     if (z.cols() == 0) return Polish::kConverged;
     const Matrix hessian = ReducedHessian(problem, u, z);
     if (!hessian.allFinite()) return Polish::kUnsure;
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(hessian);
-    const Vector& curvature = eigen.eigenvalues();
+    const SymmetricEigen eigen = DecomposeSymmetric(hessian);
+    const Vector& curvature = eigen.values;
     const double largest = curvature.cwiseAbs().maxCoeff();
     if (curvature[0] < -1e-6 * largest) {
-      u = problem.Project(u + kKick * z * eigen.eigenvectors().col(0));
+      u = problem.Project(u + kKick * z * eigen.vectors.col(0));
       return Polish::kSaddle;
     }
     if (curvature[0] <= kFlat * largest) return Polish::kUnsure;
     // p = −Z (Zᵀ H Z)⁻¹ Zᵀ g; the decrement gᵀ Z (Zᵀ H Z)⁻¹ Zᵀ g is what a full step gains, twice
-    const Matrix root =
-        z * eigen.eigenvectors() * curvature.cwiseSqrt().cwiseInverse().asDiagonal();
+    const Matrix root = z * eigen.vectors * curvature.cwiseSqrt().cwiseInverse().asDiagonal();
     const Vector p = -root * (root.transpose() * gradient);
     if (p.cwiseAbs().maxCoeff() <= options.relative_step) return Polish::kConverged;
     const Vector next = problem.Project(u + p);
@@ -208,7 +203,8 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector
     const double decrement = (root.transpose() * gradient).squaredNorm();
     const double next_decrement = (root.transpose() * next_gradient).squaredNorm();
     if (!std::isfinite(next_value) || !(next_decrement < decrement)) {
-      // No better gradient is to be had; as good as the digits of the value if that shows nothing.
+      // The gradient cannot improve any more: converged if the digits of the value do not show what
+      // a full step would gain.
       return decrement <= 1e-14 * std::abs(value) ? Polish::kConverged : Polish::kUnsure;
     }
     u = next;
@@ -254,7 +250,7 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
   Vector u = PrepareStart(problem, problem.Project(problem.ToUnit(start)));
   double value = problem.Value(u, nullptr);
   Minimum minimum;
-  for (int restart = 0; restart <= kMostRestarts && std::isfinite(value); ++restart) {
+  for (int restart = 0; restart <= kMaxRestarts && std::isfinite(value); ++restart) {
     const Run run = RunSolver(problem, u, options);
     minimum.code = run.code;
     Vector next = run.point;
@@ -270,7 +266,7 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
     minimum.converged = polish == Polish::kConverged ||
                         (polish == Polish::kUnsure && !(moved && lower) && IsSuccess(run.code));
     if (minimum.converged || problem.stopped() || !std::isfinite(next_value)) break;
-    if (problem.evaluations() >= options.most_evaluations) break;
+    if (problem.evaluations() >= options.max_evaluations) break;
   }
   minimum.point = problem.ToPoint(problem.Project(OnBounds(problem, u)));
   minimum.value = original.function(minimum.point, nullptr);
@@ -305,4 +301,4 @@ std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix
   return distinct;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,19 +1,19 @@
 #pragma once
 
 // Minimization of a smooth function in a box with linear inequality constraints, from several
-// starts. The one wrapper of NLopt (SLSQP): every return code and exception is mapped.
+// starts. This is the only wrapper of NLopt (SLSQP); it maps every return code and exception.
 
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "core/common/stop.h"
 #include "core/common/types.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct MinimizationProblem {
-  // Value at x; fills gradient when it is not null. May return +∞ (outside Ω).
+  // Returns the value at x and fills `gradient` if it is not null. May return +∞ (outside Ω).
   std::function<double(const Vector& x, Vector* gradient)> function;
   Vector lower;  // of x; finite
   Vector upper;
@@ -22,9 +22,9 @@ struct MinimizationProblem {
 };
 
 struct MinimizerOptions {
-  double relative_step = 1e-10;  // stop when every |Δx_i| ≤ relative_step × (upper_i − lower_i)
-  int most_evaluations = 500;    // a start
-  // Two minima are the same when every |Δx_i| ≤ same_point × (upper_i − lower_i) …
+  double relative_step = 1e-10;  // ends when every |Δx_i| ≤ relative_step × (upper_i − lower_i)
+  int max_evaluations = 500;     // a start
+  // Two minima count as one if every |Δx_i| ≤ same_point × (upper_i − lower_i).
   double same_point = 1e-3;
 };
 
@@ -37,10 +37,10 @@ struct Minimum {
   int evaluations = 0;
 };
 
-// The distinct minima found from the starts (one a row), lowest first; at least one. A start
-// outside the box or the constraints is moved inside. Deterministic. On a stop request returns
-// what it has, converged = false.
+// Returns the distinct minima found from the starts (rows of `starts`), lowest first; at least one.
+// A start outside the box or the constraints is moved inside. Deterministic. On a stop request
+// returns the minima found so far with converged = false.
 std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
                                 const MinimizerOptions& options, const Stop& stop);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,12 +7,12 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// Residuals at the level of rounding are as good as none: keeps the logarithms finite.
-constexpr double kLeastMeanSquare = 1e-24;
-constexpr double kMostCorrelation = 1 - 1e-12;
+// Floor of residuals, at the level of rounding, which keeps the logarithms finite.
+constexpr double kMinMeanSquare = 1e-24;
+constexpr double kMaxCorrelation = 1 - 1e-12;
 
 // J of a channel as a function of A = χ² and D = Σ (u_k − u_{k−1})², with B = A − D/2 and r = B/A,
 // and its derivatives.
@@ -22,13 +22,13 @@ struct Likelihood {
   double by_aa = 0, by_ad = 0, by_dd = 0;
 };
 
-double Correlation(double a, double d) {
-  return a > 0 ? std::clamp(1 - 0.5 * d / a, -kMostCorrelation, kMostCorrelation) : 0;
+double LagCorrelation(double a, double d) {
+  return a > 0 ? std::clamp(1 - 0.5 * d / a, -kMaxCorrelation, kMaxCorrelation) : 0;
 }
 
 Likelihood Evaluate(double n, double chi_squared, double differences, bool scale_unknown,
                     bool correlation_unknown) {
-  const double a = std::max(chi_squared, n * kLeastMeanSquare);
+  const double a = std::max(chi_squared, n * kMinMeanSquare);
   const double d = differences;
   Likelihood l;
   if (n <= 0) return l;
@@ -42,7 +42,7 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
     l.by_a = 0.5;
   }
   if (!correlation_unknown) return l;
-  const double r = Correlation(a, d);
+  const double r = LagCorrelation(a, d);
   const double r_a = 0.5 * d / (a * a), r_d = -0.5 / a;
   if (scale_unknown) {
     // ½ (N − 1) log(1 − r²)
@@ -68,7 +68,7 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
   return l;
 }
 
-// factor: of N, for the degrees of freedom that parameters have spent.
+// `factor` multiplies N and accounts for the degrees of freedom that parameters have spent.
 Likelihood Evaluate(const ChannelSums& channel, double chi_squared, double differences,
                     double factor = 1) {
   return Evaluate(factor * channel.Degrees(), chi_squared, differences, channel.scale_unknown,
@@ -83,7 +83,7 @@ double NegativeLogLikelihood(double degrees, double chi_squared, double differen
 }
 
 double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
-  return samples.count() == 0 ? 0 : Correlation(samples.ChiSquared(d), differences.ChiSquared(d));
+  return samples.count() == 0 ? 0 : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
 Mismatch::Mismatch(MismatchSums sums) : known_(std::move(sums)), count_(known_.count()) {}
@@ -105,7 +105,7 @@ double Mismatch::Evaluate(const ConstVectorRef& d) const {
   double value = known_.ChiSquared(d) / 2;
   for (const ChannelSums& channel : other_) {
     const double differences = channel.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
-    value += polyest::Evaluate(channel, channel.samples.ChiSquared(d), differences).value;
+    value += polyest::internal::Evaluate(channel, channel.samples.ChiSquared(d), differences).value;
   }
   return value;
 }
@@ -121,7 +121,7 @@ double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradien
     if (channel.correlation_unknown) {
       differences = channel.differences.ChiSquaredWithGradient(d, by_differences);
     }
-    const Likelihood l = polyest::Evaluate(channel, a, differences);
+    const Likelihood l = polyest::internal::Evaluate(channel, a, differences);
     value += l.value;
     gradient += l.by_a * by_samples;
     if (channel.correlation_unknown) gradient += l.by_d * by_differences;
@@ -140,7 +140,7 @@ Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gr
     const Vector by_a = phi_gradient.transpose() * gradient;
     const double differences = channel.differences.ChiSquaredWithGradient(d, gradient);
     const Vector by_d = phi_gradient.transpose() * gradient;
-    const Likelihood l = polyest::Evaluate(channel, a, differences, factor);
+    const Likelihood l = polyest::internal::Evaluate(channel, a, differences, factor);
     // Σ J_A ∂²A + J_AA ∂A ∂Aᵀ + …, with ∂²χ² = 2 G
     curvature += 2 * l.by_a * (phi_gradient.transpose() * (channel.samples.G() * phi_gradient)) +
                  l.by_aa * by_a * by_a.transpose();
@@ -167,9 +167,10 @@ void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
     channel.samples.ChiSquaredMany(differences, product, a);
     if (channel.correlation_unknown) channel.differences.ChiSquaredMany(differences, product, d);
     for (Eigen::Index i = 0; i < values.size(); ++i) {
-      values[i] += polyest::Evaluate(channel, a[i], channel.correlation_unknown ? d[i] : 0).value;
+      values[i] +=
+          polyest::internal::Evaluate(channel, a[i], channel.correlation_unknown ? d[i] : 0).value;
     }
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// J_mismatch over several measured channels, noise of unknown size or correlation marginalized.
+// J_mismatch over several measured channels; noise of unknown size or correlation is marginalized.
 //
 // With u_k the residuals of a channel's N samples in units of its working noise (whitened with its
 // working correlation), χ² = Σ u_k² and r = Σ u_k u_{k−1} ÷ Σ u_k² their lag-1 correlation, all
@@ -11,9 +11,9 @@
 //   correlation unknown                ½ χ² (1 − r²)
 //   both unknown                       ½ N (1 + log(χ²/N)) + ½ (N − 1) log(1 − r²)
 //
-// Unknown correlation is a factor 1 − a B of the noise beside the working one (B shifts by a
-// sample), a with a flat prior: ∫ e^{−½ Σ (u_k − a u_{k−1})²} da gives the last two lines. The
-// constants are such that a working noise of the right size gives N/2 in all cases.
+// Unknown correlation is a further factor 1 − a B of the noise (B shifts by a sample), with a flat
+// prior for a: ∫ e^{−½ Σ (u_k − a u_{k−1})²} da gives the last two lines. The constants are chosen
+// so that a working noise of the right size gives N/2 in all cases.
 //
 // Source: Zellner, An Introduction to Bayesian Inference in Econometrics (1971), ch. 3 and 4.
 
@@ -22,14 +22,14 @@
 #include "core/bayes/mismatch_sums.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// −log of the likelihood of one channel as above; differences = Σ (u_k − u_{k−1})². +∞ when χ² is.
-// degrees: N, or what stands for it.
+// Returns −log of the likelihood of one channel as above; +∞ if χ² is +∞. `degrees` is N or the
+// degrees of freedom in its place; `differences` is Σ (u_k − u_{k−1})².
 double NegativeLogLikelihood(double degrees, double chi_squared, double differences,
                              bool scale_unknown, bool correlation_unknown);
 
-// The history of one channel.
+// The sums over the history of one channel.
 struct ChannelSums {
   explicit ChannelSums(int terms = 0) : samples(terms), differences(terms) {}
 
@@ -40,27 +40,29 @@ struct ChannelSums {
   double degrees_factor = 1;  // NoiseModel::DegreesFactor
 
   bool IsKnown() const { return !scale_unknown && !correlation_unknown; }
-  // N, or less where outliers are handled: what χ² is when the working noise is right.
+  // Returns the expected χ² if the working noise is right: N, or less if outliers are handled.
   double Degrees() const { return degrees_factor * static_cast<double>(samples.count()); }
-  // r at d, in [−1, 1]; 0 without samples.
+  // Returns r at d, in [−1, 1]; 0 without samples.
   double Lag1Correlation(const ConstVectorRef& d) const;
 };
 
 class Mismatch {
  public:
-  // Noise known.
+  // Takes the sums of channels with known noise.
   Mismatch(MismatchSums sums);  // NOLINT(google-explicit-constructor): the plain case
   explicit Mismatch(std::vector<ChannelSums> channels);
 
   int terms() const { return known_.terms(); }
 
-  // At d = φ(η) − φ(η_0); gradient (S) is with respect to d.
+  // Returns J_mismatch at d = φ(η) − φ(η_0); `gradient` (S) is with respect to d.
   double Evaluate(const ConstVectorRef& d) const;
   double EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
-  // ∂φᵀ (∂²J/∂d²) ∂φ, n × n; phi_gradient = ∂φ is S × n. spent: see Cost::MismatchHessian.
+  // Returns ∂φᵀ (∂²J/∂d²) ∂φ, n × n; `phi_gradient` = ∂φ is S × n. For `spent` see
+  // Cost::MismatchHessian.
   Matrix Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
                    double spent = 0) const;
-  // J at W points; differences is W × S, values W (sized). product is scratch, W × S (resized).
+  // Writes J_mismatch at W points into `values` (W); `differences` is W × S. `product` is scratch
+  // memory, resized to W × S.
   void EvaluateMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
  private:
@@ -69,4 +71,4 @@ class Mismatch {
   int64_t count_ = 0;               // of samples, over all channels
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

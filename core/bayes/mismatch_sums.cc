@@ -4,7 +4,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {}
 
@@ -49,4 +49,4 @@ void MismatchSums::ChiSquaredMany(const ConstMatrixRef& differences, Matrix& pro
   values = (product.cwiseProduct(differences).rowwise().sum().array() + w_).max(0.0);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,19 +1,19 @@
 #pragma once
 
-// A channel's whole history in constant memory. With y_k(η) = c_kᵀ φ(η), a fixed reference point
-// with φ_0 = φ(η_0), d = φ − φ_0 and e_k = z_k − c_kᵀ φ_0, the mismatch is the quadratic form
+// Mismatch sums: a channel's whole history in constant memory. With y_k(η) = c_kᵀ φ(η), a fixed
+// reference point with φ_0 = φ(η_0), d = φ − φ_0 and e_k = z_k − c_kᵀ φ_0, it is the quadratic form
 //
 //   J_mismatch(η) = ½ Σ_k (z_k − y_k(η))²/R_k = ½ (dᵀ G d − 2 bᵀ d + w),
 //   G = Σ c_k c_kᵀ/R_k,   b = Σ c_k e_k/R_k,   w = Σ e_k²/R_k.
 //
-// The sums are taken about the reference and not about zero because w would otherwise be the
-// signal's energy, from whose digits the residual's would have to be recovered.
+// The sums are taken about the reference and not about zero, because w would otherwise be the
+// energy of the signal and the far smaller energy of the residual would be lost to rounding.
 
 #include <cstdint>
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class MismatchSums {
  public:
@@ -25,17 +25,19 @@ class MismatchSums {
   const Vector& b() const { return b_; }
   double w() const { return w_; }
 
-  // One sample: coefficients c (S), e = z − cᵀφ_0, variance R > 0. O(S²), no allocation.
+  // Adds one sample: coefficients c (S), error e = z − cᵀφ_0, variance R > 0. Takes O(S²)
+  // operations and does not allocate.
   void Add(const ConstVectorRef& coefficients, double error, double variance);
   void Add(const MismatchSums& other);
-  // 2 J_mismatch = χ² at d.
+  // Returns χ² = 2 J_mismatch at d.
   double ChiSquared(const ConstVectorRef& d) const;
-  // The same; gradient (S) is with respect to d.
+  // Returns χ² at d; `gradient` (S) is with respect to d.
   double ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
-  // The same at W points: differences is W × S, values W (sized). product is scratch (resized).
+  // Writes χ² at W points into `values` (W); `differences` is W × S. `product` is scratch memory,
+  // resized to W × S.
   void ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
-  // As cereal has it: for writing and for reading; what was read may have any shape.
+  // Writes to or reads from a cereal archive. The shapes of what is read are not checked.
   template <class Archive>
   void serialize(Archive& archive) {
     archive(g_, b_, w_, count_);
@@ -48,4 +50,4 @@ class MismatchSums {
   int64_t count_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,7 +4,7 @@
 
 #include "core/chaos/gauss_rule.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kTerms = 40;  // (3.03²)^40/40! of the widest lognormal is 10⁻⁹
@@ -33,7 +33,7 @@ HermiteRule MakeHermiteRule() {
 Vector Coefficients(const Prior& prior, int i, double z, double s) {
   const UncertainParameter& parameter = prior.parameters()[static_cast<size_t>(i)];
   Vector coefficients = Vector::Zero(kTerms);
-  if (prior.germs()[static_cast<size_t>(i)] != parameter.germ) {
+  if (prior.germs()[static_cast<size_t>(i)] != Germ(parameter.germ)) {
     static const HermiteRule rule = MakeHermiteRule();
     Vector values(kNodes);
     for (int q = 0; q < kNodes; ++q) values[q] = prior.OfScore(i, z + s * rule.nodes[q]);
@@ -74,4 +74,4 @@ Matrix ParameterCovariance(const Prior& prior, const ConstVectorRef& z,
   return covariance;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,7 +1,7 @@
 #pragma once
 
-// The covariance of θ = t(z) for Gaussian scores z ~ N(ẑ, C): what the curvature's Gaussian in the
-// germs is in the parameters, without a linearization of t.
+// The covariance of θ = t(z) for Gaussian scores z ~ N(ẑ, C), without a linearization of t. It maps
+// the Gaussian that the curvature gives in the germs to the parameters.
 //
 // With s_i² = C_ii, r_ij = C_ij/(s_i s_j) and the orthonormal Hermite polynomials h_k, expand each
 // parameter, t_i(ẑ_i + s_i u) = Σ_k c_ik h_k(u). Then by Mehler's formula
@@ -15,9 +15,9 @@
 #include "core/bayes/prior.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// z is n; root is n × m with C = root rootᵀ; the result is n × n.
+// Returns the n × n covariance at z (n), for `root` (n × m) with C = root rootᵀ.
 Matrix ParameterCovariance(const Prior& prior, const ConstVectorRef& z, const ConstMatrixRef& root);
 
-}  // namespace polyest
+}  // namespace polyest::internal

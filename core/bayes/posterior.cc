@@ -10,11 +10,11 @@
 #include "core/chaos/collocation_points.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kCoverPerParticle = 4;  // points of the cover of the box for each particle
-constexpr int kLeastStartingPoints = 50;
+constexpr int kMinStartingPoints = 50;
 constexpr double kEffectiveFraction = 0.5;
 constexpr double kShrink = 0.7;  // of the guesses, mixed with 0.3 of the cover
 constexpr int kBisections = 50;
@@ -67,7 +67,7 @@ class Sampler {
       start.row(kept) = start.row(i);
       costs[kept++] = costs[i];
     }
-    if (kept < kLeastStartingPoints) {
+    if (kept < kMinStartingPoints) {
       return absl::FailedPreconditionError(absl::StrFormat(
           "only %d of %d starting points of the sampler have a finite cost", kept, start.rows()));
     }
@@ -140,4 +140,4 @@ absl::StatusOr<Particles> SamplePosterior(const Cost& cost, const Vector& lower,
   return Sampler(cost, lower, upper, options).Run(guesses, stop);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,14 +1,14 @@
 #include "core/bayes/prior.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Matrix Independent(size_t count) {
@@ -21,7 +21,7 @@ double NormalDensity(double z) { return Germ::Normal().Density(z); }
 }  // namespace
 
 Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlation)
-    : parameters_(std::move(parameters)), factor_(correlation.llt().matrixL()) {
+    : parameters_(std::move(parameters)), factor_(CholeskyFactor(correlation).Lower()) {
   POLYEST_CHECK(!parameters_.empty());
   const int n = dimension();
   lower_.resize(n);
@@ -31,7 +31,8 @@ Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlati
     POLYEST_CHECK(parameter.scale > 0);
     in_copula_.push_back((correlation.row(i).array() != 0).count() > 1);
     correlated_ = correlated_ || in_copula_.back();
-    germs_.push_back(in_copula_.back() ? Germ::Normal() : parameter.germ);
+    marginal_germs_.push_back(Germ(parameter.germ));
+    germs_.push_back(in_copula_.back() ? Germ::Normal() : marginal_germs_.back());
     lower_[i] = germs_.back().Lower();
     upper_[i] = germs_.back().Upper();
   }
@@ -49,12 +50,12 @@ absl::StatusOr<Prior> Prior::Make(std::vector<UncertainParameter> parameters,
 bool Prior::IsCurved(int parameter) const {
   const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
   return marginal.map != ParameterMap::kAffine ||
-         germs_[static_cast<size_t>(parameter)] != marginal.germ;
+         germs_[static_cast<size_t>(parameter)] != marginal_germs_[static_cast<size_t>(parameter)];
 }
 
 double Prior::MarginalGerm(int parameter, double z) const {
   if (!IsCorrelated(parameter)) return z;
-  return parameters_[static_cast<size_t>(parameter)].germ.OfNormalScore(z);
+  return marginal_germs_[static_cast<size_t>(parameter)].OfNormalScore(z);
 }
 
 double Prior::OfScore(int parameter, double z) const {
@@ -65,8 +66,15 @@ double Prior::ScoreOf(int parameter, double theta) const {
   const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
   const double x = marginal.ToGerm(theta);
   if (!IsCorrelated(parameter)) return x;
-  const bool inside = marginal.germ.Lower() <= x && x <= marginal.germ.Upper();
-  return inside ? marginal.germ.NormalScore(x) : std::numeric_limits<double>::quiet_NaN();
+  const Germ& germ = marginal_germs_[static_cast<size_t>(parameter)];
+  const bool inside = germ.Lower() <= x && x <= germ.Upper();
+  return inside ? germ.NormalScore(x) : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::vector<std::string> Prior::Names() const {
+  std::vector<std::string> names;
+  for (const UncertainParameter& parameter : parameters_) names.push_back(parameter.name);
+  return names;
 }
 
 Vector Prior::ToScores(const ConstVectorRef& xi) const {
@@ -76,7 +84,7 @@ Vector Prior::ToScores(const ConstVectorRef& xi) const {
 
 Vector Prior::OfScores(const ConstVectorRef& z) const {
   if (!correlated_) return z;
-  return factor_.triangularView<Eigen::Lower>().solve(z);
+  return SolveLower(factor_, Vector(z));
 }
 
 Vector Prior::ToParameters(const ConstVectorRef& xi) const {
@@ -100,9 +108,10 @@ Matrix Prior::Jacobian(const ConstVectorRef& xi) const {
     const UncertainParameter& marginal = parameters_[static_cast<size_t>(i)];
     const double x = MarginalGerm(i, z[i]);
     slope[i] = marginal.Slope(x);
-    if (!IsCorrelated(i) || marginal.germ.family() == GermFamily::kNormal) continue;
+    const Germ& germ = marginal_germs_[static_cast<size_t>(i)];
+    if (!IsCorrelated(i) || germ.family() == GermFamily::kNormal) continue;
     // So near a bound that x has rounded to it, θ does not change any more.
-    const double density = marginal.germ.Density(x);
+    const double density = germ.Density(x);
     slope[i] *= density > 0 ? NormalDensity(z[i]) / density : 0;
   }
   return slope.asDiagonal() * factor_;
@@ -160,4 +169,4 @@ Vector Prior::Curvature(const ConstVectorRef& xi) const {
   return curvature;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,30 +14,31 @@
 #include <vector>
 
 #include "core/bayes/copula.h"
-#include "core/bayes/uncertain_parameter.h"
 #include "core/chaos/germ.h"
 #include "core/common/types.h"
+#include "polyest/uncertain_parameter.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Prior {
  public:
   // Independent parameters, at least one.
   explicit Prior(std::vector<UncertainParameter> parameters);
-  // INVALID_ARGUMENT as of CorrelationMatrix. At least one parameter.
+  // Requires at least one parameter; returns INVALID_ARGUMENT as CorrelationMatrix does.
   static absl::StatusOr<Prior> Make(std::vector<UncertainParameter> parameters,
                                     const std::vector<Correlation>& correlations);
 
   int dimension() const { return static_cast<int>(parameters_.size()); }
   const std::vector<UncertainParameter>& parameters() const { return parameters_; }
-  // Of ξ_i and of z_i: normal for a correlated parameter, whatever its marginal's germ.
+  std::vector<std::string> Names() const;  // of the parameters, in their order
+  // The germs of ξ_i and z_i: normal for a correlated parameter, whatever the germ of its marginal.
   const std::vector<Germ>& germs() const { return germs_; }
   const Matrix& factor() const { return factor_; }  // F
   bool correlated() const { return correlated_; }
   bool IsCurved(int parameter) const;  // whether t_i is anything but affine
 
   Vector ToParameters(const ConstVectorRef& xi) const;
-  // ±∞ at a bound of a correlated parameter; not a number outside of its bounds.
+  // Returns ±∞ at a bound of a correlated parameter, and not a number outside of its bounds.
   Vector ToGerm(const ConstVectorRef& theta) const;
   Matrix Jacobian(const ConstVectorRef& xi) const;  // ∂θ/∂ξ, n × n
 
@@ -45,20 +46,19 @@ class Prior {
   Vector OfScores(const ConstVectorRef& z) const;     // ξ = F⁻¹ z
   double OfScore(int parameter, double z) const;      // θ_i = t_i(z_i)
   double ScoreOf(int parameter, double theta) const;  // its inverse, as ToGerm
-  // The value x of the parameter's own germ, θ_i = parameters()[i].ToParameter(x): z unless
-  // correlated.
+  // Returns the value x of the parameter's own germ, θ_i = parameters()[i].ToParameter(x); it is z
+  // for a parameter that is not correlated.
   double MarginalGerm(int parameter, double z) const;
 
   Vector Mean() const;                   // of θ
   Vector StandardDeviation() const;      // of θ
   Vector GermStandardDeviation() const;  // of ξ, and of z
-  // Ω in germ coordinates; ±∞ where the germ has no bound.
+  // The bounds of Ω in germ coordinates; ±∞ where the germ has none.
   const Vector& lower() const { return lower_; }
   const Vector& upper() const { return upper_; }
   bool Contains(const ConstVectorRef& xi) const;  // ξ ∈ Ω
 
-  // J_apriori and its derivatives; +∞ outside Ω. gradient and curvature (the diagonal of the
-  // Hessian) are n.
+  // J_apriori (+∞ outside Ω), its gradient (n) and its curvature, the diagonal of the Hessian (n).
   double NegativeLogDensity(const ConstVectorRef& xi) const;
   Vector Gradient(const ConstVectorRef& xi) const;
   Vector Curvature(const ConstVectorRef& xi) const;
@@ -69,6 +69,7 @@ class Prior {
   bool IsCorrelated(int parameter) const { return in_copula_[static_cast<size_t>(parameter)]; }
 
   std::vector<UncertainParameter> parameters_;
+  std::vector<Germ> marginal_germs_;  // of the parameters, whether correlated or not
   std::vector<Germ> germs_;
   std::vector<bool> in_copula_;
   bool correlated_ = false;
@@ -76,4 +77,4 @@ class Prior {
   Vector lower_, upper_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 Region Region::WholePrior(int dimension) {
   return Region(Vector::Zero(dimension), Matrix::Identity(dimension, dimension));
@@ -14,14 +14,16 @@ Region Region::WholePrior(int dimension) {
 Region::Region(Vector centre, Matrix axes)
     : centre_(std::move(centre)), axes_(std::move(axes)), factors_(axes_) {
   POLYEST_CHECK(axes_.rows() == centre_.size() && axes_.cols() == centre_.size());
-  POLYEST_CHECK(std::abs(factors_.determinant()) > 0);
+  POLYEST_CHECK(std::abs(factors_.Determinant()) > 0);
 }
 
-double Region::Volume() const { return std::abs(factors_.determinant()); }
+double Region::Volume() const { return std::abs(factors_.Determinant()); }
 
 Vector Region::ToGerm(const ConstVectorRef& eta) const { return centre_ + axes_ * eta; }
 
-Vector Region::ToLocal(const ConstVectorRef& xi) const { return factors_.solve(xi - centre_); }
+Vector Region::ToLocal(const ConstVectorRef& xi) const {
+  return factors_.Solve(Vector(xi - centre_));
+}
 
 Matrix Region::ManyToGerm(const ConstMatrixRef& etas) const {
   Matrix xis(etas.rows(), etas.cols());
@@ -32,7 +34,7 @@ Matrix Region::ManyToGerm(const ConstMatrixRef& etas) const {
 
 Matrix Region::ManyToLocal(const ConstMatrixRef& xis) const {
   if (xis.rows() == 0) return Matrix(0, dimension());  // Eigen's solver reads the first column
-  return factors_.solve((xis.rowwise() - centre_.transpose()).transpose()).transpose();
+  return factors_.SolveRows(xis.rowwise() - centre_.transpose());
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,37 +1,35 @@
 #pragma once
 
-// The region in which an expansion interpolates, an affine image of the expansion's own
-// coordinates η in the space of the germs,  ξ = centre + axes η.
-// At first it is the whole prior (centre 0, axes the identity, the germs' own polynomials);
-// re-expansion moves it to where the posterior is (then η ∈ [−1, 1]^n and Legendre polynomials).
-// The prior density and Ω stay the original ones.
+// The region in which an expansion interpolates: an affine image of the expansion's own coordinates
+// η in the space of the germs, ξ = centre + axes η. At first it is the whole prior (centre 0, axes
+// the identity, the germs' own polynomials); re-expansion moves it to where the posterior is (then
+// η ∈ [−1, 1]^n and Legendre polynomials). The prior density and Ω do not change.
 
-#include <Eigen/LU>
-
+#include "core/common/linear_algebra.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Region {
  public:
   static Region WholePrior(int dimension);
-  // axes (n × n) must be invertible.
+  // `axes` (n × n) must be invertible.
   Region(Vector centre, Matrix axes);
 
   int dimension() const { return static_cast<int>(centre_.size()); }
   const Vector& centre() const { return centre_; }
   const Matrix& axes() const { return axes_; }
-  double Volume() const;  // |det axes|, in units of the cube's own
+  double Volume() const;  // |det axes|, in units of the volume of the cube of η
   Vector ToGerm(const ConstVectorRef& eta) const;
   Vector ToLocal(const ConstVectorRef& xi) const;
-  // Many at once, W × n.
+  // Map W points at once, W × n.
   Matrix ManyToGerm(const ConstMatrixRef& etas) const;
   Matrix ManyToLocal(const ConstMatrixRef& xis) const;
 
  private:
   Vector centre_;
   Matrix axes_;
-  Eigen::PartialPivLU<Matrix> factors_;
+  LuFactors factors_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,26 +10,27 @@
 
 #include "core/bayes/regularization_prior.h"
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kLowest = 1e-4, kHighest = 1e4;
 constexpr int kValues = 33;
 constexpr double kPrecision = 1e-4;  // of log α²
 // The evidence must fall by this much to either end of the range.
-constexpr double kLeastFall = 0.5;
+constexpr double kMinFall = 0.5;
 
 RegularizationChoice Undetermined(std::string reason) { return {false, 1, std::move(reason)}; }
 
 RegularizationChoice Determined(double regularization) { return {true, regularization, ""}; }
 
-// J of the data against what the noise allows, 2 J_mismatch − (N − γ).
+// Returns 2 J_mismatch − (N − γ), the mismatch beyond what the noise allows.
 double Discrepancy(const RegularizedMinimum& minimum, double degrees) {
   return 2 * minimum.cost.mismatch - (degrees - minimum.effective_parameters);
 }
 
-// Where a function of one maximum in [lower, upper] has it, by golden section.
+// Returns the place of the only maximum of a function in [lower, upper], by golden section.
 double Maximize(const std::function<double(double)>& function, double lower, double upper) {
   const double section = 1 / std::numbers::phi;
   double left = upper - section * (upper - lower), right = lower + section * (upper - lower);
@@ -49,9 +49,9 @@ double Maximize(const std::function<double(double)>& function, double lower, dou
   return 0.5 * (lower + upper);
 }
 
-// Laplace's log p(z | α²) but for −J: −log Z + (n/2) log 2π − ½ log det H, with H's eigenvalues in
-// units of the deviations of the prior of weight α², and the share of each parameter that the data
-// fit.
+// Returns Laplace's log p(z | α²) without −J: −log Z + (n/2) log 2π − ½ log det H, with H's
+// eigenvalues in units of the deviations of the prior of weight α², and the share of each parameter
+// that the data fit.
 double LogVolume(const Cost& cost, const Vector& deviation, const Vector& curvature,
                  const Vector& fitted) {
   double sum = 0;
@@ -76,7 +76,7 @@ std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstV
   for (int i = 0; i < n; ++i) {
     deviation[i] = std::sqrt(WeightedVariance(germs[static_cast<size_t>(i)], alpha_squared));
   }
-  const Matrix unscale = cost.region().axes().inverse() * deviation.asDiagonal();
+  const Matrix unscale = Inverse(cost.region().axes()) * deviation.asDiagonal();
   const Matrix mismatch = unscale.transpose() * cost.MismatchHessian(eta) * unscale;
   const Matrix total = unscale.transpose() * cost.Hessian(eta) * unscale;
   RegularizedMinimum minimum;
@@ -85,14 +85,12 @@ std::optional<RegularizedMinimum> DescribeMinimum(const Cost& cost, const ConstV
   minimum.cost = cost.Evaluate(eta);
   if (!total.allFinite() || !std::isfinite(minimum.cost.total)) return std::nullopt;
   // γ_i = Σ_k V_ik² λ_k/(1 + λ_k)
-  const Eigen::SelfAdjointEigenSolver<Matrix> data(mismatch);
-  const Vector information = data.eigenvalues().cwiseMax(0);
-  const Vector fitted = data.eigenvectors().cwiseAbs2() *
-                        information.cwiseQuotient((information.array() + 1).matrix());
+  const SymmetricEigen data = DecomposeSymmetric(mismatch);
+  const Vector information = data.values.cwiseMax(0);
+  const Vector fitted =
+      data.vectors.cwiseAbs2() * information.cwiseQuotient((information.array() + 1).matrix());
   minimum.effective_parameters = fitted.sum();
-  const Vector curvature = Eigen::SelfAdjointEigenSolver<Matrix>(total, Eigen::EigenvaluesOnly)
-                               .eigenvalues()
-                               .cwiseMax(1);
+  const Vector curvature = SymmetricEigenvalues(total).cwiseMax(1);
   minimum.log_evidence = -minimum.cost.total + LogVolume(cost, deviation, curvature, fitted);
   return minimum;
 }
@@ -152,7 +150,7 @@ RegularizationChoice ChooseByEvidence(const std::vector<RegularizedMinimum>& poi
   };
   const auto best = std::max_element(points.begin(), points.end(), less);
   const double ends = std::max(points.front().log_evidence, points.back().log_evidence);
-  if (!(best->log_evidence - ends >= kLeastFall)) {
+  if (!(best->log_evidence - ends >= kMinFall)) {
     return Undetermined(absl::StrFormat(
         "the data are about as probable with α² = %.3g as with any other (its log evidence is "
         "%.3g below the greatest)",
@@ -168,4 +166,4 @@ RegularizationChoice ChooseByEvidence(const std::vector<RegularizedMinimum>& poi
                                       std::log(std::next(best)->regularization))));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

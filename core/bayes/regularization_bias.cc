@@ -1,18 +1,18 @@
 #include "core/bayes/regularization_bias.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/bayes/minimizer.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kOffBound = 1e-9;  // kept from a bound of Ω, of its width (or of 1)
 constexpr double kAtBound = 1e-6;   // counts as lying at it
-// How far from the prior's mean and from ξ̂ a germ without bounds is looked for, in prior standard
-// deviations.
+// Distance from the prior's mean and from ξ̂ within which a germ without bounds is searched, in
+// prior standard deviations.
 constexpr double kReach = 20;
 
 double Width(const Prior& prior, int i) {
@@ -20,7 +20,7 @@ double Width(const Prior& prior, int i) {
   return std::isfinite(width) ? width : 1;
 }
 
-// Ω, cut where it has no bound.
+// Returns Ω, cut off where it has no bound.
 void SearchBox(const Prior& prior, const Vector& xi, MinimizationProblem& search) {
   const Vector deviation = prior.GermStandardDeviation();
   const int n = prior.dimension();
@@ -36,15 +36,16 @@ void SearchBox(const Prior& prior, const Vector& xi, MinimizationProblem& search
   }
 }
 
-// H_mismatch with respect to the germ, its negative curvatures (in units of the prior's) left out.
+// Returns H_mismatch with respect to the germ, without its negative curvatures (in units of the
+// prior's).
 Matrix ConvexMismatchHessian(const Cost& cost, const ConstVectorRef& eta) {
   const Vector deviation = cost.prior().GermStandardDeviation();
-  const Matrix unscale = cost.region().axes().inverse() * deviation.asDiagonal();
+  const Matrix unscale = Inverse(cost.region().axes()) * deviation.asDiagonal();
   const Matrix scaled = unscale.transpose() * cost.MismatchHessian(eta) * unscale;
   if (!scaled.allFinite()) return Matrix::Zero(deviation.size(), deviation.size());
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(scaled);
-  const Matrix root = deviation.cwiseInverse().asDiagonal() * eigen.eigenvectors() *
-                      eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const SymmetricEigen eigen = DecomposeSymmetric(scaled);
+  const Matrix root = deviation.cwiseInverse().asDiagonal() * eigen.vectors *
+                      eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
   return root * root.transpose();
 }
 
@@ -59,7 +60,7 @@ Vector RegularizationBias(const Cost& cost, const ConstVectorRef& eta, const Sto
   const Matrix hessian = ConvexMismatchHessian(cost, eta);
   Vector gradient(eta.size());
   cost.EvaluateWithGradient(eta, gradient);
-  const Vector of_total = cost.region().axes().transpose().partialPivLu().solve(gradient);
+  const Vector of_total = SolveTransposed(cost.region().axes(), gradient);
   Vector g = -cost.regularization() * prior.Gradient(xi);
   for (int i = 0; i < prior.dimension(); ++i) {
     const double near = kAtBound * Width(prior, i);
@@ -75,4 +76,4 @@ Vector RegularizationBias(const Cost& cost, const ConstVectorRef& eta, const Sto
   return prior.ToParameters(xi) - prior.ToParameters(bayes.point);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

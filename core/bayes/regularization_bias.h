@@ -4,23 +4,24 @@
 // that Bayes' rule asks for, θ̂(α²) − θ̂(1), in the parameters' units. More weight moves it towards
 // the prior's most likely value, less away from it.
 //
-// α² = 1 and not the minimum of the mismatch is what it is counted from: in a direction that the
-// data do not inform, the mismatch has no minimum, and what the prior at its own weight does there
-// is not a bias but knowledge.
+// The bias is counted from α² = 1 and not from the minimum of the mismatch: in a direction that the
+// data do not inform the mismatch has no minimum, and the effect of the prior at its own weight is
+// knowledge and not a bias.
 //
-// ξ̂(1) is the minimum of J with α² = 1 where the mismatch is taken for its own second-order
-// expansion about ξ̂ = ξ̂(α²) (concave directions as flat ones), the prior term as it is:
+// ξ̂(1) is the minimum of J with α² = 1, with the mismatch replaced by its second-order expansion
+// about ξ̂ = ξ̂(α²) (concave directions count as flat) and the prior term unchanged:
 //   ξ̂(1) = argmin_Ω  g·(ξ − ξ̂) + ½ (ξ − ξ̂)ᵀ H_mismatch (ξ − ξ̂) + J_apriori(ξ),
-// g = −α² ∇J_apriori(ξ̂) the mismatch's gradient at the minimum (its own where ξ̂ lies at a bound of
-// Ω, where J's need not vanish). Exact for outputs linear in the germs, and where they are not it
-// does not ask the expansion about places where it is not trusted. A flat direction has no bias.
+// g = −α² ∇J_apriori(ξ̂) is the mismatch's gradient at the minimum (computed directly where ξ̂ lies
+// at a bound of Ω, because the gradient of J need not vanish there). The result is exact for
+// outputs linear in the germs; for others it avoids evaluating the expansion where it is not
+// trusted. A flat direction has no bias.
 
 #include "core/bayes/cost.h"
-#include "core/common/stop.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// n; eta: the minimum of the cost, local coordinates. 0 for α² = 1.
+// Returns the bias (n); 0 for α² = 1. `eta` is the minimum of the cost in local coordinates.
 Vector RegularizationBias(const Cost& cost, const ConstVectorRef& eta, const Stop& stop);
 
-}  // namespace polyest
+}  // namespace polyest::internal

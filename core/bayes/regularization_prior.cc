@@ -8,12 +8,12 @@
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 const double kLogTwoPi = std::log(2 * std::numbers::pi);
 
-// From here on the probability is found from Mills' ratio, since it may be too small a number.
+// Beyond it the probability is computed from Mills' ratio, because it may underflow.
 constexpr double kTail = 30;
 
 // M(x) = ∫_x^∞ φ ÷ φ(x) = 1/(x + 1/(x + 2/(x + 3/(x + …)))), to rounding for x ≥ kTail.
@@ -95,4 +95,4 @@ double LogLaplaceNormalization(const Germ& germ, double regularization) {
          0.5 * (kLogTwoPi - std::log(std::max(curvature, 1 / variance)));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,7 +1,7 @@
 #pragma once
 
-// The prior that a weight α² of the prior term stands for. exp(−α² J_apriori) = ρ(ξ)^{α²} is a
-// density but for its integral, which depends on α² and is that of each germ apart:
+// The prior that belongs to a weight α² of the prior term: exp(−α² J_apriori) = ρ(ξ)^{α²}, divided
+// by its integral, which depends on α² and is a product over the germs:
 //
 //   Z(α²) = ∏ Z_i,  Z_i = ∫ ρ_i^{α²} dξ_i
 //   normal            (2π)^{(1−α²)/2}/√α²                       N(0, 1/α²)
@@ -16,17 +16,17 @@
 
 #include "core/chaos/germ.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// log Z_i. α² > 0.
+// Returns log Z_i; α² > 0.
 double LogNormalization(const Germ& germ, double regularization);
 
-// Variance of ρ_i^{α²}/Z_i; of a truncated normal an upper bound, the lesser of the normal's and of
-// the uniform's between its bounds. α² > 0.
+// Returns the variance of ρ_i^{α²}/Z_i, α² > 0; for a truncated normal an upper bound, the smaller
+// of the variances of the normal and of the uniform density between its bounds.
 double WeightedVariance(const Germ& germ, double regularization);
 
-// log Z_i as Laplace's approximation about the germ's mode has it, with a curvature of at least the
-// inverse of WeightedVariance: exact for the normal one. α² > 0.
+// Returns Laplace's approximation of log Z_i about the germ's mode, α² > 0, with a curvature of at
+// least the inverse of WeightedVariance. It is exact for a normal germ.
 double LogLaplaceNormalization(const Germ& germ, double regularization);
 
-}  // namespace polyest
+}  // namespace polyest::internal

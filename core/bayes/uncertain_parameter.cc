@@ -1,4 +1,4 @@
-#include "core/bayes/uncertain_parameter.h"
+#include "polyest/uncertain_parameter.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -6,61 +6,57 @@
 #include <cmath>
 #include <utility>
 
+#include "core/chaos/germ.h"
 #include "core/chaos/truncated_normal.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 // Squares of anything in between are still finite numbers.
-constexpr double kLeastScale = 1e-100;
+constexpr double kMinScale = 1e-100;
 constexpr double kGreatestMagnitude = 1e100;
-// Past it a beta or gamma density is a normal one to a percent.
+// Beyond it a beta or gamma density is normal to within a percent.
 constexpr double kGreatestShape = 10'000;
 // Standard deviation ÷ mean of a lognormal: e^(37 scale) is still a number, and 100 is a factor of
 // 430 either way.
 constexpr double kGreatestRatio = 100;
 
-absl::Status Invalid(const std::string& name, const char* family, const std::string& rule) {
-  return absl::InvalidArgumentError(absl::StrCat("uncertain ", name, ": ", family, ": ", rule));
-}
-
 absl::Status CheckName(const std::string& name) {
-  if (name.empty()) return absl::InvalidArgumentError("uncertain: name must not be empty");
+  if (name.empty()) return InvalidField(FieldPath(), "name must not be empty");
   return absl::OkStatus();
 }
 
-absl::Status CheckLocation(const std::string& name, const char* family, const char* field,
-                           double value) {
+absl::Status CheckLocation(const char* family, const char* field, double value) {
   if (std::abs(value) <= kGreatestMagnitude) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must be finite and at most ", kGreatestMagnitude,
-                              " in magnitude"));
+  return InvalidField(family, absl::StrCat(field, " ", value, " must be finite and at most ",
+                                           kGreatestMagnitude, " in magnitude"));
 }
 
-absl::Status CheckScale(const std::string& name, const char* family, const char* field,
-                        double value) {
-  if (!(value > 0)) return Invalid(name, family, absl::StrCat(field, " ", value, " must be > 0"));
-  if (value >= kLeastScale && value <= kGreatestMagnitude) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must lie between ", kLeastScale, " and ",
-                              kGreatestMagnitude));
+absl::Status CheckScale(const char* family, const char* field, double value) {
+  if (!(value > 0)) return InvalidField(family, absl::StrCat(field, " ", value, " must be > 0"));
+  if (value >= kMinScale && value <= kGreatestMagnitude) return absl::OkStatus();
+  return InvalidField(family, absl::StrCat(field, " ", value, " must lie between ", kMinScale,
+                                           " and ", kGreatestMagnitude));
 }
 
-absl::Status CheckShape(const std::string& name, const char* family, const char* field,
-                        double value) {
+absl::Status CheckShape(const char* family, const char* field, double value) {
   if (value >= 1 && value <= kGreatestShape) return absl::OkStatus();
-  return Invalid(name, family,
-                 absl::StrCat(field, " ", value, " must lie between 1 and ", kGreatestShape));
+  return InvalidField(family,
+                      absl::StrCat(field, " ", value, " must lie between 1 and ", kGreatestShape));
 }
 
-absl::Status CheckBounds(const std::string& name, const char* family, double lower, double upper) {
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, family, "lower", lower));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, family, "upper", upper));
+absl::Status CheckBounds(const char* family, double lower, double upper) {
+  POLYEST_RETURN_IF_ERROR(CheckLocation(family, "lower", lower));
+  POLYEST_RETURN_IF_ERROR(CheckLocation(family, "upper", upper));
   if (!(lower < upper)) {
-    return Invalid(name, family, absl::StrCat("lower ", lower, " must be below upper ", upper));
+    return InvalidField(family, absl::StrCat("lower ", lower, " must be below upper ", upper));
   }
-  return CheckScale(name, family, "upper - lower", upper - lower);
+  return CheckScale(family, "upper - lower", upper - lower);
 }
 
 }  // namespace
@@ -68,15 +64,15 @@ absl::Status CheckBounds(const std::string& name, const char* family, double low
 absl::StatusOr<UncertainParameter> UncertainParameter::Normal(std::string name, double mean,
                                                               double std_dev) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, "normal", "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "normal", "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckLocation("normal", "mean", mean));
+  POLYEST_RETURN_IF_ERROR(CheckScale("normal", "standard deviation", std_dev));
   return UncertainParameter{std::move(name), Germ::Normal(), mean, std_dev};
 }
 
 absl::StatusOr<UncertainParameter> UncertainParameter::Uniform(std::string name, double lower,
                                                                double upper) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckBounds(name, "uniform", lower, upper));
+  POLYEST_RETURN_IF_ERROR(CheckBounds("uniform", lower, upper));
   return UncertainParameter{std::move(name), Germ::Uniform(), (lower + upper) / 2,
                             (upper - lower) / 2};
 }
@@ -85,9 +81,9 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Beta(std::string name, do
                                                             double beta, double lower,
                                                             double upper) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "beta", "alpha", alpha));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "beta", "beta", beta));
-  POLYEST_RETURN_IF_ERROR(CheckBounds(name, "beta", lower, upper));
+  POLYEST_RETURN_IF_ERROR(CheckShape("beta", "alpha", alpha));
+  POLYEST_RETURN_IF_ERROR(CheckShape("beta", "beta", beta));
+  POLYEST_RETURN_IF_ERROR(CheckBounds("beta", lower, upper));
   return UncertainParameter{std::move(name), Germ::Beta(alpha, beta), (lower + upper) / 2,
                             (upper - lower) / 2};
 }
@@ -95,21 +91,21 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Beta(std::string name, do
 absl::StatusOr<UncertainParameter> UncertainParameter::Gamma(std::string name, double shape,
                                                              double scale, double shift) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckShape(name, "gamma", "shape", shape));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "gamma", "scale", scale));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, "gamma", "shift", shift));
+  POLYEST_RETURN_IF_ERROR(CheckShape("gamma", "shape", shape));
+  POLYEST_RETURN_IF_ERROR(CheckScale("gamma", "scale", scale));
+  POLYEST_RETURN_IF_ERROR(CheckLocation("gamma", "shift", shift));
   return UncertainParameter{std::move(name), Germ::Gamma(shape), shift, scale};
 }
 
 absl::StatusOr<UncertainParameter> UncertainParameter::Lognormal(std::string name, double mean,
                                                                  double std_dev) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "lognormal", "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, "lognormal", "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "mean", mean));
+  POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "standard deviation", std_dev));
   if (std_dev > kGreatestRatio * mean) {
-    return Invalid(name, "lognormal",
-                   absl::StrCat("standard deviation ", std_dev, " must be at most ", kGreatestRatio,
-                                " times the mean ", mean));
+    return InvalidField("lognormal",
+                        absl::StrCat("standard deviation ", std_dev, " must be at most ",
+                                     kGreatestRatio, " times the mean ", mean));
   }
   // scale² = log(1 + s²/m²), location = log m − scale²/2
   const double ratio = std_dev / mean;
@@ -121,22 +117,43 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Lognormal(std::string nam
 absl::StatusOr<UncertainParameter> UncertainParameter::TruncatedNormal(std::string name,
                                                                        double mean, double std_dev,
                                                                        double lower, double upper) {
-  constexpr char kFamily[] = "truncatedNormal";
+  constexpr char kFamily[] = "truncated_normal";
   POLYEST_RETURN_IF_ERROR(CheckName(name));
-  POLYEST_RETURN_IF_ERROR(CheckLocation(name, kFamily, "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale(name, kFamily, "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckLocation(kFamily, "mean", mean));
+  POLYEST_RETURN_IF_ERROR(CheckScale(kFamily, "standard deviation", std_dev));
   if (!(lower < upper)) {
-    return Invalid(name, kFamily, absl::StrCat("lower ", lower, " must be below upper ", upper));
+    return InvalidField(kFamily, absl::StrCat("lower ", lower, " must be below upper ", upper));
   }
   const double a = (lower - mean) / std_dev, b = (upper - mean) / std_dev;
   const double probability = NormalProbability(a, b);
-  if (!(probability >= Germ::kLeastTruncatedProbability)) {
-    return Invalid(name, kFamily,
-                   absl::StrFormat("only %g of the normal's probability lies between lower %g and "
-                                   "upper %g; it must be at least %g",
-                                   probability, lower, upper, Germ::kLeastTruncatedProbability));
+  if (!(probability >= Germ::kMinTruncatedProbability)) {
+    return InvalidField(
+        kFamily, absl::StrFormat("only %g of the normal's probability lies between lower %g and "
+                                 "upper %g; it must be at least %g",
+                                 probability, lower, upper, Germ::kMinTruncatedProbability));
   }
   return UncertainParameter{std::move(name), Germ::TruncatedNormal(a, b), mean, std_dev};
+}
+
+absl::Status UncertainParameter::Validate() const {
+  const auto is_shape = [](double shape) { return shape >= 1 && shape <= kGreatestShape; };
+  bool valid = !name.empty() && std::abs(location) <= kGreatestMagnitude && scale >= kMinScale &&
+               scale <= kGreatestMagnitude;
+  // A lognormal is the exponential of a normal, of a ratio of at most kGreatestRatio.
+  if (map == ParameterMap::kExponential) {
+    valid = valid && germ.family == GermFamily::kNormal &&
+            std::expm1(scale * scale) <= 1.0001 * kGreatestRatio * kGreatestRatio;
+  }
+  if (germ.family == GermFamily::kBeta) valid = valid && is_shape(germ.second);
+  if (germ.family == GermFamily::kBeta || germ.family == GermFamily::kGamma) {
+    valid = valid && is_shape(germ.first);
+  }
+  if (germ.family == GermFamily::kTruncatedNormal) {
+    valid = valid && germ.first < germ.second &&
+            NormalProbability(germ.first, germ.second) >= Germ::kMinTruncatedProbability;
+  }
+  if (valid) return absl::OkStatus();
+  return InvalidField(FieldPath(), "is not a prior that UncertainParameter's functions make");
 }
 
 double UncertainParameter::ToParameter(double xi) const {
@@ -156,13 +173,13 @@ double UncertainParameter::Slope(double xi) const {
 double UncertainParameter::Mean() const {
   // E[e^(μ + σξ)] = e^(μ + σ²/2)
   if (map == ParameterMap::kExponential) return std::exp(location + 0.5 * scale * scale);
-  return location + scale * germ.Mean();
+  return location + scale * Germ(germ).Mean();
 }
 
 double UncertainParameter::StandardDeviation() const {
   // mean √(e^(σ²) − 1)
   if (map == ParameterMap::kExponential) return Mean() * std::sqrt(std::expm1(scale * scale));
-  return scale * germ.StandardDeviation();
+  return scale * Germ(germ).StandardDeviation();
 }
 
 }  // namespace polyest

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kMostSweeps = 2000;
+constexpr int kMaxSweeps = 2000;
 constexpr double kProjected = 1e-14;
 
 }  // namespace
@@ -66,9 +64,9 @@ double UnitProblem::Value(const Vector& u, Vector* gradient) {
 
 Vector UnitProblem::Project(Vector u) const {
   u = u.cwiseMax(0).cwiseMin(1);
-  if (MostViolated(u) <= 0) return u;
+  if (MaxViolated(u) <= 0) return u;
   Matrix correction = Matrix::Zero(u.size(), rows_.rows() + 1);
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     const Vector before = u;
     for (Eigen::Index i = 0; i < rows_.rows(); ++i) {
       const Vector from = u + correction.col(i);
@@ -79,13 +77,13 @@ Vector UnitProblem::Project(Vector u) const {
     const Vector from = u + correction.rightCols<1>();
     u = from.cwiseMax(0).cwiseMin(1);
     correction.rightCols<1>() = from - u;
-    if ((u - before).cwiseAbs().maxCoeff() < kProjected && MostViolated(u) < kProjected) break;
+    if ((u - before).cwiseAbs().maxCoeff() < kProjected && MaxViolated(u) < kProjected) break;
   }
   return u;
 }
 
-double UnitProblem::MostViolated(const Vector& u) const {
+double UnitProblem::MaxViolated(const Vector& u) const {
   return rows_.rows() == 0 ? 0 : (rows_ * u - bounds_).maxCoeff();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,23 +1,23 @@
 #pragma once
 
-// A minimization problem as the solver likes it: in u = (x − lower)/(upper − lower), where the box
+// A minimization problem scaled for the solver: in u = (x − lower)/(upper − lower), where the box
 // is the unit cube, with constraint rows of unit length and the function divided by a scale.
 
 #include "core/bayes/minimizer.h"
-#include "core/common/stop.h"
 #include "core/common/types.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class UnitProblem {
  public:
-  // A constraint is active, or held, to this much of the unit cube.
+  // Tolerance, in units of the cube, to which a constraint is active or satisfied.
   static constexpr double kActive = 1e-10;
 
-  // Both must outlive it. A variable whose bounds are equal stays at 0.
+  // `problem` and `stop` must outlive the object. A variable whose bounds are equal stays at 0.
   UnitProblem(const MinimizationProblem& problem, const Stop& stop);
 
-  // rows u ≤ bounds.
+  // The constraints: rows u ≤ bounds.
   const Matrix& rows() const { return rows_; }
   const Vector& bounds() const { return bounds_; }
   double function_scale() const { return function_scale_; }
@@ -26,18 +26,20 @@ class UnitProblem {
   bool stopped() const { return stopped_; }
   bool PollStop() { return stopped_ = stopped_ || !stop_.Check().ok(); }
 
-  // Never outside the original bounds, whatever the rounding.
+  // Returns a point that is never outside the original bounds, despite rounding.
   Vector ToPoint(const Vector& u) const;
   Vector ToUnit(const Vector& x) const;
 
-  // Scaled value and gradient; +∞ and 0 where either is not finite. gradient may be null.
+  // Returns the scaled value and fills `gradient` unless it is null; +∞ and 0 if either is not
+  // finite.
   double Value(const Vector& u, Vector* gradient);
 
-  // The nearest point of the cube and the constraints, by Dykstra's alternating projections.
+  // Returns the nearest point in the cube and the constraints, by Dykstra's alternating
+  // projections.
   Vector Project(Vector u) const;
 
  private:
-  double MostViolated(const Vector& u) const;
+  double MaxViolated(const Vector& u) const;
 
   const MinimizationProblem& problem_;
   const Stop& stop_;
@@ -49,4 +51,4 @@ class UnitProblem {
   bool stopped_ = false;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,19 +7,19 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kTail = 5e-4;  // of the probability, left out of a density at each side
+constexpr double kLeftOut = 5e-4;  // of the probability, left out of a density at each side
 
 // Bins of equal width over the central part of the draws.
 class Bins {
  public:
   Bins(const ConstVectorRef& draws, const ConstVectorRef& weights, int count) : count_(count) {
     const WeightedQuantiles quantile(draws, weights);
-    lowest_ = quantile(kTail);
-    width_ = (quantile(1 - kTail) - lowest_) / count;
-    // Not at all varying, or so little that the density would overflow.
+    lowest_ = quantile(kLeftOut);
+    width_ = (quantile(1 - kLeftOut) - lowest_) / count;
+    // The draws do not vary, or so little that the density would overflow.
     if (width_ > std::numeric_limits<double>::min()) return;
     count_ = 1;
     width_ = 1;
@@ -127,4 +127,4 @@ std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int cou
   return chosen;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,12 +7,12 @@
 #include "core/chaos/expansion.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights);
 double WeightedStandardDeviation(const ConstVectorRef& draws, const ConstVectorRef& weights);
 
-// Quantiles of one quantity: sorts once. The cumulative probability of the i-th smallest draw is
+// Quantiles of one quantity; sorts once. The cumulative probability of the i-th smallest draw is
 // Σ_{j<i} w_j + w_i/2, linear between draws.
 class WeightedQuantiles {
  public:
@@ -24,22 +24,18 @@ class WeightedQuantiles {
   Vector cumulative_;
 };
 
-// A histogram over the central 99.9 % of the probability, with bins of equal width, in units of
-// probability per unit of the quantity: its area is what lies between, not 1. One bin of unit width
-// and density 1 when the draws do not vary.
+// Returns a histogram over the central 99.9 % of the probability, with bins of equal width, in
+// probability per unit of the quantity; its area is that probability and not 1. Returns one bin of
+// unit width and density 1 if the draws do not vary.
 DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRef& weights,
                                 int bins);
 
-struct JointDensity {
-  Vector first, second;  // bin centres
-  Matrix density;        // first × second, in 1/(unit of the first · unit of the second)
-};
-// The same of two quantities, bins × bins.
+// Returns such a histogram of two quantities, bins × bins.
 JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
                                   const ConstVectorRef& weights, int bins);
 
-// Rows of `count` equally weighted draws among the weighted ones, by systematic resampling with
-// evenly spaced pointers: the same for the same arguments, and each as often as its weight says.
+// Returns the rows of `count` equally weighted draws among the weighted ones, by systematic
+// resampling with evenly spaced pointers: deterministic, and each draw as often as its weight says.
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count);
 
-}  // namespace polyest
+}  // namespace polyest::internal

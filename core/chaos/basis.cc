@@ -6,10 +6,11 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// Points that EvaluateMany takes at a time: the columns of all terms then stay in the cache.
+// Number of points that EvaluateMany evaluates at a time, so that the columns of all terms stay in
+// the cache.
 constexpr Eigen::Index kPointsAtATime = 128;
 
 }  // namespace
@@ -160,4 +161,4 @@ void Basis::EvaluateMany(const ConstMatrixRef& points, Matrix& values) const {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,7 +1,7 @@
 #pragma once
 
-// The orthonormal polynomial basis (2) in n independent germs, of total degree p or of less by a
-// hyperbolic truncation (multi_index.h),
+// The orthonormal polynomial basis (2) in n independent germs, truncated at total degree p or
+// hyperbolically (multi_index.h),
 //   φ_s(ξ) = Π_k P^(k)_{j_sk}(ξ_k),   ∫ φ_s φ_r ρ dξ = δ_sr,   φ_0 = 1.
 //
 // The orthonormal polynomials of one germ follow from its monic recurrence, a_j and b_j, by
@@ -9,7 +9,7 @@
 // They are themselves terms of the basis, and every other term is the product of two earlier ones:
 // with k the last variable that occurs in φ_s,
 //   φ_s = φ_parent(s) · P^(k)_{j_sk}(ξ_k),   parent(s) = s without its variable k,
-// so that all S values cost one multiplication each and need no memory beside the result.
+// so each of the S values costs one multiplication, and no memory beside the result is needed.
 
 #include <utility>
 #include <vector>
@@ -18,13 +18,13 @@
 #include "core/chaos/multi_index.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Basis {
  public:
-  // germs not empty.
+  // `germs` must not be empty.
   Basis(std::vector<Germ> germs, Truncation truncation);
-  // Of total degree `order` ≥ 0.
+  // Truncates at the total degree `order` ≥ 0.
   Basis(std::vector<Germ> germs, int order) : Basis(std::move(germs), Truncation{order, 1}) {}
 
   int dimension() const { return static_cast<int>(germs_.size()); }
@@ -34,18 +34,18 @@ class Basis {
   const std::vector<Germ>& germs() const { return germs_; }
   const Eigen::ArrayXXi& indices() const { return indices_; }
 
-  // φ(ξ): xi is n, phi is S. Does not allocate.
+  // Writes φ(ξ) into `phi` (S); `xi` has n entries. Does not allocate.
   void Evaluate(const ConstVectorRef& xi, VectorRef phi) const;
-  // φ and ∂φ: gradient is S × n. Does not allocate.
+  // Writes φ(ξ) into `phi` and its derivatives by ξ into `gradient` (S × n). Does not allocate.
   void EvaluateWithGradient(const ConstVectorRef& xi, VectorRef phi, MatrixRef gradient) const;
-  // Σ_s weights_s ∇²φ_s(ξ): n × n, symmetric.
+  // Returns Σ_s weights_s ∇²φ_s(ξ), a symmetric n × n matrix.
   Matrix WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& weights) const;
-  // φ at W points at once: points is W × n, values is W × S (resized, which allocates only when its
-  // size changes). Vectorized over the points.
+  // Evaluates φ at W points: `points` is W × n; `values` becomes W × S and is allocated anew only
+  // if its size changes. Vectorized over the points.
   void EvaluateMany(const ConstMatrixRef& points, Matrix& values) const;
 
  private:
-  // How term s follows from earlier terms.
+  // The earlier terms that term s is the product of.
   struct Term {
     int variable;  // k, the last that occurs in it
     int degree;    // j_sk
@@ -65,4 +65,4 @@ class Basis {
   Matrix sqrt_b_;            // √b_j of germ k, (p + 1) × n
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

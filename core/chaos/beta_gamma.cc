@@ -2,24 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unsupported/Eigen/SpecialFunctions>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct ValueAndSlope {
   double value;
   double slope;
 };
 
-// The root of an increasing function between lower and upper (which may be infinite) by Newton's
-// method, safeguarded by bisection. The functions given to it are logarithms of probabilities of
+// Returns the root of an increasing function between lower and upper (which may be infinite) by
+// Newton's method, safeguarded by bisection. The functions are logarithms of probabilities of
 // log-concave densities, thus concave or convex: Newton's steps then come from one side only and
-// end quadratically, so that a last step of 1e-9, relative to the smaller of scale and x, leaves
-// an error of rounding size.
+// converge quadratically, so that a last step of 1e-9, relative to the smaller of scale and x,
+// leaves an error of rounding size.
 template <typename Function>
 double IncreasingRoot(const Function& function, double lower, double upper, double start,
                       double scale) {
@@ -30,7 +27,7 @@ double IncreasingRoot(const Function& function, double lower, double upper, doub
     if (std::abs(step) <= 1e-9 * std::min(std::abs(x), scale)) return x - step;
     (at_x.value < 0 ? lower : upper) = x;
     double next = x - step;
-    // Not a number too lands here: a probability that underflowed has no slope.
+    // NaN lands here too: a probability that underflowed has no slope.
     if (!(next > lower && next < upper)) {
       next = std::isinf(upper) ? 2 * lower + scale : 0.5 * (lower + upper);
     }
@@ -113,4 +110,4 @@ double UpperGammaQuantile(double shape, double q) {
   return IncreasingRoot(log_ratio, 0, kInfinity, shape, std::sqrt(shape));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

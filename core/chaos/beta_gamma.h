@@ -1,9 +1,9 @@
 #pragma once
 
-// The cumulative probabilities of the beta and gamma densities in their standard forms, and their
-// quantiles in the nearer tail.
+// Cumulative probabilities of the beta and gamma densities in their standard forms, and their
+// quantiles in the nearer tail. Arguments outside of the stated ranges are a programmer's error.
 
-namespace polyest {
+namespace polyest::internal {
 
 double LogGamma(double x);                  // log Γ(x), x > 0
 double LogBeta(double alpha, double beta);  // log B(α, β)
@@ -19,4 +19,4 @@ double LowerBetaQuantile(double alpha, double beta, double p);  // u with I_u(α
 double LowerGammaQuantile(double shape, double p);              // x with P(shape, x) = p
 double UpperGammaQuantile(double shape, double q);              // x with Q(shape, x) = q
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,38 +2,15 @@
 
 #include <absl/strings/str_format.h>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
-#include <limits>
+#include <utility>
 
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
-namespace {
-
-struct Conditioning {
-  Eigen::Index rank = 0;
-  double number = std::numeric_limits<double>::infinity();
-};
-
-// Of A, from its triangular factor, which has the same singular values: so no column has to be
-// pivoted. Of what is not finite: the worst.
-Conditioning ConditioningOf(const Matrix& triangular) {
-  const Eigen::BDCSVD<Matrix> svd(triangular);
-  Conditioning result;
-  if (svd.info() != Eigen::Success) return result;
-  result.rank = svd.rank();
-  const Vector& values = svd.singularValues();
-  const double smallest = values[values.size() - 1];
-  if (smallest > 0) result.number = values[0] / smallest;
-  return result;
-}
-
-}  // namespace
-
+namespace polyest::internal {
 absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
                                                             const ConstMatrixRef& points,
-                                                            double most_condition) {
+                                                            double max_condition) {
   POLYEST_CHECK(points.cols() == basis.dimension());
   const int terms = basis.size();
   if (points.rows() < terms) {
@@ -45,17 +22,18 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   POLYEST_CHECK(points.allFinite());
   CollocationMatrix result;
   basis.EvaluateMany(points, result.matrix_);
-  const Eigen::HouseholderQR<Matrix> qr(result.matrix_);
-  result.thin_q_ = qr.householderQ() * Matrix::Identity(points.rows(), terms);
-  result.triangular_ = qr.matrixQR().topRows(terms).triangularView<Eigen::Upper>();
+  ThinQr factors = DecomposeThinQr(result.matrix_);
+  result.thin_q_ = std::move(factors.q);
+  result.triangular_ = std::move(factors.r);
   result.workspace_.resize(points.rows());
+  // R has the singular values of A.
   const Conditioning conditioning = ConditioningOf(result.triangular_);
   result.condition_ = conditioning.number;
-  if (conditioning.rank < terms || !(result.condition_ <= most_condition)) {
+  if (conditioning.rank < terms || !(result.condition_ <= max_condition)) {
     return absl::FailedPreconditionError(absl::StrFormat(
         "collocation: %d points do not determine the %d terms of order %d (rank %d, condition "
         "number %.3g, at most %.3g allowed); use more points or a lower order",
-        points.rows(), terms, basis.order(), conditioning.rank, result.condition_, most_condition));
+        points.rows(), terms, basis.order(), conditioning.rank, result.condition_, max_condition));
   }
   return result;
 }
@@ -81,4 +59,4 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,23 +8,23 @@
 #include "core/chaos/basis.h"
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class CollocationMatrix {
  public:
-  // points is Q × n, Q ≥ S. FAILED_PRECONDITION, naming order, terms and points, when A has not
-  // full rank or its condition number passes `most_condition`.
+  // Factors A for `points` (Q × n, Q ≥ S). Returns FAILED_PRECONDITION, naming order, terms and
+  // points, if A lacks full rank or its condition number exceeds `max_condition`.
   static absl::StatusOr<CollocationMatrix> Factor(const Basis& basis, const ConstMatrixRef& points,
-                                                  double most_condition = 1e8);
+                                                  double max_condition = 1e8);
 
   int points() const { return static_cast<int>(matrix_.rows()); }  // Q
   int terms() const { return static_cast<int>(matrix_.cols()); }   // S
   double condition() const { return condition_; }                  // from the triangular factor
   const Matrix& matrix() const { return matrix_; }
 
-  // Least-squares coefficients (S × m) of the values (Q × m) at the points, and for each column the
-  // residual variance ‖Y − A c‖² / (Q − S); 0 when Q = S (interpolation shows no residual).
-  // Does not allocate when the results have their sizes already.
+  // Writes the least-squares coefficients (S × m) of the values (Q × m) at the points, and the
+  // residual variance ‖Y − A c‖² / (Q − S) of each column; 0 if Q = S, because interpolation leaves
+  // no residual. Does not allocate if the results have their sizes already.
   void Solve(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance);
 
  private:
@@ -37,4 +37,4 @@ class CollocationMatrix {
   double condition_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

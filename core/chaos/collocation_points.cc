@@ -7,8 +7,9 @@
 
 #include "core/chaos/gauss_rule.h"
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 std::vector<int> FirstPrimes(int count) {
@@ -84,15 +85,15 @@ class RadicalInverses {
 
 constexpr int kPlainDimensions = 3;
 
-absl::StatusOr<Matrix> GaussTensor(const std::vector<Germ>& germs, int order, int most_points) {
+absl::StatusOr<Matrix> GaussTensor(const std::vector<Germ>& germs, int order, int max_points) {
   const Eigen::Index side = order + 1, n = static_cast<Eigen::Index>(germs.size());
   Eigen::Index count = 1;
   for (Eigen::Index k = 0; k < n; ++k) {
-    if (count > most_points / side) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("expansion.points: a Gauss tensor grid of order ", order, " in ", n,
-                       " uncertain quantities has ", side, "^", n, " points, more than the limit ",
-                       most_points, "; use HALTON"));
+    if (count > max_points / side) {
+      return FieldError(absl::StatusCode::kResourceExhausted, "expansion.points",
+                        absl::StrCat("a Gauss tensor grid of order ", order, " in ", n,
+                                     " uncertain quantities has ", side, "^", n,
+                                     " points, more than the limit ", max_points, "; use HALTON"));
     }
     count *= side;
   }
@@ -125,9 +126,9 @@ Matrix UnitCubePoints(PointSet set, int dimension, int count) {
 }
 
 absl::StatusOr<Matrix> CollocationPoints(PointSet set, const std::vector<Germ>& germs, int order,
-                                         int count, int most_points) {
+                                         int count, int max_points) {
   POLYEST_CHECK(!germs.empty() && order >= 0);
-  if (set == PointSet::kGaussTensor) return GaussTensor(germs, order, most_points);
+  if (set == PointSet::kGaussTensor) return GaussTensor(germs, order, max_points);
   Matrix points = UnitCubePoints(set, static_cast<int>(germs.size()), count);
   for (Eigen::Index k = 0; k < points.cols(); ++k) {
     const Germ& germ = germs[static_cast<size_t>(k)];
@@ -136,4 +137,4 @@ absl::StatusOr<Matrix> CollocationPoints(PointSet set, const std::vector<Germ>& 
   return points;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

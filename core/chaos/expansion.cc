@@ -8,7 +8,7 @@
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 Expansion::Expansion(std::shared_ptr<const Basis> basis, Matrix coefficients)
     : basis_(std::move(basis)), coefficients_(std::move(coefficients)) {
@@ -46,7 +46,7 @@ DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins) {
   POLYEST_CHECK(samples.size() > 0 && bins >= 1 && samples.allFinite());
   const double lowest = samples.minCoeff();
   const double width = (samples.maxCoeff() - lowest) / bins;
-  // Not at all varying, or so little that the density would overflow.
+  // The samples do not vary, or so little that the density would overflow.
   if (!(width > std::numeric_limits<double>::min())) {
     return {Vector::Constant(1, lowest), Vector::Ones(1)};
   }
@@ -71,4 +71,4 @@ double QuantileOfSamples(Vector samples, double probability) {
   return (1 - fraction) * samples[below] + fraction * samples[above];
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,23 +1,19 @@
 #pragma once
 
 // A polynomial chaos expansion y(ξ) = Σ_s c_s φ_s(ξ) of m outputs in an orthonormal basis (3).
-//   mean = c_0,   standard deviation = √(Σ_{s≥1} c_s²)      (11)–(13) with the root put right.
+//   mean = c_0,   standard deviation = √(Σ_{s≥1} c_s²)      (11)–(13); the paper lacks the root.
 
 #include <memory>
 
 #include "core/chaos/basis.h"
 #include "core/common/types.h"
+#include "polyest/density.h"
 
-namespace polyest {
-
-struct DensityEstimate {
-  Vector value;    // bin centres, in the output's unit
-  Vector density;  // normalized to unit area, in 1/unit
-};
+namespace polyest::internal {
 
 class Expansion {
  public:
-  // coefficients is S × m.
+  // `coefficients` is S × m.
   Expansion(std::shared_ptr<const Basis> basis, Matrix coefficients);
 
   const Basis& basis() const { return *basis_; }
@@ -25,7 +21,8 @@ class Expansion {
   Vector Mean() const;
   Vector StandardDeviation() const;
   Vector Evaluate(const ConstVectorRef& xi) const;
-  // Values (count × m) at low-discrepancy draws of the germs; the same for the same count.
+  // Returns the values (count × m) at low-discrepancy draws of the germs, which depend on `count`
+  // only.
   Matrix Sample(int count) const;
 
  private:
@@ -33,10 +30,10 @@ class Expansion {
   Matrix coefficients_;
 };
 
-// Normalized histogram of finite samples; one bin holding all, of unit width, when they do not
-// vary.
+// Returns the normalized histogram of finite samples; one bin of unit width if they do not vary.
 DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins);
-// Empirical quantile by linear interpolation of the order statistics, 0 ≤ probability ≤ 1.
+// Returns the empirical quantile by linear interpolation of the order statistics, 0 ≤ probability
+// ≤ 1.
 double QuantileOfSamples(Vector samples, double probability);
 
-}  // namespace polyest
+}  // namespace polyest::internal

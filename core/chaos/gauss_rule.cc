@@ -1,18 +1,16 @@
 #include "core/chaos/gauss_rule.h"
 
-#include <Eigen/Eigenvalues>
-
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 GaussRule MakeGaussRule(const Germ& germ, int count) {
   const RecurrenceCoefficients recurrence = germ.Recurrence(count);
   const Vector off_diagonal = recurrence.b.tail(count - 1).cwiseSqrt();
-  Eigen::SelfAdjointEigenSolver<Matrix> solver;
-  solver.computeFromTridiagonal(recurrence.a, off_diagonal);
-  POLYEST_CHECK(solver.info() == Eigen::Success);
-  return {solver.eigenvalues(), solver.eigenvectors().row(0).transpose().cwiseAbs2()};
+  const SymmetricEigen eigen = DecomposeTridiagonal(recurrence.a, off_diagonal);
+  POLYEST_CHECK(eigen.converged);
+  return {eigen.values, eigen.vectors.row(0).transpose().cwiseAbs2()};
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,10 +9,8 @@
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -45,6 +43,8 @@ Germ::Germ(GermFamily family, double first_shape, double second_shape)
   }
 }
 
+Germ::Germ(const GermShape& shape) : Germ(shape.family, shape.first, shape.second) {}
+
 Germ Germ::Normal() { return Germ(GermFamily::kNormal, 0, 0); }
 
 Germ Germ::Uniform() { return Germ(GermFamily::kUniform, 0, 0); }
@@ -60,7 +60,7 @@ Germ Germ::Gamma(double shape) {
 }
 
 Germ Germ::TruncatedNormal(double lower, double upper) {
-  POLYEST_CHECK(lower < upper && NormalProbability(lower, upper) >= kLeastTruncatedProbability);
+  POLYEST_CHECK(lower < upper && NormalProbability(lower, upper) >= kMinTruncatedProbability);
   return Germ(GermFamily::kTruncatedNormal, lower, upper);
 }
 
@@ -256,7 +256,7 @@ double Germ::Quantile(double probability) const {
 
 double Germ::OfNormalScore(double score) const {
   if (family_ == GermFamily::kNormal) return score;
-  const double tail = 0.5 * std::erfc(std::min(std::abs(score), kMostScore) / std::numbers::sqrt2);
+  const double tail = 0.5 * std::erfc(std::min(std::abs(score), kMaxScore) / std::numbers::sqrt2);
   return score <= 0 ? LowerQuantile(tail) : UpperQuantile(tail);
 }
 
@@ -309,4 +309,4 @@ RecurrenceCoefficients Germ::Recurrence(int count) const {
   return result;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

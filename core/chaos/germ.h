@@ -8,18 +8,17 @@
 //   gamma(shape)    ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)        Laguerre
 //   truncated normal(a, b)   N(0, 1) cut to [a, b]                 its own (truncated_normal.h)
 //
-// α and β are the statistician's: the paper's "Beta(1,1)" is Beta(2, 2) here.
+// α and β are the statistician's parameters: the paper's "Beta(1,1)" is Beta(2, 2) here.
 
 #include <limits>
 
 #include "core/common/types.h"
+#include "polyest/uncertain_parameter.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-enum class GermFamily { kNormal, kUniform, kBeta, kGamma, kTruncatedNormal };
-
-// Monic three-term recurrence P_{k+1}(ξ) = (ξ − a_k) P_k(ξ) − b_k P_{k−1}(ξ), k = 0 … count − 1;
-// b_0 = 1, the integral of the density.
+// The monic three-term recurrence P_{k+1}(ξ) = (ξ − a_k) P_k(ξ) − b_k P_{k−1}(ξ) for
+// k = 0 … count − 1; b_0 = 1 is the integral of the density.
 struct RecurrenceCoefficients {
   Vector a;
   Vector b;
@@ -27,30 +26,34 @@ struct RecurrenceCoefficients {
 
 class Germ {
  public:
+  // Makes the germ of a prior (UncertainParameter::germ).
+  explicit Germ(const GermShape& shape);
   static Germ Normal();
   static Germ Uniform();
-  // Up to this shape the cumulative probabilities and quantiles keep their accuracy; far beyond it
-  // the incomplete beta and gamma functions run out of terms. Larger ones are the caller's to
-  // refuse.
-  static constexpr double kMostShape = 1e5;
-  // alpha, beta ≥ 1: below 1 the density is infinite at a bound and has no most likely value.
+  // The largest shape for which cumulative probabilities and quantiles keep their accuracy; far
+  // beyond it the series of the incomplete beta and gamma functions do not converge. Callers refuse
+  // larger shapes.
+  static constexpr double kMaxShape = 1e5;
+  // Requires alpha, beta ≥ 1: below 1 the density is infinite at a bound and has no mode.
   static Germ Beta(double alpha, double beta);
-  // shape ≥ 1, for the same reason.
+  // Requires shape ≥ 1, because below 1 the density is infinite at 0.
   static Germ Gamma(double shape);
-  // lower < upper, either may be infinite, with a probability of at least 1e-6 between them: with
-  // less the germ is so far out or so narrow that ξ itself rounds too much.
+  // Requires lower < upper (either may be infinite) and a probability of at least
+  // kMinTruncatedProbability between them: with less, ξ lies so far out or in so narrow an
+  // interval that its rounding matters.
   static Germ TruncatedNormal(double lower, double upper);
-  static constexpr double kLeastTruncatedProbability = 1e-6;
-  // The most polynomials of a truncated normal that Recurrence knows, less one.
-  static constexpr int kMostTruncatedNormalOrder = 100;
+  static constexpr double kMinTruncatedProbability = 1e-6;
+  // The highest degree of a truncated normal's polynomials that Recurrence computes.
+  static constexpr int kMaxTruncatedNormalOrder = 100;
 
   GermFamily family() const { return family_; }
+  operator GermShape() const { return {family_, first_shape_, second_shape_}; }
   // α of beta, shape of gamma, lower bound of truncated normal, else 0
   double first_shape() const { return first_shape_; }
   // β of beta, upper bound of truncated normal, else 0
   double second_shape() const { return second_shape_; }
-  double Lower() const;  // of the support Ω; −∞ for normal
-  double Upper() const;  // +∞ for normal and gamma
+  double Lower() const;  // lower bound of the support Ω; −∞ for normal
+  double Upper() const;  // upper bound of Ω; +∞ for normal and gamma
   double Mean() const;
   double StandardDeviation() const;
   double Mode() const;  // the centre of the support for uniform
@@ -61,16 +64,16 @@ class Germ {
   double LogDensityDerivative(double xi) const;
   double LogDensitySecondDerivative(double xi) const;
   double CumulativeProbability(double xi) const;
-  // The ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1, to 1e-12 of the
-  // standard deviation for shapes up to 1000 and to 1e-9 up to kMostShape: log Γ rounds in
-  // proportion to shape · log(shape).
+  // Returns the ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1. Its error is at
+  // most 1e-12 of the standard deviation for shapes up to 1000 and 1e-9 up to kMaxShape, because
+  // log Γ rounds in proportion to shape · log(shape).
   double Quantile(double probability) const;
-  // The ξ with CumulativeProbability(ξ) = Φ(score), Φ that of N(0, 1): as Quantile, but exact in
-  // the upper tail too. |score| ≤ kMostScore; what lies beyond, with probability 10⁻³⁰⁰, is taken
-  // for kMostScore.
+  // Returns the ξ with CumulativeProbability(ξ) = Φ(score), Φ that of N(0, 1), accurate in both
+  // tails. A score beyond ±kMaxScore, whose probability is 10⁻³⁰⁰, counts as ±kMaxScore.
   double OfNormalScore(double score) const;
-  static constexpr double kMostScore = 37;
-  // The inverse, Φ⁻¹(CumulativeProbability(ξ)); ∓∞ at a bound of the support.
+  static constexpr double kMaxScore = 37;
+  // Returns Φ⁻¹(CumulativeProbability(ξ)), the inverse of OfNormalScore; ∓∞ at a bound of the
+  // support.
   double NormalScore(double xi) const;
 
   RecurrenceCoefficients Recurrence(int count) const;
@@ -80,7 +83,7 @@ class Germ {
  private:
   Germ(GermFamily family, double first_shape, double second_shape);
   double UpperProbability(double xi) const;  // 1 − CumulativeProbability(ξ)
-  // Of probabilities 0 < p ≤ ½, from below and from above.
+  // Quantiles counted from below and from above, 0 < probability ≤ ½.
   double LowerQuantile(double probability) const;
   double UpperQuantile(double probability) const;
 
@@ -88,10 +91,10 @@ class Germ {
   double first_shape_;
   double second_shape_;
   double log_normalization_ = 0;  // log of the density's constant factor
-  // Of a truncated normal: ∫_a^b φ and moments, which have no closed form free of cancellation.
+  // ∫_a^b φ and the moments of a truncated normal, which have no closed form free of cancellation.
   double probability_ = 1;
   double mean_ = 0;
   double standard_deviation_ = 1;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

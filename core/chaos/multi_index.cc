@@ -8,7 +8,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // The set's members in descending lexicographic order.
@@ -59,7 +59,8 @@ int64_t TotalDegreeTermCount(int dimension, int order) {
   const int64_t smaller = std::min(dimension, order), larger = std::max(dimension, order);
   int64_t count = 1;
   for (int64_t i = 1; i <= smaller; ++i) {
-    // Cancelled before it is multiplied, so that only the result itself can overflow.
+    // The fraction is cancelled before it is multiplied, so that only the result itself can
+    // overflow.
     const int64_t common = std::gcd(count, i);
     const int64_t factor = (larger + i) / (i / common);
     if (count / common > std::numeric_limits<int64_t>::max() / factor) {
@@ -95,4 +96,4 @@ Eigen::ArrayXXi MultiIndices(int dimension, const Truncation& truncation) {
   return indices;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

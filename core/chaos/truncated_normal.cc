@@ -8,14 +8,14 @@
 #include "core/chaos/gauss_rule.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// e^{−38²/2} ≈ 10⁻³¹⁴: no more of the density is a number beyond.
+// Beyond it the density underflows: e^{−38²/2} ≈ 10⁻³¹⁴.
 constexpr double kReach = 38;
 constexpr double kPanel = 1;
 constexpr int kNodesForDensity = 20;
-constexpr int kMostSteps = 200;
+constexpr int kMaxSteps = 200;
 constexpr double kConverged = 1e-9;  // the error left by Newton's method is its square
 
 double Density(double x) {
@@ -79,7 +79,7 @@ double TruncatedNormalQuantile(double a, double b, double p) {
   const double target = p * NormalProbability(a, b);
   // ∫_a^ξ φ is at most Φ(ξ), and at most φ(0) (ξ − a).
   double xi = std::max(Eigen::numext::ndtri(target), a + target / Density(0));
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const double probability = NormalProbability(a, xi);
     if (!(probability > 0)) break;  // a itself, to rounding
     const double slope = Density(xi) / probability;
@@ -93,7 +93,7 @@ double TruncatedNormalQuantile(double a, double b, double p) {
 // p_{k+1} √b_{k+1} = (ξ − a_k) p_k − √b_k p_{k−1},  a_k = ∫ ξ p_k² ρ,  b_{k+1} makes ∫ p_{k+1}² ρ =
 // 1
 RecurrenceCoefficients TruncatedNormalRecurrence(double a, double b, int count) {
-  POLYEST_CHECK(a < b && count >= 1 && count <= Germ::kMostTruncatedNormalOrder + 1);
+  POLYEST_CHECK(a < b && count >= 1 && count <= Germ::kMaxTruncatedNormalOrder + 1);
   const Discretization measure = Discretize(a, b, count + kNodesForDensity);
   RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
   Eigen::ArrayXd previous = Eigen::ArrayXd::Zero(measure.weights.size());
@@ -111,4 +111,4 @@ RecurrenceCoefficients TruncatedNormalRecurrence(double a, double b, int count) 
   return result;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,7 +1,7 @@
 #pragma once
 
-// POLYEST_CHECK(condition) << nothing: a programmer's error stops the program, in every build.
-// Bad input is never checked this way; it is an absl::Status.
+// POLYEST_CHECK(condition) aborts the program, in every build, if the condition is false, which is
+// a programmer's error. Bad input is never checked this way; it is an absl::Status.
 
 #include <cstdio>
 #include <cstdlib>

@@ -1,7 +1,7 @@
 #pragma once
 
-// A parallel loop over independent items. Which thread does which item is left to chance, so items
-// must not share anything they write; then the result is the same for any number of threads.
+// A parallel loop over independent items. Any thread may do any item, so items must not share what
+// they write; then the result does not depend on the number of threads.
 
 #include <algorithm>
 #include <atomic>
@@ -10,11 +10,11 @@
 #include <thread>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Calls work(item) once for each item of 0 … items − 1 on up to `threads` threads, the caller's
-// among them, and returns when all are done. The first exception thrown by work ends the loop
-// early and is thrown again here.
+// included, and returns when all are done. The first exception that `work` throws ends the loop
+// early and is rethrown here.
 template <typename Work>
 void ParallelFor(int items, int threads, const Work& work) {
   threads = std::min(threads, items);
@@ -42,4 +42,4 @@ void ParallelFor(int items, int threads, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Early return on a status that is not OK.
+// Macros that return early on a status that is not OK.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -15,7 +15,7 @@
 #define POLYEST_CONCATENATE_INNER(a, b) a##b
 #define POLYEST_CONCATENATE(a, b) POLYEST_CONCATENATE_INNER(a, b)
 
-// POLYEST_ASSIGN_OR_RETURN(auto x, F()): x is F's value, or F's status is returned.
+// POLYEST_ASSIGN_OR_RETURN(auto x, F()) sets x to F's value or returns F's status.
 #define POLYEST_ASSIGN_OR_RETURN(declaration, expression) \
   POLYEST_ASSIGN_OR_RETURN_INNER(POLYEST_CONCATENATE(status_or_, __LINE__), declaration, expression)
 #define POLYEST_ASSIGN_OR_RETURN_INNER(temporary, declaration, expression) \

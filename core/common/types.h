@@ -1,24 +1,16 @@
 #pragma once
 
-// The few Eigen names that the whole library shares.
+// The Eigen names that the whole library shares. Sources of the library include this header, which
+// also says that the products' kernels are compiled elsewhere; users include polyest/types.h, since
+// they may compile for another processor.
 
-#include <Eigen/Core>
+#include <limits>
 
-namespace polyest {
+#include "core/common/product_kernels.h"
+#include "polyest/types.h"
 
-using Vector = Eigen::VectorXd;
-using Matrix = Eigen::MatrixXd;
-using VectorRef = Eigen::Ref<Vector>;
-using ConstVectorRef = Eigen::Ref<const Vector>;
-using MatrixRef = Eigen::Ref<Matrix>;
-using ConstMatrixRef = Eigen::Ref<const Matrix>;
+namespace polyest::internal {
 
-// A block of an ensemble in structure-of-arrays layout: one row a collocation point, one column a
-// quantity. Each column is contiguous, so that one instruction works on several points.
-using Block = Eigen::Ref<Eigen::ArrayXXd>;
-using ConstBlock = Eigen::Ref<const Eigen::ArrayXXd>;
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The number of rows of every block that a model sees is a multiple of this many points.
-inline constexpr int kLanes = 8;
-
-}  // namespace polyest
+}  // namespace polyest::internal

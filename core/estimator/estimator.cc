@@ -1,4 +1,4 @@
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 
 #include <absl/strings/str_format.h>
 
@@ -8,17 +8,25 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "core/estimator/assessment.h"
-#include "core/estimator/checkpoints.h"
-#include "core/estimator/memory_store.h"
-#include "core/estimator/mixture_component.h"
-#include "core/estimator/posterior_mixture.h"
+#include "core/estimator/estimator_access.h"
+#include "core/estimator/posterior/assessment.h"
+#include "core/estimator/posterior/mixture_component.h"
+#include "core/estimator/posterior/posterior_mixture.h"
 #include "core/estimator/problem_fingerprint.h"
-#include "core/estimator/sample_checks.h"
+#include "core/estimator/record/checkpoints.h"
+#include "core/estimator/record/memory_store.h"
+#include "core/estimator/record/sample_checks.h"
 #include "core/estimator/snapshot.h"
+#include "core/estimator/studies/cost_profile.h"
+#include "core/estimator/studies/posterior_study.h"
+#include "core/estimator/studies/regularization_sweep.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
@@ -167,7 +175,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
 absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation::ComponentsOf(
     EstimatorState& state, int64_t rows) const {
   const bool several = state.components.size() > 1;
-  if (state.components.empty() || state.components.size() > kMostComponents ||
+  if (state.components.empty() || state.components.size() > kMaxComponents ||
       (several && state.weighing_row <= rows)) {
     return absl::DataLossError("the snapshot's components cannot be of a mixture");
   }
@@ -185,7 +193,7 @@ absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation:
 absl::StatusOr<bool> Estimator::Implementation::TakeUpTo(int64_t rows, const Stop& stop) {
   for (size_t k = 0; k < components_.size(); ++k) {
     POLYEST_RETURN_IF_ERROR(components_[k]->TakeUpTo(rows, stop));
-    if (!components_[k]->torn()) continue;
+    if (!components_[k]->is_multimodal()) continue;
     POLYEST_RETURN_IF_ERROR(Divide(k, stop));
     return true;
   }
@@ -258,14 +266,14 @@ absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& 
 
 absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
     const PosteriorOptions& options, const Stop& stop) const {
-  POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(options.Effort(), stop));
+  POLYEST_RETURN_IF_ERROR(Validate(options, problem_.prior()));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(EffortOf(options), stop));
   return DescribePosterior(assessed.whole, problem_.prior(), options);
 }
 
 absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
     const ProfileOptions& options, const Stop& stop) const {
-  POLYEST_RETURN_IF_ERROR(options.Validate(problem_.prior()));
+  POLYEST_RETURN_IF_ERROR(Validate(options, problem_.prior()));
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, AssessAll(PosteriorEffort(), stop));
   const auto profile = [&](const Assessed& one, size_t component) {
     const RegionalExpansion& expansion = components_[component]->expansion();
@@ -297,26 +305,13 @@ Estimator::Estimator(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 Estimator::~Estimator() = default;
 
-absl::StatusOr<std::unique_ptr<Estimator>> Estimator::Make(ResolvedProblem problem,
+absl::StatusOr<std::unique_ptr<Estimator>> Estimator::Make(Problem problem,
                                                            EstimatorOptions options) {
-  if (problem.channels() == 0) {
-    return absl::InvalidArgumentError("measured: at least one output must be measured");
-  }
-  if (options.threads < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("threads: %d must be at least 1", options.threads));
-  }
-  if (options.store && options.store->rows() > 0) {
-    return absl::FailedPreconditionError(absl::StrFormat(
-        "the sample store holds %d rows already; an estimator begins with an empty one",
-        options.store->rows()));
-  }
-  auto implementation = std::make_unique<Implementation>(std::move(problem), std::move(options));
-  POLYEST_RETURN_IF_ERROR(implementation->Begin());
-  return std::unique_ptr<Estimator>(new Estimator(std::move(implementation)));
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ResolvedProblem::Make(std::move(problem)));
+  return EstimatorAccess::Make(std::move(resolved), std::move(options));
 }
 
-const ResolvedProblem& Estimator::problem() const { return implementation_->problem(); }
+const Problem& Estimator::problem() const { return implementation_->problem().problem(); }
 absl::Status Estimator::Append(const Samples& samples) { return implementation_->Append(samples); }
 absl::Status Estimator::Process(const Stop& stop) { return implementation_->Process(stop); }
 absl::StatusOr<Estimate> Estimator::CurrentEstimate(const Stop& stop) const {
@@ -341,3 +336,30 @@ int64_t Estimator::rows_appended() const { return implementation_->rows_appended
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }
 
 }  // namespace polyest
+
+namespace polyest::internal {
+
+absl::StatusOr<std::unique_ptr<Estimator>> EstimatorAccess::Make(ResolvedProblem problem,
+                                                                 EstimatorOptions options) {
+  if (problem.channels() == 0) {
+    return InvalidField("measured", "at least one output must be measured");
+  }
+  if (options.threads < 1) {
+    return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
+  }
+  if (options.store && options.store->rows() > 0) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "the sample store holds %d rows already; an estimator begins with an empty one",
+        options.store->rows()));
+  }
+  auto implementation =
+      std::make_unique<Estimator::Implementation>(std::move(problem), std::move(options));
+  POLYEST_RETURN_IF_ERROR(implementation->Begin());
+  return std::unique_ptr<Estimator>(new Estimator(std::move(implementation)));
+}
+
+const ResolvedProblem& EstimatorAccess::ProblemOf(const Estimator& estimator) {
+  return estimator.implementation_->problem();
+}
+
+}  // namespace polyest::internal

@@ -5,9 +5,10 @@
 #include <sstream>
 #include <variant>
 
+#include "core/chaos/germ.h"
 #include "core/estimator/state_archive.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using Archive = cereal::PortableBinaryOutputArchive;
@@ -31,7 +32,7 @@ void Add(Archive& archive, const ModelDescription& model) {
 }
 
 void Add(Archive& archive, const UncertainParameter& parameter) {
-  const Germ& germ = parameter.germ;
+  const Germ germ(parameter.germ);
   archive(parameter.name, Number(germ.family()), germ.first_shape(), germ.second_shape(),
           parameter.location, parameter.scale, Number(parameter.map), parameter.per_run);
 }
@@ -72,7 +73,7 @@ void AddOptions(Archive& archive, const Problem& problem) {
   archive(expansion.order, expansion.hyperbolic_exponent, expansion.points_per_term,
           Number(expansion.points), expansion.adaptive, problem.regularization,
           Number(problem.regularization_mode), Number(integration.method),
-          integration.relative_tolerance, integration.most_steps,
+          integration.relative_tolerance, integration.max_steps,
           integration.samples_between_checkpoints, problem.tolerance_follows_noise);
 }
 
@@ -107,4 +108,4 @@ uint32_t FingerprintOf(const Problem& problem) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "core/estimator/state_archive.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 const std::string kMagic = "polyest estimator";
@@ -29,6 +29,12 @@ void Flag(Archive& archive, bool& flag) {
 
 }  // namespace
 
+}  // namespace polyest::internal
+
+namespace polyest {
+
+using namespace internal;
+
 // As cereal has it: each for writing and for reading.
 
 template <class Archive>
@@ -43,14 +49,18 @@ void serialize(Archive& archive, RowBlock& block) {
 }
 
 template <class Archive>
+void serialize(Archive& archive, PointFailure& failure) {
+  archive(failure.point, failure.time_s, failure.flag, failure.reason);
+}
+
+}  // namespace polyest
+
+namespace polyest::internal {
+
+template <class Archive>
 void serialize(Archive& archive, RecordSummary::Channel& channel) {
   archive(channel.samples, channel.noise_variance_sum, channel.largest, channel.intervals,
           channel.interval_sum_s, channel.last_time_s, channel.last_run);
-}
-
-template <class Archive>
-void serialize(Archive& archive, PointFailure& failure) {
-  archive(failure.point, failure.time_s, failure.flag, failure.reason);
 }
 
 template <class Archive>
@@ -197,4 +207,4 @@ absl::StatusOr<EstimatorState> DecodeState(std::string_view bytes, int64_t rows,
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/estimator/component_state.h"
+#include "core/estimator/posterior/component_state.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Of the components of the posterior's mixture, all at the same row, and of the mixture.
 struct EstimatorState {
@@ -35,4 +35,4 @@ std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fing
 absl::StatusOr<EstimatorState> DecodeState(std::string_view bytes, int64_t rows,
                                            uint32_t fingerprint);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -107,10 +107,10 @@ void save(Archive& archive, const Eigen::PlainObjectBase<Derived>& matrix) {
 
 template <class Archive, class Derived>
 void load(Archive& archive, Eigen::PlainObjectBase<Derived>& matrix) {
-  constexpr int64_t kMost = int64_t{1} << 31;
+  constexpr int64_t kMax = int64_t{1} << 31;
   const int64_t rows = polyest_state::LoadSize(archive);
   const int64_t columns = polyest_state::LoadSize(archive);
-  if (rows > kMost || columns > kMost) throw Exception("a matrix too large");
+  if (rows > kMax || columns > kMax) throw Exception("a matrix too large");
   if (Derived::ColsAtCompileTime == 1 && columns != 1) throw Exception("a vector with columns");
   std::vector<double> elements;
   polyest_state::LoadPlain(archive, rows * columns, elements);

@@ -13,7 +13,7 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr size_t kLongestName = 1024;
@@ -87,9 +87,9 @@ absl::StatusOr<Archive> Archive::Open(const std::filesystem::path& file,
 
 absl::Status Archive::CheckEntries() const {
   const zip_int64_t entries = zip_get_num_entries(archive_.get(), 0);
-  if (entries > limits_.most_entries) {
+  if (entries > limits_.max_entries) {
     return absl::FailedPreconditionError(absl::StrFormat(
-        "the archive has %d entries; the limit is %d", entries, limits_.most_entries));
+        "the archive has %d entries; the limit is %d", entries, limits_.max_entries));
   }
   for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(entries); ++i) {
     const char* const name = zip_get_name(archive_.get(), i, 0);
@@ -106,7 +106,7 @@ bool Archive::Contains(const std::string& entry) const {
   return zip_name_locate(archive_.get(), entry.c_str(), 0) >= 0;
 }
 
-absl::StatusOr<std::string> Archive::Read(const std::string& entry, int64_t most_bytes) const {
+absl::StatusOr<std::string> Archive::Read(const std::string& entry, int64_t max_bytes) const {
   const zip_int64_t index = zip_name_locate(archive_.get(), entry.c_str(), 0);
   if (index < 0) {
     return absl::FailedPreconditionError(absl::StrFormat("the archive has no %s", entry));
@@ -114,9 +114,9 @@ absl::StatusOr<std::string> Archive::Read(const std::string& entry, int64_t most
   std::string text;
   const auto append = [&](const char* data, size_t size) {
     text.append(data, size);
-    if (static_cast<int64_t>(text.size()) <= most_bytes) return absl::OkStatus();
+    if (static_cast<int64_t>(text.size()) <= max_bytes) return absl::OkStatus();
     return absl::FailedPreconditionError(
-        absl::StrFormat("the archive's %s has more than %d bytes", entry, most_bytes));
+        absl::StrFormat("the archive's %s has more than %d bytes", entry, max_bytes));
   };
   POLYEST_RETURN_IF_ERROR(
       ForEachPiece(archive_.get(), static_cast<uint64_t>(index), entry, append));
@@ -124,7 +124,7 @@ absl::StatusOr<std::string> Archive::Read(const std::string& entry, int64_t most
 }
 
 absl::Status Archive::Unpack(const std::filesystem::path& folder) const {
-  int64_t bytes_left = limits_.most_bytes;
+  int64_t bytes_left = limits_.max_bytes;
   const auto entries = static_cast<uint64_t>(zip_get_num_entries(archive_.get(), 0));
   for (uint64_t i = 0; i < entries; ++i) {
     POLYEST_RETURN_IF_ERROR(UnpackEntry(i, folder, bytes_left));
@@ -151,7 +151,7 @@ absl::Status Archive::UnpackEntry(uint64_t index, const std::filesystem::path& f
     bytes_left -= static_cast<int64_t>(size);
     if (bytes_left < 0) {
       return absl::FailedPreconditionError(absl::StrFormat(
-          "the archive unpacks to more than the limit of %d bytes", limits_.most_bytes));
+          "the archive unpacks to more than the limit of %d bytes", limits_.max_bytes));
     }
     file.write(data, static_cast<std::streamsize>(size));
     return file ? absl::OkStatus() : cannot_write();
@@ -161,4 +161,4 @@ absl::Status Archive::UnpackEntry(uint64_t index, const std::filesystem::path& f
   return file ? absl::OkStatus() : cannot_write();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

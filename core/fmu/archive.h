@@ -13,11 +13,11 @@
 
 struct zip;
 
-namespace polyest {
+namespace polyest::internal {
 
 struct ArchiveLimits {
-  int64_t most_entries = 20'000;
-  int64_t most_bytes = int64_t{2} << 30;  // unpacked, all files together
+  int64_t max_entries = 20'000;
+  int64_t max_bytes = int64_t{2} << 30;  // unpacked, all files together
 };
 
 class Archive {
@@ -28,7 +28,7 @@ class Archive {
 
   bool Contains(const std::string& entry) const;
   // The text of one entry of at most this many bytes.
-  absl::StatusOr<std::string> Read(const std::string& entry, int64_t most_bytes) const;
+  absl::StatusOr<std::string> Read(const std::string& entry, int64_t max_bytes) const;
   // Writes all entries below an existing folder.
   absl::Status Unpack(const std::filesystem::path& folder) const;
 
@@ -47,4 +47,4 @@ class Archive {
   ArchiveLimits limits_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

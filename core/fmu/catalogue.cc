@@ -8,7 +8,7 @@
 
 #include "core/fmu/clean_text.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kSuffix[] = ".fmu";
@@ -99,4 +99,4 @@ absl::StatusOr<std::shared_ptr<const Model>> FmuCatalogue::Find(std::string_view
                                              names.empty() ? "none" : absl::StrJoin(names, ", ")));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

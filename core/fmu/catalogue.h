@@ -17,7 +17,7 @@
 
 #include "core/fmu/fmu_model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // A file that cannot be used, and why.
 struct BrokenFmu {
@@ -60,4 +60,4 @@ class FmuCatalogue {
   std::shared_ptr<State> state_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,11 +2,11 @@
 
 #include <pugixml.hpp>
 
-namespace polyest {
+namespace polyest::internal {
 
-std::string CleanText(const std::string& text, size_t most_bytes) {
+std::string CleanText(const std::string& text, size_t max_bytes) {
   // The way to wide characters drops what is not UTF-8, and so a character that was cut in two.
-  std::string clean = pugi::as_utf8(pugi::as_wide(text.substr(0, most_bytes)));
+  std::string clean = pugi::as_utf8(pugi::as_wide(text.substr(0, max_bytes)));
   for (char& c : clean) {
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
   }
@@ -14,4 +14,4 @@ std::string CleanText(const std::string& text, size_t most_bytes) {
   return clean;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

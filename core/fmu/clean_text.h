@@ -2,9 +2,9 @@
 
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Text that an FMU brought along, fit for messages: one line of valid UTF-8, at most so many bytes.
-std::string CleanText(const std::string& text, size_t most_bytes = 1000);
+std::string CleanText(const std::string& text, size_t max_bytes = 1000);
 
-}  // namespace polyest
+}  // namespace polyest::internal

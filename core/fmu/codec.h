@@ -17,7 +17,7 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 template <class T>
 concept PlainValue = std::is_arithmetic_v<T> || std::is_enum_v<T>;
@@ -146,4 +146,4 @@ class Decoder {
   bool ok_ = true;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

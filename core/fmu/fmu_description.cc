@@ -13,7 +13,7 @@
 #include "core/fmu/clean_text.h"
 #include "core/fmu/variable_list.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 absl::Status Wrong(const std::string& what) {
@@ -95,8 +95,8 @@ std::string Limitations(const FmuInterface& interface, const std::vector<std::st
                           interface.communication_step_s);
   }
   if (kept.empty()) return text;
-  constexpr size_t kMostNamed = 8;
-  const size_t named = std::min(kept.size(), kMostNamed);
+  constexpr size_t kMaxNamed = 8;
+  const size_t named = std::min(kept.size(), kMaxNamed);
   absl::StrAppend(&text, "; these keep their start values: ",
                   absl::StrJoin(kept.begin(), kept.begin() + static_cast<ptrdiff_t>(named), ", "),
                   kept.size() > named ? absl::StrCat(" and ", kept.size() - named, " more") : "");
@@ -146,4 +146,4 @@ std::string KindInWords(const FmuInterface& interface) {
       interface.kind == FmuKind::kModelExchange ? "Model Exchange" : "Co-Simulation");
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 enum class FmuKind : uint8_t { kModelExchange, kCoSimulation };
 
@@ -60,4 +60,4 @@ std::string LibraryPath(const FmuInterface& interface);
 // "FMI 2.0 Model Exchange".
 std::string KindInWords(const FmuInterface& interface);
 
-}  // namespace polyest
+}  // namespace polyest::internal

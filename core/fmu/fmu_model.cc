@@ -8,7 +8,7 @@
 #include "core/fmu/archive.h"
 #include "core/fmu/worker_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kDescriptionEntry[] = "modelDescription.xml";
@@ -70,4 +70,4 @@ std::unique_ptr<TrajectoryEnsemble> FmuModel::StartEnsemble(EnsembleSpecificatio
   return std::make_unique<WorkerEnsemble>(Unpack(), std::move(specification), inputs, limits_);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,7 +14,7 @@
 #include "core/fmu/worker_process.h"
 #include "core/propagation/trajectory_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct UnpackedFmu {
   FmuDescription description;
@@ -50,4 +50,4 @@ class FmuModel final : public SelfPropagatingModel {
   mutable std::shared_ptr<const UnpackedFmu> unpacked_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 #include "core/fmu/fmu_description.h"
 #include "core/propagation/trajectory_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Beyond it a message is refused by both sides.
 inline constexpr uint64_t kLongestMessage = uint64_t{1} << 30;
@@ -83,7 +83,7 @@ void Fields(Archive& archive, StreamedInput& input) {
 }
 template <class Archive>
 void Fields(Archive& archive, IntegrationOptions& options) {
-  archive(options.method, options.relative_tolerance, options.most_steps);
+  archive(options.method, options.relative_tolerance, options.max_steps);
 }
 template <class Archive>
 void Fields(Archive& archive, PointFailure& failure) {
@@ -119,4 +119,4 @@ void Fields(Archive& archive, ResultMessage& result) {
   archive(result.error, result.outputs, result.failures);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 std::vector<std::shared_ptr<const Model>> ModelLibrary::Models() const {
   std::vector<std::shared_ptr<const Model>> models(BuiltinModels().begin(), BuiltinModels().end());
@@ -33,4 +33,4 @@ absl::StatusOr<std::shared_ptr<const Model>> ModelLibrary::FindFmu(std::string_v
       "FMU \"", std::string(name), "\" cannot be used: no folder of FMUs was named (--fmu-dir)"));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/fmu/catalogue.h"
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // May be used by several threads at once.
 class ModelLibrary {
@@ -34,4 +34,4 @@ class ModelLibrary {
   std::optional<FmuCatalogue> fmus_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

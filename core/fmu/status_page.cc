@@ -1,6 +1,6 @@
 #include "core/fmu/status_page.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 const char* InWords(FmuCall call) {
   switch (call) {
@@ -30,4 +30,4 @@ const char* InWords(FmuCall call) {
   return "in an unknown call";
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

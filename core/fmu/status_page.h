@@ -8,7 +8,7 @@
 #include <atomic>
 #include <cstdint>
 
-namespace polyest {
+namespace polyest::internal {
 
 enum class FmuCall : int32_t {
   kNothing,
@@ -35,4 +35,4 @@ struct StatusPage {
 // "doing a step"; of a number that is none of the calls, "in an unknown call".
 const char* InWords(FmuCall call);
 
-}  // namespace polyest
+}  // namespace polyest::internal

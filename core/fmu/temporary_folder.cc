@@ -12,7 +12,7 @@
 #include <string>
 #include <system_error>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kLockName[] = ".lock";
@@ -76,4 +76,4 @@ TemporaryFolder::~TemporaryFolder() {
   close(lock_);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-namespace polyest {
+namespace polyest::internal {
 
 // A folder of this process alone below the system's folder for temporary files (TMPDIR), removed
 // with the object. A process that dies leaves its folders behind; the next one to make a folder
@@ -29,4 +29,4 @@ class TemporaryFolder {
   int lock_;  // descriptor of the locked file in it
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,10 +11,10 @@
 #include "core/common/status.h"
 #include "core/fmu/clean_text.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr size_t kMostVariables = 200'000;
+constexpr size_t kMaxVariables = 200'000;
 constexpr size_t kLongestName = 1'000;
 
 absl::Status Wrong(const std::string& what) {
@@ -38,15 +38,15 @@ absl::StatusOr<VariableList> VariableList::Read(const pugi::xml_node& root, int 
   const Units units = TypeUnits(root, version);
   for (const pugi::xml_node node : root.child("ModelVariables").children()) {
     if (node.type() != pugi::node_element) continue;
-    if (list.variables_.size() == kMostVariables) {
-      return Wrong(absl::StrFormat("there are more than %d variables", kMostVariables));
+    if (list.variables_.size() == kMaxVariables) {
+      return Wrong(absl::StrFormat("there are more than %d variables", kMaxVariables));
     }
     POLYEST_RETURN_IF_ERROR(version == 2 ? list.Add2(node, units) : list.Add3(node, units));
   }
   const pugi::xml_node structure = root.child("ModelStructure");
   POLYEST_RETURN_IF_ERROR(version == 2 ? list.FindStates2(structure) : list.FindStates3(structure));
   if (version == 2) list.event_indicators_ = root.attribute("numberOfEventIndicators").as_int();
-  if (list.event_indicators_ < 0 || list.event_indicators_ > static_cast<int>(kMostVariables)) {
+  if (list.event_indicators_ < 0 || list.event_indicators_ > static_cast<int>(kMaxVariables)) {
     return Wrong(absl::StrFormat("%d event indicators are not supported", list.event_indicators_));
   }
   return list;
@@ -199,4 +199,4 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
   return kept;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

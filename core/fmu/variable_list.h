@@ -12,7 +12,7 @@
 
 #include "core/fmu/fmu_description.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class VariableList {
  public:
@@ -50,4 +50,4 @@ class VariableList {
   int event_indicators_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,7 +11,7 @@
 #include "core/fmu/clean_text.h"
 #include "core/propagation/trajectory_block.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Between two looks at the stop request and at the workers' progress.
@@ -188,4 +188,4 @@ void WorkerEnsemble::KillAll() {
   for (Worker& worker : workers_) worker.process->Kill();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

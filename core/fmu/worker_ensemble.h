@@ -14,7 +14,7 @@
 #include "core/fmu/worker_process.h"
 #include "core/propagation/trajectory_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class WorkerEnsemble final : public TrajectoryEnsemble {
  public:
@@ -50,4 +50,4 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
   std::vector<PointFailure> failures_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -25,7 +25,7 @@
 #include "core/fmu/clean_text.h"
 #include "core/fmu/messages.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kProgram[] = "polyest-fmu-worker";
@@ -139,7 +139,7 @@ absl::Status WorkerProcess::Spawn(const std::filesystem::path& program) {
   DescribeFiles(worker_socket, page_descriptor_, actions);
   DescribeSignals(attributes);
   std::string path = program.string();
-  std::string memory = absl::StrCat(limits_.most_memory_bytes);
+  std::string memory = absl::StrCat(limits_.max_memory_bytes);
   std::string file = absl::StrCat(limits_.largest_file_bytes);
   const std::array<char*, 4> arguments = {path.data(), memory.data(), file.data(), nullptr};
   pid_t pid = -1;
@@ -255,9 +255,9 @@ absl::Status WorkerProcess::Died() {
   getrusage(RUSAGE_SELF, &own);
   const int64_t used_bytes = usage.ru_maxrss > own.ru_maxrss ? int64_t{1024} * usage.ru_maxrss : 0;
   const std::string memory =
-      used_bytes > limits_.most_memory_bytes / 4 * 3
+      used_bytes > limits_.max_memory_bytes / 4 * 3
           ? absl::StrFormat("; it had used %d MiB of memory and the limit is %d MiB",
-                            used_bytes >> 20, limits_.most_memory_bytes >> 20)
+                            used_bytes >> 20, limits_.max_memory_bytes >> 20)
           : "";
   return absl::FailedPreconditionError(
       absl::StrFormat("fmu %s: the worker %s %s%s", fmu_, end, WhatItDid(), memory));
@@ -274,4 +274,4 @@ void WorkerProcess::Kill() {
   socket_ = -1;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -15,12 +15,12 @@
 
 #include "core/fmu/status_page.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct WorkerLimits {
   // How long a single call of the FMU may take.
   std::chrono::milliseconds longest_call{60'000};
-  int64_t most_memory_bytes = int64_t{4} << 30;    // address space of a worker
+  int64_t max_memory_bytes = int64_t{4} << 30;     // address space of a worker
   int64_t largest_file_bytes = int64_t{16} << 20;  // that a worker writes
 };
 
@@ -86,4 +86,4 @@ class WorkerProcess {
 inline constexpr int kWorkerSocket = 3;
 inline constexpr int kWorkerPage = 4;
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,4 +1,4 @@
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -17,6 +17,9 @@
 #include "core/model/lane_model.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 template <class... Equations>

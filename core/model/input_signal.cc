@@ -5,35 +5,35 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <type_traits>
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/model/interpolation.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = std::numbers::pi;
 
-absl::Status Violation(absl::string_view kind, absl::string_view field, double value,
+absl::Status Violation(const FieldPath& kind, const FieldPath& field, double value,
                        absl::string_view rule) {
-  return absl::InvalidArgumentError(absl::StrCat(kind, ": ", field, " ", value, " must be ", rule));
+  return InvalidField(kind.Then(field), absl::StrCat(value, " must be ", rule));
 }
 
-absl::Status RequireFinite(absl::string_view kind, absl::string_view field, double value) {
+absl::Status RequireFinite(const FieldPath& kind, const FieldPath& field, double value) {
   return std::isfinite(value) ? absl::OkStatus() : Violation(kind, field, value, "finite");
 }
 
-absl::Status RequirePositive(absl::string_view kind, absl::string_view field, double value) {
+absl::Status RequirePositive(const FieldPath& kind, const FieldPath& field, double value) {
   return std::isfinite(value) && value > 0 ? absl::OkStatus()
                                            : Violation(kind, field, value, "finite and above 0");
 }
 
-absl::Status RequireNonnegative(absl::string_view kind, absl::string_view field, double value) {
+absl::Status RequireNonnegative(const FieldPath& kind, const FieldPath& field, double value) {
   return std::isfinite(value) && value >= 0
              ? absl::OkStatus()
              : Violation(kind, field, value, "finite and at least 0");
@@ -45,48 +45,47 @@ absl::Status Validate(const ConstantInput& input) {
 
 absl::Status Validate(const StepInput& input) {
   POLYEST_RETURN_IF_ERROR(RequireFinite("step", "amplitude", input.amplitude));
-  return RequireFinite("step", "timeS", input.time_s);
+  return RequireFinite("step", "time_s", input.time_s);
 }
 
 absl::Status Validate(const SinusoidInput& input) {
   POLYEST_RETURN_IF_ERROR(RequireFinite("sinusoid", "amplitude", input.amplitude));
-  POLYEST_RETURN_IF_ERROR(RequirePositive("sinusoid", "frequencyHz", input.frequency_hz));
-  return RequireFinite("sinusoid", "phaseRad", input.phase_rad);
+  POLYEST_RETURN_IF_ERROR(RequirePositive("sinusoid", "frequency_hz", input.frequency_hz));
+  return RequireFinite("sinusoid", "phase_rad", input.phase_rad);
 }
 
 absl::Status Validate(const ChirpInput& input) {
   POLYEST_RETURN_IF_ERROR(RequireFinite("chirp", "amplitude", input.amplitude));
   POLYEST_RETURN_IF_ERROR(
-      RequireNonnegative("chirp", "startFrequencyHz", input.start_frequency_hz));
-  POLYEST_RETURN_IF_ERROR(RequireNonnegative("chirp", "endFrequencyHz", input.end_frequency_hz));
-  POLYEST_RETURN_IF_ERROR(RequireFinite("chirp", "startS", input.start_s));
-  POLYEST_RETURN_IF_ERROR(RequirePositive("chirp", "durationS", input.duration_s));
-  return RequireFinite("chirp", "phaseRad", input.phase_rad);
+      RequireNonnegative("chirp", "start_frequency_hz", input.start_frequency_hz));
+  POLYEST_RETURN_IF_ERROR(RequireNonnegative("chirp", "end_frequency_hz", input.end_frequency_hz));
+  POLYEST_RETURN_IF_ERROR(RequireFinite("chirp", "start_s", input.start_s));
+  POLYEST_RETURN_IF_ERROR(RequirePositive("chirp", "duration_s", input.duration_s));
+  return RequireFinite("chirp", "phase_rad", input.phase_rad);
 }
 
 absl::Status Validate(const HalfSineBumpInput& input) {
-  POLYEST_RETURN_IF_ERROR(RequireFinite("halfSineBump", "amplitude", input.amplitude));
-  POLYEST_RETURN_IF_ERROR(RequireFinite("halfSineBump", "startS", input.start_s));
-  return RequirePositive("halfSineBump", "durationS", input.duration_s);
+  POLYEST_RETURN_IF_ERROR(RequireFinite("half_sine_bump", "amplitude", input.amplitude));
+  POLYEST_RETURN_IF_ERROR(RequireFinite("half_sine_bump", "start_s", input.start_s));
+  return RequirePositive("half_sine_bump", "duration_s", input.duration_s);
 }
 
 absl::Status Validate(const TableInput& input) {
   POLYEST_RETURN_IF_ERROR(RequireFinite("table", "amplitude", input.amplitude));
   if (input.time_s.size() != input.value.size()) {
-    return absl::InvalidArgumentError(absl::StrCat("table: timeS has ", input.time_s.size(),
-                                                   " entries and value ", input.value.size(),
-                                                   "; they must be equally many"));
+    return InvalidField("table.time_s",
+                        absl::StrCat(input.time_s.size(), " times for ", input.value.size(),
+                                     " values; they must be equally many"));
   }
   if (input.time_s.empty()) {
-    return absl::InvalidArgumentError("table: timeS has 0 entries; there must be at least 1");
+    return InvalidField("table.time_s", "there must be at least one");
   }
   for (size_t i = 0; i < input.time_s.size(); ++i) {
-    POLYEST_RETURN_IF_ERROR(
-        RequireFinite("table", absl::StrCat("timeS[", i, "]"), input.time_s[i]));
-    POLYEST_RETURN_IF_ERROR(RequireFinite("table", absl::StrCat("value[", i, "]"), input.value[i]));
+    POLYEST_RETURN_IF_ERROR(RequireFinite("table", FieldPath{"time_s", i}, input.time_s[i]));
+    POLYEST_RETURN_IF_ERROR(RequireFinite("table", FieldPath{"value", i}, input.value[i]));
     if (i > 0 && !(input.time_s[i] > input.time_s[i - 1])) {
-      return Violation("table", absl::StrCat("timeS[", i, "]"), input.time_s[i],
-                       absl::StrCat("above timeS[", i - 1, "] ", input.time_s[i - 1]));
+      return Violation("table", FieldPath{"time_s", i}, input.time_s[i],
+                       absl::StrCat("above the time before, ", input.time_s[i - 1]));
     }
   }
   return absl::OkStatus();
@@ -285,4 +284,4 @@ double InputSignal::BetweenKnots(double time_s, Interpolation interpolation) con
   return Hermite(knot_time_s_, knot_value_, left, knot_slope_[left], knot_slope_[right], time_s);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,74 +1,18 @@
 #pragma once
 
-// Excitations: u(t) = amplitude · shape(t). The amplitude of any input may be uncertain
-// ("force.amplitude"); the shape is the same for all collocation points.
+// The signal that an InputSpecification describes (polyest/input_signal.h): u(t) = amplitude ·
+// shape(t).
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <optional>
 #include <span>
-#include <variant>
 #include <vector>
 
-#include "core/model/interpolation.h"
+#include "polyest/input_signal.h"
 
-namespace polyest {
-
-// Every shape's amplitude multiplies it; all numbers are finite, times in s. Amplitudes are in the
-// unit of the model's input.
-
-struct ConstantInput {
-  double amplitude = 0;
-};
-
-// 0 before time_s, amplitude from then on.
-struct StepInput {
-  double amplitude = 1;
-  double time_s = 0;
-};
-
-// amplitude · sin(2π f t + phase), f > 0.
-struct SinusoidInput {
-  double amplitude = 1;
-  double frequency_hz = 1;
-  double phase_rad = 0;
-};
-
-// amplitude · sin(2π (f0 τ + (f1 − f0) τ²/(2 T)) + phase), τ = t − start_s, for 0 ≤ τ < T, else 0;
-// T > 0, f0 and f1 ≥ 0.
-struct ChirpInput {
-  double amplitude = 1;
-  double start_frequency_hz = 0.1;
-  double end_frequency_hz = 10;
-  double start_s = 0;
-  double duration_s = 10;
-  double phase_rad = 0;
-};
-
-// amplitude · sin(π τ/T), τ = t − start_s, for 0 ≤ τ < T, else 0; T > 0.
-struct HalfSineBumpInput {
-  double amplitude = 1;
-  double start_s = 0;
-  double duration_s = 1;
-};
-
-// One knot or more in strictly increasing time; the end values outside.
-struct TableInput {
-  std::vector<double> time_s;
-  std::vector<double> value;
-  Interpolation interpolation = Interpolation::kLinear;
-  double amplitude = 1;
-};
-
-// Values that come with the data; see Append.
-struct StreamedInput {
-  Interpolation interpolation = Interpolation::kCubic;
-  double amplitude = 1;
-};
-
-using InputSpecification = std::variant<ConstantInput, StepInput, SinusoidInput, ChirpInput,
-                                        HalfSineBumpInput, TableInput, StreamedInput>;
+namespace polyest::internal {
 
 class InputSignal {
  public:
@@ -119,4 +63,4 @@ class InputSignal {
   bool finished_ = false;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

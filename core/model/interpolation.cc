@@ -6,17 +6,17 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr size_t kMostKnots = 2 * kSplineReach + 1;
+constexpr size_t kMaxKnots = 2 * kSplineReach + 1;
 
 // Knots of a stretch with the widths h_i = t_{i+1} − t_i of its intervals and the slopes
 // δ_i = (u_{i+1} − u_i)/h_i of its chords.
 struct Stretch {
   size_t knots;
-  std::array<double, kMostKnots> width;
-  std::array<double, kMostKnots> chord;
+  std::array<double, kMaxKnots> width;
+  std::array<double, kMaxKnots> chord;
 };
 
 Stretch StretchOf(std::span<const double> time_s, std::span<const double> value) {
@@ -63,7 +63,7 @@ Row SplineRow(const Stretch& stretch, size_t i) {
 }
 
 double SlopeOfSpline(const Stretch& stretch, size_t k) {
-  std::array<Row, kMostKnots> rows;
+  std::array<Row, kMaxKnots> rows;
   for (size_t i = 0; i < stretch.knots; ++i) {
     rows[i] = SplineRow(stretch, i);
     if (i == 0) continue;
@@ -145,4 +145,4 @@ double Hermite(std::span<const double> time_s, std::span<const double> value, si
          h * q * p * (p * left_slope - q * right_slope);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,18 +11,14 @@
 #include <cstddef>
 #include <span>
 
-namespace polyest {
+#include "polyest/input_signal.h"
 
-// How a signal runs between its knots.
-enum class Interpolation {
-  kHold,             // u_k until the next knot
-  kLinear,           // straight
-  kCubic,            // SplineSlope
-  kShapePreserving,  // MonotoneSlope
-};
+namespace polyest::internal {
 
-// Knots after a knot that its slope may depend on: 3 for kCubic; 2 for kShapePreserving, at its
-// first knot; else 0.
+// Slopes are SplineSlope for kCubic and MonotoneSlope for kShapePreserving.
+
+// Returns the number of knots after a knot that its slope may depend on: 3 for kCubic; 2 for
+// kShapePreserving, at its first knot; else 0.
 int KnotsAhead(Interpolation interpolation);
 
 // The slope at knot k of the cubic spline through it and the kSplineReach knots on either side, as
@@ -41,4 +37,4 @@ double MonotoneSlope(std::span<const double> time_s, std::span<const double> val
 double Hermite(std::span<const double> time_s, std::span<const double> value, size_t k,
                double left_slope, double right_slope, double at_s);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // kLanes points of one quantity.
 using Lane = Eigen::Array<double, kLanes, 1>;
@@ -51,4 +51,4 @@ inline Lane PositiveOrNan(const Lane& x) {
   return (x > 0).select(x, std::numeric_limits<double>::quiet_NaN());
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -25,9 +25,9 @@
 #include "core/common/check.h"
 #include "core/common/types.h"
 #include "core/model/lane.h"
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 template <class Equations>
 class LaneModel final : public StateSpaceModel {
@@ -117,4 +117,4 @@ class LaneModel final : public StateSpaceModel {
   ModelDescription description_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

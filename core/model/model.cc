@@ -1,10 +1,9 @@
-#include "core/model/model.h"
-
-#include <absl/strings/str_join.h>
+#include "polyest/model.h"
 
 #include "core/common/check.h"
 
 namespace polyest {
+
 namespace {
 
 std::optional<int> Find(const std::vector<Quantity>& quantities, std::string_view name) {
@@ -26,13 +25,6 @@ std::optional<int> ModelDescription::FindInput(std::string_view input) const {
 
 std::optional<int> ModelDescription::FindOutput(std::string_view output) const {
   return Find(outputs, output);
-}
-
-std::string ListNames(const std::vector<Quantity>& quantities) {
-  if (quantities.empty()) return "none";
-  return absl::StrJoin(quantities, ", ", [](std::string* text, const Quantity& quantity) {
-    text->append(quantity.name);
-  });
 }
 
 void StateSpaceModel::StateJacobian(double, const ConstBlock&, const ConstBlock&, const ConstBlock&,

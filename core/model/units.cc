@@ -13,12 +13,12 @@
 #include "core/common/status.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr size_t kMostText = 200;
-constexpr int kMostGroups = 10;
-constexpr double kMostPower = 100;
+constexpr size_t kMaxText = 200;
+constexpr int kMaxGroups = 10;
+constexpr double kMaxPower = 100;
 
 struct Symbol {
   std::string_view name;
@@ -95,7 +95,7 @@ class UnitParser {
   explicit UnitParser(std::string_view text) : text_(text) {}
 
   absl::StatusOr<Unit> Run() {
-    if (text_.size() > kMostText) return Error("is too long");
+    if (text_.size() > kMaxText) return Error("is too long");
     POLYEST_ASSIGN_OR_RETURN(const Unit unit, Product(0));
     if (at_ < text_.size()) return Error("has a ) without its (");
     return unit;
@@ -144,7 +144,7 @@ absl::StatusOr<Unit> UnitParser::Product(int groups) {
 absl::StatusOr<Unit> UnitParser::Factor(int groups) {
   Unit unit;
   if (Take("(")) {
-    if (groups == kMostGroups) return Error("is nested too deep");
+    if (groups == kMaxGroups) return Error("is nested too deep");
     POLYEST_ASSIGN_OR_RETURN(unit, Product(groups + 1));
     if (!Take(")")) return Error("has a ( without its )");
   } else {
@@ -159,7 +159,7 @@ absl::StatusOr<double> UnitParser::Exponent() {
   if (Take("³")) return 3;
   if (!Take("^") && !Take("**")) return 1;
   const std::optional<double> exponent = Number();
-  if (!exponent || std::abs(*exponent) > kMostPower) {
+  if (!exponent || std::abs(*exponent) > kMaxPower) {
     return Error("has a ^ without a number between -100 and 100 after it");
   }
   return *exponent;
@@ -259,4 +259,4 @@ std::string FormatUnit(const Unit& unit) {
   return absl::StrCat(above.empty() ? "1" : above, below);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

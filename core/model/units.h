@@ -13,7 +13,7 @@
 #include <string>
 #include <string_view>
 
-namespace polyest {
+namespace polyest::internal {
 
 struct Unit {
   // Powers of m, kg, s, A, K, mol, cd.
@@ -38,4 +38,4 @@ bool SameDimension(const Unit& a, const Unit& b);
 // "N/m", "kg m^2/s": what ParseUnit reads as this unit again.
 std::string FormatUnit(const Unit& unit);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,12 +10,12 @@
 #include "core/propagation/newton_matrix.h"
 #include "core/propagation/sundials_integrator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class BdfIntegrator final : public SundialsIntegrator {
  public:
-  BdfIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+  BdfIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                 const ConstBlock& states);
   ~BdfIntegrator() override;
 
@@ -28,7 +28,7 @@ class BdfIntegrator final : public SundialsIntegrator {
   }
 
   void SetFirstStep(double step_s) override { CVodeSetInitStep(memory_, step_s); }
-  int Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+  int Evolve(double time_s, double stop_time_s, int max_steps, N_Vector states,
              double* reached_s) override;
   int Interpolate(double time_s, N_Vector states) override {
     return CVodeGetDky(memory_, time_s, 0, states);
@@ -47,7 +47,7 @@ class BdfIntegrator final : public SundialsIntegrator {
   long convergence_failures_ = 0;
 };
 
-BdfIntegrator::BdfIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+BdfIntegrator::BdfIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                              const ConstBlock& states)
     : SundialsIntegrator(system, relative_tolerance, time_s, states),
       memory_(CVodeCreate(CV_BDF, context())),
@@ -58,15 +58,15 @@ BdfIntegrator::BdfIntegrator(EnsembleSystem* system, double relative_tolerance, 
   solver_->ops->solve = SolveLinear;
   solver_->content = this;
   // More rejections than the defaults of seven and ten: the first step is a guess.
-  constexpr int kMostFailures = 30;
+  constexpr int kMaxFailures = 30;
   const bool accepted =
       CVodeSetErrHandlerFn(memory_, IgnoreMessage, nullptr) == CV_SUCCESS &&
       CVodeInit(memory_, RightHandSide, time_s, vector()) == CV_SUCCESS &&
       CVodeSetUserData(memory_, static_cast<SundialsIntegrator*>(this)) == CV_SUCCESS &&
       CVodeWFtolerances(memory_, ErrorWeights) == CV_SUCCESS &&
       CVodeSetLinearSolver(memory_, solver_, nullptr) == CV_SUCCESS &&
-      CVodeSetMaxErrTestFails(memory_, kMostFailures) == CV_SUCCESS &&
-      CVodeSetMaxConvFails(memory_, kMostFailures) == CV_SUCCESS &&
+      CVodeSetMaxErrTestFails(memory_, kMaxFailures) == CV_SUCCESS &&
+      CVodeSetMaxConvFails(memory_, kMaxFailures) == CV_SUCCESS &&
       CVodeSetMaxHnilWarns(memory_, -1) == CV_SUCCESS;
   POLYEST_CHECK(accepted);
 }
@@ -77,9 +77,9 @@ BdfIntegrator::~BdfIntegrator() {
   SUNLinSolFreeEmpty(solver_);
 }
 
-int BdfIntegrator::Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+int BdfIntegrator::Evolve(double time_s, double stop_time_s, int max_steps, N_Vector states,
                           double* reached_s) {
-  CVodeSetMaxNumSteps(memory_, most_steps);
+  CVodeSetMaxNumSteps(memory_, max_steps);
   CVodeSetStopTime(memory_, stop_time_s);
   return CVode(memory_, time_s, states, reached_s, CV_NORMAL);
 }
@@ -99,20 +99,20 @@ int BdfIntegrator::Reset(double time_s, N_Vector states) {
 }
 
 void BdfIntegrator::UpdateNewtonMatrix(double time_s, const Eigen::ArrayXXd& states, double gamma) {
-  constexpr long kMostSteps = 20;
-  constexpr double kMostChange = 0.3;
+  constexpr long kMaxSteps = 20;
+  constexpr double kMaxChange = 0.3;
   long steps = 0;
   long failures = 0;
   CVodeGetNumSteps(memory_, &steps);
   CVodeGetNumNonlinSolvConvFails(memory_, &failures);
   const bool differentiate = factored_gamma_ == 0 || failures != convergence_failures_ ||
-                             steps >= differentiated_at_step_ + kMostSteps;
+                             steps >= differentiated_at_step_ + kMaxSteps;
   if (differentiate) {
     newton_matrix_.Differentiate(time_s, states, scale());
     differentiated_at_step_ = steps;
     convergence_failures_ = failures;
   }
-  if (differentiate || !(std::abs(gamma / factored_gamma_ - 1) <= kMostChange)) {
+  if (differentiate || !(std::abs(gamma / factored_gamma_ - 1) <= kMaxChange)) {
     newton_matrix_.Factor(gamma);
     factored_gamma_ = gamma;
   }
@@ -125,10 +125,10 @@ int BdfIntegrator::SolveNewton(N_Vector x, N_Vector b) {
   const int flag = CVodeGetNonlinearSystemData(memory_, &time_s, &predicted, &states, &rates,
                                                &gamma, &rl1, &zn1, &user_data);
   if (flag != CV_SUCCESS) return SUNLS_PACKAGE_FAIL_UNREC;
-  UpdateNewtonMatrix(time_s, EnsembleValues(states), gamma);
-  EnsembleValues(x) = EnsembleValues(b);
-  newton_matrix_.SolveInPlace(EnsembleValues(x));
-  if (gamma != factored_gamma_) EnsembleValues(x) *= 2 / (1 + gamma / factored_gamma_);
+  UpdateNewtonMatrix(time_s, BlockValues(states), gamma);
+  BlockValues(x) = BlockValues(b);
+  newton_matrix_.SolveInPlace(BlockValues(x));
+  if (gamma != factored_gamma_) BlockValues(x) *= 2 / (1 + gamma / factored_gamma_);
   return SUNLS_SUCCESS;
 }
 
@@ -170,10 +170,9 @@ const char* BdfIntegrator::InWords(int flag) const {
 
 }  // namespace
 
-std::unique_ptr<EnsembleIntegrator> MakeBdfIntegrator(EnsembleSystem* system,
-                                                      double relative_tolerance, double time_s,
-                                                      const ConstBlock& states) {
+std::unique_ptr<BlockIntegrator> MakeBdfIntegrator(BlockSystem* system, double relative_tolerance,
+                                                   double time_s, const ConstBlock& states) {
   return std::make_unique<BdfIntegrator>(system, relative_tolerance, time_s, states);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::ArrayXXd RowsOf(const Matrix& matrix, const std::vector<int>& points) {
   if (matrix.size() == 0) return {};
@@ -101,4 +99,4 @@ void BlockInputs::CopyRow(Eigen::Index from, Eigen::Index to) {
   time_s_ = std::numeric_limits<double>::quiet_NaN();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

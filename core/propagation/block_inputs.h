@@ -1,17 +1,17 @@
 #pragma once
 
-// What drives the points of a block of trajectories,
+// The inputs that drive the points of a block of trajectories,
 //
 //   u_pi(t) = amplitude_pi · shape_i(t − delay_pi) + offset_pi,
 //
-// and the times at which an integrator must stop because of it. It stops at every jump. At a corner
-// (the end of a bump, a knot of a linear table) it stops when all points meet it at the same time;
-// with delays of their own that would mean as many stops as there are points, and the error control
-// sees to it instead.
+// and the times at which an integrator must stop because of them. It stops at every jump. At a
+// corner (the end of a bump, a knot of a linear table) it stops if all points meet it at the same
+// time. If the points have different delays there would be as many stops as points, so corners are
+// left to the error control.
 //
-// A jump at t* is met with its left limit up to t* and with its value from the right from there on:
-// until Pass(t*), shapes are evaluated no later than just before their break, and after it no
-// earlier than at the break, whatever the rounding of t − delay is.
+// At a jump at t* the input has its left limit up to t* and its right limit from there on. Until
+// Pass(t*), shapes are evaluated no later than just before their break, and after it no earlier
+// than at the break, whatever the rounding of t − delay.
 
 #include <Eigen/Core>
 #include <limits>
@@ -19,7 +19,7 @@
 
 #include "core/propagation/trajectory_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class BlockInputs {
  public:
@@ -28,22 +28,22 @@ class BlockInputs {
     bool jumps = false;
   };
 
-  // Row r is driven as point points[r] of the specification is. `signals` must outlive it.
+  // Drives row r as point points[r] of the specification. `signals` must outlive the object.
   BlockInputs(const EnsembleSpecification& specification, const InputSignals* signals,
               const std::vector<int>& points);
 
-  // The first break that has not been passed.
+  // Returns the first break that has not been passed.
   Break NextBreak();
-  // Breaks up to and including time_s are behind.
+  // Passes all breaks up to and including `time_s`.
   void Pass(double time_s);
-  // Rows × inputs, valid until the next call; time_s no earlier than the last break passed and no
-  // later than the next one.
+  // Returns the inputs (rows × inputs) at `time_s`, valid until the next call. `time_s` must not
+  // lie before the last break passed or after the next one.
   const Eigen::ArrayXXd& At(double time_s);
-  // From now on row `to` is driven as row `from` is.
+  // Drives row `to` as row `from` from now on.
   void CopyRow(Eigen::Index from, Eigen::Index to);
 
  private:
-  // In the signal's own time t − delay: the last break passed and the next one.
+  // The last break passed and the next one, in the signal's own time t − delay.
   struct Cursor {
     double delay_s = 0;
     double last_s = 0;
@@ -61,4 +61,4 @@ class BlockInputs {
   double time_s_ = std::numeric_limits<double>::quiet_NaN();  // of values_
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

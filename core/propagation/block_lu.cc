@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 
 BlockLu::BlockLu(Eigen::Index points, Eigen::Index size)
     : size_(size),
@@ -77,4 +77,4 @@ void BlockLu::SolveInPlace(Eigen::ArrayXXd& x) {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

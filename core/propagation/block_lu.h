@@ -1,26 +1,26 @@
 #pragma once
 
-// LU factors of one small dense matrix a point, kLanes points at a time:
+// LU factors of one small dense matrix for each point, computed for kLanes points at a time:
 //
 //   P_p A_p = L_p U_p, partial pivoting for each point on its own.
 //
-// A matrix that is singular gives a solution that is not finite.
+// A singular matrix gives a solution that is not finite.
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class BlockLu {
  public:
   BlockLu(Eigen::Index points, Eigen::Index size);
 
-  // Element (row, column) of all points' matrices, to be set before Factor.
+  // Sets element (row, column) of all points' matrices; every element must be set before Factor.
   void Set(Eigen::Index row, Eigen::Index column, const Eigen::Ref<const Eigen::ArrayXd>& values);
   void Factor();
-  // x_p = A_p⁻¹ x_p for each point; points × size.
+  // Replaces each row x_p of `x` (points × size) by A_p⁻¹ x_p.
   void SolveInPlace(Eigen::ArrayXXd& x);
 
  private:
@@ -39,4 +39,4 @@ class BlockLu {
   std::vector<Lanes> solution_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,27 +7,33 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/parallel.h"
 #include "core/common/status.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest {
 
+using namespace internal;
+
 absl::Status IntegrationOptions::Validate() const {
   if (!(relative_tolerance >= 1e-13 && relative_tolerance <= 1e-2)) {
-    return absl::InvalidArgumentError(absl::StrCat("relativeTolerance: ", relative_tolerance,
-                                                   " must lie between 1e-13 and 0.01"));
+    return InvalidField("relative_tolerance",
+                        absl::StrCat(relative_tolerance, " must lie between 1e-13 and 0.01"));
   }
-  if (most_steps < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("maxSteps: ", most_steps, " must be at least 1"));
+  if (max_steps < 1) {
+    return InvalidField("max_steps", absl::StrCat(max_steps, " must be at least 1"));
   }
   if (samples_between_checkpoints < 1) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "samplesBetweenCheckpoints: ", samples_between_checkpoints, " must be at least 1"));
+    return InvalidField("samples_between_checkpoints",
+                        absl::StrCat(samples_between_checkpoints, " must be at least 1"));
   }
   return absl::OkStatus();
 }
+
+}  // namespace polyest
+
+namespace polyest::internal {
 
 namespace {
 
@@ -193,4 +199,4 @@ absl::Status EnsemblePropagator::Advance(std::span<const double> times_s, Matrix
   return absl::OkStatus();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

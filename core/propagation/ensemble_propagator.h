@@ -3,10 +3,10 @@
 // Propagation (9): one trajectory of the model for each point of an ensemble, advanced together
 // from one sample time to the next, with the measured outputs read at exactly those times.
 //
-// The points are dealt into blocks of fixed size, each integrated as one ODE system; blocks are
-// independent, so that results are the same bits for any number of threads and for any way of
-// cutting the sample times into calls of Advance. A model that simulates itself does so; the others
-// have checkpoints, from which an ensemble can be restored.
+// The points are dealt into blocks of fixed size, each integrated as one ODE system. Blocks are
+// independent, so results have the same bits for any number of threads and for any division of the
+// sample times into calls of Advance. A model that simulates itself propagates its own ensemble;
+// the other models have checkpoints, from which an ensemble can be restored.
 
 #include <absl/status/status.h>
 
@@ -14,19 +14,19 @@
 #include <span>
 #include <vector>
 
-#include "core/common/stop.h"
 #include "core/common/types.h"
 #include "core/propagation/trajectory_ensemble.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// Whether ensembles of the model have a State at a checkpoint.
+// Returns whether ensembles of the model have a State at a checkpoint.
 bool HasCheckpointsInRuns(const Model& model);
 
 class EnsemblePropagator final : public TrajectoryEnsemble {
  public:
-  // The ensemble at t = 0. `inputs` must outlive the propagator; knots of streamed inputs may be
-  // appended between calls, never at or before a time already passed.
+  // Starts the ensemble at t = 0. `inputs` must outlive the propagator; knots of streamed inputs
+  // may be appended between calls, but not at or before a time already passed.
   EnsemblePropagator(EnsembleSpecification specification, const InputSignals* inputs);
 
   int points() const override { return ensemble_->points(); }
@@ -42,4 +42,4 @@ class EnsemblePropagator final : public TrajectoryEnsemble {
   std::unique_ptr<TrajectoryEnsemble> ensemble_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

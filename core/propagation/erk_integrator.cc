@@ -8,19 +8,19 @@
 #include "core/common/check.h"
 #include "core/propagation/sundials_integrator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class ErkIntegrator final : public SundialsIntegrator {
  public:
-  ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+  ErkIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                 const ConstBlock& states);
   ~ErkIntegrator() override { ERKStepFree(&memory_); }
   bool LooksStiff() override;
 
  private:
   void SetFirstStep(double step_s) override { ERKStepSetInitStep(memory_, step_s); }
-  int Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+  int Evolve(double time_s, double stop_time_s, int max_steps, N_Vector states,
              double* reached_s) override;
   int Interpolate(double time_s, N_Vector states) override {
     return ERKStepGetDky(memory_, time_s, 0, states);
@@ -36,26 +36,26 @@ class ErkIntegrator final : public SundialsIntegrator {
   long steps_looked_at_ = 0;
 };
 
-ErkIntegrator::ErkIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+ErkIntegrator::ErkIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                              const ConstBlock& states)
     : SundialsIntegrator(system, relative_tolerance, time_s, states),
       memory_(ERKStepCreate(RightHandSide, time_s, vector(), context())) {
   // More rejections than the default seven: the first step is a guess.
-  constexpr int kMostErrorTestFailures = 30;
+  constexpr int kMaxErrorTestFailures = 30;
   const bool accepted =
       memory_ != nullptr &&
       ERKStepSetErrHandlerFn(memory_, IgnoreMessage, nullptr) == ARK_SUCCESS &&
       ERKStepSetUserData(memory_, static_cast<SundialsIntegrator*>(this)) == ARK_SUCCESS &&
       ERKStepSetTableNum(memory_, ARKODE_DORMAND_PRINCE_7_4_5) == ARK_SUCCESS &&
       ERKStepWFtolerances(memory_, ErrorWeights) == ARK_SUCCESS &&
-      ERKStepSetMaxErrTestFails(memory_, kMostErrorTestFailures) == ARK_SUCCESS &&
+      ERKStepSetMaxErrTestFails(memory_, kMaxErrorTestFailures) == ARK_SUCCESS &&
       ERKStepSetMaxHnilWarns(memory_, -1) == ARK_SUCCESS;
   POLYEST_CHECK(accepted);
 }
 
-int ErkIntegrator::Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+int ErkIntegrator::Evolve(double time_s, double stop_time_s, int max_steps, N_Vector states,
                           double* reached_s) {
-  ERKStepSetMaxNumSteps(memory_, most_steps);
+  ERKStepSetMaxNumSteps(memory_, max_steps);
   ERKStepSetStopTime(memory_, stop_time_s);
   return ERKStepEvolve(memory_, time_s, states, reached_s, ARK_NORMAL);
 }
@@ -107,7 +107,7 @@ double ErkIntegrator::LargestRate() {
   const Eigen::ArrayXXd weights = scale().weights();
   const OwnedVector error(N_VClone(vector()));
   ERKStepGetEstLocalErrors(memory_, error.get());
-  Eigen::ArrayXXd direction = EnsembleValues(error.get());
+  Eigen::ArrayXXd direction = BlockValues(error.get());
   Eigen::ArrayXXd rates(x.rows(), x.cols()), moved(x.rows(), x.cols());
   system()->Derivatives(time_s(), x, rates);
   double largest = 0;
@@ -140,10 +140,9 @@ bool ErkIntegrator::LooksStiff() {
 
 }  // namespace
 
-std::unique_ptr<EnsembleIntegrator> MakeErkIntegrator(EnsembleSystem* system,
-                                                      double relative_tolerance, double time_s,
-                                                      const ConstBlock& states) {
+std::unique_ptr<BlockIntegrator> MakeErkIntegrator(BlockSystem* system, double relative_tolerance,
+                                                   double time_s, const ConstBlock& states) {
   return std::make_unique<ErkIntegrator>(system, relative_tolerance, time_s, states);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace polyest {
+namespace polyest::internal {
 
 ErrorScale::ErrorScale(Eigen::Index points, Eigen::Index states, double relative_tolerance)
     : relative_tolerance_(relative_tolerance),
@@ -14,7 +14,7 @@ ErrorScale::ErrorScale(Eigen::Index points, Eigen::Index states, double relative
       point_norm_(Eigen::ArrayXd::Zero(points)) {}
 
 void ErrorScale::Grow(const Eigen::ArrayXXd& states) {
-  // Once every state has been through its largest value there is nothing to do any more.
+  // Once every state has passed its largest value, nothing changes any more.
   if (states.size() == 0 || !((states.abs() - largest_).maxCoeff() > 0)) return;
   largest_ = largest_.max(states.abs());
   for (Eigen::Index s = 0; s < states.cols(); ++s) {
@@ -66,7 +66,7 @@ double ErrorScale::Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& wei
   return LargestOf(GrowingNorm(error));
 }
 
-// Passes the norm on; remembers a point that was not finite.
+// Returns the norm and stores a point that was not finite.
 double ErrorScale::LargestOf(double norm) {
   ++norms_since_not_finite_;
   if (norm >= kHuge) {
@@ -84,4 +84,4 @@ Eigen::Index ErrorScale::worst_point() const {
   return worst;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

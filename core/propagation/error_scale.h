@@ -4,11 +4,10 @@
 //
 //   ‖e‖ = max over points p of max over states s of |e_ps| / (rtol · S_ps + atol),
 //
-// so that ‖e‖ ≤ 1 says |e_ps| ≤ rtol · S_ps + atol for every state of every point. The scale S_ps
-// is the largest magnitude that state s of point p has had so far, floored by a thousandth of the
-// largest that any point of the block has had: a point that stays near zero while others move is
-// not resolved down to its rounding errors. atol = 1e-14 in SI units does the same for a block that
-// is at rest altogether.
+// so ‖e‖ ≤ 1 means |e_ps| ≤ rtol · S_ps + atol for every state of every point. The scale S_ps is
+// the largest magnitude that state s of point p has had so far, but at least a thousandth of the
+// largest of any point of the block: a point that stays near zero while others move is not resolved
+// down to its rounding errors. atol = 1e-14 in SI units has the same effect for a block at rest.
 //
 // A solver asks for its weights at the beginning of a step. A state that starts from 0 would then
 // have a scale of 0 through the whole step, so the norm also counts the magnitudes in the states
@@ -19,32 +18,33 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class ErrorScale {
  public:
   static constexpr double kAbsoluteTolerance = 1e-14;
   static constexpr double kBlockShare = 1e-3;
-  // What a norm that is not finite is replaced by: a step to be rejected, yet still a number.
+  // Replaces a norm that is not finite: the step is rejected, yet the norm stays a number.
   static constexpr double kHuge = 1e100;
 
   ErrorScale(Eigen::Index points, Eigen::Index states, double relative_tolerance);
 
-  // Accepts these states: S grows to them.
+  // Raises S to the magnitudes of these states, which a step has accepted.
   void Grow(const Eigen::ArrayXXd& states);
   // 1 / (rtol · S_ps + atol).
   const Eigen::ArrayXXd& weights() const { return weights_; }
-  // The largest magnitude that state s has had over the block.
+  // Returns the largest magnitude that the state has had over the block.
   double block_scale(Eigen::Index state) const { return block_scale_(state); }
 
-  // The states at which the right-hand side was evaluated last; must stay alive until the next.
+  // Sets the states at which the right-hand side was evaluated last; they must stay alive until the
+  // next call.
   void Watch(const Eigen::ArrayXXd* states) { watched_ = states; }
 
-  // ‖error‖, with kHuge for a point that is not finite; remembers each point's norm.
+  // Returns ‖error‖, with kHuge for a point that is not finite, and stores each point's norm.
   double Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights);
-  // The point that was not finite at one of the last few calls of Norm: a solver that creeps up to
-  // where a point stops being defined alternates tiny steps accepted with longer ones rejected.
-  // Without such a point, the one with the largest norm at the last call.
+  // Returns the point that was not finite at one of the last few calls of Norm, because a solver
+  // that approaches the end of a point's domain alternates tiny accepted steps with longer rejected
+  // ones. If there is none, returns the point with the largest norm at the last call.
   Eigen::Index worst_point() const;
 
  private:
@@ -63,4 +63,4 @@ class ErrorScale {
   const Eigen::ArrayXXd* watched_ = nullptr;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 
-NewtonMatrix::NewtonMatrix(EnsembleSystem* system)
+NewtonMatrix::NewtonMatrix(BlockSystem* system)
     : system_(system),
       jacobian_(system->points(), system->states() * system->states()),
       moved_(system->points(), system->states()),
@@ -51,4 +51,4 @@ void NewtonMatrix::Factor(double gamma) {
   lu_.Factor();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

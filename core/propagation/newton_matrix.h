@@ -1,21 +1,21 @@
 #pragma once
 
-// Newton's matrices I − γ ∂f/∂x of a block of trajectories, one a point.
+// Newton's matrices I − γ ∂f/∂x of a block of trajectories, one for each point.
 
 #include <Eigen/Core>
 
+#include "core/propagation/block_integrator.h"
 #include "core/propagation/block_lu.h"
-#include "core/propagation/ensemble_integrator.h"
 #include "core/propagation/error_scale.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class NewtonMatrix {
  public:
-  explicit NewtonMatrix(EnsembleSystem* system);
+  explicit NewtonMatrix(BlockSystem* system);
 
-  // ∂f/∂x at (time_s, states): exact where the system has it and it is finite, otherwise by forward
-  // differences; `scale` says how large a state is.
+  // Evaluates ∂f/∂x at (time_s, states): exactly if the system provides it and it is finite,
+  // otherwise by forward differences, whose steps follow the magnitudes in `scale`.
   void Differentiate(double time_s, const Eigen::ArrayXXd& states, const ErrorScale& scale);
   void Factor(double gamma);
   void SolveInPlace(Eigen::ArrayXXd& x) { lu_.SolveInPlace(x); }
@@ -23,10 +23,10 @@ class NewtonMatrix {
  private:
   void TakeDifferences(double time_s, const Eigen::ArrayXXd& states, const ErrorScale& scale);
 
-  EnsembleSystem* system_;
+  BlockSystem* system_;
   Eigen::ArrayXXd jacobian_;  // points × (states · states), column s·states + i is ∂f_i/∂x_s
   Eigen::ArrayXXd moved_, rates_, moved_rates_;
   BlockLu lu_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,40 +6,40 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-SundialsIntegrator::SundialsIntegrator(EnsembleSystem* system, double relative_tolerance,
+SundialsIntegrator::SundialsIntegrator(BlockSystem* system, double relative_tolerance,
                                        double time_s, const ConstBlock& states)
     : system_(system),
       scale_(system->points(), system->states(), relative_tolerance),
-      vector_(NewEnsembleVector(system->points(), system->states(), &scale_, context_)),
+      vector_(NewBlockVector(system->points(), system->states(), &scale_, context_)),
       time_s_(time_s),
       covered_s_(time_s),
       first_rates_(system->points(), system->states()) {
-  EnsembleValues(vector()) = states;
-  scale_.Grow(EnsembleValues(vector()));
+  BlockValues(vector()) = states;
+  scale_.Grow(BlockValues(vector()));
 }
 
 int SundialsIntegrator::RightHandSide(double time_s, N_Vector states, N_Vector derivatives,
                                       void* self) {
   auto* const integrator = static_cast<SundialsIntegrator*>(self);
-  const Eigen::ArrayXXd& x = EnsembleValues(states);
+  const Eigen::ArrayXXd& x = BlockValues(states);
   integrator->scale_.Watch(&x);
   // A value that is not finite is left to the error norm, which names the point and makes the
   // solver shorten the step.
-  integrator->system_->Derivatives(time_s, x, EnsembleValues(derivatives));
+  integrator->system_->Derivatives(time_s, x, BlockValues(derivatives));
   return 0;
 }
 
 int SundialsIntegrator::ErrorWeights(N_Vector states, N_Vector weights, void* self) {
   auto* const integrator = static_cast<SundialsIntegrator*>(self);
-  integrator->scale_.Grow(EnsembleValues(states));
-  EnsembleValues(weights) = integrator->scale_.weights();
+  integrator->scale_.Grow(BlockValues(states));
+  BlockValues(weights) = integrator->scale_.weights();
   return 0;
 }
 
 double SundialsIntegrator::FirstStep(double span_s) {
-  system_->Derivatives(time_s_, EnsembleValues(vector()), first_rates_);
+  system_->Derivatives(time_s_, BlockValues(vector()), first_rates_);
   double step_s = span_s / 64;
   for (Eigen::Index s = 0; s < first_rates_.cols(); ++s) {
     const double rate = first_rates_.col(s).abs().maxCoeff();
@@ -58,7 +58,7 @@ IntegratorOutcome SundialsIntegrator::Outcome(int flag, double advance_s, double
   outcome.worst_point = scale_.worst_point();
   constexpr int kTooMuchWork = -1;
   outcome.too_many_steps = flag == kTooMuchWork;
-  // Many steps that lead nowhere: more of them will not help.
+  // Many steps have made no progress: more of them will not help.
   constexpr double kStandstill = 1e-13;
   if (outcome.too_many_steps && !(advance_s > kStandstill * std::max(std::abs(time_s_), span_s))) {
     outcome.too_many_steps = false;
@@ -67,7 +67,7 @@ IntegratorOutcome SundialsIntegrator::Outcome(int flag, double advance_s, double
   return outcome;
 }
 
-IntegratorOutcome SundialsIntegrator::AdvanceTo(double time_s, double stop_time_s, int most_steps,
+IntegratorOutcome SundialsIntegrator::AdvanceTo(double time_s, double stop_time_s, int max_steps,
                                                 Block states) {
   POLYEST_CHECK(time_s >= time_s_ && stop_time_s >= time_s);
   int flag = 0;
@@ -76,15 +76,15 @@ IntegratorOutcome SundialsIntegrator::AdvanceTo(double time_s, double stop_time_
   if (time_s > covered_s_) {
     if (!first_step_set_) SetFirstStep(FirstStep(span_s));
     first_step_set_ = true;
-    // There is no way to take a stop time back, so that "none" is one that is never reached.
+    // SUNDIALS cannot unset a stop time, so "none" is one that is never reached.
     const double stop_s = std::min(stop_time_s, std::numeric_limits<double>::max());
-    flag = Evolve(time_s, stop_s, most_steps, vector(), &time_s_);
+    flag = Evolve(time_s, stop_s, max_steps, vector(), &time_s_);
     covered_s_ = std::max(InternalTime(), time_s_);
   } else if (time_s > time_s_) {
     flag = Interpolate(time_s, vector());
     if (flag >= 0) time_s_ = time_s;
   }
-  if (flag >= 0) states = EnsembleValues(vector());
+  if (flag >= 0) states = BlockValues(vector());
   return Outcome(flag, covered_s_ - before_s, span_s);
 }
 
@@ -94,4 +94,4 @@ void SundialsIntegrator::Restart() {
   covered_s_ = time_s_;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

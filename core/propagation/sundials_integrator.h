@@ -1,7 +1,7 @@
 #pragma once
 
-// What the two SUNDIALS integrators of a block share: context, error norm, the vector of states,
-// and the ways between the sample times asked for and the steps that the solver likes to take.
+// The base of the two SUNDIALS integrators of a block: context, error norm, vector of states, and
+// the translation between the sample times asked for and the steps that the solver takes.
 
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_nvector.h>
@@ -9,26 +9,26 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "core/propagation/ensemble_integrator.h"
-#include "core/propagation/ensemble_vector.h"
+#include "core/propagation/block_integrator.h"
+#include "core/propagation/block_vector.h"
 #include "core/propagation/error_scale.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct VectorDestroyer {
   void operator()(N_Vector vector) const { N_VDestroy(vector); }
 };
 using OwnedVector = std::unique_ptr<_generic_N_Vector, VectorDestroyer>;
 
-// Both solvers use the same numbers: 0 and above is success, −1 is "too much work".
-class SundialsIntegrator : public EnsembleIntegrator {
+// Return codes of both solvers are equal: 0 and above is success, −1 is "too much work".
+class SundialsIntegrator : public BlockIntegrator {
  public:
-  SundialsIntegrator(EnsembleSystem* system, double relative_tolerance, double time_s,
+  SundialsIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                      const ConstBlock& states);
 
   double time_s() const override { return time_s_; }
-  ConstBlock states() const override { return EnsembleValues(vector_.get()); }
-  IntegratorOutcome AdvanceTo(double time_s, double stop_time_s, int most_steps,
+  ConstBlock states() const override { return BlockValues(vector_.get()); }
+  IntegratorOutcome AdvanceTo(double time_s, double stop_time_s, int max_steps,
                               Block states) override;
   void Restart() override;
 
@@ -36,19 +36,19 @@ class SundialsIntegrator : public EnsembleIntegrator {
   // Callbacks with this object as user data.
   static int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self);
   static int ErrorWeights(N_Vector states, N_Vector weights, void* self);
-  // The codes that solvers return say all; their messages on stderr are not wanted.
+  // Drops the solvers' messages to stderr; their return codes contain all that is needed.
   static void IgnoreMessage(int, const char*, const char*, char*, void*) {}
 
-  // The solver's own functions.
+  // The functions of the solver, which a derived class provides.
   virtual void SetFirstStep(double step_s) = 0;
-  virtual int Evolve(double time_s, double stop_time_s, int most_steps, N_Vector states,
+  virtual int Evolve(double time_s, double stop_time_s, int max_steps, N_Vector states,
                      double* reached_s) = 0;
   virtual int Interpolate(double time_s, N_Vector states) = 0;
   virtual double InternalTime() const = 0;  // the end of the last step
   virtual int Reset(double time_s, N_Vector states) = 0;
   virtual const char* InWords(int flag) const = 0;
 
-  EnsembleSystem* system() const { return system_; }
+  BlockSystem* system() const { return system_; }
   SUNContext context() const { return context_; }
   N_Vector vector() const { return vector_.get(); }
   ErrorScale& scale() { return scale_; }
@@ -56,13 +56,13 @@ class SundialsIntegrator : public EnsembleIntegrator {
   void ChooseFirstStepAgain() { first_step_set_ = false; }
 
  private:
-  // A step to begin with, (1/100) min_s S_s ÷ max_p |ẋ_ps|, at most a small part of span_s so that
-  // an input is seen that is 0 now. It is a guess: the error test shortens it, and it may grow
-  // fast.
+  // Returns a first step, (1/100) min_s S_s ÷ max_p |ẋ_ps|, limited to a small part of `span_s` so
+  // that an input that is 0 now is not stepped over. It is a guess: the error test shortens it, and
+  // it may grow fast.
   double FirstStep(double span_s);
   IntegratorOutcome Outcome(int flag, double advance_s, double span_s) const;
 
-  EnsembleSystem* const system_;
+  BlockSystem* const system_;
   sundials::Context context_;
   ErrorScale scale_;
   OwnedVector vector_;  // the states at time_s_
@@ -72,4 +72,4 @@ class SundialsIntegrator : public EnsembleIntegrator {
   bool first_step_set_ = false;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,11 +10,10 @@
 #include "core/propagation/bdf_integrator.h"
 #include "core/propagation/erk_integrator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Steps between two looks at the stop request.
+// Number of steps between two checks of the stop request.
 constexpr int kStepsAtOnce = 500;
 // A multistep method sees an input only at the ends of its steps: one long step from rest over a
 // bump, 0 at both ends, would miss it. So after each break it stops once early on.
@@ -120,14 +119,14 @@ absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
 }
 
 absl::Status TrajectoryBlock::Reach(double time_s, double stop_time_s, const Stop& stop) {
-  const int most_steps = specification_->integration.most_steps;
-  const int steps_at_once = std::min(kStepsAtOnce, most_steps);
+  const int max_steps = specification_->integration.max_steps;
+  const int steps_at_once = std::min(kStepsAtOnce, max_steps);
   int steps = 0;
   while (integrator_) {
     const IntegratorOutcome outcome =
         integrator_->AdvanceTo(time_s, stop_time_s, steps_at_once, states_);
     steps += steps_at_once;
-    const bool may_go_on = outcome.too_many_steps && steps + steps_at_once <= most_steps;
+    const bool may_go_on = outcome.too_many_steps && steps + steps_at_once <= max_steps;
     const bool change = MayChangeMethod() && (outcome.ok || outcome.too_many_steps) &&
                         (integrator_->LooksStiff() || !(outcome.ok || may_go_on));
     if (!change && outcome.ok) break;
@@ -198,7 +197,7 @@ void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::strin
   }
 }
 
-// The row is from now on a copy of the point, which is in its own row.
+// Makes the row a copy of the point, which is in its own row.
 void TrajectoryBlock::CarryPoint(Eigen::Index row, Eigen::Index point) {
   source_[row] = static_cast<int>(point);
   parameters_.row(row) = parameters_.row(point);
@@ -252,4 +251,4 @@ void TrajectoryBlock::Restore(double time_s, const EnsembleState::OfBlock& state
   Restart();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,8 +2,8 @@
 
 // A block of trajectories: up to kPoints points of an ensemble, advanced by one integrator.
 //
-// Rows beyond the block's own points, up to a multiple of kLanes, carry copies of its last point; a
-// point that fails is replaced by a copy of one that has not, so that the shape stays.
+// Rows beyond the block's own points, up to a multiple of kLanes, carry copies of its last point. A
+// copy of a good point replaces a point that fails, so the shape does not change.
 
 #include <absl/status/status.h>
 
@@ -14,20 +14,20 @@
 #include <string>
 #include <vector>
 
-#include "core/common/stop.h"
 #include "core/common/types.h"
 #include "core/propagation/block_inputs.h"
-#include "core/propagation/ensemble_integrator.h"
+#include "core/propagation/block_integrator.h"
 #include "core/propagation/trajectory_ensemble.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-class TrajectoryBlock final : public EnsembleSystem {
+class TrajectoryBlock final : public BlockSystem {
  public:
   static constexpr int kPoints = 64;
 
-  // Points first_point … first_point + points − 1 of the specification, which must outlive it, as
-  // must the inputs.
+  // Takes points first_point … first_point + points − 1 of the specification. The specification and
+  // the inputs must outlive the block.
   TrajectoryBlock(const EnsembleSpecification* specification, const InputSignals* inputs,
                   int first_point, int points);
 
@@ -41,13 +41,13 @@ class TrajectoryBlock final : public EnsembleSystem {
 
   const std::vector<PointFailure>& failures() const { return failures_; }
 
-  // Integrates on from the present states as if they were initial ones.
+  // Restarts the integration from the present states as if they were initial states.
   void Restart();
-  // What a restart goes on from.
+  // Returns the state from which a restart continues.
   EnsembleState::OfBlock State() const;
-  // Whether it can be of such a block.
+  // Returns whether `state` can belong to such a block.
   bool Fits(const EnsembleState::OfBlock& state) const;
-  // For a new block, which has not advanced.
+  // Continues from `state`; the block must not have advanced yet.
   void Restore(double time_s, const EnsembleState::OfBlock& state);
 
  private:
@@ -65,7 +65,7 @@ class TrajectoryBlock final : public EnsembleSystem {
   absl::Status Reach(double time_s, double stop_time_s, const Stop& stop);
   void ReadOutputs(double time_s, int sample, MatrixRef outputs);
   void FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s, const char* reason);
-  // The point in that row is left out from now on.
+  // Leaves out the point in that row from now on.
   void Fail(Eigen::Index row, double time_s, int flag, std::string reason);
   void CarryPoint(Eigen::Index row, Eigen::Index point);
   bool alive() const { return alive_points_ > 0; }
@@ -87,8 +87,8 @@ class TrajectoryBlock final : public EnsembleSystem {
   bool stiff_ = false;
   double time_s_ = 0;
   double last_break_s_ = 0;
-  std::unique_ptr<EnsembleIntegrator> integrator_;
+  std::unique_ptr<BlockIntegrator> integrator_;
   std::vector<PointFailure> failures_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

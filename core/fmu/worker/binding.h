@@ -13,7 +13,7 @@
 
 #include "core/fmu/fmu_description.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct EventUpdate {
   bool again = false;      // the discrete states want another iteration
@@ -73,4 +73,4 @@ absl::StatusOr<std::unique_ptr<FmuLibrary>> LoadFmi3(const FmuInterface& interfa
                                                      const std::string& library,
                                                      const std::string& resources);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Two communication points closer than this part of a step are one.
@@ -100,4 +100,4 @@ PointFailure CoSimulationPoint::failure() const {
   return {0, good_s_, instance_->failure_status(), failure_};
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -18,7 +18,7 @@
 #include "core/fmu/worker/pointwise_ensemble.h"
 #include "core/propagation/block_inputs.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class CoSimulationPoint final : public PointTrajectory {
  public:
@@ -45,4 +45,4 @@ class CoSimulationPoint final : public PointTrajectory {
   std::string failure_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -16,13 +16,13 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kAbsoluteTolerance = 1e-14;
 constexpr double kNominalShare = 1e-3;
 // More events than this, each so close to the one before, accumulate at a point in time.
-constexpr int kMostCloseEvents = 10;
+constexpr int kMaxCloseEvents = 10;
 constexpr double kClose = 1e-8;
 
 // A time that an integrator cannot resolve from the present one.
@@ -39,7 +39,7 @@ EventTrajectory::EventTrajectory(const InstanceFactory* factory, std::unique_ptr
       instance_(std::move(instance)),
       inputs_(std::move(inputs)),
       relative_tolerance_(options.relative_tolerance),
-      most_steps_(options.most_steps) {
+      max_steps_(options.max_steps) {
   // Without states, one that stays 0 lets the same solver look for events.
   const int count = std::max(1, factory_.interface.states);
   states_ = N_VNew_Serial(count, context_);
@@ -138,9 +138,9 @@ void EventTrajectory::Restart(double span_s) {
   // before, as the next one may follow as soon.
   constexpr double kOfSpan = 1.0 / 64;
   constexpr double kOfEvents = 1.0 / 16;
-  constexpr double kLeast = 1e-12;
+  constexpr double kMin = 1e-12;
   const double step_s = std::max(std::min(kOfSpan * span_s, kOfEvents * since_event_s_),
-                                 kLeast * std::max(1.0, time_s_));
+                                 kMin * std::max(1.0, time_s_));
   const bool accepted = CVodeReInit(solver_, time_s_, states_) == CV_SUCCESS &&
                         CVodeSetInitStep(solver_, std::isfinite(step_s) ? step_s : 0) == CV_SUCCESS;
   POLYEST_CHECK(accepted);
@@ -177,7 +177,7 @@ bool EventTrajectory::Integrate(double stop_s, bool& event) {
   }
   CVodeSetStopTime(solver_, stop_s);
   while (time_s_ < stop_s && !event) {
-    if (++steps_ > most_steps_) return Fail("too many steps between two samples");
+    if (++steps_ > max_steps_) return Fail("too many steps between two samples");
     const int flag = CVode(solver_, stop_s, states_, &time_s_, CV_ONE_STEP);
     if (flag < 0) return Fail(flag);
     event = flag == CV_ROOT_RETURN;
@@ -209,9 +209,9 @@ bool EventTrajectory::CheckAccumulation() {
   const bool close = since_event_s_ < kClose * std::max(1.0, time_s_);
   close_events_ = close ? close_events_ + 1 : 0;
   last_event_s_ = time_s_;
-  if (close_events_ <= kMostCloseEvents) return true;
+  if (close_events_ <= kMaxCloseEvents) return true;
   return Fail(absl::StrFormat("more than %d events follow each other within %g s: they accumulate",
-                              kMostCloseEvents, kClose));
+                              kMaxCloseEvents, kClose));
 }
 
 bool EventTrajectory::ReadOutputs(double* outputs) {
@@ -254,4 +254,4 @@ bool EventTrajectory::FailSinceRead(const std::string& reason) {
 
 PointFailure EventTrajectory::failure() const { return failure_; }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -31,7 +31,7 @@
 #include "core/fmu/worker/pointwise_ensemble.h"
 #include "core/propagation/block_inputs.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class EventTrajectory final : public PointTrajectory {
  public:
@@ -71,7 +71,7 @@ class EventTrajectory final : public PointTrajectory {
   std::unique_ptr<Instance> instance_;
   BlockInputs inputs_;
   const double relative_tolerance_;
-  const int most_steps_;
+  const int max_steps_;
   sundials::Context context_;
   N_Vector states_ = nullptr;
   SUNMatrix matrix_ = nullptr;
@@ -88,4 +88,4 @@ class EventTrajectory final : public PointTrajectory {
   PointFailure failure_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 std::vector<Quantity> Numbered(size_t count) {
@@ -95,4 +95,4 @@ absl::Status ExchangeEnsemble::Advance(std::span<const double> times_s, MatrixRe
   return status;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

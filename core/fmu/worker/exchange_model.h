@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "core/fmu/worker/instance.h"
-#include "core/model/model.h"
 #include "core/propagation/ensemble_propagator.h"
+#include "polyest/model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class ExchangeModel final : public StateSpaceModel {
  public:
@@ -52,4 +52,4 @@ class ExchangeEnsemble final : public TrajectoryEnsemble {
   std::vector<PointFailure> failures_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

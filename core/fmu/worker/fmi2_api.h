@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-namespace polyest::fmi2 {
+namespace polyest::internal::fmi2 {
 
 using Component = void*;
 using Reference = unsigned int;
@@ -58,4 +58,4 @@ using SetInputDerivatives = Status(Component, const Reference* references, size_
                                    const int* orders, const double* values);
 using DoStep = Status(Component, double time, double step, Boolean no_set_state_before);
 
-}  // namespace polyest::fmi2
+}  // namespace polyest::internal::fmi2

@@ -10,7 +10,7 @@
 #include "core/fmu/worker/fmi2_api.h"
 #include "core/fmu/worker/shared_library.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 struct Functions {
@@ -221,4 +221,4 @@ absl::StatusOr<std::unique_ptr<FmuLibrary>> LoadFmi2(const FmuInterface& interfa
   return fmu;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

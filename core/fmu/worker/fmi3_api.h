@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace polyest::fmi3 {
+namespace polyest::internal::fmi3 {
 
 using Instance = void*;
 using Reference = uint32_t;
@@ -50,4 +50,4 @@ using DoStep = Status(Instance, double time, double step, bool no_set_state_befo
                       bool* event_needed, bool* terminate, bool* early_return,
                       double* last_successful_time);
 
-}  // namespace polyest::fmi3
+}  // namespace polyest::internal::fmi3

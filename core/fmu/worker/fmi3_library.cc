@@ -6,7 +6,7 @@
 #include "core/fmu/worker/fmi3_api.h"
 #include "core/fmu/worker/shared_library.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 struct Functions {
@@ -230,4 +230,4 @@ absl::StatusOr<std::unique_ptr<FmuLibrary>> LoadFmi3(const FmuInterface& interfa
   return fmu;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

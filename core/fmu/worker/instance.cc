@@ -2,16 +2,14 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kWarning = 1;
 constexpr int kDiscard = 2;
 constexpr int kError = 3;
-constexpr int kMostEventIterations = 1'000;
+constexpr int kMaxEventIterations = 1'000;
 
 const char* StatusInWords(int status) {
   switch (status) {
@@ -119,8 +117,8 @@ bool Instance::IterateEvents() {
   int iterations = 0;
   do {
     update = {};
-    if (++iterations > kMostEventIterations) {
-      return Fail(kError, absl::StrCat("an event is not settled after ", kMostEventIterations,
+    if (++iterations > kMaxEventIterations) {
+      return Fail(kError, absl::StrCat("an event is not settled after ", kMaxEventIterations,
                                        " iterations"));
     }
     if (!Do(FmuCall::kEvents, [&] { return binding_->UpdateDiscreteStates(update); })) return false;
@@ -192,4 +190,4 @@ bool Instance::DoStep(double time_s, double step_s) {
   return !terminate || Fail(kError, "the FMU asked for the end of the simulation");
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,7 +14,7 @@
 #include "core/fmu/worker/binding.h"
 #include "core/fmu/worker/monitor.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // What one worker's instances have in common.
 class Instance;
@@ -90,4 +90,4 @@ class Instance {
   void* state_ = nullptr;       // saved, while another has the shared one
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -17,10 +17,11 @@
 #include <memory>
 #include <string>
 
+#include "core/common/sanitizer.h"
 #include "core/fmu/worker/simulation.h"
 #include "core/fmu/worker_process.h"
 
-#if defined(__SANITIZE_ADDRESS__)
+#if POLYEST_ADDRESS_SANITIZER
 // A crash of the FMU is to be seen as the signal that it is.
 extern "C" const char* __asan_default_options() {
   return "handle_segv=0:handle_abort=0:handle_sigfpe=0:handle_sigbus=0:handle_sigill=0:"
@@ -28,10 +29,10 @@ extern "C" const char* __asan_default_options() {
 }
 #endif
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZER
 constexpr bool kLimitsMemory = false;  // a sanitizer's shadow is larger than any limit
 #else
 constexpr bool kLimitsMemory = true;
@@ -109,8 +110,8 @@ void LimitAll(int64_t memory_bytes, int64_t file_bytes) {
   Limit(RLIMIT_FSIZE, file_bytes);
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_NPROC, 0);  // no process or thread but those there are; root is exempt from it
-  constexpr int64_t kMostDescriptors = 256;
-  Limit(RLIMIT_NOFILE, kMostDescriptors);
+  constexpr int64_t kMaxDescriptors = 256;
+  Limit(RLIMIT_NOFILE, kMaxDescriptors);
   prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
   // A file too large is an error of its write, as on a full disk.
@@ -151,7 +152,7 @@ int Serve(StatusPage* page) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 int main(int argc, char** argv) {
   int64_t memory_bytes = 0, file_bytes = 0;
@@ -159,11 +160,11 @@ int main(int argc, char** argv) {
       !absl::SimpleAtoi(argv[2], &file_bytes)) {
     return 2;
   }
-  void* const page = mmap(nullptr, sizeof(polyest::StatusPage), PROT_READ | PROT_WRITE, MAP_SHARED,
-                          polyest::kWorkerPage, 0);
-  if (page == MAP_FAILED || chdir("/") != 0 || !polyest::StartWatch()) return 2;
-  close(polyest::kWorkerPage);
-  polyest::LimitAll(memory_bytes, file_bytes);
+  void* const page = mmap(nullptr, sizeof(polyest::internal::StatusPage), PROT_READ | PROT_WRITE,
+                          MAP_SHARED, polyest::internal::kWorkerPage, 0);
+  if (page == MAP_FAILED || chdir("/") != 0 || !polyest::internal::StartWatch()) return 2;
+  close(polyest::internal::kWorkerPage);
+  polyest::internal::LimitAll(memory_bytes, file_bytes);
   // Without the destructors of the FMU's and others' static objects.
-  _exit(polyest::Serve(static_cast<polyest::StatusPage*>(page)));
+  _exit(polyest::internal::Serve(static_cast<polyest::internal::StatusPage*>(page)));
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace polyest {
+namespace polyest::internal {
 
 void Monitor::Say(absl::string_view message) {
   auto& text = page_->message;
@@ -11,4 +11,4 @@ void Monitor::Say(absl::string_view message) {
   text[size] = '\0';
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

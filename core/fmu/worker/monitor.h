@@ -6,7 +6,7 @@
 
 #include "core/fmu/status_page.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Monitor {
  public:
@@ -29,4 +29,4 @@ class Monitor {
   StatusPage* page_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

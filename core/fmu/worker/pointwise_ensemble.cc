@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::Status PointwiseEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
                                         const Stop& stop) {
@@ -32,4 +32,4 @@ void PointwiseEnsemble::AdvancePoint(int point, std::span<const double> times_s,
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "core/propagation/trajectory_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class PointTrajectory {
  public:
@@ -40,4 +40,4 @@ class PointwiseEnsemble final : public TrajectoryEnsemble {
   std::vector<PointFailure> failures_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

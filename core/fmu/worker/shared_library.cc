@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <dlfcn.h>
 
-namespace polyest {
+namespace polyest::internal {
 
 void SharedLibrary::Unload::operator()(void* handle) const { dlclose(handle); }
 
@@ -21,4 +21,4 @@ absl::Status SharedLibrary::Missing(const char* name) {
   return absl::FailedPreconditionError(absl::StrCat("its library has no function ", name));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // A library loaded into this process: only ever a worker's.
 class SharedLibrary {
@@ -35,4 +35,4 @@ class SharedLibrary {
   std::unique_ptr<void, Unload> handle_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

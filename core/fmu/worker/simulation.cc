@@ -11,7 +11,7 @@
 #include "core/fmu/worker/event_trajectory.h"
 #include "core/fmu/worker/exchange_model.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Matrix MiddleRows(const Matrix& matrix, int first, int points) {
@@ -156,4 +156,4 @@ absl::Status Simulation::Advance(const AdvanceMessage& message, ResultMessage& r
   return absl::OkStatus();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 #include "core/fmu/worker/instance.h"
 #include "core/propagation/block_inputs.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Simulation {
  public:
@@ -37,4 +37,4 @@ class Simulation {
   std::vector<std::unique_ptr<TrajectoryEnsemble>> blocks_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

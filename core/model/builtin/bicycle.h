@@ -33,9 +33,9 @@
 #include <limits>
 
 #include "core/model/lane.h"
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 struct Bicycle {
   static constexpr int kStates = 2;
@@ -139,4 +139,4 @@ struct Bicycle {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -2,9 +2,9 @@
 
 #include <array>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 // m ẍ + c ẋ + k x + k2 x² + k3 x³ = force + offset. A rest position x_e of a linear spring is
 // offset = k x_e.
@@ -64,4 +64,4 @@ struct Duffing {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

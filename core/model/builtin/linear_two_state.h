@@ -2,9 +2,9 @@
 
 #include <array>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 // (57): θ drives both states alike, so that x₁ − x₂ says nothing about it.
 struct LinearTwoState {
@@ -61,4 +61,4 @@ struct LinearTwoState {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -3,9 +3,9 @@
 #include <array>
 #include <numbers>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 // m ẍ + c ẋ + k x = force; the paper's (26) is the case without damping and force.
 struct MassSpringDamper {
@@ -70,4 +70,4 @@ struct MassSpringDamper {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -4,9 +4,9 @@
 #include <numbers>
 
 #include "core/model/lane.h"
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 // ω = √(k/m), an algebraic model: one measurement of ω leaves a valley in the plane of m and k.
 struct MassSpringFrequency {
@@ -40,4 +40,4 @@ struct MassSpringFrequency {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 // θ̈ = −(g/ℓ) sin θ − c θ̇ − c2 θ̇ |θ̇|
 struct Pendulum {
@@ -60,4 +60,4 @@ struct Pendulum {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

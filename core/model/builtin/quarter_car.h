@@ -15,9 +15,9 @@
 
 #include <array>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 struct QuarterCar {
   static constexpr int kStates = 4;
@@ -103,4 +103,4 @@ struct QuarterCar {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -20,9 +20,9 @@
 
 #include <array>
 
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 struct RollPlane2Dof {
   static constexpr int kStates = 4;
@@ -98,4 +98,4 @@ struct RollPlane2Dof {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

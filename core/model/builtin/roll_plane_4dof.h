@@ -29,9 +29,9 @@
 #include <array>
 
 #include "core/model/lane.h"
-#include "core/model/model.h"
+#include "polyest/model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 
 struct RollPlane4Dof {
   static constexpr int kStates = 8;
@@ -164,4 +164,4 @@ struct RollPlane4Dof {
   }
 };
 
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

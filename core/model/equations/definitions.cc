@@ -7,11 +7,12 @@
 #include <set>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 // Depth first from each definition in turn, with the way there at hand, without recursion.
@@ -83,8 +84,8 @@ absl::Status SortByDependency(std::vector<Definition>& definitions) {
     const std::string way = absl::StrJoin(
         cycle, " → ",
         [&definitions](std::string* text, size_t i) { text->append(definitions[i].name); });
-    return absl::InvalidArgumentError(
-        absl::StrCat(definitions[cycle.front()].syntax.field, ": depends on itself: ", way));
+    return InvalidField(definitions[cycle.front()].syntax.field,
+                        absl::StrCat("depends on itself: ", way));
   }
   std::vector<Definition> sorted;
   for (const size_t i : dependencies.order()) sorted.push_back(std::move(definitions[i]));
@@ -118,9 +119,9 @@ absl::StatusOr<NodeId> Lower(const Syntax& syntax, const std::map<std::string, N
         }
     }
     if (graph.exhausted()) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat(syntax.field, ": too much; all expressions together may have ", kMostNodes,
-                       " different operations at most"));
+      return FieldError(absl::StatusCode::kResourceExhausted, syntax.field,
+                        absl::StrCat("too much; all expressions together may have ", kMaxNodes,
+                                     " different operations at most"));
     }
     ids.push_back(id);
   }
@@ -128,4 +129,4 @@ absl::StatusOr<NodeId> Lower(const Syntax& syntax, const std::map<std::string, N
   return ids.back();
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

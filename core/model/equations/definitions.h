@@ -11,7 +11,7 @@
 #include "core/model/equations/graph.h"
 #include "core/model/equations/parser.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 struct Definition {
   std::string name;
@@ -28,4 +28,4 @@ absl::Status SortByDependency(std::vector<Definition>& definitions);
 absl::StatusOr<NodeId> Lower(const Syntax& syntax, const std::map<std::string, NodeId>& names,
                              const std::map<std::string, int>& tables, Graph& graph);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

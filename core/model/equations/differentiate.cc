@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 // The derivative with respect to one variable of nodes whose operands' derivatives are known.
@@ -179,4 +179,4 @@ std::vector<NodeId> Differentiate(Graph& graph, const std::vector<NodeId>& roots
   return result;
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -10,7 +10,7 @@
 
 #include "core/model/equations/graph.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 // ∂root/∂variable for each root, in the order of the roots for the first variable, then for the
 // next: element v·roots + r. kZero where a root does not depend on a variable. If the graph runs
@@ -18,4 +18,4 @@ namespace polyest::equations {
 std::vector<NodeId> Differentiate(Graph& graph, const std::vector<NodeId>& roots,
                                   const std::vector<NodeId>& variables);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

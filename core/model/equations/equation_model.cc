@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/model/equations/differentiate.h"
 #include "core/model/equations/equation_reader.h"
@@ -14,7 +15,7 @@
 #include "core/model/equations/limits.h"
 #include "core/model/equations/program.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace equations {
 namespace {
 
@@ -100,7 +101,7 @@ class Assembly {
   absl::StatusOr<std::vector<NodeId>> LowerAll(const std::vector<Definition>& definitions);
 
   const ReadEquations& read_;
-  Graph graph_{kMostNodes};
+  Graph graph_{kMaxNodes};
   std::map<std::string, NodeId> names_;
   std::vector<VariablePlace> places_;
   std::vector<NodeId> states_, initial_, derivatives_, outputs_;
@@ -150,11 +151,11 @@ Programs Assembly::Compile(const std::vector<Lookup>& tables) {
                     Program(graph_, derivatives_, places_, tables),
                     Program(graph_, outputs_, places_, tables), std::nullopt};
   if (states_.empty()) return programs;
-  graph_.set_most_nodes(kMostJacobianNodes);
+  graph_.set_most_nodes(kMaxJacobianNodes);
   const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
   if (graph_.exhausted()) return programs;
   programs.jacobian = Program(graph_, jacobian, places_, tables);
-  if (programs.jacobian->registers() > kMostRegisters) programs.jacobian.reset();
+  if (programs.jacobian->registers() > kMaxRegisters) programs.jacobian.reset();
   return programs;
 }
 
@@ -205,10 +206,11 @@ std::shared_ptr<const StateSpaceModel> Make(const EquationSpecification& specifi
       std::make_shared<EquationModel>(Describe(specification, read, output_units), read.tables);
   Programs programs = assembly.Compile(model->tables());
   const int registers = std::max(programs.derivatives.registers(), programs.outputs.registers());
-  if (registers > kMostRegisters) {
-    problems.push_back(absl::ResourceExhaustedError(
-        absl::StrCat("model.equations: needs ", registers, " intermediate values at once; at most ",
-                     kMostRegisters, " are allowed")));
+  if (registers > kMaxRegisters) {
+    problems.push_back(
+        FieldError(absl::StatusCode::kResourceExhausted, "model.equations",
+                   absl::StrCat("needs ", registers, " intermediate values at once; at most ",
+                                kMaxRegisters, " are allowed")));
     return nullptr;
   }
   model->set_programs(std::move(programs));
@@ -218,13 +220,17 @@ std::shared_ptr<const StateSpaceModel> Make(const EquationSpecification& specifi
 }  // namespace
 }  // namespace equations
 
-std::vector<std::string> CheckEquations(const EquationSpecification& specification) {
+std::vector<absl::Status> CheckEquations(const EquationSpecification& specification) {
   std::vector<absl::Status> problems;
   equations::Make(specification, problems);
-  std::vector<std::string> messages;
-  for (const absl::Status& problem : problems) messages.emplace_back(problem.message());
-  return messages;
+  return problems;
 }
+
+}  // namespace polyest::internal
+
+namespace polyest {
+
+using namespace internal;
 
 absl::StatusOr<std::shared_ptr<const StateSpaceModel>> MakeEquationModel(
     const EquationSpecification& specification) {

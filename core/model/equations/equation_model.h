@@ -7,25 +7,15 @@
 // block of points at once. Nothing but arithmetic can be expressed: no loops, no memory, no files.
 // The derivatives ∂f/∂x are exact.
 
-#include <absl/status/statusor.h>
-
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "core/model/equations/equation_specification.h"
-#include "core/model/model.h"
+#include "polyest/equation_model.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// All that is wrong with it, each message beginning with the field's path as in a problem file:
+// Returns all that is wrong with it, each with its field's path from the problem on:
 // "model.equations.states.v: column 7: unknown function \"sine\"; …". Empty: nothing.
-std::vector<std::string> CheckEquations(const EquationSpecification& specification);
+std::vector<absl::Status> CheckEquations(const EquationSpecification& specification);
 
-// INVALID_ARGUMENT, or RESOURCE_EXHAUSTED past a limit, with the first of these. States, outputs
-// and parameters of the model are in alphabetical order, its initial states after the other
-// parameters, inputs in the order given.
-absl::StatusOr<std::shared_ptr<const StateSpaceModel>> MakeEquationModel(
-    const EquationSpecification& specification);
-
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,18 +7,19 @@
 #include <cmath>
 #include <set>
 
+#include "core/common/field_error.h"
 #include "core/model/equations/functions.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
-std::string Path(const char* member) { return absl::StrCat("model.equations.", member); }
+FieldPath Path(const char* member) { return {"model", "equations", member}; }
 
-std::string Path(const char* member, const std::string& name) {
-  return IsName(name) ? absl::StrCat(Path(member), ".", name)
-                      : absl::StrCat(Path(member), "[", Quoted(name), "]");
+FieldPath Path(const char* member, const std::string& name) {
+  return Path(member).Then(
+      {IsName(name) ? FieldStep::Key(name) : FieldStep(FieldStep::Kind::kIndex, Quoted(name))});
 }
 
 class Reader {
@@ -45,10 +46,10 @@ class Reader {
 
  private:
   void CheckSizes();
-  void CheckSize(const std::string& path, size_t size, size_t most);
+  void CheckSize(const FieldPath& path, size_t size, size_t most, const char* what = "");
   void ReadTables();
   void Declare();
-  void Declare(const std::string& path, const char* member, const std::string& name,
+  void Declare(const FieldPath& path, const char* member, const std::string& name,
                const std::string& what);
   void DeclareOutput(const std::string& name);
   void ReadAll(const char* member, const std::map<std::string, std::string>& texts,
@@ -57,8 +58,8 @@ class Reader {
   void ReadParameters();
   void CheckUnitNames();
 
-  void Wrong(const std::string& path, const std::string& rule) {
-    problems_.push_back(absl::InvalidArgumentError(absl::StrCat(path, ": ", rule)));
+  void Wrong(const FieldPath& path, const std::string& rule) {
+    problems_.push_back(InvalidField(path, rule));
   }
 
   const EquationSpecification& specification_;
@@ -69,45 +70,45 @@ class Reader {
   std::set<std::string> free_;  // names that nothing declares
 };
 
-void Reader::CheckSize(const std::string& path, size_t size, size_t most) {
+// `what` follows their number in the message.
+void Reader::CheckSize(const FieldPath& path, size_t size, size_t most, const char* what) {
   if (size <= most) return;
-  problems_.push_back(absl::ResourceExhaustedError(
-      absl::StrFormat("%s: there are %d; at most %d are allowed", path, size, most)));
+  problems_.push_back(
+      FieldError(absl::StatusCode::kResourceExhausted, path,
+                 absl::StrFormat("there are %d%s; at most %d are allowed", size, what, most)));
 }
 
 void Reader::CheckSizes() {
   const auto& [states, outputs, intermediates, parameters, inputs, units, tables] = specification_;
-  CheckSize(Path("states"), states.size(), kMostStates);
+  CheckSize(Path("states"), states.size(), kMaxStates);
   CheckSize("model.equations", states.size() + outputs.size() + intermediates.size(),
-            kMostExpressions);
-  CheckSize(Path("parameters"), parameters.size(), kMostNames);
-  CheckSize(Path("inputs"), inputs.size(), kMostNames);
-  CheckSize(Path("units"), units.size(), kMostNames);
-  CheckSize(Path("tables"), tables.size(), kMostTables);
+            kMaxExpressions);
+  CheckSize(Path("parameters"), parameters.size(), kMaxNames);
+  CheckSize(Path("inputs"), inputs.size(), kMaxNames);
+  CheckSize(Path("units"), units.size(), kMaxNames);
+  CheckSize(Path("tables"), tables.size(), kMaxTables);
   size_t text = 0, values = 0;
   for (const auto* texts : {&states, &outputs, &intermediates}) {
     for (const auto& [name, expression] : *texts) text += expression.size();
   }
-  if (text > kMostTextInAll) {
-    problems_.push_back(absl::ResourceExhaustedError(
-        absl::StrFormat("model.equations: the expressions have %d bytes in all; at most %d", text,
-                        kMostTextInAll)));
+  if (text > kMaxTextInAll) {
+    problems_.push_back(FieldError(
+        absl::StatusCode::kResourceExhausted, "model.equations",
+        absl::StrFormat("the expressions have %d bytes in all; at most %d", text, kMaxTextInAll)));
   }
   for (const auto& [name, table] : tables) {
     const size_t size = std::max({table.value.size(), table.x.size(), table.y.size()});
-    CheckSize(absl::StrCat(Path("tables"), " of ", Quoted(name), ", values"), size,
-              kMostTableValues);
+    CheckSize(Path("tables", name), size, kMaxTableValues, " values");
     values += size;
   }
-  CheckSize(absl::StrCat(Path("tables"), ", values in all"), values, kMostTableValuesInAll);
+  CheckSize(Path("tables"), values, kMaxTableValuesInAll, " values in all");
 }
 
 void Reader::ReadTables() {
   for (const auto& [name, table] : specification_.tables) {
     table_arguments_[name] = table.y.empty() ? 1 : 2;
-    if (const auto problem = CheckTable(table)) {
-      problems_.push_back(
-          absl::InvalidArgumentError(absl::StrCat(Path("tables", name), ".", *problem)));
+    if (const absl::Status problem = CheckTable(table); !problem.ok()) {
+      problems_.push_back(Within(Path("tables", name), problem));
       continue;
     }
     read_.table_index[name] = static_cast<int>(read_.tables.size());
@@ -115,13 +116,13 @@ void Reader::ReadTables() {
   }
 }
 
-void Reader::Declare(const std::string& path, const char* member, const std::string& name,
+void Reader::Declare(const FieldPath& path, const char* member, const std::string& name,
                      const std::string& what) {
   if (!IsName(name)) {
     return Wrong(Path(member),
                  absl::StrFormat("%s is not a name: a letter, then letters, digits and _, at most "
                                  "%d of them",
-                                 Quoted(name), kMostNameLength));
+                                 Quoted(name), kMaxNameLength));
   }
   if (IsReserved(name)) {
     return Wrong(path, absl::StrFormat("%s means something else in an expression: t, pi and the "
@@ -137,7 +138,7 @@ void Reader::Declare() {
   for (const auto& [name, text] : s.states)
     Declare(Path("states", name), "states", name, "a state");
   for (size_t i = 0; i < s.inputs.size(); ++i) {
-    Declare(absl::StrCat(Path("inputs"), "[", i, "]"), "inputs", s.inputs[i], "an input");
+    Declare(Path("inputs").Then({i}), "inputs", s.inputs[i], "an input");
   }
   for (const auto& [name, text] : s.intermediates) {
     Declare(Path("intermediates", name), "intermediates", name, "an intermediate");
@@ -218,7 +219,7 @@ void Reader::ReadParameters() {
     }
   }
   for (const auto& [state, text] : specification_.states) names.erase(InitialName(state));
-  CheckSize(Path("parameters"), names.size(), kMostNames);
+  CheckSize(Path("parameters"), names.size(), kMaxNames);
   for (const std::string& name : names) {
     const auto found = defaults.find(name);
     const bool has_default = found != defaults.end();
@@ -253,4 +254,4 @@ ReadEquations Read(const EquationSpecification& specification,
   return Reader(specification, problems).Run();
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

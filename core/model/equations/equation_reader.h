@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "core/model/equations/definitions.h"
-#include "core/model/equations/equation_specification.h"
-#include "core/model/model.h"
+#include "core/model/equations/lookup.h"
+#include "polyest/equation_model.h"
+#include "polyest/model.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 struct ReadEquations {
   std::vector<Definition> states, outputs, intermediates;  // intermediates by dependency
@@ -28,4 +29,4 @@ ReadEquations Read(const EquationSpecification& specification, std::vector<absl:
 // The name of the parameter that is the state's initial value.
 std::string InitialName(const std::string& state);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

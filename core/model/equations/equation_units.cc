@@ -5,10 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/model/equations/unit_check.h"
 #include "core/model/units.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 class ModelUnits {
@@ -48,7 +49,7 @@ class ModelUnits {
       if (unit.ok()) {
         units_[name] = *unit;
       } else {
-        Wrong("model.equations.units." + name, std::string(unit.status().message()));
+        Wrong(UnitOf(name), std::string(unit.status().message()));
       }
     }
   }
@@ -60,10 +61,9 @@ class ModelUnits {
       const std::string initial = InitialName(state.name);
       const auto [given, is_new] = units_.emplace(initial, *unit);
       if (is_new || SameUnit(given->second, *unit)) continue;
-      Wrong("model.equations.units." + initial,
-            absl::StrFormat("is \"%s\"; it must be that of its state %s, \"%s\"",
-                            specification_.units.at(initial), state.name,
-                            specification_.units.at(state.name)));
+      Wrong(UnitOf(initial), absl::StrFormat("is \"%s\"; it must be that of its state %s, \"%s\"",
+                                             specification_.units.at(initial), state.name,
+                                             specification_.units.at(state.name)));
     }
   }
 
@@ -99,8 +99,12 @@ class ModelUnits {
     return FormatUnit(unit);
   }
 
-  void Wrong(const std::string& path, const std::string& rule) {
-    problems_.push_back(absl::InvalidArgumentError(path + ": " + rule));
+  static FieldPath UnitOf(const std::string& name) {
+    return {"model", "equations", "units", FieldStep::Key(name)};
+  }
+
+  void Wrong(const FieldPath& path, const std::string& rule) {
+    problems_.push_back(InvalidField(path, rule));
   }
 
   const EquationSpecification& specification_;
@@ -117,4 +121,4 @@ std::map<std::string, std::string> CheckUnits(const EquationSpecification& speci
   return ModelUnits(specification, read, problems).Run();
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

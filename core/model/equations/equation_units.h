@@ -10,7 +10,7 @@
 
 #include "core/model/equations/equation_reader.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 // Appends what does not to `problems`. Returns the unit of each output that has one, as given or
 // as its expression has it.
@@ -18,4 +18,4 @@ std::map<std::string, std::string> CheckUnits(const EquationSpecification& speci
                                               const ReadEquations& read,
                                               std::vector<absl::Status>& problems);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -10,38 +10,40 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/model/equations/definitions.h"
 #include "core/model/equations/functions.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace equations {
 namespace {
 
-constexpr size_t kMostListed = 50;  // names in a message
+constexpr size_t kMaxListed = 50;  // names in a message
 
-absl::Status CheckSizes(const std::string& field,
+absl::Status CheckSizes(const FieldPath& field,
                         const std::map<std::string, std::string>& definitions) {
   size_t text = 0;
   for (const auto& [name, expression] : definitions) text += expression.size();
-  if (definitions.size() <= kMostExpressions && text <= kMostTextInAll) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrFormat("%s: has %d expressions of %d bytes in all; at most %d of %d", field,
-                      definitions.size(), text, kMostExpressions, kMostTextInAll));
+  if (definitions.size() <= kMaxExpressions && text <= kMaxTextInAll) return absl::OkStatus();
+  return FieldError(absl::StatusCode::kResourceExhausted, field,
+                    absl::StrFormat("has %d expressions of %d bytes in all; at most %d of %d",
+                                    definitions.size(), text, kMaxExpressions, kMaxTextInAll));
 }
 
-absl::Status CheckName(const std::string& field, const std::string& name,
+absl::Status CheckName(const FieldPath& field, const std::string& name,
                        const std::set<std::string>& variables) {
   const std::vector<std::string> parts = absl::StrSplit(name, '.');
   if (!std::all_of(parts.begin(), parts.end(), IsName)) {
-    return absl::InvalidArgumentError(absl::StrCat(field, ": ", Quoted(name), " is not a name"));
+    return InvalidField(field, absl::StrCat(Quoted(name), " is not a name"));
   }
   if (IsReserved(name) || variables.contains(name)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        field, ".", name, ": ", name,
-        variables.contains(name) ? " is a variable already" : " is reserved in expressions"));
+    return InvalidField(
+        field.Then({FieldStep::Key(name)}),
+        absl::StrCat(name, variables.contains(name) ? " is a variable already"
+                                                    : " is reserved in expressions"));
   }
   return absl::OkStatus();
 }
@@ -54,7 +56,7 @@ absl::Status CheckNames(const Syntax& syntax, const std::set<std::string>& varia
     if (node.operation != Operation::kVariable || definitions.contains(node.name)) continue;
     if (!variables.contains(node.name)) {
       std::vector<std::string> known(variables.begin(), variables.end());
-      if (known.size() > kMostListed) known.resize(kMostListed);
+      if (known.size() > kMaxListed) known.resize(kMaxListed);
       return ErrorAt(syntax.field, syntax.text, node.offset,
                      absl::StrFormat("unknown name %s; the names are %s", Quoted(node.name),
                                      known.empty() ? "none" : absl::StrJoin(known, ", ")));
@@ -67,7 +69,7 @@ absl::Status CheckNames(const Syntax& syntax, const std::set<std::string>& varia
 }  // namespace
 }  // namespace equations
 
-absl::StatusOr<Expressions> Expressions::Make(std::string field,
+absl::StatusOr<Expressions> Expressions::Make(const FieldPath& field,
                                               const std::map<std::string, std::string>& definitions,
                                               const std::vector<std::string>& variables) {
   using namespace equations;
@@ -77,14 +79,14 @@ absl::StatusOr<Expressions> Expressions::Make(std::string field,
   std::vector<Definition> read;
   for (const auto& [name, text] : definitions) {
     POLYEST_RETURN_IF_ERROR(CheckName(field, name, known));
-    POLYEST_ASSIGN_OR_RETURN(Syntax syntax, Parse(absl::StrCat(field, ".", name), text, {}));
+    POLYEST_ASSIGN_OR_RETURN(Syntax syntax, Parse(field.Then({FieldStep::Key(name)}), text, {}));
     POLYEST_RETURN_IF_ERROR(CheckNames(syntax, known, definitions, expressions.variables_used_));
     expressions.names_.push_back(name);
     read.push_back({name, std::move(syntax)});
   }
   POLYEST_RETURN_IF_ERROR(SortByDependency(read));
 
-  Graph graph(kMostNodes);
+  Graph graph(kMaxNodes);
   std::map<std::string, NodeId> nodes;
   std::vector<VariablePlace> places;
   for (const std::string& name : expressions.variables_used_) {
@@ -98,9 +100,9 @@ absl::StatusOr<Expressions> Expressions::Make(std::string field,
   std::vector<NodeId> roots;
   for (const std::string& name : expressions.names_) roots.push_back(nodes.at(name));
   expressions.program_ = Program(graph, roots, places, {});
-  if (expressions.program_.registers() > kMostRegisters) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(field, ": needs too many intermediate values at once"));
+  if (expressions.program_.registers() > kMaxRegisters) {
+    return FieldError(absl::StatusCode::kResourceExhausted, field,
+                      "needs too many intermediate values at once");
   }
   expressions.variables_ = std::ssize(variables);
   return expressions;
@@ -122,4 +124,4 @@ void Expressions::Evaluate(const ConstMatrixRef& variables, MatrixRef results) c
   results = computed.topRows(rows).matrix();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,17 +10,18 @@
 #include <string>
 #include <vector>
 
+#include "core/common/field_error.h"
 #include "core/common/types.h"
 #include "core/model/equations/program.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Expressions {
  public:
   // definitions: name -> text, which may use the variables and other definitions, without a cycle;
   // no time and no tables. `field` begins each message: "derived" gives "derived.k2: column 3: …".
   // INVALID_ARGUMENT, or RESOURCE_EXHAUSTED past a limit.
-  static absl::StatusOr<Expressions> Make(std::string field,
+  static absl::StatusOr<Expressions> Make(const FieldPath& field,
                                           const std::map<std::string, std::string>& definitions,
                                           const std::vector<std::string>& variables);
 
@@ -41,4 +42,4 @@ class Expressions {
   equations::Program program_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "core/model/equations/limits.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 constexpr Function kFunctions[] = {
@@ -26,8 +26,8 @@ constexpr Function kFunctions[] = {
     {"if", Operation::kSelect, 3, 3},
     {"log", Operation::kLogarithm, 1, 1},
     {"log10", Operation::kLogarithm10, 1, 1},
-    {"max", Operation::kMaximum, 2, kMostArguments},
-    {"min", Operation::kMinimum, 2, kMostArguments},
+    {"max", Operation::kMaximum, 2, kMaxArguments},
+    {"min", Operation::kMinimum, 2, kMaxArguments},
     {"mod", Operation::kModulo, 2, 2},
     {"pow", Operation::kPower, 2, 2},
     {"sign", Operation::kSign, 1, 1},
@@ -68,7 +68,7 @@ bool IsReserved(std::string_view name) {
 }
 
 bool IsName(std::string_view text) {
-  return !text.empty() && text.size() <= kMostNameLength && IsLetter(text[0]) &&
+  return !text.empty() && text.size() <= kMaxNameLength && IsLetter(text[0]) &&
          std::all_of(text.begin(), text.end(),
                      [](char c) { return IsLetter(c) || (c >= '0' && c <= '9'); });
 }
@@ -89,4 +89,4 @@ std::string SuggestFunction(std::string_view unknown, const std::vector<std::str
   return absl::StrCat("; the functions are ", absl::StrJoin(names, ", "));
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -9,10 +9,10 @@
 #include "core/common/check.h"
 #include "core/model/equations/kernels.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
-constexpr int kMostFactors = 16;  // of a power that is written as a product
+constexpr int kMaxFactors = 16;  // of a power that is written as a product
 
 }  // namespace
 
@@ -28,14 +28,14 @@ size_t Graph::Hash::operator()(const Node& node) const {
   return static_cast<size_t>(hash);
 }
 
-Graph::Graph(int most_nodes) : most_nodes_(most_nodes) {
-  POLYEST_CHECK(most_nodes > 2);
+Graph::Graph(int max_nodes) : max_nodes_(max_nodes) {
+  POLYEST_CHECK(max_nodes > 2);
   POLYEST_CHECK(Constant(0) == kZero && Constant(1) == kOne);
 }
 
 NodeId Graph::Intern(const Node& node) {
   if (const auto known = ids_.find(node); known != ids_.end()) return known->second;
-  if (size() >= most_nodes_) {
+  if (size() >= max_nodes_) {
     exhausted_ = true;
     return kZero;
   }
@@ -184,7 +184,7 @@ NodeId Graph::Power(NodeId a, NodeId b) {
   if (!IsConstant(b)) return Raw(Operation::kPower, a, b);
   const double exponent = node(b).value;
   if (exponent == 0.5) return Apply(Operation::kSquareRoot, a);
-  if (exponent == std::floor(exponent) && std::abs(exponent) <= kMostFactors) {
+  if (exponent == std::floor(exponent) && std::abs(exponent) <= kMaxFactors) {
     const NodeId power = IntegerPower(a, static_cast<int>(std::abs(exponent)));
     return exponent < 0 ? Apply(Operation::kDivide, kOne, power) : power;
   }
@@ -200,4 +200,4 @@ NodeId Graph::IntegerPower(NodeId a, int exponent) {
   return exponent % 2 == 0 ? square : Apply(Operation::kMultiply, square, a);
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -13,7 +13,7 @@
 
 #include "core/model/equations/operation.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 // Of a node in its graph. The operands of a node come before it.
 using NodeId = int;
@@ -32,7 +32,7 @@ class Graph {
   static constexpr NodeId kZero = 0;
   static constexpr NodeId kOne = 1;
 
-  explicit Graph(int most_nodes);
+  explicit Graph(int max_nodes);
 
   NodeId Constant(double value);  // finite
   NodeId Variable(int index);
@@ -41,7 +41,7 @@ class Graph {
 
   // There was no room for a node: what was asked for since is kZero.
   bool exhausted() const { return exhausted_; }
-  void set_most_nodes(int most_nodes) { most_nodes_ = most_nodes; }
+  void set_most_nodes(int max_nodes) { max_nodes_ = max_nodes; }
 
   int size() const { return static_cast<int>(nodes_.size()); }
   const Node& node(NodeId id) const { return nodes_[static_cast<size_t>(id)]; }
@@ -65,10 +65,10 @@ class Graph {
   bool Is(NodeId id, Operation operation) const { return node(id).operation == operation; }
   bool IsValue(NodeId id, double value) const { return IsConstant(id) && node(id).value == value; }
 
-  int most_nodes_;
+  int max_nodes_;
   bool exhausted_ = false;
   std::vector<Node> nodes_;
   std::unordered_map<Node, NodeId, Hash> ids_;
 };
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

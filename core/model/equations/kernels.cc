@@ -3,7 +3,7 @@
 #include "core/common/check.h"
 #include "core/model/equations/lane_functions.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 // An operand: kLanes rows from `row` on, or the same for all rows.
@@ -194,4 +194,4 @@ double EvaluateAtPoint(Operation operation, double a, double b, double c) {
   return result[0];
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

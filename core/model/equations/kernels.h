@@ -7,7 +7,7 @@
 #include "core/model/equations/lookup.h"
 #include "core/model/equations/operation.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 struct Instruction;
 
@@ -31,4 +31,4 @@ Kernel CopyKernel(bool uniform);
 // The operation at one point, to the bit what the kernels give.
 double EvaluateAtPoint(Operation operation, double a, double b, double c);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

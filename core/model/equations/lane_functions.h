@@ -9,7 +9,7 @@
 #include "core/model/equations/operation.h"
 #include "core/model/lane.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 template <Operation operation>
 struct LaneFunction;
@@ -150,4 +150,4 @@ POLYEST_TERNARY(kSubtractMultiplied, c - a * b)
 #undef POLYEST_BINARY
 #undef POLYEST_TERNARY
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

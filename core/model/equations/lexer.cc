@@ -9,7 +9,7 @@
 #include "core/model/equations/limits.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
@@ -65,9 +65,9 @@ absl::StatusOr<Token> Lexer::Next() {
     end = Skip(end + 1, BelongsToName);
   }
   const Token token{Token::Kind::kName, offset_, text_.substr(offset_, end - offset_)};
-  if (token.text.size() > kMostNameLength) {
+  if (token.text.size() > kMaxNameLength) {
     return Error(offset_, absl::StrFormat("a name of %d characters; at most %d", token.text.size(),
-                                          kMostNameLength));
+                                          kMaxNameLength));
   }
   offset_ = end;
   return token;
@@ -109,4 +109,4 @@ absl::StatusOr<Token> Lexer::Symbol() {
   return Error(offset_, Hint(rest[0]));
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 
-namespace polyest::equations {
+#include "core/common/field_error.h"
+
+namespace polyest::internal::equations {
 
 struct Token {
   enum class Kind { kNumber, kName, kSymbol, kEnd };
@@ -20,7 +22,7 @@ struct Token {
 class Lexer {
  public:
   // Both must outlive the lexer and its tokens.
-  Lexer(std::string_view field, std::string_view text) : field_(field), text_(text) {}
+  Lexer(const FieldPath& field, std::string_view text) : field_(field), text_(text) {}
 
   absl::StatusOr<Token> Next();
 
@@ -30,9 +32,9 @@ class Lexer {
   size_t Skip(size_t from, bool (*belongs)(char)) const;
   absl::Status Error(size_t offset, std::string_view message) const;
 
-  std::string_view field_;
+  const FieldPath& field_;
   std::string_view text_;
   size_t offset_ = 0;
 };
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

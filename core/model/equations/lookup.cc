@@ -8,25 +8,28 @@
 #include <limits>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
+#include "core/common/status.h"
 #include "core/model/equations/limits.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
-std::optional<std::string> CheckGrid(const char* name, const std::vector<double>& grid) {
+absl::Status CheckGrid(const char* name, const std::vector<double>& grid) {
   if (grid.size() < 2) {
-    return absl::StrCat(name, ": has ", grid.size(), " values; it must have at least 2");
+    return InvalidField(name,
+                        absl::StrCat("has ", grid.size(), " values; it must have at least 2"));
   }
   for (size_t i = 0; i < grid.size(); ++i) {
     if (!std::isfinite(grid[i])) {
-      return absl::StrCat(name, "[", i, "]: is ", grid[i], "; it must be finite");
+      return InvalidField({name, i}, absl::StrCat("is ", grid[i], "; it must be finite"));
     }
     if (i > 0 && !(grid[i] > grid[i - 1])) {
-      return absl::StrCat(name, "[", i, "]: is ", grid[i], " after ", grid[i - 1],
-                          "; the values must strictly increase");
+      return InvalidField({name, i}, absl::StrCat("is ", grid[i], " after ", grid[i - 1],
+                                                  "; the values must strictly increase"));
     }
   }
-  return std::nullopt;
+  return absl::OkStatus();
 }
 
 // The second derivatives M at the knots of the natural cubic spline through `count` values that are
@@ -83,28 +86,27 @@ Place Find(const std::vector<double>& grid, double x, bool spline, int order) {
 
 }  // namespace
 
-std::optional<std::string> CheckTable(const LookupTable& table) {
-  if (auto problem = CheckGrid("x", table.x)) return problem;
-  if (!table.y.empty()) {
-    if (auto problem = CheckGrid("y", table.y)) return problem;
-  }
+absl::Status CheckTable(const LookupTable& table) {
+  POLYEST_RETURN_IF_ERROR(CheckGrid("x", table.x));
+  if (!table.y.empty()) POLYEST_RETURN_IF_ERROR(CheckGrid("y", table.y));
   const size_t columns = table.y.empty() ? 1 : table.y.size();
   if (table.value.size() != table.x.size() * columns) {
-    return absl::StrCat("value: has ", table.value.size(), " values; ", table.x.size(),
-                        table.y.empty() ? "" : absl::StrCat(" × ", columns),
-                        " are needed, one for each ",
-                        table.y.empty() ? "x" : "pair of x and y, all of the first x first");
+    return InvalidField(
+        "value", absl::StrCat("has ", table.value.size(), " values; ", table.x.size(),
+                              table.y.empty() ? "" : absl::StrCat(" × ", columns),
+                              " are needed, one for each ",
+                              table.y.empty() ? "x" : "pair of x and y, all of the first x first"));
   }
   for (size_t i = 0; i < table.value.size(); ++i) {
     if (!std::isfinite(table.value[i])) {
-      return absl::StrCat("value[", i, "]: is ", table.value[i], "; it must be finite");
+      return InvalidField({"value", i}, absl::StrCat("is ", table.value[i], "; it must be finite"));
     }
   }
-  return std::nullopt;
+  return absl::OkStatus();
 }
 
 Lookup::Lookup(LookupTable table) : table_(std::move(table)) {
-  POLYEST_CHECK(!CheckTable(table_));
+  POLYEST_CHECK(CheckTable(table_).ok());
   if (!table_.spline) return;
   const size_t rows = table_.x.size();
   const size_t columns = two_dimensional() ? table_.y.size() : 1;
@@ -149,4 +151,4 @@ double Lookup::Evaluate(double x, double y, int order_x, int order_y) const {
   return sum;
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

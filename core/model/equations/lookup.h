@@ -12,26 +12,17 @@
 // nearest end and the slope 0. At a knot of a linear table the slope is that to its right.
 // Source: C. de Boor, A Practical Guide to Splines, chapter IV.
 
-#include <optional>
+#include <absl/status/status.h>
+
 #include <string>
 #include <vector>
 
-#include "core/common/types.h"
+#include "polyest/equation_model.h"
 
-namespace polyest {
+namespace polyest::internal::equations {
 
-// Called in an expression by its name: name(x) or name(x, y).
-struct LookupTable {
-  std::vector<double> x = {};      // at least two, strictly increasing
-  std::vector<double> y = {};      // empty: one-dimensional
-  std::vector<double> value = {};  // x.size(), or row-major x.size() × y.size()
-  bool spline = false;             // linear, or natural cubic (bicubic) spline
-};
-
-namespace equations {
-
-// What is wrong with the table, beginning with the member at fault ("x: …"), or nothing.
-std::optional<std::string> CheckTable(const LookupTable& table);
+// INVALID_ARGUMENT names the member at fault, "x[2]".
+absl::Status CheckTable(const LookupTable& table);
 
 class Lookup {
  public:
@@ -51,5 +42,4 @@ class Lookup {
   std::vector<double> curvature_x_, curvature_y_, curvature_xy_;
 };
 
-}  // namespace equations
-}  // namespace polyest
+}  // namespace polyest::internal::equations

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 enum class Operation : std::uint8_t {
   // Leaves
@@ -87,4 +87,4 @@ constexpr bool IsCommutative(Operation operation) {
   }
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

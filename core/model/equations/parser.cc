@@ -7,13 +7,14 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/model/equations/functions.h"
 #include "core/model/equations/lexer.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 struct BinaryOperator {
@@ -53,7 +54,7 @@ class Parser {
   using Result = absl::StatusOr<int>;
 
   absl::Status Advance();
-  Result Expression(int least_precedence);
+  Result Expression(int min_precedence);
   Result Prefix();
   Result Primary();
   Result Call(const Token& name);
@@ -106,15 +107,15 @@ std::optional<BinaryOperator> Parser::Operator() const {
   return std::nullopt;
 }
 
-Parser::Result Parser::Expression(int least_precedence) {
-  if (++nesting_ > kMostNesting) {
+Parser::Result Parser::Expression(int min_precedence) {
+  if (++nesting_ > kMaxNesting) {
     return Error(token_.offset,
-                 absl::StrFormat("nested more than %d deep; use intermediates", kMostNesting));
+                 absl::StrFormat("nested more than %d deep; use intermediates", kMaxNesting));
   }
   POLYEST_ASSIGN_OR_RETURN(int left, Prefix());
   for (;;) {
     const std::optional<BinaryOperator> found = Operator();
-    if (!found || found->precedence < least_precedence) break;
+    if (!found || found->precedence < min_precedence) break;
     const size_t offset = token_.offset;
     POLYEST_RETURN_IF_ERROR(Advance());
     // Powers bind to the right and may have a sign in the exponent.
@@ -225,13 +226,13 @@ absl::StatusOr<std::vector<int>> Parser::Arguments() {
 Parser::Result Parser::CallFunction(const Token& token, const Function& function,
                                     const std::vector<int>& given) {
   const int count = static_cast<int>(given.size());
-  if (count < function.least_arguments || count > function.most_arguments) {
-    const bool many = function.most_arguments == kMostArguments;
+  if (count < function.min_arguments || count > function.max_arguments) {
+    const bool many = function.max_arguments == kMaxArguments;
     return Error(
         token.offset,
-        absl::StrFormat("%s takes %d%s argument%s, not %d", function.name, function.least_arguments,
-                        many ? absl::StrFormat(" to %d", function.most_arguments) : "",
-                        function.most_arguments == 1 ? "" : "s", count));
+        absl::StrFormat("%s takes %d%s argument%s, not %d", function.name, function.min_arguments,
+                        many ? absl::StrFormat(" to %d", function.max_arguments) : "",
+                        function.max_arguments == 1 ? "" : "s", count));
   }
   SyntaxNode node{.operation = function.operation, .offset = token.offset};
   std::copy_n(given.begin(), std::min(count, Operands(function.operation)), node.operands);
@@ -247,16 +248,16 @@ Parser::Result Parser::CallFunction(const Token& token, const Function& function
 
 }  // namespace
 
-absl::StatusOr<Syntax> Parse(std::string field, std::string text,
+absl::StatusOr<Syntax> Parse(FieldPath field, std::string text,
                              const std::map<std::string, int>& tables) {
-  if (text.size() > kMostTextLength) {
-    return absl::ResourceExhaustedError(
-        absl::StrFormat("%s: has %d bytes; an expression may have %d at most", field, text.size(),
-                        kMostTextLength));
+  if (text.size() > kMaxTextLength) {
+    return FieldError(absl::StatusCode::kResourceExhausted, field,
+                      absl::StrFormat("has %d bytes; an expression may have %d at most",
+                                      text.size(), kMaxTextLength));
   }
   Syntax syntax{std::move(field), std::move(text), {}};
   POLYEST_RETURN_IF_ERROR(Parser(&syntax, tables).Run());
   return syntax;
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -17,9 +17,10 @@
 #include <string>
 #include <vector>
 
+#include "core/common/field_error.h"
 #include "core/model/equations/operation.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 struct SyntaxNode {
   Operation operation = Operation::kConstant;  // kVariable: a name; kLookup: a table's
@@ -32,14 +33,14 @@ struct SyntaxNode {
 
 // An expression as it was written; the last node is the whole.
 struct Syntax {
-  std::string field;  // where it stands, as in "model.equations.states.v"
+  FieldPath field;  // where it stands, as in "model.equations.states.v"
   std::string text;
   std::vector<SyntaxNode> nodes;
 };
 
 // `tables`: how many arguments each takes. Errors are INVALID_ARGUMENT with the column, or
-// RESOURCE_EXHAUSTED for a text longer than kMostTextLength.
-absl::StatusOr<Syntax> Parse(std::string field, std::string text,
+// RESOURCE_EXHAUSTED for a text longer than kMaxTextLength.
+absl::StatusOr<Syntax> Parse(FieldPath field, std::string text,
                              const std::map<std::string, int>& tables);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -4,7 +4,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 // What the thread's programs work in.
@@ -52,4 +52,4 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
   }
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -14,7 +14,7 @@
 #include "core/model/equations/graph.h"
 #include "core/model/equations/kernels.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 // Where the values of a variable are: a column of one of the blocks, or the time, the same for all.
 struct VariablePlace {
@@ -59,4 +59,4 @@ class Program {
   int registers_ = 0;
 };
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

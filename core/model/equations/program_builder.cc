@@ -6,7 +6,7 @@
 #include "core/common/check.h"
 #include "core/model/equations/program.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
@@ -237,4 +237,4 @@ Program::Program(const Graph& graph, const std::vector<NodeId>& roots,
                  const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables)
     : Program(ProgramBuilder(graph, roots, places, tables).Build()) {}
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

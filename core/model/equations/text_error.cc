@@ -5,10 +5,12 @@
 
 #include <algorithm>
 
-namespace polyest::equations {
+#include "core/common/field_error.h"
+
+namespace polyest::internal::equations {
 namespace {
 
-constexpr size_t kMostQuoted = 24;  // bytes
+constexpr size_t kMaxQuoted = 24;  // bytes
 
 bool Continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
 
@@ -41,22 +43,21 @@ bool IsPlain(std::string_view text) {
 }  // namespace
 
 std::string Quoted(std::string_view text) {
-  size_t length = std::min(text.size(), kMostQuoted);
+  size_t length = std::min(text.size(), kMaxQuoted);
   while (length > 0 && length < text.size() && Continues(text[length])) --length;
   std::string quoted(text.substr(0, length));
   if (!IsPlain(quoted)) quoted = absl::CHexEscape(quoted);
   return absl::StrFormat("\"%s%s\"", quoted, length < text.size() ? "…" : "");
 }
 
-absl::Status ErrorAt(std::string_view field, std::string_view text, size_t offset,
+absl::Status ErrorAt(const FieldPath& field, std::string_view text, size_t offset,
                      std::string_view message) {
   const auto begin = text.begin();
   const auto column = 1 + std::count_if(begin, begin + static_cast<std::ptrdiff_t>(offset),
                                         [](char byte) { return !Continues(byte); });
   const std::string where =
       offset < text.size() ? "at " + Quoted(text.substr(offset)) : std::string("at the end");
-  return absl::InvalidArgumentError(
-      absl::StrFormat("%s: column %d: %s (%s)", field, column, message, where));
+  return InvalidField(field, absl::StrFormat("column %d: %s (%s)", column, message, where));
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

@@ -9,7 +9,7 @@
 #include "core/model/equations/kernels.h"
 #include "core/model/equations/text_error.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 namespace {
 
 // What is known of a part of an expression.
@@ -173,4 +173,4 @@ absl::StatusOr<std::optional<Unit>> InferUnit(const Syntax& syntax,
   return UnitCheck(syntax, units).Run();
 }
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

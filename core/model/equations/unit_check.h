@@ -16,11 +16,11 @@
 #include "core/model/equations/parser.h"
 #include "core/model/units.h"
 
-namespace polyest::equations {
+namespace polyest::internal::equations {
 
 // The unit of the expression, nullopt if it is not known or is any. `units`: of the names that have
 // one. INVALID_ARGUMENT with the column where units do not go together.
 absl::StatusOr<std::optional<Unit>> InferUnit(const Syntax& syntax,
                                               const std::map<std::string, Unit>& units);
 
-}  // namespace polyest::equations
+}  // namespace polyest::internal::equations

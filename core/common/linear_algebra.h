@@ -1,0 +1,94 @@
+#pragma once
+
+// Decompositions of dense matrices behind plain functions, so that Eigen's templates for them are
+// compiled once and not in every source that needs one. They allocate, so no path that runs for
+// every sample may use them. They do not check that their arguments are finite, except where they
+// say so.
+
+#include <Eigen/LU>
+
+#include "core/common/types.h"
+
+namespace polyest::internal {
+
+// A = V diag(values) Vᵀ of a symmetric n × n matrix.
+struct SymmetricEigen {
+  Vector values;   // n, ascending
+  Matrix vectors;  // n × n, orthonormal, a column each
+  bool converged = false;
+};
+
+// Reads the lower triangle of `matrix` only.
+SymmetricEigen DecomposeSymmetric(const Matrix& matrix);
+// Decomposes the symmetric tridiagonal matrix with `diagonal` (n ≥ 1) and `off_diagonal` (n − 1).
+SymmetricEigen DecomposeTridiagonal(const Vector& diagonal, const Vector& off_diagonal);
+// Returns the eigenvalues alone, ascending; reads the lower triangle of `matrix` only.
+Vector SymmetricEigenvalues(const Matrix& matrix);
+
+// A = L Lᵀ of a symmetric positive definite n × n matrix; reads its lower triangle only.
+class CholeskyFactor {
+ public:
+  explicit CholeskyFactor(const Matrix& matrix);
+
+  // Whether the matrix was positive definite to working precision; the functions below require it.
+  bool positive_definite() const { return positive_definite_; }
+  Matrix Lower() const;                          // L
+  double HalfLogDeterminant() const;             // ½ log det A = Σ log L_ii
+  Vector Solve(const Vector& right) const;       // A⁻¹ right
+  Vector SolveLower(const Vector& right) const;  // L⁻¹ right
+
+ private:
+  Matrix packed_;  // L in the lower triangle
+  bool positive_definite_;
+};
+
+// P A = L U of a square matrix, with partial pivoting. Invertible only if Determinant() ≠ 0.
+class LuFactors {
+ public:
+  explicit LuFactors(const Matrix& matrix);
+
+  double Determinant() const;
+  Vector Solve(const Vector& right) const;
+  // Solves for each row of `right` (k × n, k ≥ 1); the solutions are rows, too.
+  Matrix SolveRows(const Matrix& right) const;
+
+ private:
+  Eigen::PartialPivLU<Matrix> factors_;
+};
+
+// Returns the inverse of an invertible matrix.
+Matrix Inverse(const Matrix& matrix);
+// Returns (Aᵀ)⁻¹ right, A being invertible.
+Vector SolveTransposed(const Matrix& matrix, const Vector& right);
+// Returns L⁻¹ right, L being the lower triangle of `lower`, whose diagonal has no zero.
+Vector SolveLower(const Matrix& lower, const Vector& right);
+Matrix SolveLower(const Matrix& lower, const Matrix& right);
+// Returns (Lᵀ)⁻¹ r for each row r of `right`; the solutions are rows, too.
+Matrix SolveLowerTransposedRows(const ConstMatrixRef& lower, const Matrix& right);
+
+// A = Q R of an m × n matrix, m ≥ n, without pivoting.
+struct ThinQr {
+  Matrix q;  // m × n, orthonormal columns
+  Matrix r;  // n × n, upper triangular
+};
+ThinQr DecomposeThinQr(const Matrix& matrix);
+// Returns an orthonormal basis (m × m) whose first column is parallel to `vector` (m ≥ 1, not 0).
+Matrix OrthonormalBasisFrom(const Vector& vector);
+
+// A P = Q R with column pivoting, of an m × n matrix.
+struct PivotedQr {
+  Matrix q;  // m × m; its last m − rank columns span the orthogonal complement of A's range
+  Eigen::Index rank = 0;
+  Vector solution;  // the least-squares solution of A x = right
+};
+PivotedQr SolveByPivotedQr(const Matrix& matrix, const Vector& right);
+
+// Rank and condition number of a matrix by its singular values; rank 0 and +∞ when it has entries
+// that are not finite.
+struct Conditioning {
+  Eigen::Index rank = 0;
+  double number;  // largest singular value ÷ smallest; +∞ when the smallest is 0
+};
+Conditioning ConditioningOf(const Matrix& matrix);
+
+}  // namespace polyest::internal

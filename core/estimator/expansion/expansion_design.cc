@@ -1,0 +1,186 @@
+#include "core/estimator/expansion/expansion_design.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "core/chaos/collocation_points.h"
+#include "core/common/check.h"
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/truncation.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kTrustedProbability = 1e-3;  // left out in each tail of an unbounded germ
+constexpr double kMargin = 1.35;              // of a region around its particles
+constexpr double kMinHalfWidth = 1e-10;       // of a region, in germ units
+constexpr double kLeaningFraction = 0.01;
+constexpr double kBeyond = 1.12;         // where to look for Ω past an edge, of the half width
+constexpr double kGoesOnFraction = 0.2;  // of the particles at an edge
+constexpr double kWiden = 1.5;
+constexpr int kChecksPastDimension = 3;
+constexpr double kJustInside = 1 - 1e-12;  // so that rounding does not put a point outside Ω
+
+int PointCount(const ResolvedProblem& problem, const Basis& basis) {
+  return static_cast<int>(std::ceil(problem.problem().expansion.points_per_term * basis.size()));
+}
+
+// The largest s ≤ 1 with inside + s (xi − inside) in Ω.
+double FractionInside(const Prior& prior, const Vector& xi, const Vector& inside) {
+  double fraction = 1;
+  for (Eigen::Index j = 0; j < xi.size(); ++j) {
+    const double step = xi[j] - inside[j];
+    if (xi[j] > prior.upper()[j]) {
+      fraction = std::min(fraction, (prior.upper()[j] - inside[j]) / step);
+    } else if (xi[j] < prior.lower()[j]) {
+      fraction = std::min(fraction, (prior.lower()[j] - inside[j]) / step);
+    }
+  }
+  return fraction;
+}
+
+// Local coordinates in units of the trusted box: η = middle + half ∘ e.
+Matrix InBoxUnits(const ExpansionDesign& design, const Matrix& etas) {
+  const Vector middle = 0.5 * (design.lower + design.upper);
+  const Vector half = 0.5 * (design.upper - design.lower);
+  return (etas.rowwise() - middle.transpose()).array().rowwise() / half.transpose().array();
+}
+
+}  // namespace
+
+int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
+
+std::pair<double, double> TrustedRange(const Germ& germ) {
+  double lower = germ.Lower(), upper = germ.Upper();
+  if (!std::isfinite(lower)) lower = germ.Quantile(kTrustedProbability);
+  if (!std::isfinite(upper)) upper = germ.Quantile(1 - kTrustedProbability);
+  return {lower, upper};
+}
+
+absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
+  const Prior& prior = problem.prior();
+  const ExpansionOptions& options = problem.problem().expansion;
+  const int n = problem.dimension();
+  ExpansionDesign design;
+  design.region = Region::WholePrior(n);
+  design.basis = std::make_shared<Basis>(prior.germs(), FirstTruncation(options, n));
+  const int order = design.basis->order();
+  const int count = PointCount(problem, *design.basis);
+  POLYEST_ASSIGN_OR_RETURN(design.points, CollocationPoints(options.points, prior.germs(), order,
+                                                            count, static_cast<int>(kMaxPoints)));
+  // Points of the same sequence after the collocation points: draws of the prior.
+  POLYEST_ASSIGN_OR_RETURN(
+      const Matrix sequence,
+      CollocationPoints(PointSet::kHalton, prior.germs(), order, count + CheckCount(n),
+                        2 * static_cast<int>(kMaxPoints)));
+  design.check_points = sequence.bottomRows(CheckCount(n));
+  design.check_costs.resize(design.check_points.rows());
+  for (Eigen::Index i = 0; i < design.check_costs.size(); ++i) {
+    design.check_costs[i] = prior.NegativeLogDensity(design.check_points.row(i).transpose());
+  }
+  design.reference.resize(n);
+  design.lower.resize(n);
+  design.upper.resize(n);
+  for (int j = 0; j < n; ++j) {
+    const Germ& germ = prior.germs()[static_cast<size_t>(j)];
+    design.reference[j] = germ.Mean();
+    std::tie(design.lower[j], design.upper[j]) = TrustedRange(germ);
+  }
+  return design;
+}
+
+ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
+                                Region region, const Vector& inside) {
+  const ExpansionOptions& options = problem.problem().expansion;
+  const int n = problem.dimension();
+  ExpansionDesign design;
+  design.basis = std::make_shared<Basis>(std::vector<Germ>(static_cast<size_t>(n), Germ::Uniform()),
+                                         truncation);
+  const PointSet set = options.points == PointSet::kHammersley ? options.points : PointSet::kHalton;
+  design.points = 2 * UnitCubePoints(set, n, PointCount(problem, *design.basis)).array() - 1;
+  for (Eigen::Index q = 0; q < design.points.rows(); ++q) {
+    const Vector xi = region.ToGerm(design.points.row(q).transpose());
+    const double fraction = FractionInside(problem.prior(), xi, inside);
+    if (fraction < 1) {
+      design.points.row(q) =
+          region.ToLocal(inside + kJustInside * fraction * (xi - inside)).transpose();
+    }
+  }
+  design.region = std::move(region);
+  design.check_points.resize(0, n);
+  design.reference = Vector::Zero(n);
+  design.lower = Vector::Constant(n, -1);
+  design.upper = Vector::Constant(n, 1);
+  design.whole_prior = false;
+  return design;
+}
+
+Region RegionOfParticles(const Matrix& xis) {
+  const Vector mean = xis.colwise().mean().transpose();
+  const Matrix centred = xis.rowwise() - mean.transpose();
+  const Matrix covariance = centred.transpose() * centred / static_cast<double>(xis.rows());
+  // Scaled to unit variances, so that axes are principal whatever the germs' own scales are.
+  const Vector scale = covariance.diagonal().cwiseSqrt().cwiseMax(kMinHalfWidth);
+  const Matrix correlation =
+      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const Matrix axes = DecomposeSymmetric(correlation).vectors;
+  const Matrix along = centred * scale.cwiseInverse().asDiagonal() * axes;
+  const Vector low = along.colwise().minCoeff().transpose();
+  const Vector high = along.colwise().maxCoeff().transpose();
+  const Vector half = (0.5 * kMargin * (high - low)).cwiseMax(kMinHalfWidth);
+  const Vector centre = mean + scale.asDiagonal() * (axes * (0.5 * (low + high)));
+  return Region(centre, scale.asDiagonal() * axes * half.asDiagonal());
+}
+
+Region TrustedRegion(const ExpansionDesign& design) {
+  const Vector middle = 0.5 * (design.lower + design.upper);
+  const Vector half = 0.5 * (design.upper - design.lower);
+  return Region(design.region.ToGerm(middle), design.region.axes() * half.asDiagonal());
+}
+
+void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper) {
+  const Vector middle = 0.5 * (design.lower + design.upper);
+  const Vector half = 0.5 * kOvershoot * (design.upper - design.lower);
+  lower = middle - half;
+  upper = middle + half;
+}
+
+std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
+                             const Matrix& etas) {
+  const Matrix units = InBoxUnits(design, etas);
+  const Region trusted = TrustedRegion(design);
+  std::vector<int> leaning;
+  for (Eigen::Index j = 0; j < units.cols(); ++j) {
+    int at_edge = 0;
+    int goes_on = 0;
+    for (Eigen::Index i = 0; i < units.rows(); ++i) {
+      if (std::abs(units(i, j)) <= kEdge) continue;
+      ++at_edge;
+      Vector beyond = units.row(i).transpose();
+      beyond[j] *= kBeyond;
+      if (prior.Contains(trusted.ToGerm(beyond))) ++goes_on;
+    }
+    if (at_edge > kLeaningFraction * static_cast<double>(units.rows()) &&
+        goes_on > kGoesOnFraction * at_edge) {
+      leaning.push_back(static_cast<int>(j));
+    }
+  }
+  return leaning;
+}
+
+Region WidenedRegion(const ExpansionDesign& design, const Matrix& etas,
+                     const std::vector<int>& axes) {
+  const Region trusted = TrustedRegion(design);
+  const Vector mean = InBoxUnits(design, etas).colwise().mean().transpose();
+  Vector shift = Vector::Zero(mean.size());
+  Matrix widened = trusted.axes();
+  for (const int j : axes) {
+    shift[j] = mean[j];
+    widened.col(j) *= kWiden;
+  }
+  return Region(trusted.ToGerm(shift), widened);
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,207 @@
+#include "core/estimator/expansion/expansion_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/truncation.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int64_t kKnotRows = 256;  // at a time
+
+bool IsVector(const Vector& vector, Eigen::Index size) {
+  return vector.size() == size && vector.allFinite();
+}
+
+bool IsMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
+  return matrix.rows() == rows && matrix.cols() == columns && matrix.allFinite();
+}
+
+// One that an expansion of the problem may come to have: its first or, of automatic order, more.
+bool IsTruncationOf(const ResolvedProblem& problem, const Truncation& truncation,
+                    bool whole_prior) {
+  const ExpansionOptions& options = problem.problem().expansion;
+  const Truncation first = FirstTruncation(options, problem.dimension());
+  if (truncation.exponent != first.exponent) return false;
+  if (truncation.order == first.order) return true;
+  return !whole_prior && !options.order && truncation.order > first.order &&
+         truncation.order < kMaxTerms &&
+         TermCount(problem.dimension(), truncation, kMaxTerms) <= kMaxTerms;
+}
+
+bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
+  const int n = problem.dimension();
+  const Eigen::Index checks = state.check_points.rows();
+  if (!IsTruncationOf(problem, state.truncation, state.whole_prior) || !IsVector(state.centre, n) ||
+      !IsMatrix(state.axes, n, n) || !IsMatrix(state.points, state.points.rows(), n) ||
+      state.points.rows() > kMaxPoints || !IsMatrix(state.check_points, checks, n) ||
+      checks > kMaxPoints || state.check_costs.size() != checks || !IsVector(state.reference, n) ||
+      !IsVector(state.lower, n) || !IsVector(state.upper, n)) {
+    return false;
+  }
+  const double volume = std::abs(LuFactors(state.axes).Determinant());
+  return volume > 0 && std::isfinite(volume) && (state.upper - state.lower).minCoeff() > 0;
+}
+
+bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {
+  if (std::ssize(noise.channels) != problem.channels()) return false;
+  for (const ChannelNoise& channel : noise.channels) {
+    if (!(channel.scale > 0 && std::isfinite(channel.scale))) return false;
+    if (!(channel.time_constant_s >= 0 && std::isfinite(channel.time_constant_s))) return false;
+  }
+  const int n = problem.dimension();
+  const PosteriorSummary& posterior = noise.posterior;
+  return posterior.centre.size() == 0 ||
+         (IsVector(posterior.centre, n) && IsMatrix(posterior.factor, n, n));
+}
+
+bool AreSums(const MismatchSums& sums, int terms) {
+  return IsMatrix(sums.G(), terms, terms) && IsVector(sums.b(), terms) && std::isfinite(sums.w()) &&
+         sums.count() >= 0;
+}
+
+// What the check points have gathered may be infinite: a trajectory may go far astray.
+bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
+  const auto terms = static_cast<int>(fresh.previous_coefficients.rows());
+  const auto channels = fresh.discount.size();
+  for (const ChannelSums& sums : state.sums) {
+    if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
+  }
+  return state.sums.size() == fresh.sums.size() && IsVector(state.discount, channels) &&
+         std::ssize(state.outliers) == channels &&
+         IsMatrix(state.previous_coefficients, terms, channels) &&
+         IsVector(state.previous_error, channels) &&
+         state.check_chi_squared.rows() == fresh.check_chi_squared.rows() &&
+         state.check_chi_squared.cols() == channels &&
+         state.check_residual.size() == fresh.check_residual.size() &&
+         state.check_valid.size() == fresh.check_valid.size() && state.rows >= 0 &&
+         state.samples >= 0 && state.propagated >= 0;
+}
+
+bool IsAscendingBelow(const std::vector<int>& numbers, int end) {
+  return std::ranges::adjacent_find(numbers, std::ranges::greater_equal()) == numbers.end() &&
+         (numbers.empty() || (numbers.front() >= 0 && numbers.back() < end));
+}
+
+absl::Status Inconsistent(const char* what) {
+  return absl::DataLossError(absl::StrCat("the snapshot's ", what, " cannot be of this problem"));
+}
+
+}  // namespace
+
+DesignState StateOf(const ExpansionDesign& design) {
+  return {design.basis->truncation(),
+          design.whole_prior,
+          design.region.centre(),
+          design.region.axes(),
+          design.points,
+          design.check_points,
+          design.check_costs,
+          design.reference,
+          design.lower,
+          design.upper};
+}
+
+absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignState state) {
+  if (!IsDesignFor(problem, state)) return Inconsistent("expansion");
+  const auto n = static_cast<size_t>(problem.dimension());
+  ExpansionDesign design;
+  design.region = Region(std::move(state.centre), std::move(state.axes));
+  design.basis = std::make_shared<Basis>(
+      state.whole_prior ? problem.prior().germs() : std::vector<Germ>(n, Germ::Uniform()),
+      state.truncation);
+  design.points = std::move(state.points);
+  design.check_points = std::move(state.check_points);
+  design.check_costs = std::move(state.check_costs);
+  design.reference = std::move(state.reference);
+  design.lower = std::move(state.lower);
+  design.upper = std::move(state.upper);
+  design.whole_prior = state.whole_prior;
+  return design;
+}
+
+ExpansionState RegionalExpansion::State() const {
+  ExpansionState state;
+  state.design = StateOf(design_);
+  state.noise = noise_;
+  state.absorbed = absorbed_;
+  state.kept = kept_;
+  state.failures = failures_;
+  state.run = run_;
+  if (propagator_) state.ensemble = propagator_->State();
+  state.previous = whitening_.State();
+  return state;
+}
+
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
+    const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads) {
+  if (!IsNoiseOf(problem, state.noise)) return Inconsistent("noise");
+  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignOf(problem, std::move(state.design)));
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
+      Make(problem, std::move(design), std::move(state.noise), threads);
+  if (!expansion.ok()) return Inconsistent("collocation points");
+  if (state.ensemble) POLYEST_RETURN_IF_ERROR((*expansion)->RestoreRun(state, store));
+  POLYEST_RETURN_IF_ERROR((*expansion)->RestoreFit(state));
+  return expansion;
+}
+
+// The run as it was after the rows absorbed.
+absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const SampleStore& store) {
+  const int64_t rows = state.absorbed.rows;
+  const int64_t samples = state.ensemble->samples;
+  if (samples < 1 || samples > rows || rows > store.rows() || state.run < 0 ||
+      (problem_.per_run() && state.run >= problem_.runs())) {
+    return Inconsistent("run");
+  }
+  const int64_t begin = rows - samples;
+  POLYEST_RETURN_IF_ERROR(store.Read(rows - 1, 1, block_));
+  const SampleRow last = block_.rows.front();
+  POLYEST_RETURN_IF_ERROR(store.Read(begin, 1, block_));
+  if (last.run != state.run || block_.rows.front().run != state.run ||
+      last.time_s != state.ensemble->time_s) {
+    return absl::FailedPreconditionError("the rows appended are not those of the snapshot");
+  }
+  StartRun(state.run);
+  const bool streamed = !problem_.streamed_inputs().empty();
+  for (int64_t first = begin; streamed && first < rows; first += kKnotRows) {
+    POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kKnotRows, rows - first), block_));
+    AppendKnots(0);
+  }
+  return propagator_->Restore(*state.ensemble) ? absl::OkStatus() : Inconsistent("ensemble");
+}
+
+// What of the fit, the noise and the sums follows from the rows absorbed.
+absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
+  if (!HasSizesOf(state.absorbed, absorbed_)) return Inconsistent("sums");
+  for (size_t c = 0; c < absorbed_.sums.size(); ++c) {
+    ChannelSums sums = absorbed_.sums[c];  // what is unknown of its noise is not of the rows
+    sums.samples = std::move(state.absorbed.sums[c].samples);
+    sums.differences = std::move(state.absorbed.sums[c].differences);
+    state.absorbed.sums[c] = std::move(sums);
+  }
+  absorbed_ = std::move(state.absorbed);
+  for (const PreviousSample& sample : state.previous) {
+    if (sample.output.size() != thetas_.rows()) return Inconsistent("correlated noise");
+  }
+  if (state.previous.size() != absorbed_.sums.size()) return Inconsistent("correlated noise");
+  whitening_.Restore(std::move(state.previous));
+  for (const FailedTrajectory& failure : state.failures) {
+    if (failure.theta.size() != thetas_.cols()) return Inconsistent("failed trajectories");
+  }
+  failures_ = std::move(state.failures);
+  if (!IsAscendingBelow(state.kept, points())) return Inconsistent("collocation points");
+  if (std::ssize(state.kept) == points()) return absl::OkStatus();
+  kept_ = std::move(state.kept);
+  const Matrix left = design_.points(kept_, Eigen::all);
+  absl::StatusOr<CollocationMatrix> matrix = CollocationMatrix::Factor(*design_.basis, left);
+  if (!matrix.ok()) return Inconsistent("collocation points");
+  matrix_ = *std::move(matrix);
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,98 @@
+#include "core/estimator/expansion/new_runs.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/chaos/collocation_points.h"
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/truncation.h"
+
+namespace polyest::internal {
+namespace {
+
+std::vector<Germ> NewGerms(const ResolvedProblem& grown, Eigen::Index known) {
+  const std::vector<Germ>& germs = grown.prior().germs();
+  return {germs.begin() + known, germs.end()};
+}
+
+// The region as it is, beside the box of the new germs that holds all but a negligible part of
+// their prior.
+Region RegionWith(const Region& present, const std::vector<Germ>& germs) {
+  const Eigen::Index known = present.dimension(), n = known + std::ssize(germs);
+  Vector centre(n);
+  Matrix axes = Matrix::Zero(n, n);
+  centre.head(known) = present.centre();
+  axes.topLeftCorner(known, known) = present.axes();
+  for (Eigen::Index j = known; j < n; ++j) {
+    const auto [lower, upper] = TrustedRange(germs[static_cast<size_t>(j - known)]);
+    centre[j] = 0.5 * (lower + upper);
+    axes(j, j) = 0.5 * (upper - lower);
+  }
+  return Region(std::move(centre), std::move(axes));
+}
+
+// The present check points, over again until there are enough, with draws of the prior beside them.
+void AddCheckPoints(const ResolvedProblem& grown, const ExpansionDesign& present,
+                    ExpansionDesign& design) {
+  const Eigen::Index count = CheckCount(grown.dimension()), known = present.check_points.rows();
+  if (known == 0) return;
+  const Matrix before = present.region.ManyToGerm(present.check_points);
+  Matrix repeated(count, before.cols());
+  for (Eigen::Index i = 0; i < count; ++i) repeated.row(i) = before.row(i % known);
+  const Matrix xis = ParticlesForNewRuns(grown, repeated);
+  design.check_points = design.region.ManyToLocal(xis);
+  design.check_costs.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    double cost = present.check_costs[i % known];
+    for (Eigen::Index j = before.cols(); j < xis.cols(); ++j) {
+      cost -= grown.prior().germs()[static_cast<size_t>(j)].LogDensity(xis(i, j));
+    }
+    design.check_costs[i] = cost;
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<ExpansionDesign> DesignForNewRuns(const ResolvedProblem& grown,
+                                                 const ExpansionDesign& present) {
+  if (present.whole_prior) return DesignForPrior(grown);
+  const Eigen::Index known = present.region.dimension();
+  POLYEST_CHECK(known <= grown.dimension());
+  Region region = RegionWith(TrustedRegion(present), NewGerms(grown, known));
+  const Vector inside = region.centre();
+  ExpansionDesign design =
+      DesignForRegion(grown, FirstTruncation(grown.problem().expansion, grown.dimension()),
+                      std::move(region), inside);
+  AddCheckPoints(grown, present, design);
+  return design;
+}
+
+Matrix ParticlesForNewRuns(const ResolvedProblem& grown, const Matrix& present) {
+  const Eigen::Index known = present.cols();
+  Matrix particles(present.rows(), grown.dimension());
+  particles.leftCols(known) = present;
+  if (known == grown.dimension() || present.rows() == 0) return particles;
+  const absl::StatusOr<Matrix> draws = CollocationPoints(PointSet::kHalton, NewGerms(grown, known),
+                                                         1, static_cast<int>(present.rows()));
+  POLYEST_CHECK(draws.ok());
+  particles.rightCols(grown.dimension() - known) = *draws;
+  return particles;
+}
+
+PosteriorSummary SummaryForNewRuns(const ResolvedProblem& grown, const PosteriorSummary& present) {
+  const Eigen::Index known = present.centre.size(), n = grown.dimension();
+  if (known == 0) return present;
+  PosteriorSummary summary{Vector(n), Matrix::Zero(n, n)};
+  summary.centre.head(known) = present.centre;
+  summary.factor.topLeftCorner(known, known) = present.factor;
+  const Vector deviation = grown.prior().GermStandardDeviation();
+  for (Eigen::Index j = known; j < n; ++j) {
+    summary.centre[j] = grown.prior().germs()[static_cast<size_t>(j)].Mean();
+    summary.factor(j, j) = deviation[j];
+  }
+  return summary;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,214 @@
+#include "core/estimator/expansion/prior_expansion.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "core/chaos/collocation_points.h"
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/truncation.h"
+#include "core/model/list_names.h"
+
+namespace polyest::internal {
+namespace {
+
+// Columns (output × time) worked on at once: bounds the memory and the time between two looks at
+// Stop.
+constexpr int64_t kColumnsAtATime = 128;
+
+absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
+  if (problem.streamed_inputs().empty()) return absl::OkStatus();
+  const auto column = static_cast<size_t>(problem.streamed_inputs().front());
+  return InvalidField(
+      "inputs",
+      absl::StrFormat("%s is streamed, but here are no data to carry it; give it as a table",
+                      problem.problem().model->description().inputs[column].name));
+}
+
+absl::StatusOr<std::vector<int>> FindOutputs(const ModelDescription& model,
+                                             const std::vector<std::string>& asked) {
+  std::vector<int> columns;
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const auto column = model.FindOutput(asked[i]);
+    if (!column) {
+      return InvalidField(FieldPath{"outputs", i},
+                          absl::StrFormat("model %s has no output \"%s\"; it has %s", model.name,
+                                          asked[i], ListNames(model.outputs)));
+    }
+    if (std::count(columns.begin(), columns.end(), *column) > 0) {
+      return InvalidField(FieldPath{"outputs", i},
+                          absl::StrFormat("output %s is given twice", asked[i]));
+    }
+    columns.push_back(*column);
+  }
+  return columns;
+}
+
+// Variances, and what is weighed with them, are squares.
+absl::Status CheckMagnitude(const Matrix& coefficients, double time_s) {
+  constexpr double kLargest = 1e140;
+  const double largest = coefficients.cwiseAbs().maxCoeff();
+  if (largest <= kLargest) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "from t = %g s on an output is as large as %g, and no variance can be told beyond %g", time_s,
+      largest, kLargest));
+}
+
+}  // namespace
+
+absl::Status TimeGrid::Validate() const {
+  const auto positive = [](const char* field, double value) {
+    if (value > 0 && std::isfinite(value)) return absl::OkStatus();
+    return InvalidField(field, absl::StrFormat("%g must be a finite number > 0", value));
+  };
+  POLYEST_RETURN_IF_ERROR(positive("until_s", until_s));
+  POLYEST_RETURN_IF_ERROR(positive("step_s", step_s));
+  if (step_s > until_s) {
+    return InvalidField("step_s", absl::StrFormat("%g must be at most until %g", step_s, until_s));
+  }
+  return absl::OkStatus();
+}
+
+int64_t TimeGrid::count() const {
+  const double steps = std::floor(until_s / step_s * (1 + 1e-12));
+  return steps < 1e15 ? static_cast<int64_t>(steps) + 1 : int64_t{1} << 50;
+}
+
+double TimeGrid::time_s(int64_t k) const {
+  return std::min(static_cast<double>(k) * step_s, until_s);
+}
+
+std::vector<double> TimeGrid::times_s() const {
+  std::vector<double> times(static_cast<size_t>(count()));
+  for (size_t k = 0; k < times.size(); ++k) times[k] = time_s(static_cast<int64_t>(k));
+  return times;
+}
+
+absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbers, int64_t most) {
+  const int64_t times = grid.count();
+  const int64_t values = std::min(times, most + 1) * numbers * static_cast<int64_t>(outputs);
+  if (values <= most) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrFormat(
+      "until/step: %d times of %d outputs with %d numbers each are more than the limit of %d "
+      "numbers",
+      times, outputs, numbers, most));
+}
+
+absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
+                                               const std::vector<std::string>& asked) {
+  const ModelDescription& model = problem.problem().model->description();
+  if (!asked.empty()) return FindOutputs(model, asked);
+  if (problem.channels() > 0) return problem.outputs();
+  std::vector<int> all(model.outputs.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
+                                                                     std::vector<int> outputs,
+                                                                     int threads) {
+  POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
+  const ExpansionOptions& design = problem.problem().expansion;
+  const std::vector<Germ>& germs = problem.prior().germs();
+  auto basis = std::make_shared<const Basis>(germs, FirstTruncation(design, problem.dimension()));
+  const int count = static_cast<int>(std::ceil(design.points_per_term * basis->size()));
+  POLYEST_ASSIGN_OR_RETURN(Matrix points,
+                           CollocationPoints(design.points, germs, basis->order(), count));
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix, CollocationMatrix::Factor(*basis, points));
+  return std::unique_ptr<PriorExpansion>(new PriorExpansion(problem, std::move(outputs),
+                                                            std::move(basis), std::move(points),
+                                                            std::move(matrix), threads));
+}
+
+PriorExpansion::PriorExpansion(const ResolvedProblem& problem, std::vector<int> outputs,
+                               std::shared_ptr<const Basis> basis, Matrix points,
+                               CollocationMatrix matrix, int threads)
+    : prior_(problem.prior()),
+      outputs_(std::move(outputs)),
+      basis_(std::move(basis)),
+      points_(std::move(points)),
+      matrix_(std::move(matrix)),
+      kept_(static_cast<size_t>(points_.rows())),
+      inputs_(problem.MakeInputs()),
+      ensemble_(problem.MakeEnsemble(Thetas(), outputs_, threads), &inputs_) {
+  std::iota(kept_.begin(), kept_.end(), 0);
+}
+
+absl::Status PriorExpansion::Run(const TimeGrid& grid,
+                                 absl::FunctionRef<void(const ExpandedOutputs&)> visit,
+                                 const Stop& stop) {
+  const std::vector<double> times = grid.times_s();
+  const auto m = static_cast<int64_t>(outputs_.size());
+  const int64_t at_a_time = std::max<int64_t>(1, kColumnsAtATime / m);
+  for (int64_t first = 0; first < grid.count(); first += at_a_time) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    const int64_t count = std::min(at_a_time, grid.count() - first);
+    Matrix values(points_.rows(), m * count);
+    POLYEST_RETURN_IF_ERROR(
+        ensemble_.Advance({times.data() + first, static_cast<size_t>(count)}, values, stop));
+    POLYEST_RETURN_IF_ERROR(LeaveOutFailed());
+    // c = A⁺ Y (10)
+    Matrix coefficients(basis_->size(), values.cols());
+    Vector residual_variance(values.cols());
+    matrix_.Solve(values(kept_, Eigen::all), coefficients, residual_variance);
+    POLYEST_RETURN_IF_ERROR(CheckMagnitude(coefficients, times[static_cast<size_t>(first)]));
+    visit({first, count, Expansion(basis_, std::move(coefficients)), std::move(residual_variance)});
+  }
+  return absl::OkStatus();
+}
+
+Matrix PriorExpansion::Thetas() const {
+  Matrix thetas(points_.rows(), points_.cols());
+  for (Eigen::Index q = 0; q < points_.rows(); ++q) {
+    thetas.row(q) = prior_.ToParameters(points_.row(q).transpose()).transpose();
+  }
+  return thetas;
+}
+
+// Points that failed are left out of the fit from the times of this call of Advance on.
+absl::Status PriorExpansion::LeaveOutFailed() {
+  if (kept_.size() + failures().size() == static_cast<size_t>(points_.rows())) {
+    return absl::OkStatus();
+  }
+  std::set<int> failed;
+  for (const PointFailure& failure : failures()) failed.insert(failure.point);
+  std::erase_if(kept_, [&](int point) { return failed.contains(point); });
+  if (kept_.size() <= static_cast<size_t>(basis_->size())) {
+    const PointFailure& last =
+        *std::max_element(failures().begin(), failures().end(),
+                          [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "only %d of %d collocation points could be integrated and an expansion of %d terms needs "
+        "more; at %s the model failed at t = %g s: %s (solver flag %d)",
+        kept_.size(), points_.rows(), basis_->size(), DescribePoint(last.point), last.time_s,
+        last.reason, last.flag));
+  }
+  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*basis_, points_(kept_, Eigen::all)));
+  return absl::OkStatus();
+}
+
+std::string PriorExpansion::DescribePoint(int point) const {
+  const Vector theta = prior_.ToParameters(points_.row(point).transpose());
+  std::vector<std::string> values;
+  for (int i = 0; i < prior_.dimension(); ++i) {
+    values.push_back(
+        absl::StrFormat("%s = %g", prior_.parameters()[static_cast<size_t>(i)].name, theta[i]));
+  }
+  return absl::StrJoin(values, ", ");
+}
+
+Diagnostic DescribeFailures(const std::vector<PointFailure>& failures, int points) {
+  const PointFailure& first = failures.front();
+  return {DiagnosticCode::kPointsFailed,
+          absl::StrFormat("%d of %d trajectories could not be integrated and were left out; the "
+                          "first of them failed after %g s: %s",
+                          failures.size(), points, first.time_s, first.reason)};
+}
+
+}  // namespace polyest::internal

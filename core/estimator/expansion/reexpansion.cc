@@ -1,0 +1,227 @@
+#include "core/estimator/expansion/reexpansion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/common/status.h"
+#include "core/estimator/problem/truncation.h"
+#include "core/estimator/record/rows_ahead.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kMaxAttempts = 15;
+constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
+// Mean square of the expansion's error, in units of the noise's. A higher order that leaves more
+// does not follow the model, and its ripples would be taken for pieces of the posterior.
+constexpr double kMaxErrorOfRaised = 0.05;
+constexpr int64_t kReplayRows = 256;
+constexpr double kMinEffectiveChecks = 2;   // for a spread over them to be seen
+constexpr double kMaxSpread = 0.25;         // of ΔJ, for its mean to be known
+constexpr double kNegligibleWeight = 1e-3;  // of a check point, relative to the heaviest
+
+// Loop of one settlement; holds what changes from attempt to attempt.
+class Settler {
+ public:
+  Settler(const RegionalExpansion& present, const SettleRequest& request, const Stop& stop)
+      : present_(present), request_(request), stop_(stop) {}
+
+  absl::StatusOr<Settlement> Run() {
+    result_.particles = request_.guesses;
+    bool may_move = true;
+    for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+      POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
+      if (!sampled) break;
+      const ExpansionDesign& design = expansion().design();
+      const std::vector<int> leaning =
+          LeaningAxes(design, request_.problem->prior(), particles_.etas);
+      if (!leaning.empty()) {
+        POLYEST_ASSIGN_OR_RETURN(const bool moved,
+                                 Move(WidenedRegion(design, particles_.etas, leaning), present()));
+        if (!moved) break;
+        continue;
+      }
+      if (!may_move) break;
+      const Region region = RegionOfParticles(result_.particles);
+      if (region.Volume() >= kPays * TrustedRegion(design).Volume()) {
+        if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
+        break;
+      }
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, OneOrderLess()));
+      if (!moved) break;
+      may_move = false;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  const RegionalExpansion& expansion() const {
+    return result_.expansion ? *result_.expansion : present_;
+  }
+
+  const ExpansionOptions& options() const { return request_.problem->problem().expansion; }
+  const Truncation& present() const { return expansion().design().basis->truncation(); }
+
+  Truncation OneOrderLess() const {
+    Truncation truncation = FirstTruncation(options(), request_.problem->dimension());
+    truncation.order = std::max(truncation.order, present().order - 1);
+    return truncation;
+  }
+
+  // To the first order that follows the model; the present one stays when none does.
+  absl::Status RaiseOrder(const Region& region) {
+    if (!request_.may_raise_order) return absl::OkStatus();
+    auto next = NextTruncation(options(), request_.problem->dimension(), present());
+    for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
+      POLYEST_ASSIGN_OR_RETURN(const bool raised, Move(region, *next));
+      if (!raised) break;
+      if (ErrorOf(*result_.expansion) <= kMaxErrorOfRaised) return absl::OkStatus();
+    }
+    if (!result_.expansion) return absl::OkStatus();
+    result_.propagated_rows += result_.expansion->propagated_rows();
+    result_.expansion.reset();
+    return absl::OkStatus();
+  }
+
+  // ρ/σ² of the samples taken, in the mean, with all of them alike: D/(N − D), D = Σ ρ_k/R_k.
+  static double ErrorOf(const RegionalExpansion& expansion) {
+    double discount = 0, samples = 0;
+    for (size_t c = 0; c < expansion.sums().size(); ++c) {
+      discount += expansion.Discount(static_cast<int>(c));
+      samples += expansion.sums()[c].Degrees();
+    }
+    return discount / std::max(samples - discount, std::numeric_limits<double>::min());
+  }
+
+  // False when the sampler finds nowhere to start.
+  absl::StatusOr<bool> Sample(int attempt) {
+    const Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    Vector lower, upper;
+    SamplingBox(expansion().design(), lower, upper);
+    SamplerOptions options;
+    options.seed = request_.seed + static_cast<uint64_t>(attempt);
+    const Matrix guesses = expansion().design().region.ManyToLocal(result_.particles);
+    absl::StatusOr<Particles> particles =
+        SamplePosterior(cost, lower, upper, guesses, options, stop_);
+    if (absl::IsFailedPrecondition(particles.status())) return false;
+    if (!particles.ok()) return particles.status();
+    particles_ = *std::move(particles);
+    result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
+    return true;
+  }
+
+  // False when the expansion there cannot be built; the present one then stays.
+  absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
+    const Vector inside = result_.particles.colwise().mean().transpose();
+    ExpansionDesign design =
+        DesignForRegion(*request_.problem, truncation, std::move(region), inside);
+    const Eigen::Index checks =
+        std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
+    design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
+    design.check_costs = particles_.costs.head(checks);
+    absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
+        Replay(*request_.problem, std::move(design), present_.noise(), *request_.store,
+               request_.rows, request_.threads, stop_);
+    if (absl::IsFailedPrecondition(moved.status())) return false;
+    if (!moved.ok()) return moved.status();
+    if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
+    result_.expansion = *std::move(moved);
+    ++result_.reexpansions;
+    return true;
+  }
+
+  const RegionalExpansion& present_;
+  const SettleRequest& request_;
+  const Stop& stop_;
+  Particles particles_;
+  Settlement result_;
+};
+
+}  // namespace
+
+absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
+                                  const Stop& stop) {
+  return Settler(present, request, stop).Run();
+}
+
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
+                                                          ExpansionDesign design,
+                                                          LearnedNoise noise,
+                                                          const SampleStore& store, int64_t rows,
+                                                          int threads, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(
+      std::unique_ptr<RegionalExpansion> expansion,
+      RegionalExpansion::Make(problem, std::move(design), std::move(noise), threads));
+  RowBlock block;
+  for (int64_t first = 0; first < rows; first += kReplayRows) {
+    const int64_t count = std::min(kReplayRows, rows - first);
+    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store, first, count, problem.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
+    if (expansion->fitted_rows() < block.count()) return expansion->shortage();
+    for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);
+  }
+  return expansion;
+}
+
+namespace {
+
+// J_mismatch of the model itself at check point i.
+double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
+                     const RegionalExpansion::Check& check, Eigen::Index i) {
+  double mismatch = 0;
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    const ChannelSums& sums = expansion.sums()[c];
+    const double chi_squared = check.chi_squared(i, static_cast<Eigen::Index>(c));
+    const double differences = 2 * chi_squared * (1 - sums.Lag1Correlation(d));
+    mismatch += NegativeLogLikelihood(sums.Degrees(), chi_squared, differences, sums.scale_unknown,
+                                      sums.correlation_unknown);
+  }
+  return mismatch;
+}
+
+}  // namespace
+
+Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
+  const ExpansionDesign& design = expansion.design();
+  const RegionalExpansion::Check check = expansion.Checks();
+  std::vector<double> log_weight, difference, residual;
+  for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
+    const Vector eta = design.check_points.row(i).transpose();
+    const CostValue value = cost.Evaluate(eta);
+    if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
+    log_weight.push_back(design.check_costs[i] - value.total);
+    difference.push_back(ModelMismatch(expansion, cost.BasisDifference(eta), check, i) -
+                         value.mismatch);
+    residual.push_back(check.residual_to_noise[i]);
+  }
+  Agreement agreement;
+  if (log_weight.empty()) return agreement;
+  const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());
+  double sum = 0, sum_of_squares = 0, mean = 0, worst = 0;
+  for (size_t i = 0; i < log_weight.size(); ++i) {
+    const double weight = std::exp(log_weight[i] - heaviest);
+    sum += weight;
+    sum_of_squares += weight * weight;
+    mean += weight * difference[i];
+    worst = std::max(worst, residual[i]);
+    if (weight > kNegligibleWeight) {
+      agreement.residual_to_noise = std::max(agreement.residual_to_noise, residual[i]);
+    }
+  }
+  mean /= sum;
+  double variance = 0;
+  for (size_t i = 0; i < log_weight.size(); ++i) {
+    const double weight = std::exp(log_weight[i] - heaviest) / sum;
+    variance += weight * (difference[i] - mean) * (difference[i] - mean);
+  }
+  agreement.shift = worst * std::sqrt(static_cast<double>(check.samples));
+  if (sum * sum / sum_of_squares >= kMinEffectiveChecks) {
+    agreement.shift = std::min(agreement.shift, std::sqrt(variance));
+    if (std::sqrt(variance) <= kMaxSpread) agreement.mean_difference = mean;
+  }
+  return agreement;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,332 @@
+#include "core/estimator/expansion/regional_expansion.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/bayes/noise.h"
+#include "core/common/check.h"
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+Matrix Stack(const Matrix& top, const Matrix& bottom) {
+  Matrix stacked(top.rows() + bottom.rows(), top.cols());
+  stacked << top, bottom;
+  return stacked;
+}
+
+}  // namespace
+
+AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index check_points)
+    : sums(static_cast<size_t>(channels), ChannelSums(terms)),
+      discount(Vector::Zero(channels)),
+      outliers(static_cast<size_t>(channels), 0),
+      previous_coefficients(Matrix::Zero(terms, channels)),
+      previous_error(Vector::Zero(channels)),
+      check_chi_squared(Matrix::Zero(check_points, channels)),
+      check_residual(Vector::Zero(check_points)),
+      check_valid(static_cast<size_t>(check_points), true) {}
+
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
+    const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
+                           CollocationMatrix::Factor(*design.basis, design.points));
+  return std::unique_ptr<RegionalExpansion>(new RegionalExpansion(
+      problem, std::move(design), std::move(noise), std::move(matrix), threads));
+}
+
+RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
+                                     LearnedNoise noise, CollocationMatrix matrix, int threads)
+    : problem_(problem),
+      design_(std::move(design)),
+      noise_(std::move(noise)),
+      matrix_(std::move(matrix)),
+      threads_(threads),
+      channels_(problem.channels()),
+      reference_phi_(design_.basis->size()),
+      kept_(static_cast<size_t>(design_.points.rows())),
+      whitening_(noise_.channels, design_.points.rows() + design_.check_points.rows()),
+      absorbed_(design_.basis->size(), channels_, design_.check_points.rows()),
+      difference_(design_.basis->size()) {
+  POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
+  std::iota(kept_.begin(), kept_.end(), 0);
+  design_.basis->Evaluate(design_.reference, reference_phi_);
+  design_.basis->EvaluateMany(design_.check_points, check_phi_);
+  const Matrix xis = design_.region.ManyToGerm(Stack(design_.points, design_.check_points));
+  thetas_.resize(xis.rows(), xis.cols());
+  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
+    thetas_.row(i) = problem_.prior().ToParameters(xis.row(i).transpose()).transpose();
+  }
+  for (int c = 0; c < channels_; ++c) {
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
+    const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
+    sums.scale_unknown = model.unknown && learned;
+    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned;
+    sums.degrees_factor = DegreesFactor(model.outliers);
+  }
+  LookFromPosterior();
+}
+
+void RegionalExpansion::LookFromPosterior() {
+  const int terms = design_.basis->size();
+  if (noise_.posterior.centre.size() == 0) {
+    // Not known yet: what the expansion itself leaves open, Σ c_s² over s ≥ 1 (12).
+    centre_phi_ = reference_phi_;
+    spread_ = Matrix::Identity(terms, terms).rightCols(terms - 1);
+    return;
+  }
+  const Vector eta = design_.region.ToLocal(noise_.posterior.centre);
+  centre_phi_.resize(terms);
+  Matrix phi_gradient(terms, eta.size());
+  design_.basis->EvaluateWithGradient(eta, centre_phi_, phi_gradient);
+  spread_ = phi_gradient * Inverse(design_.region.axes()) * noise_.posterior.factor;
+}
+
+// A run begins at t = 0 from the initial states, with inputs of its own.
+void RegionalExpansion::StartRun(int run) {
+  run_ = run;
+  knot_time_s_ = -std::numeric_limits<double>::infinity();
+  inputs_finished_ = false;
+  whitening_.BeginRun();
+  propagator_.reset();
+  inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
+  propagator_ = std::make_unique<EnsemblePropagator>(
+      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), inputs_.get());
+}
+
+absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
+  block_ = block;
+  fitted_rows_ = 0;
+  outputs_.resize(thetas_.rows(), channels_ * block.count());
+  coefficients_.resize(design_.basis->size(), channels_ * block.count());
+  residual_variance_.resize(channels_ * block.count());
+  for (int first = 0; first < block.count() && fitted_rows_ == first;) {
+    int count = 1;
+    const int run = block.rows[static_cast<size_t>(first)].run;
+    while (first + count < block.count() &&
+           block.rows[static_cast<size_t>(first + count)].run == run) {
+      ++count;
+    }
+    if (run != run_) StartRun(run);
+    POLYEST_RETURN_IF_ERROR(PropagateRun(first, count, stop));
+    first += count;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
+  AppendKnots(first);
+  std::vector<double> times;
+  for (int k = first; k < first + count; ++k) {
+    times.push_back(block_.rows[static_cast<size_t>(k)].time_s);
+  }
+  POLYEST_RETURN_IF_ERROR(
+      propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
+  whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
+  FitRows(first, count);
+  return absl::OkStatus();
+}
+
+// The streamed inputs of the present run as far as the block tells, from this row on. Rows ahead
+// come again with the next block.
+void RegionalExpansion::AppendKnots(int row) {
+  const std::vector<int>& streamed = problem_.streamed_inputs();
+  if (streamed.empty()) return;
+  const size_t width = block_.values.size() / block_.rows.size();
+  auto k = static_cast<size_t>(row);
+  for (; k < block_.rows.size() && block_.rows[k].run == run_; ++k) {
+    const double time_s = block_.rows[k].time_s;
+    if (time_s <= knot_time_s_) continue;
+    for (size_t i = 0; i < streamed.size(); ++i) {
+      const double value = block_.values[k * width + static_cast<size_t>(channels_) + i];
+      (*inputs_)[static_cast<size_t>(streamed[i])].Append(time_s, value);
+    }
+    knot_time_s_ = time_s;
+  }
+  const bool complete = k < block_.rows.size() || block_.run_ended;
+  if (!complete || inputs_finished_) return;
+  for (const int input : streamed) (*inputs_)[static_cast<size_t>(input)].Finish();
+  inputs_finished_ = true;
+}
+
+// Fits each stretch of rows over which the same trajectories are good.
+void RegionalExpansion::FitRows(int first, int count) {
+  for (int begin = first; begin < first + count;) {
+    shortage_ = DropFailed(begin);
+    if (!shortage_.ok()) return;
+    int end = begin + 1;
+    while (end < first + count && !FailsAt(end)) ++end;
+    const int columns = (end - begin) * channels_;
+    const auto values = outputs_.block(0, begin * channels_, points(), columns);
+    auto coefficients = coefficients_.middleCols(begin * channels_, columns);
+    auto residual = residual_variance_.segment(begin * channels_, columns);
+    if (matrix_.points() == points()) {
+      matrix_.Solve(values, coefficients, residual);
+    } else {
+      matrix_.Solve(values(kept_, Eigen::all), coefficients, residual);
+    }
+    fitted_rows_ = begin = end;
+  }
+}
+
+// Whether a trajectory still in the fit has no output at this row of the block.
+bool RegionalExpansion::FailsAt(int row) const {
+  const auto values = outputs_.block(0, row * channels_, points(), channels_);
+  if (values.allFinite()) return false;
+  for (const int q : kept_) {
+    if (!values.row(q).allFinite()) return true;
+  }
+  return false;
+}
+
+// Leaves out the trajectories without output at this row, and factors again what is left.
+absl::Status RegionalExpansion::DropFailed(int row) {
+  if (!FailsAt(row)) return absl::OkStatus();
+  NoteFailures(row);
+  const auto values = outputs_.block(0, row * channels_, points(), channels_);
+  std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
+  const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
+  if (static_cast<int>(kept_.size()) < needed) {
+    const FailedTrajectory& last = failures_.back();
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "only %d of %d trajectories could be integrated to t = %g s and the expansion needs %d; "
+        "the last to fail: %s",
+        kept_.size(), points(), block_.rows[static_cast<size_t>(row)].time_s, needed,
+        DescribeFailure(last, problem_.prior())));
+  }
+  const Matrix left = design_.points(kept_, Eigen::all);
+  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left));
+  return absl::OkStatus();
+}
+
+// The trajectories that fail at this row, once each; the propagator may be ahead of it and know of
+// later ones.
+void RegionalExpansion::NoteFailures(int row) {
+  for (const PointFailure& failure : propagator_->failures()) {
+    const bool kept = std::binary_search(kept_.begin(), kept_.end(), failure.point);
+    if (!kept || outputs_.block(failure.point, row * channels_, 1, channels_).allFinite()) continue;
+    failures_.push_back({thetas_.row(failure.point).transpose(), run_, failure.time_s, failure.flag,
+                         failure.reason});
+  }
+}
+
+std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior) {
+  std::string parameters;
+  for (int i = 0; i < prior.dimension(); ++i) {
+    absl::StrAppendFormat(&parameters, "%s%s = %.6g", i == 0 ? "" : ", ",
+                          prior.parameters()[static_cast<size_t>(i)].name, failure.theta[i]);
+  }
+  return absl::StrFormat("%s at t = %g s (run %d): %s (solver flag %d)", parameters, failure.time_s,
+                         failure.run, failure.reason, failure.flag);
+}
+
+double RegionalExpansion::ResidualToNoise(int row) const {
+  double worst = 0;
+  for (int c = 0; c < channels_; ++c) {
+    const double noise = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    if (noise > 0) {
+      worst = std::max(worst, std::sqrt(residual_variance_[row * channels_ + c]) / noise);
+    }
+  }
+  return worst;
+}
+
+void RegionalExpansion::Absorb(int row) {
+  const size_t width = block_.values.size() / block_.rows.size();
+  const int run = block_.rows[static_cast<size_t>(row)].run;
+  if (run != absorbed_.summed_run) {
+    absorbed_.summed_run = run;
+    absorbed_.previous_coefficients.setZero();
+    absorbed_.previous_error.setZero();
+  }
+  for (int c = 0; c < channels_; ++c) {
+    const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    if (sigma <= 0) continue;  // no sample
+    const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
+    const int column = row * channels_ + c;
+    const auto coefficients = coefficients_.col(column);
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    const double deviation =
+        DeviationFromCentre(c, coefficients, z, sigma * sigma + residual_variance_[column]);
+    const double weight = OutlierWeight(model.outliers, deviation);
+    // e = z − cᵀφ_0,  R = σ²/w + the residual's variance ρ
+    const double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
+    const double variance = noise + residual_variance_[column];
+    const double error = z - coefficients.dot(reference_phi_);
+    absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
+    AddDifference(c, coefficients, error, variance);
+    absorbed_.discount[c] += residual_variance_[column] / variance;
+    Normalize(VarianceFactor(model.outliers) * sigma * sigma, residual_variance_[column],
+              LackOfWeight(model.outliers, deviation));
+    if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
+    Compare(column, z, noise);
+    ++absorbed_.samples;
+  }
+  ++absorbed_.rows;
+  absorbed_.propagated += thetas_.rows();
+}
+
+// In units of what the sample may be off by there; variance: of the sample about the expansion.
+// 0 where nobody looks for outliers.
+double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,
+                                              double z, double variance) const {
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  if (model.outliers == OutlierHandling::kNone) return 0;
+  const double error = z - coefficients.dot(centre_phi_);
+  const double open = (spread_.transpose() * coefficients).squaredNorm();
+  return error / std::sqrt(variance + open);
+}
+
+// noise: σ²; own_error: the residual's variance ρ; lack: of the outlier's weight.
+void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
+  absorbed_.log_noise += 0.5 * std::log(noise) + lack;
+  absorbed_.log_variance += 0.5 * std::log(noise + own_error) + lack;
+}
+
+// u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
+void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coefficients, double error,
+                                      double variance) {
+  const double unit = 1 / std::sqrt(variance);
+  auto previous = absorbed_.previous_coefficients.col(channel);
+  difference_ = unit * coefficients - previous;
+  absorbed_.sums[static_cast<size_t>(channel)].differences.Add(
+      difference_, unit * error - absorbed_.previous_error[channel], 1);
+  previous = unit * coefficients;
+  absorbed_.previous_error[channel] = unit * error;
+}
+
+// The check points' own trajectories beside the expansion at one sample.
+void RegionalExpansion::Compare(int column, double z, double variance) {
+  const int channel = column % channels_;
+  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+    if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
+    const double y = outputs_(points() + i, column);
+    if (!std::isfinite(y)) {
+      absorbed_.check_valid[static_cast<size_t>(i)] = false;
+      continue;
+    }
+    const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
+    absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
+    absorbed_.check_residual[i] += difference * difference / variance;
+  }
+}
+
+Cost RegionalExpansion::MakeCost(double regularization) const {
+  return Cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
+              problem_.prior(), regularization);
+}
+
+RegionalExpansion::Check RegionalExpansion::Checks() const {
+  const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
+  return {absorbed_.check_chi_squared, (absorbed_.check_residual / samples).cwiseSqrt(),
+          absorbed_.check_valid, absorbed_.samples};
+}
+
+}  // namespace polyest::internal

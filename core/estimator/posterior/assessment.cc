@@ -1,0 +1,284 @@
+#include "core/estimator/posterior/assessment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/curvature.h"
+#include "core/bayes/identifiability.h"
+#include "core/bayes/minimizer.h"
+#include "core/bayes/regularization_bias.h"
+#include "core/bayes/weighted_samples.h"
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/regularization_choice.h"
+#include "core/estimator/posterior/trade_off.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr Eigen::Index kDrawsForNoise = 200;
+constexpr double kMinMeanSquare = 1e-24;  // of residuals that vanish
+// Other minima count when their density is not below this part of the best one's: e^−7 ≈ 10⁻³.
+constexpr double kComparableCost = 7;
+// An isolated minimum has all its curvatures above the prior's; a valley's floor has not.
+constexpr double kIsolatedCurvature = 1;
+
+class Assessment {
+ public:
+  explicit Assessment(const AssessmentRequest& request)
+      : problem_(*request.problem),
+        prior_(problem_.prior()),
+        request_(request),
+        design_(request.expansion->design()) {}
+
+  absl::StatusOr<Assessed> Run(const Stop& stop) {
+    regularization_ = problem_.problem().regularization;
+    if (request_.regularization) {
+      regularization_ = *request_.regularization;
+    } else if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
+      POLYEST_ASSIGN_OR_RETURN(const RegularizationChoice choice,
+                               ChooseRegularization(problem_, *request_.expansion, stop));
+      regularization_ = choice.regularization;
+      findings_.regularization_not_determined = choice.reason;
+    }
+    const Cost cost = request_.expansion->MakeCost(regularization_);
+    POLYEST_ASSIGN_OR_RETURN(
+        posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
+    MixtureShare share;
+    if (request_.partition != nullptr) {
+      share =
+          TakeShare(*request_.partition, request_.component, *request_.expansion, cost, posterior_);
+    }
+    const std::vector<Minimum>& minima = posterior_.minima;
+    const Vector eta = minima.front().point;
+    findings_.problem = &problem_;
+    findings_.expansion = request_.expansion;
+    findings_.record = request_.record;
+    findings_.map_xi = design_.region.ToGerm(eta);
+    findings_.converged = minima.front().converged;
+    findings_.minimizer_reason = minima.front().reason;
+    NoteOtherMinima(cost, minima);
+    Summarize(cost, eta);
+    fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
+    spent_ = fitted_ + 2;
+    DescribeParameters(cost, eta);
+    DescribeBias(cost, eta, stop);
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    DescribeChannels(cost, eta);
+    estimate_.diagnostics = Diagnose(findings_, estimate_);
+    return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share};
+  }
+
+ private:
+  // J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
+  Matrix ToGermHessian(const Matrix& hessian) const {
+    const Matrix inverse = Inverse(design_.region.axes());
+    return inverse.transpose() * hessian * inverse;
+  }
+
+  bool Isolated(const Cost& cost, const Vector& eta) const {
+    const Vector unit = prior_.GermStandardDeviation();
+    const Matrix scaled = unit.asDiagonal() * ToGermHessian(cost.Hessian(eta)) * unit.asDiagonal();
+    return SymmetricEigenvalues(scaled).minCoeff() > kIsolatedCurvature;
+  }
+
+  void NoteOtherMinima(const Cost& cost, const std::vector<Minimum>& minima) {
+    for (size_t i = 1; i < minima.size(); ++i) {
+      if (minima[i].value - minima[0].value > kComparableCost) continue;
+      if (!minima[i].converged || !Isolated(cost, minima[i].point)) continue;
+      findings_.other_minima.push_back(prior_.ToParameters(design_.region.ToGerm(minima[i].point)));
+    }
+  }
+
+  void Summarize(const Cost& cost, const Vector& eta) {
+    const RecordSummary& record = *request_.record;
+    const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
+    findings_.shift = agreement.shift;
+    estimate_.expansion = {design_.basis->order(),       design_.basis->size(),
+                           request_.expansion->points(), agreement.residual_to_noise,
+                           request_.reexpansions,        0};
+    if (record.rows() > 0) {
+      estimate_.expansion.trajectories =
+          (request_.propagated_rows + record.rows() / 2) / record.rows();
+    }
+    estimate_.time_s = record.time_s();
+    estimate_.samples = record.samples();
+    estimate_.regularization = regularization_;
+    estimate_.cost = cost.Evaluate(eta);
+  }
+
+  void DescribeParameters(const Cost& cost, const Vector& eta) {
+    const Vector informed = ContractionByData(cost, eta);
+    const double widening =
+        findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
+    DescribeSpread(cost, eta, informed, widening);
+    estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta, spent_)), prior_);
+    const Vector map = prior_.ToParameters(findings_.map_xi);
+    const Vector prior_mean = prior_.Mean();
+    const Vector prior_deviation = prior_.StandardDeviation();
+    WidenPosterior(widening);
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      ParameterEstimate parameter;
+      parameter.name = prior_.parameters()[static_cast<size_t>(i)].name;
+      parameter.unit = problem_.units()[static_cast<size_t>(i)];
+      parameter.map = map[i];
+      parameter.std_dev = deviation_[i];
+      parameter.prior_mean = prior_mean[i];
+      parameter.prior_std_dev = prior_deviation[i];
+      parameter.contraction = deviation_[i] / prior_deviation[i];
+      parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
+      DescribeMarginal(posterior_, prior_, i, parameter);
+      estimate_.parameters.push_back(std::move(parameter));
+    }
+    DescribeTradeOffs();
+  }
+
+  void DescribeBias(const Cost& cost, const Vector& eta, const Stop& stop) {
+    const Vector bias = RegularizationBias(cost, eta, stop);
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      estimate_.parameters[static_cast<size_t>(i)].bias = bias[i];
+    }
+  }
+
+  void DescribeTradeOffs() {
+    std::vector<std::string> names;
+    std::vector<Verdict> verdicts;
+    Matrix thetas(posterior_.scores.rows(), prior_.dimension());
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const ParameterEstimate& parameter = estimate_.parameters[static_cast<size_t>(i)];
+      names.push_back(parameter.name);
+      verdicts.push_back(parameter.verdict);
+    }
+    if (std::ranges::count(verdicts, Verdict::kIdentified) == prior_.dimension()) return;
+    for (int i = 0; i < prior_.dimension(); ++i) thetas.col(i) = posterior_.Parameter(prior_, i);
+    estimate_.trade_offs =
+        FindTradeOffs(thetas, posterior_.weights, names, problem_.units(), verdicts);
+  }
+
+  // Covariance and standard deviations: never above the prior's. Where the map of a parameter is
+  // curved its slope at the estimate scales what is known of it: a parameter that the data do not
+  // identify then has the prior's own standard deviation, wherever they drew it.
+  void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
+                      double widening) {
+    const Curvature curvature =
+        CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
+    const Vector prior_deviation = prior_.StandardDeviation();
+    deviation_ = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const Verdict verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
+      if (prior_.IsCurved(i) && verdict == Verdict::kNotIdentified) {
+        deviation_[i] = prior_deviation[i];
+      }
+    }
+    const Vector factor = deviation_.cwiseQuotient(curvature.standard_deviation);
+    estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
+  }
+
+  // Posterior ÷ prior standard deviation of the scores as far as it is the data's doing: the larger
+  // of what the curvature gives with the prior at its own weight, whatever α² is (a heavy prior
+  // narrows the posterior, but that is not knowledge), and of
+  //   (H_mismatch + Σ_prior⁻¹)⁻¹,
+  // in which a skewed prior's sharp mode does not pass for information either.
+  Vector ContractionByData(const Cost& cost, const Vector& eta) const {
+    const Vector& xi = findings_.map_xi;
+    const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta, spent_));
+    Matrix curved = mismatch;
+    curved.diagonal() += prior_.Curvature(xi);
+    Matrix spread = mismatch;
+    spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
+    return CovarianceFromCurvature(curved, prior_, xi)
+        .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
+  }
+
+  // Draws' scores widened about their mean but not past Ω.
+  void WidenPosterior(double widening) {
+    if (!(widening > 1)) return;
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      auto scores = posterior_.scores.col(i).array();
+      const double centre = WeightedMean(posterior_.scores.col(i), posterior_.weights);
+      scores =
+          (centre + widening * (scores - centre)).max(prior_.lower()[i]).min(prior_.upper()[i]);
+    }
+  }
+
+  void DescribeChannels(const Cost& cost, const Vector& eta) {
+    const Vector d = cost.BasisDifference(eta);
+    for (int c = 0; c < problem_.channels(); ++c) {
+      ChannelEstimate channel;
+      channel.output = problem_.problem().measured[static_cast<size_t>(c)].output;
+      if (!request_.record->channels().empty()) DescribeChannel(cost, d, c, channel);
+      estimate_.channels.push_back(std::move(channel));
+    }
+  }
+
+  void DescribeChannel(const Cost& cost, const Vector& d, int c, ChannelEstimate& channel) const {
+    const RecordSummary::Channel& summary = request_.record->channels()[static_cast<size_t>(c)];
+    const ChannelSums& sums = request_.expansion->sums()[static_cast<size_t>(c)];
+    const ChannelNoise& noise = request_.expansion->noise().channels[static_cast<size_t>(c)];
+    channel.samples = summary.samples;
+    if (summary.samples == 0) return;
+    const auto samples = static_cast<double>(summary.samples);
+    // With N the degrees of freedom, χ² ÷ N of a working noise of the right size is 1 in the mean.
+    const double mean_square =
+        sums.scale_unknown ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums) / sums.Degrees())
+                           : 1;
+    channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
+    channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
+    const double share = fitted_ * samples / static_cast<double>(request_.record->samples());
+    channel.lag1_correlation =
+        std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
+    channel.noise_time_constant_s = noise.time_constant_s;
+    channel.outliers = request_.expansion->Outliers(c);
+    // That of the noise before whitening.
+    const double a = noise.time_constant_s > 0 ? summary.Correlation(noise)
+                                               : std::max(0.0, channel.lag1_correlation);
+    channel.effective_samples = samples * (1 - a) / (1 + a);
+  }
+
+  // E[χ²] over the posterior, where E[σ²] = E[χ²]/N of an unknown scale.
+  double MeanChiSquared(const Cost& cost, const ChannelSums& sums) const {
+    const Eigen::Index stride =
+        std::max<Eigen::Index>(1, posterior_.scores.rows() / kDrawsForNoise);
+    double sum = 0, weights = 0;
+    for (Eigen::Index i = 0; i < posterior_.scores.rows(); i += stride) {
+      const Vector xi = prior_.OfScores(posterior_.scores.row(i).transpose());
+      const double weight = posterior_.weights[i];
+      sum += weight * sums.samples.ChiSquared(cost.BasisDifference(design_.region.ToLocal(xi)));
+      weights += weight;
+    }
+    return sum / weights;
+  }
+
+  const ResolvedProblem& problem_;
+  const Prior& prior_;
+  const AssessmentRequest& request_;
+  const ExpansionDesign& design_;
+  double regularization_ = 1;
+  double fitted_ = 0;  // parameters fitted by the data
+  double spent_ = 0;   // degrees of freedom, see Cost::MismatchHessian
+  PosteriorDraws posterior_;
+  Vector deviation_;  // of the parameters
+  Findings findings_;
+  Estimate estimate_;
+};
+
+}  // namespace
+
+void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
+                      ParameterEstimate& parameter) {
+  const Vector theta = posterior.Parameter(prior, i);
+  const WeightedQuantiles quantile(theta, posterior.weights);
+  parameter.mean = WeightedMean(theta, posterior.weights);
+  parameter.posterior_std_dev = WeightedStandardDeviation(theta, posterior.weights);
+  parameter.lower95 = quantile(0.025);
+  parameter.upper95 = quantile(0.975);
+}
+
+absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop) {
+  return Assessment(request).Run(stop);
+}
+
+}  // namespace polyest::internal

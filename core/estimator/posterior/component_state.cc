@@ -1,0 +1,102 @@
+#include "core/estimator/posterior/component_state.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+#include "core/estimator/posterior/mixture_component.h"
+
+namespace polyest::internal {
+namespace {
+
+bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, int64_t rows) {
+  const auto m = static_cast<size_t>(problem.channels());
+  const size_t width = m + problem.streamed_inputs().size();
+  const RowBlock& beginning = summary.beginning();
+  return summary.rows() == rows && summary.channels().size() == m &&
+         beginning.rows.size() <= RecordSummary::kBeginning &&
+         beginning.values.size() == beginning.rows.size() * width &&
+         beginning.noise.size() == beginning.rows.size() * m;
+}
+
+bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
+  return state.taken > 0 && state.windows_from >= 0 && state.windows_from <= state.taken &&
+         state.expansion.absorbed.rows == state.taken &&
+         state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
+         state.weight >= 0 && state.weight <= 1 &&
+         IsSummaryFor(problem, state.summary, state.taken);
+}
+
+absl::StatusOr<ResolvedProblem> ProblemOf(const ResolvedProblem& problem,
+                                          const ComponentState& state) {
+  if (state.runs < 1 || (state.runs > 1 && !problem.per_run()) || state.runs > problem.max_runs()) {
+    return absl::DataLossError(
+        absl::StrCat("the snapshot's ", state.runs, " runs cannot be of this problem"));
+  }
+  ResolvedProblem own = problem;
+  if (state.runs != problem.runs()) {
+    POLYEST_ASSIGN_OR_RETURN(own, problem.WithRuns(state.runs));
+  }
+  IntegrationOptions integration = own.problem().integration;
+  integration.relative_tolerance = state.relative_tolerance;
+  if (!integration.Validate().ok()) {
+    return absl::DataLossError("the snapshot's tolerance is out of range");
+  }
+  own.set_relative_tolerance(state.relative_tolerance);
+  return own;
+}
+
+}  // namespace
+
+ComponentState MixtureComponent::State() const {
+  POLYEST_CHECK(!broken_ && !is_multimodal());
+  ComponentState state;
+  state.runs = problem_.runs();
+  state.relative_tolerance = problem_.problem().integration.relative_tolerance;
+  state.expansion = expansion_->State();
+  state.particles = particles_;
+  state.weight = weight_;
+  state.taken = taken_;
+  state.windows_from = windows_from_;
+  state.window_end = window_end_;
+  state.patient_until = patient_until_;
+  state.whole_until = whole_until_;
+  state.settled_row = settled_row_;
+  state.settlements_at_row = settlements_at_row_;
+  state.comparable_row = comparable_row_;
+  state.settlements = settlements_;
+  state.reexpansions = reexpansions_;
+  state.abandoned_rows = abandoned_rows_;
+  state.summary = summary_;
+  return state;
+}
+
+absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
+    const ResolvedProblem& problem, ComponentState state, const SampleStore* store, int threads) {
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem own, ProblemOf(problem, state));
+  if (!IsStateFor(own, state)) {
+    return absl::DataLossError("the snapshot's windows or particles cannot be of this problem");
+  }
+  std::unique_ptr<MixtureComponent> component(new MixtureComponent(own, store, threads));
+  POLYEST_ASSIGN_OR_RETURN(component->expansion_,
+                           RegionalExpansion::FromState(
+                               component->problem_, std::move(state.expansion), *store, threads));
+  component->particles_ = std::move(state.particles);
+  component->weight_ = state.weight;
+  component->taken_ = state.taken;
+  component->windows_from_ = state.windows_from;
+  component->window_end_ = state.window_end;
+  component->patient_until_ = state.patient_until;
+  component->whole_until_ = state.whole_until;
+  component->settled_row_ = state.settled_row;
+  component->settlements_at_row_ = state.settlements_at_row;
+  component->comparable_row_ = state.comparable_row;
+  component->settlements_ = state.settlements;
+  component->reexpansions_ = state.reexpansions;
+  component->abandoned_rows_ = state.abandoned_rows;
+  component->summary_ = std::move(state.summary);
+  return component;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,32 @@
+#pragma once
+
+// A mixture component between two rows as plain data. Fields as of MixtureComponent.
+
+#include <cstdint>
+
+#include "core/estimator/expansion/expansion_state.h"
+#include "core/estimator/record/record_summary.h"
+
+namespace polyest::internal {
+
+struct ComponentState {
+  int runs = 1;                   // of its problem, and
+  double relative_tolerance = 0;  // that of its integrators, which follows the noise
+  ExpansionState expansion;
+  Matrix particles;
+  double weight = 1;
+  int64_t taken = 0;
+  int64_t windows_from = 0;
+  int64_t window_end = 0;
+  int64_t patient_until = 0;
+  int64_t whole_until = 0;
+  int64_t settled_row = -1;
+  int settlements_at_row = 0;
+  int64_t comparable_row = -1;
+  uint64_t settlements = 0;
+  int reexpansions = 0;
+  int64_t abandoned_rows = 0;
+  RecordSummary summary;
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,300 @@
+#include "core/estimator/posterior/diagnosis.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <cmath>
+
+#include "core/estimator/posterior/undersampling.h"
+
+namespace polyest::internal {
+namespace {
+
+// χ² of a right model has mean N and standard deviation √(2N); far larger is both many of those
+// and half as much again.
+constexpr double kMisfitDeviations = 6;
+constexpr double kMisfitRatio = 1.5;
+// A lag-1 correlation of independent residuals has a standard deviation of 1/√N. Below kCorrelated
+// it changes the uncertainty by less than a sixth.
+constexpr double kCorrelationDeviations = 4;
+constexpr double kCorrelated = 0.15;
+constexpr int64_t kMinForCorrelation = 20;
+constexpr double kAtBound = 1e-6;  // of the width of Ω
+// The same for a correlated parameter: its score has no bound, and only ever nears the parameter's.
+constexpr double kNearBound = 1e-4;
+// Of the posterior's and the curvature's standard deviations, either way.
+constexpr double kGaussianRatio = 1.2;
+constexpr size_t kFailuresNamed = 3;
+
+const std::string& Name(const Findings& findings, int i) {
+  return findings.problem->prior().parameters()[static_cast<size_t>(i)].name;
+}
+
+void AddIdentifiability(const Findings& findings, const Estimate& estimate,
+                        std::vector<Diagnostic>& diagnostics) {
+  std::vector<std::string> names;
+  for (const ParameterEstimate& parameter : estimate.parameters) {
+    if (parameter.verdict == Verdict::kNotIdentified) names.push_back(parameter.name);
+  }
+  if (names.empty()) return;
+  std::string message = absl::StrFormat(
+      "the data say less than the prior about %s; what is reported there is the prior's",
+      absl::StrJoin(names, ", "));
+  for (const TradeOff& trade_off : estimate.trade_offs) {
+    absl::StrAppendFormat(
+        &message, "; %s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%",
+        trade_off.combination, 100 * trade_off.relative_std_dev, Name(findings, trade_off.first),
+        Name(findings, trade_off.second), 100 * trade_off.first_alone,
+        100 * trade_off.second_alone);
+  }
+  diagnostics.push_back({DiagnosticCode::kNotIdentified, std::move(message)});
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    if (parameter.verdict != Verdict::kNotIdentified) continue;
+    const SamplingInformation information =
+        InformationBetweenSamples(*findings.problem, findings.expansion->noise(),
+                                  findings.record->beginning(), findings.map_xi, i);
+    if (!information.undersampled) continue;
+    diagnostics.push_back(
+        {DiagnosticCode::kUndersampled,
+         absl::StrFormat("the samples miss what %s changes: as many samples between them would "
+                         "know it %.0f times better than the prior (in variance); sample at other "
+                         "times, or more often",
+                         parameter.name, information.between)});
+  }
+}
+
+// Of a scale learned, χ² says nothing: it is what the scale was learned from.
+void AddMisfit(const Findings& findings, const Estimate& estimate,
+               std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    if (findings.problem->problem().measured[c].noise.unknown) continue;
+    const auto samples = static_cast<double>(channel.samples);
+    if (channel.chi_squared > kMisfitRatio * samples &&
+        channel.chi_squared > samples + kMisfitDeviations * std::sqrt(2 * samples)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
+                           "prior is wrong, and the uncertainty reported is too small",
+                           channel.output, std::sqrt(channel.chi_squared / samples))});
+    }
+    // What the expansion's own error takes from a sample's weight it takes from χ².
+    const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
+    if (channel.chi_squared < expected / kMisfitRatio &&
+        channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat(
+               "output %s: residuals are only %.3g times the noise assumed, which makes "
+               "the uncertainty reported too large; give the noise its own size or let "
+               "it be unknown",
+               channel.output, std::sqrt(channel.chi_squared / samples))});
+    }
+  }
+}
+
+// Residuals that hang together in time although the noise is taken not to, or otherwise than it is
+// taken to.
+void AddCorrelation(const Findings& findings, const Estimate& estimate,
+                    std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    const double correlation = channel.lag1_correlation;
+    if (std::abs(correlation) < kCorrelated || channel.samples < kMinForCorrelation ||
+        std::abs(correlation) * std::sqrt(static_cast<double>(channel.samples)) <
+            kCorrelationDeviations) {
+      continue;
+    }
+    const NoiseModel& noise = findings.problem->problem().measured[c].noise;
+    if (noise.correlation != NoiseCorrelation::kWhite) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f) even after the "
+                           "noise's own correlation is taken out; model or noise is wrong",
+                           channel.output, correlation)});
+    } else if (correlation > 0) {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f), so that %d "
+                           "samples tell no more than %.0f independent ones and the uncertainty "
+                           "reported is too small; let the noise have a correlation "
+                           "({\"auto\": true}), or improve the model",
+                           channel.output, correlation, channel.samples,
+                           channel.effective_samples)});
+    } else {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat(
+               "output %s: successive residuals alternate (correlation %.2f); the noise "
+               "is not white",
+               channel.output, correlation)});
+    }
+  }
+}
+
+void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
+                       std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    if (!findings.problem->problem().measured[c].noise.unknown ||
+        findings.expansion->noise().channels[c].learned || estimate.channels[c].samples == 0) {
+      continue;
+    }
+    diagnostics.push_back(
+        {DiagnosticCode::kNoiseNotLearned,
+         absl::StrFormat("output %s: too few samples (%d) to learn its noise from; it is taken to "
+                         "be as large as the signal",
+                         estimate.channels[c].output, estimate.channels[c].samples)});
+  }
+}
+
+// Whether the estimate lies on a bound of parameter i: < 0 the lower one, > 0 the upper one. Looked
+// for in the marginal's own germ, which has bounds even where a correlated parameter's score has
+// none.
+int BoundReached(const Findings& findings, int i) {
+  const Prior& prior = findings.problem->prior();
+  const Germ germ(prior.parameters()[static_cast<size_t>(i)].germ);
+  const double x = prior.MarginalGerm(i, prior.ToScores(findings.map_xi)[i]);
+  const double width = germ.Upper() - germ.Lower();
+  const double part = prior.germs()[static_cast<size_t>(i)] == germ ? kAtBound : kNearBound;
+  const double near = part * (std::isfinite(width) ? width : 1);
+  if (x - germ.Lower() < near) return -1;
+  return germ.Upper() - x < near ? 1 : 0;
+}
+
+// A prior that is densest at a bound puts the estimate there by itself, where the data are silent.
+bool PriorAsksForBound(const Findings& findings, const Estimate& estimate, int i) {
+  const Germ& germ = findings.problem->prior().germs()[static_cast<size_t>(i)];
+  return (germ.Mode() == germ.Lower() || germ.Mode() == germ.Upper()) &&
+         estimate.parameters[static_cast<size_t>(i)].verdict == Verdict::kNotIdentified;
+}
+
+void AddBounds(const Findings& findings, const Estimate& estimate,
+               std::vector<Diagnostic>& diagnostics) {
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const int bound = BoundReached(findings, i);
+    if (bound == 0 || PriorAsksForBound(findings, estimate, i)) continue;
+    diagnostics.push_back({DiagnosticCode::kAtPriorBound,
+                           absl::StrFormat("%s lies on the %s bound of its prior: the data ask for "
+                                           "values beyond it",
+                                           Name(findings, i), bound < 0 ? "lower" : "upper")});
+  }
+}
+
+// Of what the data inform: where they say nothing, what is reported is the prior's by contract.
+void AddNonGaussian(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
+  std::vector<std::string> ratios;
+  for (const ParameterEstimate& parameter : estimate.parameters) {
+    if (parameter.verdict == Verdict::kNotIdentified) continue;
+    const double ratio = parameter.posterior_std_dev / parameter.std_dev;
+    if (ratio <= kGaussianRatio && ratio >= 1 / kGaussianRatio) continue;
+    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large", parameter.name, ratio));
+  }
+  if (ratios.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kNonGaussian,
+       absl::StrFormat("the posterior's standard deviation is not what the curvature of the cost "
+                       "says: %s; go by the posterior's own mean, standard deviation and interval",
+                       absl::StrJoin(ratios, ", "))});
+}
+
+void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  const auto& failures = findings.expansion->failures();
+  if (failures.empty()) return;
+  std::string message = absl::StrFormat(
+      "%d of %d trajectories could not be integrated and were "
+      "left out: ",
+      failures.size(), findings.expansion->points());
+  for (size_t i = 0; i < std::min(failures.size(), kFailuresNamed); ++i) {
+    absl::StrAppendFormat(&message, "%s%s", i == 0 ? "" : "; ",
+                          DescribeFailure(failures[i], findings.problem->prior()));
+  }
+  if (failures.size() > kFailuresNamed) message += "; …";
+  diagnostics.push_back({DiagnosticCode::kPointsFailed, message});
+}
+
+// The pieces of a mixture, with their weights.
+void AddComponents(const Findings& findings, const Estimate& estimate,
+                   std::vector<Diagnostic>& diagnostics) {
+  if (estimate.components.empty()) return;
+  std::vector<std::string> pieces;
+  for (const ComponentEstimate& component : estimate.components) {
+    std::vector<std::string> values;
+    for (const ParameterEstimate& parameter : component.parameters) {
+      values.push_back(absl::StrFormat("%s = %.6g", parameter.name, parameter.map));
+    }
+    pieces.push_back(
+        absl::StrFormat("%.3g %% at %s", 100 * component.weight, absl::StrJoin(values, ", ")));
+  }
+  std::string message = absl::StrFormat("the posterior is in %d separated pieces: %s",
+                                        pieces.size(), absl::StrJoin(pieces, "; "));
+  if (findings.left_out > 0) {
+    absl::StrAppendFormat(&message, "; there were more, left out with %.2g %%",
+                          100 * findings.left_out);
+  }
+  diagnostics.push_back({DiagnosticCode::kMultipleMinima, std::move(message)});
+}
+
+void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.other_minima.empty()) {
+    std::vector<std::string> places;
+    for (const Vector& theta : findings.other_minima) {
+      std::vector<std::string> values;
+      for (int i = 0; i < theta.size(); ++i) {
+        values.push_back(absl::StrFormat("%s = %.6g", Name(findings, i), theta[i]));
+      }
+      places.push_back(absl::StrJoin(values, ", "));
+    }
+    diagnostics.push_back({DiagnosticCode::kMultipleMinima,
+                           absl::StrFormat("the cost has other minima of comparable depth at %s",
+                                           absl::StrJoin(places, " and at "))});
+  }
+  if (!findings.converged) {
+    diagnostics.push_back({DiagnosticCode::kNotConverged,
+                           absl::StrFormat("the minimizer gave up before it had converged: %s",
+                                           findings.minimizer_reason)});
+  }
+}
+
+std::string_view RemedyForInaccuracy(const ExpansionOptions& expansion) {
+  if (!expansion.adaptive) return "raise expansion.order or let it be adaptive";
+  if (expansion.order) return "raise expansion.order or leave it to \"AUTO\"";
+  return "narrower priors or more informative data would let the expansion hold";
+}
+
+void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (findings.regularization_not_determined.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kRegularizationNotDetermined,
+       absl::StrFormat("α² is 1, as Bayes' rule has it, for the rule asked for does not choose: %s",
+                       findings.regularization_not_determined)});
+}
+
+}  // namespace
+
+std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
+  std::vector<Diagnostic> diagnostics;
+  AddIdentifiability(findings, estimate, diagnostics);
+  if (findings.shift > kInaccurateShift) {
+    diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat(
+             "the expansion of order %d differs from the model by %.3g times the noise; "
+             "estimates may be off by %.3g standard deviations of the fit, by which the "
+             "uncertainty has been widened; %s",
+             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
+             RemedyForInaccuracy(findings.problem->problem().expansion))});
+  }
+  AddMisfit(findings, estimate, diagnostics);
+  AddCorrelation(findings, estimate, diagnostics);
+  AddUnlearnedNoise(findings, estimate, diagnostics);
+  AddBounds(findings, estimate, diagnostics);
+  AddNonGaussian(estimate, diagnostics);
+  AddComponents(findings, estimate, diagnostics);
+  AddMinima(findings, diagnostics);
+  AddRegularization(findings, diagnostics);
+  AddFailures(findings, diagnostics);
+  return diagnostics;
+}
+
+}  // namespace polyest::internal

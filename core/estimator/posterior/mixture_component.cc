@@ -1,0 +1,392 @@
+#include "core/estimator/posterior/mixture_component.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/new_runs.h"
+#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/posterior_pieces.h"
+#include "core/estimator/record/rows_ahead.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int64_t kBlockRows = 64;
+// A sample whose expansion residual passes this part of the noise ends the window before it.
+constexpr double kResidualToNoise = 0.1;
+// Where a window ends the expansion is compared with the model: it is settled anew when the
+// posterior's means may be off by this many of its standard deviations.
+constexpr double kMaxShift = 0.1;
+// Pieces are believed of an expansion that is too coarse for more samples, but not so coarse that
+// it may have made them up, or left others out: ΔJ over them is no more than this.
+constexpr double kMaxShiftInPieces = 1;
+constexpr double kWindowGrowth = 1.3;
+// The integration error must stay so far below the noise that it does not add up over a long
+// record to a share of the posterior's standard deviation: relative tolerance ≤ this × noise ÷
+// signal, looked at where windows end; never tighter than double precision bears.
+constexpr double kTolerancePerNoise = 1e-5;
+constexpr double kTightestTolerance = 1e-12;
+// After a settlement that did not help, this part of the record so far is taken with its discount
+// before the next one is tried.
+constexpr int64_t kPatience = 8;
+constexpr int kMaxSettlementsAtRow = 4;
+// Of the noise, where a window ends. A scale that falls from the signal's size to 10⁻⁶ of it takes
+// 20 halvings.
+constexpr int kMaxRevisions = 24;
+// By how much a scale not learned yet exceeds the largest sample.
+constexpr double kAboveSignal = 2;
+
+// Where outliers are looked for from once the posterior is there.
+PosteriorSummary SummaryOf(const Matrix& particles) {
+  PosteriorSummary summary;
+  summary.centre = particles.colwise().mean().transpose();
+  const Matrix centred = particles.rowwise() - summary.centre.transpose();
+  const SymmetricEigen eigen =
+      DecomposeSymmetric(centred.transpose() * centred / static_cast<double>(particles.rows()));
+  summary.factor = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+  return summary;
+}
+
+}  // namespace
+
+int64_t NextWindow(int64_t rows, int64_t from) {
+  const auto window = static_cast<double>(rows - from);
+  return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
+}
+
+MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleStore* store,
+                                   int threads)
+    : problem_(problem),
+      store_(store),
+      threads_(threads),
+      learns_noise_(LearnsNoise(problem_.problem())),
+      particles_(0, problem_.dimension()) {}
+
+absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
+    const ResolvedProblem& problem, const SampleStore* store, int threads) {
+  std::unique_ptr<MixtureComponent> component(new MixtureComponent(problem, store, threads));
+  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(component->problem_));
+  POLYEST_ASSIGN_OR_RETURN(component->expansion_,
+                           RegionalExpansion::Make(component->problem_, std::move(design),
+                                                   NoiseToBeginWith(problem.problem()), threads));
+  return component;
+}
+
+absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
+  if (is_multimodal()) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(Recover(stop));
+  // A window's end that an earlier stop left open.
+  if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
+  RowBlock block;
+  while (taken_ < rows && !is_multimodal()) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    POLYEST_RETURN_IF_ERROR(ReadBlock(rows, block, stop));
+    broken_ = true;
+    POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
+    if (through) broken_ = false;
+  }
+  return absl::OkStatus();
+}
+
+// The next rows, up to the first `rows` of the store, for which there are parameters.
+absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const Stop& stop) {
+  const int64_t count = std::min(kBlockRows, rows - taken_);
+  const auto read = [&](int64_t some) {
+    return ReadWithRowsAhead(*store_, taken_, some, problem_.knots_ahead(), block);
+  };
+  POLYEST_RETURN_IF_ERROR(read(count));
+  if (!problem_.per_run()) return absl::OkStatus();
+  if (block.rows.front().run >= problem_.runs()) {
+    POLYEST_RETURN_IF_ERROR(BeginRun(block.rows.front().run, stop));
+  }
+  int64_t known = 0;
+  while (known < count && block.rows[static_cast<size_t>(known)].run < problem_.runs()) ++known;
+  return known < count ? read(known) : absl::OkStatus();
+}
+
+// The record so far, with the parameters that the run brings: as unknown as their prior.
+absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
+  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
+  LearnedNoise noise = expansion_->noise();
+  noise.posterior = SummaryForNewRuns(grown, noise.posterior);
+  Matrix particles = ParticlesForNewRuns(grown, particles_);
+  std::swap(problem_, grown);  // in its place, since expansions refer to it
+  auto replayed =
+      Replay(problem_, std::move(design), std::move(noise), *store_, taken_, threads_, stop);
+  if (!replayed.ok()) {
+    std::swap(problem_, grown);
+    return replayed.status();
+  }
+  Adopt(*std::move(replayed));
+  particles_ = std::move(particles);
+  windows_from_ = patient_until_ = taken_;
+  window_end_ = taken_ + 2;
+  return absl::OkStatus();
+}
+
+// After a stop in the middle of a block: the same expansion, propagated again up to the last row
+// taken.
+absl::Status MixtureComponent::Recover(const Stop& stop) {
+  if (!broken_) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, expansion_->design(), expansion_->noise(),
+                                              *store_, taken_, threads_, stop));
+  broken_ = false;
+  return absl::OkStatus();
+}
+
+// False when the expansion moved and the rest of the block must be propagated again.
+absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const Stop& stop) {
+  for (int row = 0; row < block.count(); ++row) {
+    POLYEST_ASSIGN_OR_RETURN(const bool raised, RaiseUnlearnedScales(block, row, stop));
+    if (raised) return false;
+    const bool short_of_trajectories = row == expansion_->fitted_rows();
+    const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
+                        expansion_->ResidualToNoise(row) > kResidualToNoise;
+    if (short_of_trajectories || (adaptive() && coarse)) {
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(short_of_trajectories, stop));
+      if (moved) return false;
+    }
+    expansion_->Absorb(row);
+    summary_.Add(block, row, problem_.channels());
+    ++taken_;
+    if (WindowEnds()) {
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleAfterWindow(stop));
+      if (moved) return false;
+    }
+  }
+  return true;
+}
+
+// The next row is too coarse for the present expansion, or too few trajectories reach it.
+absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, const Stop& stop) {
+  if (settled_row_ != taken_) settlements_at_row_ = 0;
+  settled_row_ = taken_;
+  if (adaptive() && taken_ > 0 && settlements_at_row_ < kMaxSettlementsAtRow) {
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, !short_of_trajectories));
+    ++settlements_at_row_;
+    if (moved) return true;
+  }
+  if (LookForPieces()) return true;
+  if (short_of_trajectories) return expansion_->shortage();
+  patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
+  return false;
+}
+
+absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
+  bool moved = false;
+  if (learns_noise_) {
+    POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
+  }
+  if (adaptive()) {
+    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    moved = moved || tightened || settled;
+  }
+  window_end_ = NextWindow(taken_, windows_from_);
+  return moved;
+}
+
+absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
+  const auto accurate = [&] {
+    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+    return AgreementWithModel(*expansion_, cost).shift <= kMaxShift;
+  };
+  bool moved = false;
+  // Each settlement may raise the order.
+  for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
+    if (accurate()) return moved;
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));
+    if (!settled) break;
+    moved = true;
+  }
+  return (!accurate() && LookForPieces()) || moved;
+}
+
+// True when the posterior on the present expansion, which no move makes accurate, is in pieces. A
+// noise not learned yet makes no pieces: it would be what decides between them.
+bool MixtureComponent::LookForPieces() {
+  if (!adaptive() || taken_ < whole_until_) return false;
+  for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
+    const bool unknown = problem_.problem().measured[c].noise.unknown;
+    if (unknown && !expansion_->noise().channels[c].learned) return false;
+  }
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  if (AgreementWithModel(*expansion_, cost).shift > kMaxShiftInPieces) return false;
+  std::vector<Matrix> pieces = FindPieces(cost, expansion_->design(), particles_);
+  if (pieces.size() > 1) pieces_ = std::move(pieces);
+  return is_multimodal();
+}
+
+absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
+    const Stop& stop) {
+  std::vector<std::unique_ptr<MixtureComponent>> parts;
+  for (const Matrix& piece : pieces_) {
+    std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
+    const absl::Status begun = part->BeginOn(*this, piece, stop);
+    if (absl::IsFailedPrecondition(begun)) {
+      pieces_.clear();
+      whole_until_ = NextWindow(taken_, windows_from_);
+      parts.clear();
+      return parts;
+    }
+    POLYEST_RETURN_IF_ERROR(begun);
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+// At the parent's row, over a region around one of its pieces.
+absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Matrix& piece,
+                                       const Stop& stop) {
+  taken_ = window_end_ = parent.taken_;
+  windows_from_ = parent.windows_from_;
+  summary_ = parent.summary_;
+  settlements_ = parent.settlements_;
+  whole_until_ = NextWindow(taken_, windows_from_);
+  particles_ = piece;
+  const ExpansionDesign& before = parent.expansion_->design();
+  ExpansionDesign design =
+      DesignForRegion(problem_, before.basis->truncation(), RegionOfParticles(piece),
+                      piece.colwise().mean().transpose());
+  const Matrix checks = piece.topRows(std::min(before.check_points.rows(), piece.rows()));
+  design.check_points = design.region.ManyToLocal(checks);
+  parent.expansion_->MakeCost(problem_.problem().regularization)
+      .EvaluateMany(before.region.ManyToLocal(checks), design.check_costs);
+  LearnedNoise noise = parent.expansion_->noise();
+  if (noise.posterior.centre.size() > 0) noise.posterior = SummaryOf(piece);
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, std::move(design), std::move(noise),
+                                              *store_, taken_, threads_, stop));
+  ++reexpansions_;
+  bool moved = true;
+  for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
+    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
+  }
+  return absl::OkStatus();
+}
+
+// Scales that are not learned yet follow the signal, so that the first samples weigh little however
+// large they are. True when the record was taken anew.
+absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& block, int row,
+                                                            const Stop& stop) {
+  if (!learns_noise_) return false;
+  std::optional<LearnedNoise> raised;  // made only when needed: this is done for every sample
+  const std::vector<ChannelNoise>& present = expansion_->noise().channels;
+  const size_t width = block.values.size() / block.rows.size();
+  for (size_t c = 0; c < present.size(); ++c) {
+    const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
+    if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;
+    const double size = std::abs(block.values[static_cast<size_t>(row) * width + c]) / shape;
+    if (size <= present[c].scale) continue;
+    if (!raised) raised = expansion_->noise();
+    raised->channels[c].scale = kAboveSignal * size;
+  }
+  if (!raised) return false;
+  POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(raised), stop));
+  return true;
+}
+
+// Returns whether the record was reweighed with another noise. Less noise asks more of the
+// expansion.
+absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
+  bool moved = false;
+  for (int i = 0; i < kMaxRevisions; ++i) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    std::optional<LearnedNoise> revised = ReviseNoise(problem_, *expansion_, summary_, stop);
+    if (!revised) break;
+    POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(revised), stop));
+    moved = true;
+    if (!adaptive()) continue;
+    POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
+    POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+  }
+  return moved;
+}
+
+// Propagates the expansion along the record so far again, with the samples weighed by `noise`.
+absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(auto replayed, Replay(problem_, expansion_->design(), std::move(noise),
+                                                 *store_, taken_, threads_, stop));
+  Adopt(std::move(replayed));
+  return absl::OkStatus();
+}
+
+// True when the noise asked for a tighter tolerance and the record was propagated again with it.
+absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
+  if (!problem_.problem().tolerance_follows_noise) return false;
+  const double needed = std::max(kTightestTolerance,
+                                 kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()));
+  const double present = problem_.problem().integration.relative_tolerance;
+  if (needed >= present) return false;
+  // Half of what is needed now, so that a slowly falling ratio does not ask again and again.
+  problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
+  auto replayed =
+      Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
+  if (!replayed.ok()) {
+    problem_.set_relative_tolerance(present);
+    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present one stays
+    return replayed.status();
+  }
+  Adopt(*std::move(replayed));
+  return true;
+}
+
+// True when the expansion moved.
+absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order) {
+  SettleRequest request;
+  request.may_raise_order = may_raise_order;
+  request.problem = &problem_;
+  request.store = store_;
+  request.rows = taken_;
+  request.guesses = particles_;
+  request.seed = 1000 * (settlements_ + 1);
+  request.threads = threads_;
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
+                           polyest::internal::Settle(*expansion_, request, stop));
+  ++settlements_;
+  particles_ = std::move(settlement.particles);
+  if (!settlement.expansion) return false;
+  abandoned_rows_ += settlement.propagated_rows;
+  reexpansions_ += settlement.reexpansions;
+  Adopt(std::move(settlement.expansion));
+  return true;
+}
+
+absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
+  if (comparable_row_ == taken_) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(Recover(stop));
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  if (!AgreementWithModel(*expansion_, cost).mean_difference) {
+    POLYEST_RETURN_IF_ERROR(Settle(stop, /*may_raise_order=*/false).status());
+  }
+  comparable_row_ = taken_;
+  return absl::OkStatus();
+}
+
+// The present expansion is given up for another one that has taken the same rows.
+void MixtureComponent::Adopt(std::unique_ptr<RegionalExpansion> expansion) {
+  abandoned_rows_ += expansion_->propagated_rows();
+  expansion_ = std::move(expansion);
+  broken_ = false;
+}
+
+AssessmentRequest MixtureComponent::RequestAssessment() const {
+  AssessmentRequest request;
+  request.problem = &problem_;
+  request.expansion = expansion_.get();
+  request.record = &summary_;
+  request.guesses = &particles_;
+  request.reexpansions = reexpansions_;
+  request.propagated_rows = propagated_rows();
+  request.last_weight = weight_;
+  return request;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,392 @@
+#include "core/estimator/problem/resolved_problem.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+
+#include "core/common/check.h"
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/parameters_of_runs.h"
+#include "core/estimator/problem/truncation.h"
+#include "core/estimator/problem/validate_regularization.h"
+#include "core/model/list_names.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::Status UnknownName(const FieldPath& field, std::string_view name, std::string_view kind,
+                         const ModelDescription& model, std::string_view known) {
+  return InvalidField(field, absl::StrFormat("model %s has no %s \"%s\"; it has %s", model.name,
+                                             kind, name, known.empty() ? "none" : known));
+}
+
+absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) {
+  for (int i = 0; i < prior.dimension(); ++i) {
+    if (prior.germs()[static_cast<size_t>(i)].family() != GermFamily::kTruncatedNormal) continue;
+    const int order = FirstTruncation(options, prior.dimension()).order;
+    if (order <= Germ::kMaxTruncatedNormalOrder) return absl::OkStatus();
+    return InvalidField(
+        "expansion.order",
+        absl::StrFormat("%d must be at most %d with the truncated normal prior of %s", order,
+                        Germ::kMaxTruncatedNormalOrder,
+                        prior.parameters()[static_cast<size_t>(i)].name));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
+  const NoiseModel& noise = measured.noise;
+  for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
+                                     {"relative", noise.relative},
+                                     {"relative_to_max", noise.relative_to_max}}) {
+    if (!std::isfinite(value) || value < 0) {
+      return InvalidField({"measured", index, "noise", field},
+                          absl::StrFormat("%g must be a finite number ≥ 0", value));
+    }
+  }
+  if (!std::isfinite(noise.time_constant_s) || noise.time_constant_s < 0 ||
+      (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
+    return InvalidField(FieldPath{"measured", index, "noise", "correlation", "time_constant_s"},
+                        absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
+  }
+  if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
+    return InvalidField(FieldPath{"measured", index, "noise"},
+                        absl::StrFormat("output %s needs a noise: at least one of absolute, "
+                                        "relative, relativeToMax must be above 0",
+                                        measured.output));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ValidatePriors(const Problem& problem) {
+  for (size_t i = 0; i < problem.uncertain.size(); ++i) {
+    POLYEST_RETURN_IF_ERROR(Within({"uncertain", i}, problem.uncertain[i].Validate()));
+  }
+  return absl::OkStatus();
+}
+
+// What can be said without looking into the model.
+std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
+  std::vector<absl::Status> refusals;
+  const auto add = [&refusals](absl::Status status) {
+    if (!status.ok()) refusals.push_back(std::move(status));
+  };
+  if (problem.model == nullptr) add(InvalidField("model", "a model must be given"));
+  if (problem.uncertain.empty()) {
+    add(InvalidField("uncertain", "at least one parameter must be uncertain"));
+  }
+  add(ValidateRegularization(problem));
+  if (const absl::Status priors = ValidatePriors(problem); !priors.ok()) {
+    add(priors);
+  } else if (!problem.uncertain.empty()) {
+    const auto parameters = ParametersOfRuns(problem.uncertain, runs);
+    add(problem.expansion.Validate(static_cast<int>(parameters.size())));
+    const absl::StatusOr<Prior> prior = PriorOfRuns(problem.uncertain, problem.correlations, runs);
+    add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
+  }
+  if (const absl::Status status = problem.integration.Validate(); !status.ok()) {
+    add(Within("integration", status));
+  }
+  for (size_t i = 0; i < problem.inputs.size(); ++i) {
+    add(Within({"inputs", i}, InputSignal::Make(problem.inputs[i].signal).status()));
+  }
+  for (size_t i = 0; i < problem.measured.size(); ++i) {
+    add(ValidateNoise(static_cast<int>(i), problem.measured[i]));
+  }
+  return refusals;
+}
+
+}  // namespace
+
+// Finds every name of a problem in its model, and collects what is wrong.
+class ResolvedProblem::Resolver {
+ public:
+  explicit Resolver(ResolvedProblem& resolved)
+      : resolved_(resolved),
+        problem_(resolved.problem_),
+        model_(problem_.model->description()),
+        settable_(resolved.settable_) {}
+
+  std::vector<absl::Status> Run() {
+    ResolveInputs();
+    ResolveMeasured();
+    ResolveFixed();
+    ResolveUncertain();
+    ResolveDerived();
+    CheckAllHaveValues();
+    return std::move(refusals_);
+  }
+
+ private:
+  void Refuse(absl::Status refusal) { refusals_.push_back(std::move(refusal)); }
+  template <class... Arguments>
+  void Refuse(const FieldPath& field, const absl::FormatSpec<Arguments...>& format,
+              const Arguments&... arguments) {
+    Refuse(InvalidField(field, absl::StrFormat(format, arguments...)));
+  }
+
+  void ResolveInputs();
+  void ResolveMeasured();
+  void ResolveFixed();
+  void ResolveUncertain();
+  void ResolveDerived();
+  void CheckAllHaveValues();
+  std::optional<int> Find(const FieldPath& field, const std::string& name);
+  bool Driven(int input) const { return signals_.contains(input); }
+  bool Measured(int output) const;
+  void CheckDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
+                  double smallest_s);
+
+  ResolvedProblem& resolved_;
+  const Problem& problem_;
+  const ModelDescription& model_;
+  const SettableQuantities& settable_;
+  std::set<int> signals_;  // inputs that have one
+  std::vector<bool> has_value_ = std::vector<bool>(static_cast<size_t>(settable_.size()));
+  std::vector<absl::Status> refusals_;
+};
+
+void ResolvedProblem::Resolver::ResolveInputs() {
+  for (size_t i = 0; i < problem_.inputs.size(); ++i) {
+    const NamedInput& input = problem_.inputs[i];
+    const FieldPath field{"inputs", i};
+    const auto column = model_.FindInput(input.name);
+    if (!column) {
+      Refuse(UnknownName(field, input.name, "input", model_, ListNames(model_.inputs)));
+      continue;
+    }
+    if (!signals_.insert(*column).second) {
+      Refuse(field, "input %s is given twice", input.name);
+      continue;
+    }
+    const absl::StatusOr<InputSignal> signal = InputSignal::Make(input.signal);
+    if (!signal.ok()) continue;  // CheckOptions has said so
+    resolved_.base_[settable_.Amplitude(*column)] = signal->default_amplitude();
+    if (!signal->streamed()) continue;
+    resolved_.streamed_inputs_.push_back(*column);
+    resolved_.knots_ahead_ = std::max(resolved_.knots_ahead_, signal->knots_ahead());
+  }
+  std::sort(resolved_.streamed_inputs_.begin(), resolved_.streamed_inputs_.end());
+}
+
+void ResolvedProblem::Resolver::ResolveMeasured() {
+  for (size_t i = 0; i < problem_.measured.size(); ++i) {
+    const MeasuredOutput& measured = problem_.measured[i];
+    const FieldPath field{"measured", i};
+    const auto column = model_.FindOutput(measured.output);
+    if (!column) {
+      Refuse(UnknownName(field, measured.output, "output", model_, ListNames(model_.outputs)));
+      continue;
+    }
+    if (Measured(*column)) Refuse(field, "output %s is given twice", measured.output);
+    resolved_.outputs_.push_back(*column);
+  }
+}
+
+bool ResolvedProblem::Resolver::Measured(int output) const {
+  return std::count(resolved_.outputs_.begin(), resolved_.outputs_.end(), output) > 0;
+}
+
+// The settable quantity of that name, if setting it makes a difference.
+std::optional<int> ResolvedProblem::Resolver::Find(const FieldPath& field,
+                                                   const std::string& name) {
+  const auto index = settable_.Find(name);
+  if (!index) {
+    Refuse(UnknownName(field, name, "parameter", model_, settable_.Describe()));
+    return std::nullopt;
+  }
+  const SettableQuantities::Settable& settable = settable_[*index];
+  const auto column = static_cast<size_t>(settable.column);
+  if (settable.of_input() && settable.kind != SettableQuantities::Kind::kInputOffset &&
+      !Driven(settable.column)) {
+    Refuse(field, "%s needs a signal for input %s in inputs", name, model_.inputs[column].name);
+    return std::nullopt;
+  }
+  if (settable.of_output() && !problem_.measured.empty() && !Measured(settable.column)) {
+    Refuse(field, "%s needs output %s in measured", name, model_.outputs[column].name);
+    return std::nullopt;
+  }
+  has_value_[static_cast<size_t>(*index)] = true;
+  return index;
+}
+
+void ResolvedProblem::Resolver::CheckDelay(const FieldPath& field,
+                                           const SettableQuantities::Settable& delay,
+                                           double smallest_s) {
+  const auto& streamed = resolved_.streamed_inputs_;
+  if (delay.kind != SettableQuantities::Kind::kDelay || smallest_s >= 0) return;
+  if (std::find(streamed.begin(), streamed.end(), delay.column) == streamed.end()) return;
+  Refuse(field,
+         "%s may be as small as %g s; the delay of a streamed input must not be negative, since "
+         "values to come would be needed",
+         delay.name, smallest_s);
+}
+
+void ResolvedProblem::Resolver::ResolveFixed() {
+  for (const auto& [name, value] : problem_.fixed) {
+    const FieldPath field{"fixed", FieldStep::Key(name)};
+    const auto index = Find(field, name);
+    if (!index) continue;
+    if (!std::isfinite(value)) Refuse(field, "%g must be finite", value);
+    CheckDelay(field, settable_[*index], value);
+    resolved_.base_[*index] = value;
+  }
+}
+
+void ResolvedProblem::Resolver::ResolveUncertain() {
+  std::set<std::string> seen;
+  std::vector<std::optional<int>> found(problem_.uncertain.size());
+  for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
+    const UncertainParameter& parameter = problem_.uncertain[i];
+    const FieldPath field{"uncertain", i};
+    const auto index = Find(field, parameter.name);
+    if (!index) continue;
+    if (!seen.insert(parameter.name).second) {
+      Refuse(field, "%s is given twice", parameter.name);
+    }
+    if (problem_.fixed.contains(parameter.name)) {
+      Refuse(field, "%s is both fixed and uncertain", parameter.name);
+    }
+    CheckDelay(field, settable_[*index], parameter.ToParameter(Germ(parameter.germ).Lower()));
+    found[i] = *index;
+  }
+  for (int run = 0; run < resolved_.runs_; ++run) {
+    for (size_t i = 0; i < found.size(); ++i) {
+      const bool per_run = problem_.uncertain[i].per_run;
+      if (!found[i] || (run > 0 && !per_run)) continue;
+      resolved_.targets_.push_back(*found[i]);
+      resolved_.target_run_.push_back(per_run ? run : -1);
+      resolved_.units_.push_back(settable_[*found[i]].unit);
+      if (per_run && run == 0) ++resolved_.parameters_per_run_;
+    }
+  }
+}
+
+void ResolvedProblem::Resolver::ResolveDerived() {
+  if (problem_.derived.empty()) return;
+  std::vector<std::string> variables;
+  for (std::string& name : settable_.Names()) {
+    if (!problem_.derived.contains(name)) variables.push_back(std::move(name));
+  }
+  for (const auto& [name, text] : problem_.derived) {
+    const FieldPath field{"derived", FieldStep::Key(name)};
+    const auto index = Find(field, name);
+    if (!index) continue;
+    if (problem_.fixed.contains(name)) Refuse(field, "%s is both fixed and derived", name);
+    for (const UncertainParameter& parameter : problem_.uncertain) {
+      if (parameter.name == name) Refuse(field, "%s is both uncertain and derived", name);
+    }
+    if (settable_[*index].kind == SettableQuantities::Kind::kDelay) {
+      Refuse(field, "a delay cannot be derived; derive others from it");
+    }
+    resolved_.derived_targets_.push_back(*index);
+  }
+  auto derived = Expressions::Make("derived", problem_.derived, variables);
+  if (!derived.ok()) {
+    Refuse(derived.status());
+    return;
+  }
+  for (const std::string& variable : variables) {
+    resolved_.derived_variables_.push_back(*settable_.Find(variable));
+  }
+  resolved_.derived_ = std::make_shared<const Expressions>(*std::move(derived));
+}
+
+void ResolvedProblem::Resolver::CheckAllHaveValues() {
+  for (int i = 0; i < settable_.size(); ++i) {
+    if (settable_[i].has_default || has_value_[static_cast<size_t>(i)]) continue;
+    Refuse("model",
+           "parameter %s of model %s has no default; give it a value in fixed, a prior in "
+           "uncertain or an expression in derived",
+           settable_[i].name, model_.name);
+  }
+}
+
+absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs) {
+  POLYEST_CHECK(runs >= 1);
+  std::vector<absl::Status> refusals = CheckOptions(problem, runs);
+  if (!refusals.empty()) return refusals.front();
+  POLYEST_ASSIGN_OR_RETURN(Prior prior, PriorOfRuns(problem.uncertain, problem.correlations, runs));
+  ResolvedProblem resolved(std::move(problem), std::move(prior), runs);
+  refusals = Resolver(resolved).Run();
+  if (!refusals.empty()) return refusals.front();
+  return resolved;
+}
+
+std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
+  std::vector<absl::Status> refusals = CheckOptions(problem, 1);
+  if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
+  // For its names, as the correlations may be wrong. It needs a parameter: if there is none, then
+  // one that no name refers to.
+  Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);
+  ResolvedProblem resolved(std::move(problem), std::move(prior), 1);
+  for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
+  return refusals;
+}
+
+int ResolvedProblem::max_runs() const {
+  if (!per_run()) return std::numeric_limits<int>::max();
+  const int of_one_run = dimension() - (runs_ - 1) * parameters_per_run_;
+  int most = 1 + std::max(0, kMaxParametersOfRuns - of_one_run) / parameters_per_run_;
+  const auto too_many = [&] {
+    return !problem_.expansion.Validate(of_one_run + (most - 1) * parameters_per_run_).ok();
+  };
+  while (most > 1 && too_many()) --most;
+  return most;
+}
+
+InputSignals ResolvedProblem::MakeInputs() const {
+  const ModelDescription& model = problem_.model->description();
+  InputSignals signals;
+  for (const Quantity& input : model.inputs) {
+    InputSpecification specification = ConstantInput{};
+    for (const NamedInput& given : problem_.inputs) {
+      if (given.name == input.name) specification = given.signal;
+    }
+    absl::StatusOr<InputSignal> signal = InputSignal::Make(specification);
+    POLYEST_CHECK(signal.ok());
+    signals.push_back(*std::move(signal));
+  }
+  return signals;
+}
+
+EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas,
+                                                    std::vector<int> outputs, int threads,
+                                                    int run) const {
+  POLYEST_CHECK(thetas.cols() == dimension() && (run < runs_ || !per_run()));
+  Matrix values = base_.transpose().replicate(thetas.rows(), 1);
+  for (size_t i = 0; i < targets_.size(); ++i) {
+    if (target_run_[i] >= 0 && target_run_[i] != run) continue;
+    values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
+  }
+  if (derived_ != nullptr) Derive(values);
+  EnsembleSpecification specification;
+  specification.model = problem_.model;
+  specification.outputs = std::move(outputs);
+  settable_.Fill(values, specification);
+  specification.integration = problem_.integration;
+  specification.threads = threads;
+  return specification;
+}
+
+// A derived value that is not finite makes the whole point one that fails.
+void ResolvedProblem::Derive(Matrix& values) const {
+  Matrix results(values.rows(), std::ssize(derived_targets_));
+  derived_->Evaluate(values(Eigen::all, derived_variables_), results);
+  for (size_t i = 0; i < derived_targets_.size(); ++i) {
+    values.col(derived_targets_[i]) = results.col(static_cast<Eigen::Index>(i));
+  }
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    if (results.row(row).allFinite()) continue;
+    values.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+}  // namespace polyest::internal

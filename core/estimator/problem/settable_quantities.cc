@@ -1,0 +1,98 @@
+#include "core/estimator/problem/settable_quantities.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+namespace polyest::internal {
+namespace {
+
+// `block` or, when it is `neutral` throughout, nothing.
+Matrix UnlessNeutral(const Matrix& block, double neutral) {
+  return (block.array() == neutral).all() ? Matrix() : block;
+}
+
+}  // namespace
+
+SettableQuantities::SettableQuantities(const ModelDescription& model)
+    : parameters_(static_cast<int>(model.parameters.size())),
+      inputs_(static_cast<int>(model.inputs.size())),
+      outputs_(static_cast<int>(model.outputs.size())) {
+  for (int i = 0; i < parameters_; ++i) {
+    const Quantity& parameter = model.parameters[static_cast<size_t>(i)];
+    all_.push_back({parameter.name, parameter.unit, parameter.default_value, parameter.has_default,
+                    Kind::kParameter, i});
+  }
+  for (int i = 0; i < inputs_; ++i) {
+    const Quantity& input = model.inputs[static_cast<size_t>(i)];
+    all_.push_back({input.name + ".amplitude", input.unit, 0, true, Kind::kAmplitude, i});
+    all_.push_back({input.name + ".gain", "1", 1, true, Kind::kInputGain, i});
+    all_.push_back({input.name + ".delay", "s", 0, true, Kind::kDelay, i});
+    all_.push_back({input.name + ".offset", input.unit, 0, true, Kind::kInputOffset, i});
+  }
+  for (int i = 0; i < outputs_; ++i) {
+    const Quantity& output = model.outputs[static_cast<size_t>(i)];
+    all_.push_back({output.name + ".gain", "1", 1, true, Kind::kOutputGain, i});
+    all_.push_back({output.name + ".offset", output.unit, 0, true, Kind::kOutputOffset, i});
+  }
+}
+
+std::optional<int> SettableQuantities::Find(std::string_view name) const {
+  for (int i = 0; i < size(); ++i) {
+    if ((*this)[i].name == name) return i;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> SettableQuantities::Names() const {
+  std::vector<std::string> names;
+  for (const Settable& settable : all_) names.push_back(settable.name);
+  return names;
+}
+
+Vector SettableQuantities::Defaults() const {
+  Vector defaults(size());
+  for (int i = 0; i < size(); ++i) defaults[i] = (*this)[i].default_value;
+  return defaults;
+}
+
+std::string SettableQuantities::Describe() const {
+  std::vector<std::string> parts, inputs, outputs;
+  for (const Settable& settable : all_) {
+    const std::string channel = settable.name.substr(0, settable.name.rfind('.'));
+    if (settable.kind == Kind::kParameter) parts.push_back(settable.name);
+    if (settable.kind == Kind::kAmplitude) inputs.push_back(channel);
+    if (settable.kind == Kind::kOutputGain) outputs.push_back(channel);
+  }
+  if (!inputs.empty()) {
+    parts.push_back(
+        absl::StrCat("{", absl::StrJoin(inputs, ", "), "}.{amplitude, gain, delay, offset}"));
+  }
+  if (!outputs.empty()) {
+    parts.push_back(absl::StrCat("{", absl::StrJoin(outputs, ", "), "}.{gain, offset}"));
+  }
+  return absl::StrJoin(parts, ", ");
+}
+
+void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensemble) const {
+  const auto of_inputs = [&](int which) {
+    Matrix columns(values.rows(), inputs_);
+    for (int i = 0; i < inputs_; ++i) columns.col(i) = values.col(Amplitude(i) + which);
+    return columns;
+  };
+  const auto of_outputs = [&](int which) {
+    Matrix columns(values.rows(), std::ssize(ensemble.outputs));
+    for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+      const int output = ensemble.outputs[static_cast<size_t>(c)];
+      columns.col(c) = values.col(Amplitude(inputs_) + 2 * output + which);
+    }
+    return columns;
+  };
+  ensemble.parameters = values.leftCols(parameters_);
+  ensemble.amplitudes = of_inputs(0).cwiseProduct(of_inputs(1));
+  ensemble.input_delays_s = UnlessNeutral(of_inputs(2), 0);
+  ensemble.input_offsets = UnlessNeutral(of_inputs(3), 0);
+  ensemble.output_gains = UnlessNeutral(of_outputs(0), 1);
+  ensemble.output_offsets = UnlessNeutral(of_outputs(1), 0);
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,72 @@
+#pragma once
+
+// What of a model can be given a value or a prior, by name: its parameters, initial states among
+// them, and the parameters of its channels,
+//
+//   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
+//   sample = x.gain · x + x.offset + noise                         of an output x.
+//
+// Their values stand in one vector: the parameters, then amplitude, gain, delay and offset of each
+// input, then gain and offset of each output.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/common/types.h"
+#include "core/propagation/trajectory_ensemble.h"
+#include "polyest/model.h"
+
+namespace polyest::internal {
+
+class SettableQuantities {
+ public:
+  enum class Kind {
+    kParameter,
+    kAmplitude,
+    kInputGain,
+    kDelay,
+    kInputOffset,
+    kOutputGain,
+    kOutputOffset
+  };
+  struct Settable {
+    std::string name;
+    std::string unit;
+    double default_value;  // of an amplitude: 0, until an input has a signal
+    bool has_default;
+    Kind kind;
+    int column;  // of the model's parameters, inputs or outputs
+
+    bool of_input() const {
+      return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
+             kind == Kind::kInputOffset;
+    }
+    bool of_output() const { return kind == Kind::kOutputGain || kind == Kind::kOutputOffset; }
+  };
+
+  explicit SettableQuantities(const ModelDescription& model);
+
+  int size() const { return static_cast<int>(all_.size()); }
+  const Settable& operator[](int index) const { return all_[static_cast<size_t>(index)]; }
+  std::optional<int> Find(std::string_view name) const;
+  std::vector<std::string> Names() const;
+  Vector Defaults() const;
+  // Index of the amplitude of the model's input `column`.
+  int Amplitude(int column) const { return parameters_ + 4 * column; }
+  // What there is, for a message.
+  std::string Describe() const;
+
+  // Parameters and channels of the ensemble from values (Q × size); the outputs to read must be set
+  // already.
+  void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
+
+ private:
+  std::vector<Settable> all_;
+  int parameters_;
+  int inputs_;
+  int outputs_;
+};
+
+}  // namespace polyest::internal

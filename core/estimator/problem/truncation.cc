@@ -1,0 +1,38 @@
+#include "core/estimator/problem/truncation.h"
+
+#include <cstdint>
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kFirstOrder = 3;
+constexpr int kLastOrder = 9;
+constexpr int64_t kAffordableTerms = 500;
+// An expansion that may yet grow should begin well below what is affordable.
+constexpr int64_t kAffordableAtFirst = 250;
+
+}  // namespace
+
+Truncation FirstTruncation(const ExpansionOptions& options, int dimension) {
+  if (options.order) return {*options.order, options.hyperbolic_exponent};
+  Truncation truncation{kFirstOrder, options.hyperbolic_exponent};
+  while (truncation.order > 1 &&
+         TermCount(dimension, truncation, kAffordableAtFirst) > kAffordableAtFirst) {
+    --truncation.order;
+  }
+  return truncation;
+}
+
+std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
+                                         const Truncation& present) {
+  if (options.order) return std::nullopt;
+  // One order alone would bring nothing to even or odd functions.
+  for (const int more : {2, 1}) {
+    const Truncation next{present.order + more, present.exponent};
+    if (next.order > kLastOrder) continue;
+    if (TermCount(dimension, next, kAffordableTerms) <= kAffordableTerms) return next;
+  }
+  return std::nullopt;
+}
+
+}  // namespace polyest::internal

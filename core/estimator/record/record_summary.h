@@ -1,0 +1,58 @@
+#pragma once
+
+// What an estimate reports of the record itself, in constant memory.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/estimator/record/learned_noise.h"
+#include "polyest/samples.h"
+
+namespace polyest::internal {
+
+class RecordSummary {
+ public:
+  struct Channel {
+    int64_t samples = 0;
+    double noise_variance_sum = 0;  // of the noise as the problem gives it
+    double largest = 0;             // |z|
+    int64_t intervals = 0;          // between successive samples of a run
+    double interval_sum_s = 0;
+    double last_time_s = 0;
+    int last_run = -1;
+
+    double RootMeanSquareNoise() const;  // as the problem gives it
+    double MeanInterval() const;         // s; 0 without intervals
+    // Of successive samples with this noise, at the mean interval: exp(−Δt/τ).
+    double Correlation(const ChannelNoise& noise) const;
+    void AddTime(const SampleRow& row);
+  };
+
+  void Add(const RowBlock& block, int row, int channels);
+
+  int64_t rows() const { return rows_; }
+  int64_t samples() const;  // over all channels
+  double time_s() const { return time_s_; }
+  // The least over the channels of root mean square noise ÷ largest sample, of correlated noise its
+  // innovations; 1 before any sample.
+  double NoiseToSignal(const LearnedNoise& noise) const;
+  const std::vector<Channel>& channels() const { return channels_; }
+  // The first rows of the first run, at most kBeginning: enough to see how the record is sampled.
+  const RowBlock& beginning() const { return beginning_; }
+
+  static constexpr int kBeginning = 64;
+
+  // As cereal has it: for writing and for reading.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(rows_, time_s_, channels_, beginning_);
+  }
+
+ private:
+  int64_t rows_ = 0;
+  double time_s_ = 0;
+  std::vector<Channel> channels_;
+  RowBlock beginning_;
+};
+
+}  // namespace polyest::internal

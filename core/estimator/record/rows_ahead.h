@@ -1,0 +1,17 @@
+#pragma once
+
+// Reads rows together with those after them that tell how the streamed inputs go on.
+
+#include <absl/status/status.h>
+
+#include <cstdint>
+
+#include "polyest/samples.h"
+
+namespace polyest::internal {
+
+// Reads rows [first, first + count) and up to `ahead` rows after them, as far as there are any.
+absl::Status ReadWithRowsAhead(const SampleStore& store, int64_t first, int64_t count, int ahead,
+                               RowBlock& block);
+
+}  // namespace polyest::internal

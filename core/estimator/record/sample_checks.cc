@@ -1,0 +1,195 @@
+#include "core/estimator/record/sample_checks.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+// A sample farther than this from zero, in standard deviations of its noise, is a wrong unit or a
+// wrong noise; its square would drown every other sample's in rounding.
+constexpr double kMaxSignalToNoise = 1e9;
+
+// A refusal that names the place by row and column, as whoever looks at the rows knows it. `field`
+// is within the samples.
+template <class... Arguments>
+absl::Status Refusal(const FieldPath& field, const absl::FormatSpec<Arguments...>& format,
+                     const Arguments&... arguments) {
+  return NamedInWords(FieldPath("measurements").Then(field),
+                      absl::InvalidArgumentError(absl::StrFormat(format, arguments...)));
+}
+
+FieldPath ValueAt(const Samples& samples, const SampleColumn& column, size_t row) {
+  return {"columns", &column - samples.columns.data(), "value", row};
+}
+
+bool Missing(const SampleColumn& column, size_t row) {
+  return !column.missing.empty() && column.missing[row];
+}
+
+}  // namespace
+
+SampleChecks::SampleChecks(const ResolvedProblem& problem)
+    : problem_(problem), max_runs_(problem.max_runs()) {
+  for (const MeasuredOutput& measured : problem.problem().measured) {
+    names_.push_back(measured.output);
+  }
+  for (const int column : problem.streamed_inputs()) {
+    names_.push_back(
+        problem.problem().model->description().inputs[static_cast<size_t>(column)].name);
+  }
+  position_.largest = Vector::Zero(problem.channels());
+}
+
+absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const {
+  POLYEST_RETURN_IF_ERROR(CheckColumns(samples));
+  POLYEST_RETURN_IF_ERROR(CheckTimes(samples));
+  POLYEST_RETURN_IF_ERROR(CheckValues(samples));
+  CheckedSamples checked;
+  checked.after = position_;
+  const auto channels = static_cast<size_t>(problem_.channels());
+  const size_t width = names_.size();
+  checked.values.assign(samples.rows() * width, std::numeric_limits<double>::quiet_NaN());
+  checked.noise.assign(samples.rows() * channels, 0);
+  for (const SampleColumn& column : samples.columns) {
+    const auto found = std::find(names_.begin(), names_.end(), column.name);
+    const auto place = static_cast<size_t>(found - names_.begin());
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      if (Missing(column, k)) continue;
+      const double z = column.value[k];
+      checked.values[k * width + place] = z;
+      if (place >= channels) continue;
+      double& largest = checked.after.largest[static_cast<Eigen::Index>(place)];
+      largest = std::max(largest, std::abs(z));
+      const NoiseModel& noise = problem_.problem().measured[place].noise;
+      const double sigma = noise.StandardDeviation(z, largest);
+      if (!noise.unknown && std::abs(z) > kMaxSignalToNoise * sigma) {
+        return Refusal(ValueAt(samples, column, k),
+                       "row %d, column %s: %g is more than %g times its noise of %g; check its "
+                       "unit or the noise",
+                       k, column.name, z, kMaxSignalToNoise, sigma);
+      }
+      checked.noise[k * channels + place] = sigma;
+    }
+  }
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    checked.rows.push_back({samples.run.empty() ? 0 : samples.run[k], samples.time_s[k]});
+  }
+  for (const SampleRow& row : checked.rows) {
+    const bool same_run = checked.after.rows > 0 && row.run == checked.after.run;
+    checked.after.rows_in_run = same_run ? checked.after.rows_in_run + 1 : 1;
+    checked.after.run = row.run;
+    checked.after.time_s = row.time_s;
+    ++checked.after.rows;
+  }
+  checked.run_ended = samples.end_of_run;
+  checked.after.run_ended = samples.end_of_run;
+  return checked;
+}
+
+absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
+  if (samples.rows() == 0) {
+    if (samples.end_of_run && position_.rows > 0) return absl::OkStatus();
+    return Refusal("time_s", "the measurements have no rows");
+  }
+  if (!samples.run.empty() && samples.run.size() != samples.rows()) {
+    return InvalidField(
+        "run", absl::StrFormat("%d values for %d rows", samples.run.size(), samples.rows()));
+  }
+  std::set<std::string> seen;
+  for (const SampleColumn& column : samples.columns) {
+    if (std::find(names_.begin(), names_.end(), column.name) == names_.end()) {
+      return Refusal({"columns", &column - samples.columns.data()},
+                     "column \"%s\" is neither a measured output nor a streamed input of the "
+                     "problem; it has %s",
+                     column.name, absl::StrJoin(names_, ", "));
+    }
+    if (!seen.insert(column.name).second) {
+      return Refusal({"columns", &column - samples.columns.data()}, "column %s is given twice",
+                     column.name);
+    }
+    if (column.value.size() != samples.rows()) {
+      return Refusal({"columns", &column - samples.columns.data()},
+                     "column %s: %d values for %d rows", column.name, column.value.size(),
+                     samples.rows());
+    }
+    if (!column.missing.empty() && column.missing.size() != samples.rows()) {
+      return Refusal({"columns", &column - samples.columns.data()},
+                     "column %s: %d missing flags for %d rows", column.name, column.missing.size(),
+                     samples.rows());
+    }
+  }
+  for (size_t i = static_cast<size_t>(problem_.channels()); i < names_.size(); ++i) {
+    if (!seen.contains(names_[i])) {
+      return Refusal("columns", "column %s is missing: the input is streamed", names_[i]);
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
+  RecordPosition before = position_;
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    const double time_s = samples.time_s[k];
+    const int run = samples.run.empty() ? 0 : samples.run[k];
+    if (run >= max_runs_) {
+      return Refusal(
+          {"run", k},
+          "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
+          "runs would have too many of them",
+          k, run, max_runs_);
+    }
+    if (!std::isfinite(time_s) || time_s < 0) {
+      return Refusal({"time_s", k}, "row %d, column t: %g must be a finite time ≥ 0", k, time_s);
+    }
+    if (before.rows == 0 ? run != 0 : run < before.run) {
+      return Refusal({"run", k},
+                     "row %d, column run: %d after %d; runs start at 0 and never decrease", k, run,
+                     before.run);
+    }
+    if (before.run_ended && run == before.run) {
+      return Refusal({"run", k}, "row %d: run %d has ended; further rows belong to a new run", k,
+                     run);
+    }
+    if (before.rows > 0 && run == before.run && time_s <= before.time_s) {
+      return Refusal({"time_s", k},
+                     "row %d, column t: %.17g after %.17g; times must increase within a run", k,
+                     time_s, before.time_s);
+    }
+    before.run = run;
+    before.run_ended = false;
+    before.time_s = time_s;
+    ++before.rows;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SampleChecks::CheckValues(const Samples& samples) const {
+  for (const SampleColumn& column : samples.columns) {
+    const auto found = std::find(names_.begin(), names_.end(), column.name);
+    const bool input = found - names_.begin() >= problem_.channels();
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      if (Missing(column, k)) {
+        if (!input) continue;
+        return Refusal(ValueAt(samples, column, k),
+                       "row %d, column %s: a streamed input needs a value in every row", k,
+                       column.name);
+      }
+      if (!std::isfinite(column.value[k])) {
+        return Refusal(ValueAt(samples, column, k), "row %d, column %s: %g must be a finite number",
+                       k, column.name, column.value[k]);
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal

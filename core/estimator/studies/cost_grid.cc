@@ -1,0 +1,298 @@
+#include "core/estimator/studies/cost_grid.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/mismatch.h"
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/record/sample_checks.h"
+#include "core/estimator/record/whitening.h"
+
+namespace polyest::internal {
+namespace {
+
+// Grid points run together and sample times advanced at once: bound the memory.
+constexpr Eigen::Index kPointsAtATime = 1024;
+constexpr size_t kTimesAtATime = 64;
+// An axis without a bound goes this many standard deviations from the mean.
+constexpr double kDeviations = 4;
+
+absl::StatusOr<int> FindUncertain(const Prior& prior, const FieldPath& field,
+                                  const std::string& name) {
+  const std::vector<std::string> names = prior.Names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  return InvalidField(field, absl::StrFormat("\"%s\" is not among the uncertain parameters %s",
+                                             name, absl::StrJoin(names, ", ")));
+}
+
+// The uncertain parameters on the axes, by column.
+absl::StatusOr<std::vector<int>> ChooseAxes(const Prior& prior, const CostGridOptions& options) {
+  if (options.parameters.empty()) {
+    return prior.dimension() == 1 ? std::vector<int>{0} : std::vector<int>{0, 1};
+  }
+  if (options.parameters.size() > 2) {
+    return InvalidField("parameters", absl::StrFormat("%d are given; a grid is over one or two",
+                                                      options.parameters.size()));
+  }
+  std::vector<int> axes;
+  for (size_t i = 0; i < options.parameters.size(); ++i) {
+    const std::string field = absl::StrFormat("parameters[%d]", i);
+    POLYEST_ASSIGN_OR_RETURN(const int axis, FindUncertain(prior, field, options.parameters[i]));
+    if (!axes.empty() && axes.front() == axis) {
+      return InvalidField(field, absl::StrFormat("%s is given twice", options.parameters[i]));
+    }
+    axes.push_back(axis);
+  }
+  return axes;
+}
+
+absl::StatusOr<Eigen::Index> ChoosePoints(const CostGridOptions& options, size_t axes) {
+  if (options.points == 0) return axes == 1 ? 201 : 41;
+  if (options.points < 2) {
+    return InvalidField(
+        "grid_points",
+        absl::StrFormat("%d must be at least 2, or 0 for the default", options.points));
+  }
+  const auto points = static_cast<int64_t>(options.points);
+  const int64_t all = axes == 1 ? points : points * points;
+  if (all > kMaxGridPoints) {
+    return FieldError(absl::StatusCode::kResourceExhausted, "grid_points",
+                      absl::StrFormat("%d an axis make %d runs of the model; the limit is %d",
+                                      points, all, kMaxGridPoints));
+  }
+  return static_cast<Eigen::Index>(points);
+}
+
+// The scores at which everything is held: the prior mean, but for the values given.
+absl::StatusOr<Vector> HeldScores(const Prior& prior, const CostGridOptions& options,
+                                  const std::vector<int>& axes) {
+  const Vector mean = prior.Mean();
+  Vector z(prior.dimension());
+  for (int i = 0; i < prior.dimension(); ++i) z[i] = prior.ScoreOf(i, mean[i]);
+  for (const auto& [name, value] : options.held) {
+    const FieldPath field{"held", FieldStep::Key(name)};
+    POLYEST_ASSIGN_OR_RETURN(const int column, FindUncertain(prior, field, name));
+    if (std::find(axes.begin(), axes.end(), column) != axes.end()) {
+      return InvalidField(field,
+                          absl::StrFormat("%s is on an axis of the grid and cannot be held", name));
+    }
+    z[column] = prior.ScoreOf(column, value);
+    if (!std::isfinite(z[column]) || z[column] < prior.lower()[column] ||
+        z[column] > prior.upper()[column]) {
+      return InvalidField(field, absl::StrFormat("%g lies outside the prior of %s", value, name));
+    }
+  }
+  return z;
+}
+
+// α² of the total.
+absl::StatusOr<double> ChooseRegularization(const Problem& problem,
+                                            const CostGridOptions& options) {
+  if (options.regularization) {
+    if (std::isfinite(*options.regularization) && *options.regularization >= 0) {
+      return *options.regularization;
+    }
+    return InvalidField("regularization", absl::StrFormat("%g must be finite and at least 0",
+                                                          *options.regularization));
+  }
+  if (problem.regularization_mode == RegularizationMode::kFixed) return problem.regularization;
+  return InvalidField("regularization", "must be given for a problem in which a rule chooses it");
+}
+
+// Scores along an axis: over Ω, or mean ± 4 standard deviations where it has no bound.
+Vector AxisScores(const Germ& germ, Eigen::Index points) {
+  const double reach = kDeviations * germ.StandardDeviation();
+  const double lower = std::isfinite(germ.Lower()) ? germ.Lower() : germ.Mean() - reach;
+  const double upper = std::isfinite(germ.Upper()) ? germ.Upper() : germ.Mean() + reach;
+  Vector axis = Vector::LinSpaced(points, lower, upper);
+  axis[points - 1] = upper;  // exactly, so that it lies in Ω
+  return axis;
+}
+
+// J_mismatch of every row of `thetas`, from runs of the model over the whole record. Outliers are
+// not looked for: there is no estimate to look from.
+class ModelMismatch {
+ public:
+  ModelMismatch(const ResolvedProblem& problem, const CheckedSamples& record, int threads)
+      : problem_(problem),
+        record_(record),
+        threads_(threads),
+        channels_(static_cast<size_t>(problem.channels())),
+        width_(channels_ + problem.streamed_inputs().size()) {}
+
+  absl::StatusOr<Vector> Evaluate(const Matrix& thetas, const Stop& stop) const {
+    const auto m = static_cast<Eigen::Index>(channels_);
+    Sums sums{Matrix::Zero(thetas.rows(), m), Matrix::Zero(thetas.rows(), m),
+              Matrix::Zero(thetas.rows(), m), Vector::Zero(m)};
+    for (size_t first = 0; first < record_.rows.size();) {
+      size_t end = first + 1;
+      while (end < record_.rows.size() && record_.rows[end].run == record_.rows[first].run) ++end;
+      POLYEST_RETURN_IF_ERROR(AddRun(thetas, first, end, sums, stop));
+      first = end;
+    }
+    return Total(sums);
+  }
+
+ private:
+  // With u_k a residual in units of its noise: Σ u_k², Σ (u_k − u_{k−1})² and the last u_k, by
+  // point and channel; samples by channel.
+  struct Sums {
+    Matrix chi_squared, differences, previous;
+    Vector samples;
+  };
+
+  // The rows [first, end) of one run: the model starts anew, with inputs of its own.
+  absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Sums& sums,
+                      const Stop& stop) const {
+    sums.previous.setZero();
+    InputSignals inputs = problem_.MakeInputs();
+    std::vector<double> times;
+    for (size_t k = first; k < end; ++k) {
+      times.push_back(record_.rows[k].time_s);
+      for (size_t i = 0; i < problem_.streamed_inputs().size(); ++i) {
+        inputs[static_cast<size_t>(problem_.streamed_inputs()[i])].Append(
+            times.back(), record_.values[k * width_ + channels_ + i]);
+      }
+    }
+    for (const int input : problem_.streamed_inputs()) inputs[static_cast<size_t>(input)].Finish();
+    EnsemblePropagator ensemble(
+        problem_.MakeEnsemble(thetas, problem_.outputs(), threads_, record_.rows[first].run),
+        &inputs);
+    std::vector<ChannelNoise> noise = NoiseToBeginWith(problem_.problem()).channels;
+    for (ChannelNoise& channel : noise) channel.scale = 1;
+    Whitening whitening(noise, thetas.rows());
+    RowBlock block = record_;
+    Matrix outputs;
+    for (size_t k = 0; k < times.size(); k += kTimesAtATime) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      const size_t count = std::min(kTimesAtATime, times.size() - k);
+      outputs.resize(thetas.rows(), static_cast<Eigen::Index>(count * channels_));
+      POLYEST_RETURN_IF_ERROR(ensemble.Advance(std::span(times).subspan(k, count), outputs, stop));
+      whitening.Apply(static_cast<int>(first + k), static_cast<int>(count), block, outputs);
+      for (size_t row = 0; row < count; ++row) {
+        AddRow(block, first + k + row, outputs, row * channels_, sums);
+      }
+    }
+    for (const PointFailure& failure : ensemble.failures()) {
+      sums.chi_squared.row(failure.point).setConstant(kInfinity);
+    }
+    return absl::OkStatus();
+  }
+
+  void AddRow(const RowBlock& block, size_t row, const Matrix& outputs, size_t first_column,
+              Sums& sums) const {
+    for (size_t channel = 0; channel < channels_; ++channel) {
+      const double sigma = block.noise[row * channels_ + channel];
+      if (!(sigma > 0)) continue;  // missing
+      const double z = block.values[row * width_ + channel];
+      const auto c = static_cast<Eigen::Index>(channel);
+      const auto y = outputs.col(static_cast<Eigen::Index>(first_column + channel)).array();
+      const Eigen::ArrayXd u = (z - y) / sigma;
+      sums.chi_squared.col(c).array() += u.square();
+      sums.differences.col(c).array() += (u - sums.previous.col(c).array()).square();
+      sums.previous.col(c) = u.matrix();
+      ++sums.samples[c];
+    }
+  }
+
+  Vector Total(const Sums& sums) const {
+    Vector mismatch = Vector::Zero(sums.chi_squared.rows());
+    for (Eigen::Index c = 0; c < sums.samples.size(); ++c) {
+      const NoiseModel& noise = problem_.problem().measured[static_cast<size_t>(c)].noise;
+      for (Eigen::Index i = 0; i < mismatch.size(); ++i) {
+        const double chi_squared = sums.chi_squared(i, c);
+        // A failed point's later values are no numbers.
+        mismatch[i] += std::isfinite(chi_squared)
+                           ? NegativeLogLikelihood(sums.samples[c], chi_squared,
+                                                   sums.differences(i, c), noise.unknown,
+                                                   noise.correlation == NoiseCorrelation::kUnknown)
+                           : kInfinity;
+      }
+    }
+    return mismatch;
+  }
+
+  const ResolvedProblem& problem_;
+  const CheckedSamples& record_;
+  int threads_;
+  size_t channels_;
+  size_t width_;  // of a row's values: channels, then streamed inputs
+};
+
+// Where the model could not be run J is +∞, never a value that is not a number.
+Matrix WithoutNotANumber(Matrix values) {
+  for (double& value : values.reshaped()) {
+    if (std::isnan(value)) value = kInfinity;
+  }
+  return values;
+}
+
+// J of the points of the grid, given by their scores with the first axis running fastest.
+absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model,
+                      const Matrix& scores, CostGrid& grid, const Stop& stop) {
+  const Prior& prior = problem.prior();
+  Matrix thetas(scores.rows(), scores.cols());
+  for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+    const Vector xi = prior.OfScores(scores.row(i).transpose());
+    thetas.row(i) = prior.ToParameters(xi).transpose();
+    grid.prior.reshaped()[i] = prior.NegativeLogDensity(xi);
+  }
+  for (Eigen::Index first = 0; first < scores.rows(); first += kPointsAtATime) {
+    const Eigen::Index count = std::min(kPointsAtATime, scores.rows() - first);
+    POLYEST_ASSIGN_OR_RETURN(const Vector mismatch,
+                             model.Evaluate(thetas.middleRows(first, count), stop));
+    grid.mismatch.reshaped().segment(first, count) = mismatch;
+  }
+  grid.mismatch = WithoutNotANumber(std::move(grid.mismatch));
+  grid.total = grid.mismatch;
+  if (grid.regularization > 0) grid.total += grid.regularization * grid.prior;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
+                                          const CostGridOptions& options, const Stop& stop) {
+  const Prior& prior = problem.prior();
+  if (problem.channels() == 0) {
+    return InvalidField("measured", "at least one output must be measured");
+  }
+  if (options.threads < 1) {
+    return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
+  }
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
+  if (problem.per_run() && record.after.run >= problem.runs()) {
+    POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem.WithRuns(record.after.run + 1));
+    return EvaluateCostGrid(grown, samples, options, stop);
+  }
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<int> axes, ChooseAxes(prior, options));
+  POLYEST_ASSIGN_OR_RETURN(const Eigen::Index points, ChoosePoints(options, axes.size()));
+  POLYEST_ASSIGN_OR_RETURN(const Vector held, HeldScores(prior, options, axes));
+
+  CostGrid grid;
+  POLYEST_ASSIGN_OR_RETURN(grid.regularization, ChooseRegularization(problem.problem(), options));
+  const Eigen::Index second = axes.size() == 2 ? points : 1;
+  Matrix scores = held.transpose().replicate(points * second, 1);
+  for (size_t a = 0; a < axes.size(); ++a) {
+    const auto parameter = static_cast<size_t>(axes[a]);
+    const Vector axis = AxisScores(prior.germs()[parameter], points);
+    grid.parameters.push_back(prior.parameters()[parameter].name);
+    grid.axes.push_back(axis.unaryExpr([&](double z) { return prior.OfScore(axes[a], z); }));
+    for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+      scores(i, axes[a]) = axis[a == 0 ? i % points : i / points];
+    }
+  }
+  grid.mismatch.resize(points, second);
+  grid.prior.resize(points, second);
+  const ModelMismatch model(problem, record, options.threads);
+  POLYEST_RETURN_IF_ERROR(FillGrid(problem, model, scores, grid, stop));
+  return grid;
+}
+
+}  // namespace polyest::internal

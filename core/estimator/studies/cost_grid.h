@@ -1,0 +1,16 @@
+#pragma once
+
+// J_mismatch, J_apriori and J_total (25), (56) over one or two uncertain parameters, for a resolved
+// problem. Noise of unknown size or correlation is marginalized as bayes/mismatch.h says.
+
+#include <absl/status/statusor.h>
+
+#include "core/estimator/problem/resolved_problem.h"
+#include "polyest/cost_grid.h"
+
+namespace polyest::internal {
+
+absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
+                                          const CostGridOptions& options, const Stop& stop);
+
+}  // namespace polyest::internal

@@ -1,0 +1,311 @@
+#include "core/estimator/studies/experiment_design.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/prior_expansion.h"
+#include "core/estimator/problem/assumed_noise.h"
+#include "core/estimator/studies/information_gain.h"
+#include "core/estimator/studies/prior_propagation.h"
+#include "core/estimator/studies/sample_times.h"
+#include "core/model/list_names.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kDraws = 64;  // of the truth
+// Root mean square of the residual, in units of the noise, from which an expansion is reported.
+constexpr double kInaccurateResidual = 0.5;
+
+// An output that is, or could be, measured.
+struct Candidate {
+  int column;               // of the model's outputs
+  const NoiseModel* noise;  // null: not known
+};
+
+absl::Status CheckNoise(const NoiseModel& noise, const FieldPath& field) {
+  for (const double number : {noise.absolute, noise.relative, noise.relative_to_max}) {
+    if (number >= 0 && std::isfinite(number)) continue;
+    return InvalidField(field.Then("noise"),
+                        absl::StrFormat("%g must be a finite number ≥ 0", number));
+  }
+  return absl::OkStatus();
+}
+
+// The problem's channels, then the others that are possible.
+absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& problem,
+                                                      const ExperimentOptions& options) {
+  const ModelDescription& model = problem.problem().model->description();
+  std::vector<Candidate> candidates;
+  for (const int column : problem.outputs()) {
+    candidates.push_back({column, GivenNoise(problem, column)});
+  }
+  const auto known = [&](int column) {
+    return std::any_of(candidates.begin(), candidates.end(),
+                       [column](const Candidate& other) { return other.column == column; });
+  };
+  for (size_t i = 0; i < options.possible.size(); ++i) {
+    const MeasuredOutput& possible = options.possible[i];
+    const FieldPath field{"possible", i};
+    const auto column = model.FindOutput(possible.output);
+    if (!column) {
+      return InvalidField(field,
+                          absl::StrFormat("model %s has no output \"%s\"; it has %s", model.name,
+                                          possible.output, ListNames(model.outputs)));
+    }
+    POLYEST_RETURN_IF_ERROR(CheckNoise(possible.noise, field));
+    if (known(*column)) {
+      if (!HasNumbers(possible.noise)) continue;
+      return InvalidField(field.Then("noise"),
+                          absl::StrFormat("output %s has a noise already", possible.output));
+    }
+    candidates.push_back({*column, HasNumbers(possible.noise) ? &possible.noise : nullptr});
+  }
+  if (options.possible.empty()) {
+    for (int column = 0; column < static_cast<int>(model.outputs.size()); ++column) {
+      if (!known(column)) candidates.push_back({column, nullptr});
+    }
+  }
+  return candidates;
+}
+
+// The expansions of all candidates at all times: column k·m + i of output i at time k.
+struct ExpandedRecord {
+  Matrix coefficients;  // S × (m · times)
+  Vector residual_variance;
+};
+
+absl::StatusOr<ExpandedRecord> Expand(PriorExpansion& expansion, const TimeGrid& grid, int m,
+                                      const Stop& stop) {
+  const Eigen::Index columns = grid.count() * m;
+  ExpandedRecord record{Matrix(expansion.basis().size(), columns), Vector(columns)};
+  POLYEST_RETURN_IF_ERROR(expansion.Run(
+      grid,
+      [&](const ExpandedOutputs& expanded) {
+        const Matrix& coefficients = expanded.expansion.coefficients();
+        const Eigen::Index first = expanded.first_time * m;
+        record.coefficients.middleCols(first, coefficients.cols()) = coefficients;
+        record.residual_variance.segment(first, coefficients.cols()) = expanded.residual_variance;
+      },
+      stop));
+  return record;
+}
+
+// The experiment as each draw of the truth would see it.
+class Outlook {
+ public:
+  Outlook(const ResolvedProblem& problem, const PriorExpansion& expansion,
+          const std::vector<Candidate>& candidates, const ExpandedRecord& record)
+      : m_(static_cast<int>(candidates.size())),
+        draws_(problem.prior(), expansion.points(), kDraws),
+        noise_variance_(Vector::Zero(m_)) {
+    const std::vector<NoiseModel> noises = Noises(candidates, record);
+    for (int draw = 0; draw < kDraws; ++draw) AddDraw(draw, expansion.basis(), noises, record);
+    noise_variance_ /= static_cast<double>(kDraws) * static_cast<double>(times());
+  }
+
+  int times() const { return static_cast<int>(slopes_.front().rows()) / m_; }
+  const TruthDraws& draws() const { return draws_; }
+  // Mean of σ² of output i over times and draws.
+  double NoiseVariance(int i) const { return noise_variance_[i]; }
+
+  // Σ a aᵀ of each draw over all samples of output i.
+  std::vector<Matrix> Information(int i) const {
+    std::vector<Matrix> information;
+    for (const Matrix& slopes : slopes_) {
+      const Matrix a = slopes(Eigen::seq(i, slopes.rows() - 1, m_), Eigen::all);
+      information.push_back(a.transpose() * a);
+    }
+    return information;
+  }
+
+  // a of each draw for the first `count` outputs: times · count × n.
+  std::vector<Matrix> Slopes(int count) const {
+    std::vector<Matrix> all;
+    for (const Matrix& slopes : slopes_) {
+      Matrix chosen(times() * count, slopes.cols());
+      for (int k = 0; k < times(); ++k) {
+        chosen.middleRows(k * count, count) = slopes.middleRows(k * m_, count);
+      }
+      all.push_back(std::move(chosen));
+    }
+    return all;
+  }
+
+ private:
+  std::vector<NoiseModel> Noises(const std::vector<Candidate>& candidates,
+                                 const ExpandedRecord& record) const {
+    const Matrix& c = record.coefficients;
+    const Vector mean = c.row(0).transpose();
+    const Vector deviation = c.bottomRows(c.rows() - 1).colwise().norm().transpose();
+    std::vector<NoiseModel> noises;
+    for (int i = 0; i < m_; ++i) {
+      const auto at = Eigen::seq(i, mean.size() - 1, m_);
+      const NoiseModel* given = candidates[static_cast<size_t>(i)].noise;
+      noises.push_back(given != nullptr ? *given : AssumedNoise(mean(at), deviation(at)));
+    }
+    return noises;
+  }
+
+  // a_k = L ∂y_k/∂ξ /√R_k at the draw.
+  void AddDraw(int draw, const Basis& basis, const std::vector<NoiseModel>& noises,
+               const ExpandedRecord& record) {
+    Vector phi(basis.size());
+    Matrix gradient(basis.size(), basis.dimension());
+    basis.EvaluateWithGradient(draws_.xi(draw), phi, gradient);
+    const Vector y = record.coefficients.transpose() * phi;
+    Matrix slopes =
+        record.coefficients.transpose() * gradient * draws_.germ_standard_deviation().asDiagonal();
+    Vector largest = Vector::Zero(m_);
+    for (Eigen::Index row = 0; row < slopes.rows(); ++row) {
+      const Eigen::Index i = row % m_;
+      largest[i] = std::max(largest[i], std::abs(y[row]));
+      const double sigma = noises[static_cast<size_t>(i)].StandardDeviation(y[row], largest[i]);
+      noise_variance_[i] += sigma * sigma;
+      // R = σ² + residual variance
+      slopes.row(row) /= std::sqrt(sigma * sigma + record.residual_variance[row]);
+    }
+    slopes_.push_back(std::move(slopes));
+  }
+
+  int m_;
+  TruthDraws draws_;
+  std::vector<Matrix> slopes_;  // of each draw, (m · times) × n
+  Vector noise_variance_;
+};
+
+std::vector<Matrix> Sum(const std::vector<Matrix>& a, const std::vector<Matrix>& b) {
+  std::vector<Matrix> sum = a;
+  for (size_t d = 0; d < sum.size(); ++d) sum[d] += b[d];
+  return sum;
+}
+
+// `planned`: how many of the candidates, from the first on, are to be measured in any case.
+absl::Status CompareOutputs(const ResolvedProblem& problem,
+                            const std::vector<Candidate>& candidates, const Outlook& outlook,
+                            int planned, const Stop& stop, ExperimentDesign& design) {
+  std::vector<std::vector<Matrix>> information;
+  for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {
+    information.push_back(outlook.Information(i));
+  }
+  std::vector<Matrix> all_planned = information[0];
+  for (int i = 1; i < planned; ++i) {
+    all_planned = Sum(all_planned, information[static_cast<size_t>(i)]);
+  }
+  design.gain = outlook.draws().Expected(all_planned);
+  const auto& outputs = problem.problem().model->description().outputs;
+  for (int i = 0; i < static_cast<int>(candidates.size()); ++i) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    const auto index = static_cast<size_t>(i);
+    const Quantity& output = outputs[static_cast<size_t>(candidates[index].column)];
+    OutputGain gain{output.name,
+                    output.unit,
+                    std::sqrt(outlook.NoiseVariance(i)),
+                    i < problem.channels(),
+                    outlook.draws().Expected(information[index]),
+                    {}};
+    gain.together =
+        i < planned ? design.gain : outlook.draws().Expected(Sum(all_planned, information[index]));
+    design.outputs.push_back(std::move(gain));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ChooseTimes(const Outlook& outlook, const TimeGrid& grid, int planned, int most,
+                         const Stop& stop, ExperimentDesign& design) {
+  const std::vector<Matrix> slopes = outlook.Slopes(planned);
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<int> chosen,
+                           ChooseSampleTimes(slopes, planned, most, stop));
+  const Eigen::Index n = slopes.front().cols();
+  std::vector<Matrix> information(slopes.size(), Matrix::Zero(n, n));
+  for (const int k : chosen) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    for (size_t d = 0; d < slopes.size(); ++d) {
+      const auto a = slopes[d].middleRows(k * planned, planned);
+      information[d] += a.transpose() * a;
+    }
+    design.samples.push_back({grid.time_s(k), outlook.draws().Expected(information)});
+  }
+  return absl::OkStatus();
+}
+
+void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, const Outlook& outlook,
+              ExperimentDesign& design) {
+  const auto m = static_cast<int>(design.outputs.size());
+  std::vector<std::string> inaccurate;
+  for (int i = 0; i < m; ++i) {
+    const double residual =
+        record.residual_variance(Eigen::seq(i, record.residual_variance.size() - 1, m)).mean();
+    const double ratio = std::sqrt(residual / outlook.NoiseVariance(i));
+    if (ratio <= kInaccurateResidual) continue;
+    inaccurate.push_back(
+        absl::StrFormat("%s by %.2g", design.outputs[static_cast<size_t>(i)].output, ratio));
+  }
+  if (!inaccurate.empty()) {
+    design.diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat("the expansion differs from the model, in units of the noise: %s; this "
+                         "counts as noise, so that samples tell more than said here, above all "
+                         "late ones; a higher order or narrower priors bring it down",
+                         absl::StrJoin(inaccurate, ", "))});
+  }
+  if (!expansion.failures().empty()) {
+    design.diagnostics.push_back(DescribeFailures(expansion.failures(), expansion.points()));
+  }
+}
+
+}  // namespace
+
+}  // namespace polyest::internal
+
+namespace polyest {
+
+using namespace internal;
+
+absl::Status ExperimentOptions::Validate() const {
+  POLYEST_RETURN_IF_ERROR((TimeGrid{until_s, step_s}.Validate()));
+  if (samples < 1 || samples > kMaxSampleTimes) {
+    return InvalidField("samples",
+                        absl::StrFormat("%d must lie between 1 and %d", samples, kMaxSampleTimes));
+  }
+  if (threads >= 1) return absl::OkStatus();
+  return InvalidField("threads", absl::StrFormat("%d must be at least 1", threads));
+}
+
+}  // namespace polyest
+
+namespace polyest::internal {
+
+absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem,
+                                                  const ExperimentOptions& options,
+                                                  const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_ASSIGN_OR_RETURN(const auto candidates, FindCandidates(problem, options));
+  std::vector<int> columns;
+  for (const Candidate& candidate : candidates) columns.push_back(candidate.column);
+  const auto m = static_cast<int>(columns.size());
+  POLYEST_ASSIGN_OR_RETURN(const auto expansion,
+                           PriorExpansion::Make(problem, columns, options.threads));
+  const TimeGrid grid{options.until_s, options.step_s};
+  POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(),
+                                          expansion->basis().size() + kDraws * problem.dimension(),
+                                          kMaxPropagatedValues));
+  POLYEST_ASSIGN_OR_RETURN(const ExpandedRecord record, Expand(*expansion, grid, m, stop));
+  const Outlook outlook(problem, *expansion, candidates, record);
+  const int planned = problem.channels() > 0 ? problem.channels() : m;
+  ExperimentDesign design;
+  POLYEST_RETURN_IF_ERROR(CompareOutputs(problem, candidates, outlook, planned, stop, design));
+  POLYEST_RETURN_IF_ERROR(ChooseTimes(outlook, grid, planned, options.samples, stop, design));
+  design.order = expansion->basis().order();
+  design.terms = expansion->basis().size();
+  design.points = expansion->points();
+  Diagnose(*expansion, record, outlook, design);
+  return design;
+}
+
+}  // namespace polyest::internal

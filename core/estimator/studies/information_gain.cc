@@ -1,0 +1,48 @@
+#include "core/estimator/studies/information_gain.h"
+
+#include <cmath>
+
+#include "core/bayes/parameter_covariance.h"
+#include "core/chaos/collocation_points.h"
+#include "core/common/check.h"
+
+namespace polyest::internal {
+TruthDraws::TruthDraws(const Prior& prior, int first, int count)
+    : prior_(prior), mean_(prior.dimension()), scale_(prior.GermStandardDeviation()) {
+  for (int i = 0; i < prior.dimension(); ++i) {
+    mean_[i] = prior.germs()[static_cast<size_t>(i)].Mean();
+  }
+  const int all = first + count;
+  xis_ = CollocationPoints(PointSet::kHalton, prior.germs(), 1, all, all).value().bottomRows(count);
+}
+
+InformationGain TruthDraws::Expected(const std::vector<Matrix>& information) const {
+  POLYEST_CHECK(information.size() == static_cast<size_t>(count()));
+  InformationGain gain{0, Vector::Zero(prior_.dimension())};
+  for (int draw = 0; draw < count(); ++draw) {
+    const CholeskyFactor factor = FactorPrecision(information[static_cast<size_t>(draw)]);
+    gain.bits += factor.HalfLogDeterminant() / std::log(2.0);
+    gain.standard_deviation += StandardDeviation(draw, factor.Lower());
+  }
+  gain.bits /= count();
+  gain.standard_deviation /= count();
+  return gain;
+}
+
+// lower_root: R with R Rᵀ = M.
+Vector TruthDraws::StandardDeviation(int draw, const Matrix& lower_root) const {
+  // M⁻¹ = R⁻ᵀ R⁻¹ is the posterior covariance of the scaled germs.
+  const Matrix inverse_root =
+      SolveLower(lower_root, Matrix(Matrix::Identity(mean_.size(), mean_.size())));
+  const Matrix root = inverse_root.transpose();
+  // Where data of this truth would put the posterior's centre: (Id − M⁻¹) u beside the prior's, at
+  // the truth itself when they tell all and at the prior's mean when they tell nothing.
+  const Vector u = (xi(draw) - mean_).cwiseQuotient(scale_);
+  const Vector centre = mean_ + scale_.asDiagonal() * (u - root * (inverse_root * u));
+  const Matrix& F = prior_.factor();
+  return ParameterCovariance(prior_, F * centre, F * scale_.asDiagonal() * root)
+      .diagonal()
+      .cwiseSqrt();
+}
+
+}  // namespace polyest::internal

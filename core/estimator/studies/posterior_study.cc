@@ -1,0 +1,140 @@
+#include "core/estimator/studies/posterior_study.h"
+
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kImportancePoints = 65'536;
+constexpr double kChainEffectiveSize = 60'000;
+constexpr int kMaxSweeps = 2'000;
+// Importance points for each sample given out, so that hardly any is given out twice.
+constexpr int kPointsPerSample = 4;
+constexpr double kMaxRHat = 1.01;
+constexpr double kMinEffectiveSize = 400;
+
+// −1 when there is none.
+int Find(const Prior& prior, const std::string& name) {
+  const std::vector<std::string> names = prior.Names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+absl::Status CheckRange(const char* field, int value, int least, int most) {
+  if (value >= least && value <= most) return absl::OkStatus();
+  return InvalidField(field, absl::StrFormat("%d must be from %d to %d", value, least, most));
+}
+
+absl::Status CheckJoint(const Prior& prior, size_t index,
+                        const std::pair<std::string, std::string>& joint) {
+  for (const std::string& name : {joint.first, joint.second}) {
+    if (Find(prior, name) >= 0) continue;
+    return InvalidField(FieldPath{"joints", index},
+                        absl::StrFormat("\"%s\" is not among the uncertain parameters %s", name,
+                                        absl::StrJoin(prior.Names(), ", ")));
+  }
+  if (joint.first == joint.second) {
+    return InvalidField(
+        FieldPath{"joints", index},
+        absl::StrFormat("%s is given twice; a pair is of two parameters", joint.first));
+  }
+  return absl::OkStatus();
+}
+
+// By the rules of Vehtari et al. (bayes/convergence.h).
+void AddNotConverged(Posterior& posterior) {
+  if (posterior.method != PosteriorMethod::kMarkovChains) return;
+  if (posterior.r_hat <= kMaxRHat && posterior.effective_size >= kMinEffectiveSize) return;
+  posterior.diagnostics.push_back(
+      {DiagnosticCode::kNotConverged,
+       absl::StrFormat(
+           "the Markov chains have not mixed: R̂ is %.3f and should be at most %.2f, and "
+           "the draws are worth %.0f independent ones and should be worth %d",
+           posterior.r_hat, kMaxRHat, posterior.effective_size,
+           static_cast<int>(kMinEffectiveSize))});
+}
+
+}  // namespace
+
+absl::Status Validate(const PosteriorOptions& options, const Prior& prior) {
+  if (options.probabilities.size() > kMaxProbabilities) {
+    return InvalidField("probabilities",
+                        absl::StrFormat("%d are given; the limit is %d",
+                                        options.probabilities.size(), kMaxProbabilities));
+  }
+  for (size_t i = 0; i < options.probabilities.size(); ++i) {
+    if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;
+    return InvalidField(FieldPath{"probabilities", i},
+                        absl::StrFormat("%g must lie between 0 and 1", options.probabilities[i]));
+  }
+  POLYEST_RETURN_IF_ERROR(CheckRange("density_bins", options.density_bins, 0, kMaxPosteriorBins));
+  POLYEST_RETURN_IF_ERROR(CheckRange("joint_bins", options.joint_bins, 1, kMaxJointBins));
+  POLYEST_RETURN_IF_ERROR(CheckRange("samples", options.samples, 0, kMaxPosteriorSamples));
+  if (options.joints.size() > kMaxJointDensities) {
+    return InvalidField("joints", absl::StrFormat("%d are given; the limit is %d",
+                                                  options.joints.size(), kMaxJointDensities));
+  }
+  for (size_t i = 0; i < options.joints.size(); ++i) {
+    POLYEST_RETURN_IF_ERROR(CheckJoint(prior, i, options.joints[i]));
+  }
+  return absl::OkStatus();
+}
+
+PosteriorEffort EffortOf(const PosteriorOptions& options) {
+  PosteriorEffort effort;
+  effort.importance_points = std::max(kImportancePoints, kPointsPerSample * options.samples);
+  effort.chain_effective_size = kChainEffectiveSize;
+  effort.max_sweeps = kMaxSweeps;
+  return effort;
+}
+
+Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
+                            const PosteriorOptions& options) {
+  const PosteriorDraws& draws = assessed.posterior;
+  const Vector& weights = draws.weights;
+  Matrix thetas(draws.scores.rows(), prior.dimension());
+  Posterior posterior;
+  for (int i = 0; i < prior.dimension(); ++i) {
+    thetas.col(i) = draws.Parameter(prior, i);
+    const ParameterEstimate& estimate = assessed.estimate.parameters[static_cast<size_t>(i)];
+    PosteriorMarginal marginal;
+    marginal.parameter = estimate.name;
+    marginal.unit = estimate.unit;
+    marginal.mean = WeightedMean(thetas.col(i), weights);
+    marginal.std_dev = WeightedStandardDeviation(thetas.col(i), weights);
+    const WeightedQuantiles quantile(thetas.col(i), weights);
+    marginal.quantiles.resize(static_cast<Eigen::Index>(options.probabilities.size()));
+    std::transform(options.probabilities.begin(), options.probabilities.end(),
+                   marginal.quantiles.begin(), quantile);
+    if (options.density_bins > 0) {
+      marginal.density = WeightedDensity(thetas.col(i), weights, options.density_bins);
+    }
+    marginal.effective_size = draws.effective_size[i];
+    if (draws.r_hat.size() > 0) marginal.r_hat = draws.r_hat[i];
+    posterior.marginals.push_back(std::move(marginal));
+  }
+  for (const auto& [first, second] : options.joints) {
+    posterior.joints.push_back(
+        {first, second,
+         WeightedJointDensity(thetas.col(Find(prior, first)), thetas.col(Find(prior, second)),
+                              weights, options.joint_bins)});
+  }
+  posterior.samples = thetas(EquallyWeighted(weights, options.samples), Eigen::all);
+  posterior.method = draws.method;
+  posterior.draws = draws.scores.rows();
+  posterior.effective_size = draws.effective_size.minCoeff();
+  if (draws.r_hat.size() > 0) posterior.r_hat = draws.r_hat.maxCoeff();
+  posterior.diagnostics = assessed.estimate.diagnostics;
+  AddNotConverged(posterior);
+  posterior.time_s = assessed.estimate.time_s;
+  posterior.sample_values = assessed.estimate.samples;
+  return posterior;
+}
+
+}  // namespace polyest::internal

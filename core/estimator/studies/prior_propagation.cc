@@ -1,0 +1,119 @@
+#include "core/estimator/studies/prior_propagation.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/prior_expansion.h"
+
+namespace polyest::internal {
+namespace {
+
+Propagation EmptyPropagation(const ResolvedProblem& problem, const PropagationOptions& options,
+                             const TimeGrid& grid, const std::vector<int>& columns) {
+  const std::vector<Quantity>& outputs = problem.problem().model->description().outputs;
+  Propagation result;
+  result.time_s = grid.times_s();
+  const auto times = static_cast<Eigen::Index>(result.time_s.size());
+  for (const int column : columns) {
+    PropagatedOutput output;
+    output.output = outputs[static_cast<size_t>(column)].name;
+    output.unit = outputs[static_cast<size_t>(column)].unit;
+    output.mean.resize(times);
+    output.standard_deviation.resize(times);
+    output.residual.resize(times);
+    output.quantiles.resize(times, static_cast<Eigen::Index>(options.probabilities.size()));
+    result.outputs.push_back(std::move(output));
+  }
+  return result;
+}
+
+void Describe(const ConstVectorRef& samples, Eigen::Index k, const PropagationOptions& options,
+              PropagatedOutput& output) {
+  Vector sorted = samples;
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t i = 0; i < options.probabilities.size(); ++i) {
+    output.quantiles(k, static_cast<Eigen::Index>(i)) =
+        QuantileOfSamples(sorted, options.probabilities[i]);
+  }
+  if (options.density_bins > 0) {
+    output.densities.push_back(DensityOfSamples(sorted, options.density_bins));
+  }
+}
+
+// What is read off the expansion of some times.
+void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options,
+              Propagation& result) {
+  const bool sampled = !options.probabilities.empty() || options.density_bins > 0;
+  const Matrix samples = sampled ? expanded.expansion.Sample(options.density_samples) : Matrix();
+  const Vector mean = expanded.expansion.Mean();
+  const Vector deviation = expanded.expansion.StandardDeviation();
+  const auto m = static_cast<Eigen::Index>(result.outputs.size());
+  for (Eigen::Index column = 0; column < mean.size(); ++column) {
+    PropagatedOutput& output = result.outputs[static_cast<size_t>(column % m)];
+    const Eigen::Index k = expanded.first_time + column / m;
+    output.mean[k] = mean[column];
+    output.standard_deviation[k] = deviation[column];
+    output.residual[k] = std::sqrt(expanded.residual_variance[column]);
+    if (sampled) Describe(samples.col(column), k, options, output);
+  }
+}
+
+}  // namespace
+
+}  // namespace polyest::internal
+
+namespace polyest {
+
+using namespace internal;
+
+absl::Status PropagationOptions::Validate() const {
+  POLYEST_RETURN_IF_ERROR((TimeGrid{until_s, step_s}.Validate()));
+  for (size_t i = 0; i < probabilities.size(); ++i) {
+    if (probabilities[i] >= 0 && probabilities[i] <= 1) continue;
+    return InvalidField(FieldPath{"probabilities", i},
+                        absl::StrFormat("%g must lie between 0 and 1", probabilities[i]));
+  }
+  if (density_bins < 0 || density_bins > kMaxDensityBins) {
+    return InvalidField("density_bins", absl::StrFormat("%d must lie between 0 and %d",
+                                                        density_bins, kMaxDensityBins));
+  }
+  if (density_samples < 1 || density_samples > kMaxDensitySamples) {
+    return InvalidField("density_samples", absl::StrFormat("%d must lie between 1 and %d",
+                                                           density_samples, kMaxDensitySamples));
+  }
+  if (threads < 1) {
+    return InvalidField("threads", absl::StrFormat("%d must be at least 1", threads));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace polyest
+
+namespace polyest::internal {
+
+absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
+                                           const PropagationOptions& options, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
+  const TimeGrid grid{options.until_s, options.step_s};
+  const auto numbers = static_cast<int64_t>(4 + options.probabilities.size() +
+                                            2 * static_cast<size_t>(options.density_bins));
+  // Past this a caller wants another tool, not more memory.
+  POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(), numbers, kMaxPropagatedValues));
+  POLYEST_ASSIGN_OR_RETURN(const auto expansion,
+                           PriorExpansion::Make(problem, columns, options.threads));
+  Propagation result = EmptyPropagation(problem, options, grid, columns);
+  POLYEST_RETURN_IF_ERROR(expansion->Run(
+      grid, [&](const ExpandedOutputs& expanded) { Describe(expanded, options, result); }, stop));
+  result.order = expansion->basis().order();
+  result.terms = expansion->basis().size();
+  result.points = expansion->points();
+  result.failures = expansion->failures();
+  return result;
+}
+
+}  // namespace polyest::internal

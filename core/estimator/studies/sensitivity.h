@@ -1,0 +1,16 @@
+#pragma once
+
+// Sobol' indices of the outputs over the prior, for a resolved problem.
+
+#include <absl/status/statusor.h>
+
+#include "core/estimator/problem/resolved_problem.h"
+#include "polyest/sensitivity.h"
+
+namespace polyest::internal {
+
+absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& problem,
+                                                       const SensitivityOptions& options,
+                                                       const Stop& stop);
+
+}  // namespace polyest::internal

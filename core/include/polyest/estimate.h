@@ -1,0 +1,127 @@
+#pragma once
+
+// What the estimator answers.
+//
+// The cost of parameter values is J = J_mismatch + α² J_prior: J_mismatch is half the sum of
+// squared residuals in units of their noise, J_prior the negative logarithm of the prior's density,
+// and e^{−J} is the posterior density up to a factor (α² = 1).
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "polyest/diagnostic.h"
+#include "polyest/types.h"
+
+namespace polyest {
+
+// A value of the cost; plain numbers without unit.
+struct CostValue {
+  double mismatch = 0;  // J_mismatch ≥ 0
+  double prior = 0;     // J_prior, not yet weighted; +∞ outside the prior's support
+  double total = 0;     // mismatch + α² prior
+};
+
+// Whether the data tell a parameter or a direction.
+enum class Verdict {
+  // A parameter: its standard deviation is at most half the prior's. A direction: the data know it
+  // ten times better than the prior, in variance.
+  kIdentified,
+  // Between the two others.
+  kWeak,
+  // A parameter: its standard deviation is at least 0.9 of the prior's. A direction: the data know
+  // it less well than the prior.
+  kNotIdentified,
+};
+
+// A combination of parameters and how well the data alone know it.
+struct Direction {
+  double information = 0;  // ≥ 0: prior variance ÷ variance from the data
+  // Unit vector over the uncertain parameters, each in units of the prior standard deviation of its
+  // normal score. Correlated parameters move together in a direction on which the data are silent
+  // for one.
+  Vector coefficients;
+  Verdict verdict = Verdict::kNotIdentified;  // by `information`
+};
+
+// Two parameters that the data cannot tell apart, and their combination that is known far better,
+// k/m or k1 + k2.
+struct TradeOff {
+  int first = 0, second = 0;    // indices of the uncertain parameters
+  std::string combination;      // as text, "k/m"
+  double relative_std_dev = 0;  // of the combination: posterior standard deviation ÷ |mean|
+  // The same of either parameter alone.
+  double first_alone = 0, second_alone = 0;
+};
+
+// What is known of one uncertain parameter; numbers are in its unit unless said otherwise.
+struct ParameterEstimate {
+  std::string name;              // "x_0[2]" for run 2's own value
+  std::string unit;              // SI; "1" for a plain number
+  double map = 0;                // at the minimum of the cost: the most probable value
+  double std_dev = 0;            // from the cost's curvature there; the prior's if that is less
+  double mean = 0;               // of the posterior
+  double lower95 = 0;            // 2.5 % quantile of the posterior
+  double upper95 = 0;            // 97.5 % quantile of the posterior
+  double posterior_std_dev = 0;  // of the posterior itself
+  double prior_mean = 0;         // of the prior
+  double prior_std_dev = 0;      // of the prior
+  double contraction = 0;        // std_dev ÷ prior_std_dev, 0 … 1
+  double bias = 0;               // what α² ≠ 1 adds to map; 0 for α² = 1
+  Verdict verdict = Verdict::kNotIdentified;  // by the contraction of the normal score
+};
+
+// One of the separated pieces of a posterior.
+struct ComponentEstimate {
+  double weight = 0;  // the posterior's probability of it, 0 … 1
+  // Of this piece alone: the minimum and the curvature there, mean, standard deviation and limits.
+  std::vector<ParameterEstimate> parameters;
+};
+
+// How well the samples of one measured output are met.
+struct ChannelEstimate {
+  std::string output;   // its name
+  int64_t samples = 0;  // number of them
+  // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples` when
+  // model and noise are right, and by its making when the noise was unknown.
+  double chi_squared = 0;
+  // Root mean square of the noise assumed or, where it was unknown, estimated; in the output's
+  // unit.
+  double noise_std_dev = 0;
+  double lag1_correlation = 0;   // of the residuals (whitened), −1 … 1, free of the fit's bias
+  double effective_samples = 0;  // number of independent samples that would tell as much
+  double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
+  int64_t outliers = 0;              // number of samples with less than half their weight
+};
+
+// The expansion that the estimate was computed on.
+struct ExpansionSummary {
+  int order = 0;   // p
+  int terms = 0;   // S
+  int points = 0;  // Q
+  // Root mean square over the samples of (model − expansion)/σ, the worst over the posterior; small
+  // beside 1 when the expansion can be trusted.
+  double residual_to_noise = 0;
+  int reexpansions = 0;      // how often the outputs were expanded again
+  int64_t trajectories = 0;  // model runs in all, in units of the whole record so far
+};
+
+// An estimate. Of a posterior in several pieces: map, std_dev, covariance, cost, channels and
+// directions are those of the heaviest piece; mean, posterior_std_dev and limits those of all. A
+// parameter that each piece identifies, but not which of them it is, is kWeak.
+struct Estimate {
+  std::vector<ParameterEstimate> parameters;  // in the problem's order
+  std::vector<ComponentEstimate> components;  // heaviest first; none when there is one piece
+  Matrix covariance;                          // of the parameters, from the curvature, n × n
+  CostValue cost;                             // at map
+  double regularization = 1;                  // α² used
+  std::vector<ChannelEstimate> channels;      // in the problem's order
+  std::vector<Direction> directions;          // the best known first
+  std::vector<TradeOff> trade_offs;           // pairs known together, not alone
+  ExpansionSummary expansion;                 // what it was computed on
+  std::vector<Diagnostic> diagnostics;        // warnings; empty is good
+  double time_s = 0;                          // of the last sample
+  int64_t samples = 0;                        // values taken, over all outputs and runs
+};
+
+}  // namespace polyest

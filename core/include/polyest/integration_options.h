@@ -1,0 +1,45 @@
+#pragma once
+
+// How a model's trajectories are integrated, and what is said of those that cannot be.
+
+#include <absl/status/status.h>
+
+#include <string>
+
+namespace polyest {
+
+// The integrator.
+enum class IntegrationMethod {
+  kAuto,      // explicit; trajectories that need too many steps change to the stiff method for good
+  kExplicit,  // Dormand–Prince 5(4)
+  kStiff,     // backward differentiation formulas of order 1 to 5
+};
+
+// Options of the integrator.
+struct IntegrationOptions {
+  IntegrationMethod method = IntegrationMethod::kAuto;  // which integrator
+  // Estimated local error of each state of each trajectory ≤ relative_tolerance × the largest
+  // magnitude that this state has had so far over a block of trajectories, + 1e-14 in SI units; in
+  // fact × that of the trajectory itself, unless that is below a thousandth of the block's. From
+  // 1e-13 to 0.01.
+  double relative_tolerance = 1e-7;
+  // Most steps from one sample to the next, ≥ 1; a trajectory that needs more has failed.
+  int max_steps = 100'000;
+  // ≥ 1. After so many samples of a run, and as many again, …, the integrators start anew from the
+  // states there, so that an estimator can be restored there (EstimatorOptions::snapshot). That
+  // changes results, within the tolerance.
+  int samples_between_checkpoints = 4096;
+
+  // Returns OK, or INVALID_ARGUMENT with the field, the value and the rule.
+  absl::Status Validate() const;
+};
+
+// A trajectory that could not be integrated; it is left out from then on.
+struct PointFailure {
+  int point = 0;       // which collocation point, from 0
+  double time_s = 0;   // the last time at which it was good
+  int flag = 0;        // the solver's own return code
+  std::string reason;  // that code in words
+};
+
+}  // namespace polyest

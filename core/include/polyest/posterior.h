@@ -1,0 +1,75 @@
+#pragma once
+
+// The posterior in full: marginal and joint densities, quantiles and draws. What an estimate says
+// of the posterior is the same, from fewer draws. Estimator::CurrentPosterior computes it.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "polyest/density.h"
+#include "polyest/diagnostic.h"
+#include "polyest/types.h"
+
+namespace polyest {
+
+// Limits past which options are INVALID_ARGUMENT.
+inline constexpr int kMaxPosteriorSamples = 100'000;  // PosteriorOptions::samples
+inline constexpr int kMaxPosteriorBins = 1'000;       // PosteriorOptions::density_bins
+inline constexpr int kMaxJointBins = 200;             // PosteriorOptions::joint_bins
+inline constexpr size_t kMaxJointDensities = 100;     // PosteriorOptions::joints
+inline constexpr size_t kMaxProbabilities = 1'000;    // PosteriorOptions::probabilities
+
+// How draws of the posterior were made.
+enum class PosteriorMethod {
+  kImportanceSampling,  // independent draws of a Gaussian, weighted: the posterior is nearly that
+  kMarkovChains,        // differential evolution from tempered particles
+};
+
+// What to compute.
+struct PosteriorOptions {
+  std::vector<double> probabilities = {0.025, 0.5, 0.975};  // of the quantiles, in (0, 1)
+  int density_bins = 100;  // of each marginal density; 0: no densities
+  // Pairs of uncertain parameters, each of two different ones, whose joint density is wanted.
+  std::vector<std::pair<std::string, std::string>> joints;
+  int joint_bins = 40;  // on each axis of a joint density, ≥ 1
+  int samples = 0;      // number of draws given out
+};
+
+// The posterior of one parameter; numbers are in its unit unless said otherwise.
+struct PosteriorMarginal {
+  std::string parameter;      // its name
+  std::string unit;           // SI; "1" for a plain number
+  double mean = 0;            // of the posterior
+  double std_dev = 0;         // of the posterior
+  Vector quantiles;           // one for each probability asked for
+  DensityEstimate density;    // over the central 99.9 %; empty when not asked for
+  double effective_size = 0;  // number of independent draws that would do as well
+  double r_hat = 0;           // of the chains, 1 when they have mixed; 0 for importance sampling
+};
+
+// The posterior of two parameters together.
+struct PosteriorJoint {
+  std::string first, second;  // their names
+  JointDensity density;       // over the central 99.9 % of each
+};
+
+// The posterior.
+struct Posterior {
+  PosteriorMethod method = PosteriorMethod::kMarkovChains;  // how it was drawn
+  int64_t draws = 0;                         // number of draws that the answer sums up
+  double effective_size = 0;                 // the least of the marginals'
+  double r_hat = 0;                          // the largest of the marginals'
+  std::vector<PosteriorMarginal> marginals;  // in the problem's order
+  std::vector<PosteriorJoint> joints;        // as asked for
+  Matrix samples;  // draws given out × uncertain parameters, equally weighted
+  // What an estimate from the same draws is warned of, and kNotConverged where its chains have not
+  // mixed.
+  std::vector<Diagnostic> diagnostics;
+  double time_s = 0;          // of the last sample
+  int64_t sample_values = 0;  // values taken, as Estimate::samples
+};
+
+}  // namespace polyest

@@ -1,0 +1,71 @@
+#pragma once
+
+// Measurements as they arrive, and the store that an estimator keeps them in.
+
+#include <absl/status/status.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace polyest {
+
+// The values of one measured output or streamed input.
+struct SampleColumn {
+  std::string name;           // of a measured output or a streamed input
+  std::vector<double> value;  // one for each row, in the quantity's unit; ignored where missing
+  std::vector<bool> missing;  // one for each row; empty: none is missing. Inputs are never missing
+};
+
+// Measurements: rows in time order, columns by name. All measured outputs and streamed inputs of
+// the problem must be there.
+struct Samples {
+  std::vector<double> time_s;  // ≥ 0, strictly increasing within a run
+  std::vector<int> run;        // one for each row, from 0, never decreasing; empty: all are run 0
+  std::vector<SampleColumn> columns;  // in any order
+  // No more rows of the last row's run will follow; may come without rows.
+  bool end_of_run = false;
+
+  // The number of rows.
+  size_t rows() const { return time_s.size(); }
+};
+
+// The place of one row in a record.
+struct SampleRow {
+  int run = 0;        // from 0
+  double time_s = 0;  // since the run began
+};
+
+// Consecutive rows of a record that have passed the checks.
+struct RowBlock {
+  std::vector<SampleRow> rows;  // their places
+  // Row by row: the measured outputs in the problem's order, then the streamed inputs in the
+  // model's; NaN where missing.
+  std::vector<double> values;
+  // Row by row: the standard deviation of each measured output's sample, in its unit; 0 where
+  // missing.
+  std::vector<double> noise;
+  int ahead = 0;           // the last so many rows only tell how the inputs go on
+  bool run_ended = false;  // no more rows of the last row's run will follow
+
+  // The number of rows without those ahead.
+  int count() const { return static_cast<int>(rows.size()) - ahead; }
+};
+
+// Where the rows of a record are kept, so that a moved expansion can be computed over them again.
+// An estimator has one in memory unless it is given another (EstimatorOptions::store), such as one
+// on disk. Rows are appended and never changed. Only the estimator's own thread calls it.
+class SampleStore {
+ public:
+  virtual ~SampleStore() = default;
+  // The number of rows appended.
+  virtual int64_t rows() const = 0;
+  // Appends all of the block, its mark of an ended run included, or nothing and says why. A block
+  // without rows only marks the last row's run as ended.
+  virtual absl::Status Append(const RowBlock& block) = 0;
+  // Reads rows [first, first + count), which must be there, into the block; none of them is ahead.
+  virtual absl::Status Read(int64_t first, int64_t count, RowBlock& block) const = 0;
+};
+
+}  // namespace polyest

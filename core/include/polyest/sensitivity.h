@@ -1,0 +1,96 @@
+#pragma once
+
+// Which uncertain parameters matter, and when, before anything is measured: Sobol' indices of the
+// outputs, read off the coefficients of their expansions over the prior (B. Sudret, "Global
+// sensitivity analysis using polynomial chaos expansions", Reliab. Eng. Syst. Saf. 93, 2008).
+//
+// In an orthonormal basis the variance of y = Σ_s c_s φ_s(ξ) is V = Σ_{s≥1} c_s². Of it are
+//   first order  S_i = Σ c_s²/V over the terms s in which ξ_i alone occurs: the share that would go
+//                      on average if parameter i were known;
+//   total        T_i = Σ c_s²/V over the terms s in which ξ_i occurs: the share that would be left
+//                      on average if all others were known. T_i ≥ S_i, the difference being what i
+//                      does together with others; Σ_i S_i ≤ 1 ≤ Σ_i T_i.
+// The germs stand for the parameters one to one, so that these are the parameters' own indices;
+// correlated parameters have none.
+//
+// The activity of a parameter is its share in the variance of all outputs over all of the time,
+// each in units of its noise σ_o:
+//   a_i = Σ_o ∫ T_i V/σ_o² dt ÷ Σ_o ∫ V/σ_o² dt                     (trapezoidal rule).
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <vector>
+
+#include "polyest/diagnostic.h"
+#include "polyest/problem.h"
+#include "polyest/stop.h"
+#include "polyest/types.h"
+
+namespace polyest {
+
+// An expansion that leaves more than this share of an output's variance unexplained is called
+// inaccurate: residual² ÷ V.
+inline constexpr double kUnexplained = 0.05;
+
+// What to compute.
+struct SensitivityOptions {
+  double until_s = 0;                // > 0: the last time
+  double step_s = 0;                 // > 0; times are 0, step, 2 step … until
+  std::vector<std::string> outputs;  // names; empty: the measured ones, or all if none is
+  int threads = 1;                   // ≥ 1; results do not depend on it
+
+  // Returns OK, or INVALID_ARGUMENT with the field, the value and the rule.
+  absl::Status Validate() const;
+};
+
+// One output over time, in its unit. Vectors have one entry for each time, matrices are times ×
+// parameters.
+struct OutputSensitivity {
+  std::string output;         // its name
+  std::string unit;           // SI; "1" for a plain number
+  Vector mean;                // under the prior
+  Vector standard_deviation;  // √V
+  // S_i, 0 … 1; 0 where the output does not vary: where √V is no more than an error of the
+  // integration, ten times its relative tolerance of the output's largest magnitude.
+  Matrix first_order;
+  Matrix total;  // T_i, 0 … 1; 0 where the output does not vary
+  // Root mean square of model − expansion at the collocation points (degrees of freedom Q − S).
+  // Where it is not small beside √V the indices cannot be believed.
+  Vector residual;
+  // σ_o of a sample equal to the mean: the problem's noise of the output, or 1 % of the range of
+  // its predictions.
+  Vector noise;
+};
+
+// How much one parameter matters over all.
+struct ParameterActivity {
+  std::string parameter;  // its name
+  double share = 0;       // a_i, 0 … 1; 0 when nothing varies
+  // The largest √(T_i V)/σ_o of any output at any time: the most that not knowing this parameter
+  // changes one sample, in standard deviations of its noise.
+  double peak_to_noise = 0;
+};
+
+// The sensitivities of the outputs.
+struct SensitivityAnalysis {
+  std::vector<double> time_s;               // 0, step, 2 step …
+  std::vector<std::string> parameters;      // the columns of the matrices
+  std::vector<OutputSensitivity> outputs;   // as asked for
+  std::vector<ParameterActivity> activity;  // the most active first
+  int order = 0;                            // of the expansion, p
+  int terms = 0;                            // of the expansion, S
+  int points = 0;                           // of collocation, Q
+  // kExpansionInaccurate when the expansion leaves more than kUnexplained of an output's variance
+  // unexplained, or has no points to spare that would show it; kPointsFailed.
+  std::vector<Diagnostic> diagnostics;
+};
+
+// Computes Sobol' indices over the problem's prior. INVALID_ARGUMENT names the field, the value and
+// the rule, `correlations` when there are any; otherwise as PropagatePrior.
+absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const Problem& problem,
+                                                       const SensitivityOptions& options,
+                                                       const Stop& stop = {});
+
+}  // namespace polyest

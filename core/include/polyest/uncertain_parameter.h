@@ -1,0 +1,98 @@
+#pragma once
+
+// The prior of an uncertain parameter θ, as a map of a standard random variable ξ, its germ:
+//   normal, uniform, beta, gamma, truncated normal   θ = location + scale ξ
+//   lognormal                                        θ = exp(location + scale ξ), ξ ~ N(0, 1)
+//
+// Lognormal, from its own mean m and standard deviation s:
+//   scale² = log(1 + s²/m²),  location = log m − scale²/2.
+// Estimates are modes of densities of ξ. That of an affine θ is the same; of a lognormal it is the
+// θ whose logarithm is most likely: the prior's is e^location, the median, between mode and mean.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <limits>
+#include <string>
+
+namespace polyest {
+
+// The family of a germ's density.
+enum class GermFamily {
+  kNormal,           // N(0, 1) on ℝ
+  kUniform,          // 1/2 on [−1, 1]
+  kBeta,             // ∝ (1+ξ)^(α−1) (1−ξ)^(β−1) on [−1, 1]
+  kGamma,            // ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)
+  kTruncatedNormal,  // N(0, 1) cut to [lower, upper]
+};
+
+// The density of a germ.
+struct GermShape {
+  GermFamily family = GermFamily::kUniform;  // its kind
+  double first = 0;   // α of beta, shape of gamma, lower bound of truncated normal; else 0
+  double second = 0;  // β of beta, upper bound of truncated normal; else 0
+};
+
+// How a germ is mapped to its parameter.
+enum class ParameterMap {
+  kAffine,       // θ = location + scale ξ
+  kExponential,  // θ = exp(location + scale ξ)
+};
+
+// An uncertain parameter: its name and its prior. Make one with the functions below, which check
+// their arguments: INVALID_ARGUMENT names the argument, its value and the rule.
+struct UncertainParameter {
+  std::string name;                          // of a settable quantity (polyest/problem.h)
+  GermShape germ;                            // the density of ξ; uniform by default
+  double location = 0;                       // θ, or log θ, at ξ = 0
+  double scale = 1;                          // dθ/dξ, or d log θ/dξ, > 0
+  ParameterMap map = ParameterMap::kAffine;  // from ξ to θ
+  bool per_run = false;  // each run of the record has a value of its own, all with this prior
+
+  // Makes a normal prior. `std_dev` > 0, both in the parameter's unit.
+  static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);
+  // Makes a uniform prior on [lower, upper], lower < upper.
+  static absl::StatusOr<UncertainParameter> Uniform(std::string name, double lower, double upper);
+  // Makes a beta prior on [lower, upper], density ∝ (θ − lower)^(alpha−1) (upper − θ)^(beta−1);
+  // alpha and beta from 1 to 10,000.
+  static absl::StatusOr<UncertainParameter> Beta(std::string name, double alpha, double beta,
+                                                 double lower, double upper);
+  // Makes a gamma prior: (θ − shift)/scale has the density x^(shape−1) e^(−x)/Γ(shape); shape from
+  // 1 to 10,000, scale > 0.
+  static absl::StatusOr<UncertainParameter> Gamma(std::string name, double shape, double scale,
+                                                  double shift);
+  // Makes a lognormal prior. `mean` and `std_dev` are those of the quantity itself,
+  // 0 < std_dev ≤ 100 mean.
+  static absl::StatusOr<UncertainParameter> Lognormal(std::string name, double mean,
+                                                      double std_dev);
+  // Makes a normal prior cut to [lower, upper]. `mean` and `std_dev` are those before the cut;
+  // either bound may be infinite. At least 10⁻⁶ of the normal's probability must lie between them.
+  static absl::StatusOr<UncertainParameter> TruncatedNormal(
+      std::string name, double mean, double std_dev,
+      double lower = -std::numeric_limits<double>::infinity(),
+      double upper = std::numeric_limits<double>::infinity());
+
+  // Returns OK for what the functions above make, else INVALID_ARGUMENT.
+  absl::Status Validate() const;
+
+  // Returns the θ of a germ's value.
+  double ToParameter(double xi) const;
+  // Returns the germ's value of a θ; not a number for a θ ≤ 0 of a lognormal.
+  double ToGerm(double theta) const;
+  // Returns dθ/dξ at a germ's value.
+  double Slope(double xi) const;
+  // Returns the prior's mean of θ.
+  double Mean() const;
+  // Returns the prior's standard deviation of θ.
+  double StandardDeviation() const;
+};
+
+// A correlation of two uncertain parameters in the prior, by a Gaussian copula: it is that of their
+// normal scores. For two normal parameters, or the logarithms of two lognormal ones, it is their
+// own; Spearman's is (6/π) asin(coefficient/2).
+struct Correlation {
+  std::string first, second;  // names of two different uncertain parameters
+  double coefficient = 0;     // −1 < coefficient < 1
+};
+
+}  // namespace polyest

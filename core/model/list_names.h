@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "polyest/model.h"
+
+namespace polyest::internal {
+
+// Returns the names in order, comma-separated, for messages that list what there is: "m, c, k, x0,
+// v0", or "none".
+std::string ListNames(const std::vector<Quantity>& quantities);
+
+}  // namespace polyest::internal
