@@ -1,14 +1,18 @@
 #include "server/daemon/command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <iostream>
 
+#include "core/common/status.h"
+#include "proto/wire/transport/loopback.h"
 #include "server/daemon/configuration.h"
 #include "server/security/exposure.h"
 #include "server/security/token_table.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kBadUsage = 2;
@@ -25,11 +29,11 @@ CommandLine Refuse(const std::string& message) {
   return Done(kBadUsage);
 }
 
-constexpr int64_t kMostOfAnything = int64_t{1} << 60;
+constexpr int64_t kMaxOfAnything = int64_t{1} << 60;
 
 // From 1 to `highest`, what the method itself can bear.
 void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std::string& meaning,
-              int64_t highest = kMostOfAnything) {
+              int64_t highest = kMaxOfAnything) {
   app.add_option(name, limit, meaning)
       ->check(CLI::Range(int64_t{1}, highest))
       ->capture_default_str();
@@ -45,17 +49,17 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
   AddLimit(app, "--max-total-rows", limits.total_rows, "Rows of all sessions of all tenants");
   ProblemLimits& problem = limits.problem;
   AddLimit(app, "--max-parameters", problem.parameters,
-           "Uncertain parameters of a problem, those of all its runs together", kMostTerms);
+           "Uncertain parameters of a problem, those of all its runs together", kMaxTerms);
   AddLimit(app, "--max-states", problem.states, "States of a problem's model");
   AddLimit(app, "--max-points", problem.points,
            "Collocation points of a problem, of the highest order that its expansion may get",
-           kMostPoints);
-  app.add_option("--max-memory-mb", daemon.most_memory_mb,
+           kMaxPoints);
+  app.add_option("--max-memory-mb", daemon.max_memory_mb,
                  "Resident memory in MiB beyond which idle sessions leave the memory and new "
                  "sessions, those that come back, and requests without one are refused; 0: none")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
-  app.add_option("--max-compute-s", daemon.most_computing_s,
+  app.add_option("--max-compute-s", daemon.max_computing_s,
                  "Seconds that one request, or one batch of a stream, may be computed")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
       ->capture_default_str();
@@ -141,12 +145,20 @@ void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::stri
       "token: polyestd --new-token rig1:chassis:writer > rig1.token 2>> tokens");
 }
 
-absl::Status CheckListening(const DaemonOptions& daemon, bool insecure) {
-  return CheckExposure(
-      {.host = daemon.listen.host,
-       .tls = !daemon.tls.certificate.empty(),
-       .authentication = !daemon.token_file.empty() || !daemon.tls.client_ca.empty(),
-       .insecure = insecure});
+// Sets where the daemon listens, each address as exposed as is allowed.
+absl::Status Listen(const std::vector<std::string>& addresses, bool insecure,
+                    DaemonOptions& daemon) {
+  daemon.listen.clear();
+  for (const std::string& text : addresses) {
+    POLYEST_ASSIGN_OR_RETURN(ListenAddress address, ListenAddress::Parse(text));
+    POLYEST_RETURN_IF_ERROR(CheckExposure(
+        {.host = address.host,
+         .tls = !daemon.tls.certificate.empty(),
+         .authentication = !daemon.token_file.empty() || !daemon.tls.client_ca.empty(),
+         .insecure = insecure}));
+    daemon.listen.push_back(std::move(address));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -156,10 +168,14 @@ CommandLine ParseCommandLine(int argc, char** argv) {
                "polyestd");
   CommandLine command_line;
   DaemonOptions& daemon = command_line.daemon;
-  std::string listen = daemon.listen.ToString();
+  std::vector<std::string> listen{daemon.listen.front().ToString()};
   std::string durability = "disk";
-  app.add_option("--listen", listen, "HOST:PORT to listen on; port 0 picks a free one")
-      ->capture_default_str();
+  app.add_option("--listen", listen,
+                 "HOST:PORT to listen on; port 0 picks a free one; repeat the option, or separate "
+                 "by commas, to listen on several")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->default_str(listen.front());
   app.add_option("--data-dir", daemon.data_dir,
                  "Folder in which sessions are kept; by default $STATE_DIRECTORY, or "
                  "$XDG_STATE_HOME/polyest, or ~/.local/state/polyest");
@@ -168,7 +184,7 @@ CommandLine ParseCommandLine(int argc, char** argv) {
                  "daemon")
       ->check(CLI::IsMember({"disk", "memory"}))
       ->capture_default_str();
-  app.add_option("--max-disk-mb", daemon.most_disk_mb,
+  app.add_option("--max-disk-mb", daemon.max_disk_mb,
                  "Largest size of the sessions on disk, MiB; 0: the disk's")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
@@ -178,7 +194,7 @@ CommandLine ParseCommandLine(int argc, char** argv) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   AddLimits(app, daemon);
-  app.add_option("--max-message-mb", daemon.most_message_mb, "Largest message taken, MiB")
+  app.add_option("--max-message-mb", daemon.max_message_mb, "Largest message taken, MiB")
       ->check(CLI::Range(1, 2047))
       ->capture_default_str();
   bool insecure = false;
@@ -196,6 +212,8 @@ CommandLine ParseCommandLine(int argc, char** argv) {
     return Refuse(DescribeError(app, error, argc, argv));
   }
   if (!new_token.empty()) return PrintNewToken(new_token);
+  const std::string wrong_variable = CheckEnvironment(app, environ);
+  if (!wrong_variable.empty()) return Refuse(wrong_variable);
   if (durability == "memory") {
     daemon.data_dir.clear();
   } else if (daemon.data_dir.empty()) {
@@ -204,11 +222,8 @@ CommandLine ParseCommandLine(int argc, char** argv) {
       return Refuse("--data-dir: say where sessions are kept; there is no home folder to choose");
     }
   }
-  auto address = ListenAddress::Parse(listen);
-  if (!address.ok()) return Refuse(std::string(address.status().message()));
-  daemon.listen = *std::move(address);
-  const absl::Status exposure = CheckListening(daemon, insecure);
-  if (!exposure.ok()) return Refuse(std::string(exposure.message()));
+  const absl::Status listening = Listen(listen, insecure, daemon);
+  if (!listening.ok()) return Refuse(std::string(listening.message()));
   if (!metrics.empty()) {
     auto metrics_address = MetricsAddress(metrics, insecure);
     if (!metrics_address.ok()) return Refuse(std::string(metrics_address.status().message()));
@@ -217,4 +232,4 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   return command_line;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,7 +4,7 @@
 
 #include "server/daemon/daemon.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct CommandLine {
   DaemonOptions daemon;
@@ -17,4 +17,4 @@ struct CommandLine {
 
 CommandLine ParseCommandLine(int argc, char** argv);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,10 +5,13 @@
 #include <cstdlib>
 #include <memory>
 
-namespace polyest {
+#include "proto/wire/transport/nearest_name.h"
+
+namespace polyest::internal {
 namespace {
 
 constexpr char kConfig[] = "--config";
+const std::string kVariablePrefix = "POLYESTD_";
 
 std::string Variable(const std::string& name) {
   const char* value = std::getenv(name.c_str());
@@ -43,6 +46,12 @@ class File final : public CLI::ConfigBase {
   const CLI::App& app_;
 };
 
+// Whether Kubernetes makes a variable of this name for a service that is called polyestd.
+bool IsOfKubernetes(const std::string& variable) {
+  return variable == "POLYESTD_PORT" || variable.rfind("POLYESTD_PORT_", 0) == 0 ||
+         variable.rfind("POLYESTD_SERVICE_", 0) == 0;
+}
+
 bool IsGiven(const std::string& option, int argc, const char* const* argv) {
   return std::any_of(argv, argv + argc, [&](const std::string& argument) {
     return argument == option || argument.rfind(option + "=", 0) == 0;
@@ -52,11 +61,34 @@ bool IsGiven(const std::string& option, int argc, const char* const* argv) {
 }  // namespace
 
 std::string EnvironmentVariable(const std::string& option) {
-  std::string name = "POLYESTD_";
+  std::string name = kVariablePrefix;
   for (const char c : option.substr(option.find_first_not_of('-'))) {
     name += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   }
   return name;
+}
+
+std::string CheckEnvironment(const CLI::App& app, const char* const* environment) {
+  std::vector<std::string> known{EnvironmentVariable(kConfig)};
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_envname().empty()) known.push_back(option->get_envname());
+  }
+  for (; *environment != nullptr; ++environment) {
+    const std::string setting = *environment;
+    const std::string name = setting.substr(0, setting.find('='));
+    if (name.rfind(kVariablePrefix, 0) != 0 || IsOfKubernetes(name) ||
+        std::find(known.begin(), known.end(), name) != known.end()) {
+      continue;
+    }
+    // The prefix that all have would make any two of them near.
+    std::vector<std::string> names;
+    for (const std::string& one : known) names.push_back(one.substr(kVariablePrefix.size()));
+    const std::string nearest = NearestName(name.substr(kVariablePrefix.size()), names);
+    return name + ": no option has this variable" +
+           (nearest.empty() ? "; polyestd --help lists the options"
+                            : "; did you mean " + kVariablePrefix + nearest + "?");
+  }
+  return "";
 }
 
 void AddConfiguration(CLI::App& app, const std::vector<std::string>& flags_only) {
@@ -99,4 +131,4 @@ std::string DescribeError(const CLI::App& app, const CLI::ParseError& error, int
   return file.empty() ? what : file + ": " + what.substr(2);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,7 @@
 #include "server/daemon/daemon.h"
 
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 #include <grpc/support/time.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -13,14 +14,13 @@
 #include <vector>
 
 #include "core/common/status.h"
-#include "polyest/v1/estimation_service.grpc.pb.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
-#include "server/service/estimation_service.h"
+#include "server/service/services.h"
 #include "server/telemetry/call_interceptor.h"
 #include "server/telemetry/process_info.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // The clients ping every 20 s, also while no call is open.
@@ -28,7 +28,7 @@ constexpr int kShortestPingIntervalMs = 10'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 // Streams of one connection.
-constexpr int kMostConcurrentStreams = 1'000;
+constexpr int kMaxConcurrentStreams = 1'000;
 // Tasks that may wait for a thread.
 constexpr int kWaitingTasks = 20'000;
 // Lanes of the executor that may be busy with long tasks before another lane has to wait: a tenant
@@ -41,6 +41,8 @@ constexpr int kNiceness = 5;
 constexpr int kIntakeThreads = 4;
 // From a change of tokens or certificates to its notice, twice that until it is settled.
 constexpr std::chrono::seconds kWatchInterval{1};
+// In the place of the port of an address that is not listened on.
+constexpr int kNotListening = -1;
 // What the last bytes of calls already ended may take.
 constexpr int kFlushTimeS = 1;
 
@@ -73,7 +75,7 @@ void SetKeepalive(grpc::ServerBuilder& builder) {
 
 Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
     : options_(options),
-      address_(options.listen),
+      addresses_(options.listen),
       models_(std::move(models)),
       metrics_(Version()),
       readiness_([this] { return journal_->CheckWritable(); }),
@@ -92,7 +94,7 @@ absl::Status Daemon::OpenJournal() {
     journal_ = std::make_unique<MemoryJournal>();
     return absl::OkStatus();
   }
-  SqliteJournalOptions journal{.folder = options_.data_dir, .most_mb = options_.most_disk_mb};
+  SqliteJournalOptions journal{.folder = options_.data_dir, .max_mb = options_.max_disk_mb};
   journal.on_commit = [this](const CommitReport& commit) {
     metrics_.Count(Metrics::Commit{static_cast<int64_t>(commit.writes), !commit.outcome.ok(),
                                    commit.duration.count()});
@@ -104,13 +106,12 @@ absl::Status Daemon::OpenJournal() {
 
 absl::Status Daemon::OpenSessions() {
   const SessionServices services{executor_,       *journal_, models_,
-                                 options_.limits, &metrics_, MemoryLimit(options_.most_memory_mb)};
+                                 options_.limits, &metrics_, MemoryLimit(options_.max_memory_mb)};
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
-  service_ =
-      MakeEstimationService({executor_, intake_, *sessions_, calls_, *access_, stop_.get_token(),
-                             models_, std::chrono::seconds(options_.most_computing_s)});
+  services_ = MakeServices({executor_, intake_, *sessions_, calls_, *access_, stop_.get_token(),
+                            models_, std::chrono::seconds(options_.max_computing_s), Now});
   return absl::OkStatus();
 }
 
@@ -168,29 +169,47 @@ absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
-  builder.AddListeningPort(
-      address_.ToString(),
-      tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials(), &address_.port);
+  const auto credentials =
+      tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials();
+  std::vector<int> ports(addresses_.size(), kNotListening);
+  for (size_t i = 0; i < addresses_.size(); ++i) {
+    builder.AddListeningPort(addresses_[i].ToString(), credentials, &ports[i]);
+  }
   // Otherwise a second daemon on the same port would silently take half of the connections.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostConcurrentStreams);
-  builder.SetMaxReceiveMessageSize(options_.most_message_mb * 1024 * 1024);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
+  builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
   SetKeepalive(builder);
-  builder.RegisterService(service_.get());
+  for (const auto& service : services_) builder.RegisterService(service.get());
   ObserveCalls(builder, metrics_, [this](const grpc::ServerContextBase& call) {
     const auto caller = access_->Authorize(call, "GetStatus");
-    return caller.ok() ? caller->tenant : "";
+    return caller.ok() ? LoggedCaller{caller->tenant, caller->name} : LoggedCaller();
   });
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) {
+    // They are taken in their order, up to the first that cannot be had.
+    const auto failed = std::find(ports.begin(), ports.end(), kNotListening) - ports.begin();
     return absl::UnavailableError(absl::StrFormat(
         "cannot listen on %s: the port is in use or the address is not this machine's",
-        options_.listen.ToString()));
+        addresses_.at(std::min<size_t>(failed, addresses_.size() - 1)).ToString()));
   }
-  server_->GetHealthCheckService()->SetServingStatus(v1::EstimationService::service_full_name(),
-                                                     true);
-  readiness_.Start(server_->GetHealthCheckService());
+  for (size_t i = 0; i < addresses_.size(); ++i) addresses_[i].port = ports[i];
+  self_check_ = std::make_unique<SelfCheck>(*server_);
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    server_->GetHealthCheckService()->SetServingStatus(service->full_name(), true);
+  }
+  readiness_.Start(server_->GetHealthCheckService(), Described());
   return absl::OkStatus();
+}
+
+LogFields Daemon::Described() const {
+  return {{"version", Version()},
+          {"listen", absl::StrJoin(addresses_, ", ",
+                                   [](std::string* text, const ListenAddress& address) {
+                                     text->append(address.ToString());
+                                   })},
+          {"metrics", metrics_address_ ? metrics_address_->ToString() : ""},
+          {"tls", tls_ == nullptr ? "no" : "yes"}};
 }
 
 absl::Status Daemon::TellMetrics() {
@@ -214,6 +233,7 @@ void Daemon::Stop() {
   server_->Shutdown(
       gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
   server_->Wait();
+  self_check_ = nullptr;
   server_ = nullptr;
 }
 
@@ -223,4 +243,4 @@ Daemon::~Daemon() {
   housekeeper_ = nullptr;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

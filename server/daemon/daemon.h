@@ -12,11 +12,13 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "core/fmu/model_library.h"
 #include "server/daemon/daemon_gauges.h"
 #include "server/daemon/listen_address.h"
 #include "server/daemon/readiness.h"
+#include "server/daemon/self_check.h"
 #include "server/execution/executor.h"
 #include "server/security/access_control.h"
 #include "server/security/file_watch.h"
@@ -26,21 +28,22 @@
 #include "server/sessions/session_registry.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
+#include "server/telemetry/structured_log.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct DaemonOptions {
-  ListenAddress listen{"127.0.0.1", 50051};
-  int threads = 0;  // of the numerics; 0: one a core
+  std::vector<ListenAddress> listen{{"127.0.0.1", 50051}};  // one or more
+  int threads = 0;                                          // of the numerics; 0: one a core
   // Where sessions are kept; empty: in memory, and they end with the daemon.
   std::string data_dir{};
-  int64_t most_disk_mb = 0;  // of the data folder; 0: as large as the disk
+  int64_t max_disk_mb = 0;  // of the data folder; 0: as large as the disk
   SessionLimits limits{};
-  int64_t most_memory_mb = 0;  // resident, of the process; 0: no limit
+  int64_t max_memory_mb = 0;  // resident, of the process; 0: no limit
   std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
-  int most_message_mb = 64;
-  int64_t most_computing_s = 3'600;  // of one call, or one batch of a stream
-  std::string fmu_dir{};             // of FMUs that problems may name; empty: none
+  int max_message_mb = 64;
+  int64_t max_computing_s = 3'600;  // of one call, or one batch of a stream
+  std::string fmu_dir{};            // of FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
   std::string token_file{};                // empty: no tokens are asked for
   TlsFiles tls{};                          // without a certificate: no TLS
@@ -49,21 +52,24 @@ struct DaemonOptions {
 
 class Daemon {
  public:
-  // UNAVAILABLE when the address cannot be listened on, NOT_FOUND when there is no folder of FMUs;
+  // UNAVAILABLE when an address cannot be listened on, NOT_FOUND when there is no folder of FMUs;
   // what SqliteJournal::Open says of the data folder; as TokenTable and ReadTlsMaterial for what is
   // wrong with tokens, certificates and keys.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
   // Drains first.
   ~Daemon();
 
-  // Where it listens, with the port chosen.
-  const ListenAddress& address() const { return address_; }
+  // Where it listens, in the order of the options, with the ports chosen.
+  const std::vector<ListenAddress>& addresses() const { return addresses_; }
   // Where its metrics are, if anywhere, with the port chosen.
   const std::optional<ListenAddress>& metrics_address() const { return metrics_address_; }
 
   // Reads the tokens and the certificates again, as happens by itself when their files change. What
   // cannot be used is logged, and the old ones stay.
   void Reload();
+
+  // Whether it answers calls; not to be called by two threads at once, nor during Stop.
+  bool IsAlive(std::chrono::milliseconds timeout) const { return self_check_->Answers(timeout); }
 
   // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
   // sockets: at most the drain time-out, past which what is left is cancelled.
@@ -76,9 +82,11 @@ class Daemon {
   absl::Status Secure();
   absl::Status Listen();
   absl::Status TellMetrics();
+  // What the log says of it once it is ready.
+  LogFields Described() const;
 
   const DaemonOptions options_;
-  ListenAddress address_;
+  std::vector<ListenAddress> addresses_;
   const ModelLibrary models_;
   std::mutex reloading_;
   std::unique_ptr<AccessControl> access_;
@@ -94,11 +102,12 @@ class Daemon {
   Executor intake_;
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
-  std::unique_ptr<grpc::Service> service_;
+  std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<SelfCheck> self_check_;
   std::unique_ptr<FileWatch> watch_;  // null without files to watch
   std::optional<ListenAddress> metrics_address_;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

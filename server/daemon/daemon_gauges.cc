@@ -9,7 +9,7 @@
 
 #include "server/telemetry/process_info.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using Families = std::vector<prometheus::MetricFamily>;
@@ -63,7 +63,7 @@ void DaemonGauges::CollectSessions(Families& families) const {
     // A factor of 0: nothing measured yet.
     const double factor = activity.real_time_factor();
     if (activity.has_writer() && factor > 0 && factor < 1) ++behind;
-    unprocessed += activity.unprocessed_batches();
+    unprocessed += activity.unprocessed_batch_count();
     waiting += std::max<int64_t>(0, session->taken().sequence - described.last_sequence());
   }
   Add(families, "polyest_sessions", "Sessions of all tenants.", sessions);
@@ -90,4 +90,4 @@ void DaemonGauges::CollectDisk(Families& families) const {
       static_cast<double>(space.available));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class DaemonGauges final : public prometheus::Collectable {
  public:
@@ -38,4 +38,4 @@ class DaemonGauges final : public prometheus::Collectable {
   const std::atomic<bool>& ready_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

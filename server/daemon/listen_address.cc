@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kLargestPort = 65'535;
@@ -48,4 +48,4 @@ absl::StatusOr<ListenAddress> ListenAddress::Parse(const std::string& text,
 
 std::string ListenAddress::ToString() const { return absl::StrCat(host, ":", port); }
 
-}  // namespace polyest
+}  // namespace polyest::internal

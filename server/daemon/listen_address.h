@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // HOST:PORT, where HOST is a name, an IPv4 address or an IPv6 address in brackets.
 struct ListenAddress {
@@ -17,4 +17,4 @@ struct ListenAddress {
   std::string ToString() const;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,26 +1,26 @@
 // polyestd: the daemon as a process.
 
-#include <grpc/support/log.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
+#include "server/daemon/service_manager.h"
+#include "server/telemetry/grpc_log.h"
 #include "server/telemetry/structured_log.h"
 
 namespace {
 
-// gRPC's own messages are for debugging; what matters of them comes back as a status.
-void LogOfGrpc(gpr_log_func_args* arguments) { spdlog::debug("grpc: {}", arguments->message); }
-
-void StartLog(const polyest::CommandLine& command_line) {
-  polyest::StartLog(
-      command_line.log_format == "json" ? polyest::LogFormat::kJson : polyest::LogFormat::kText,
-      spdlog::level::from_str(command_line.log_level));
-  gpr_set_log_function(LogOfGrpc);
+void StartLog(const polyest::internal::CommandLine& command_line) {
+  polyest::internal::StartLog(command_line.log_format == "json"
+                                  ? polyest::internal::LogFormat::kJson
+                                  : polyest::internal::LogFormat::kText,
+                              spdlog::level::from_str(command_line.log_level));
+  polyest::internal::StartGrpcLog();
 }
 
 // Blocked here, before there are threads, and so in all of them: only sigwait takes these signals.
@@ -35,30 +35,45 @@ sigset_t BlockSignals() {
   return signals;
 }
 
+// Says on stdout, a line each, where the daemon listens; and to the service manager that it does.
+void Announce(const polyest::internal::Daemon& daemon) {
+  std::string addresses;
+  for (const polyest::internal::ListenAddress& address : daemon.addresses()) {
+    std::printf("listening on %s\n", address.ToString().c_str());
+    addresses += (addresses.empty() ? "" : ", ") + address.ToString();
+  }
+  if (const auto& metrics = daemon.metrics_address()) {
+    std::printf("metrics on %s\n", metrics->ToString().c_str());
+  }
+  std::fflush(stdout);
+  polyest::internal::ReportReady("listening on " + addresses);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const polyest::CommandLine command_line = polyest::ParseCommandLine(argc, argv);
+  const polyest::internal::CommandLine command_line =
+      polyest::internal::ParseCommandLine(argc, argv);
   if (command_line.done) return command_line.exit_status;
   const sigset_t signals = BlockSignals();
   // gRPC's traces show the headers of calls, and so the tokens.
   if (!command_line.daemon.token_file.empty()) unsetenv("GRPC_TRACE");
   StartLog(command_line);
 
-  auto daemon = polyest::Daemon::Start(command_line.daemon);
+  auto daemon = polyest::internal::Daemon::Start(command_line.daemon);
   if (!daemon.ok()) {
     std::fprintf(stderr, "polyestd: %s\n", std::string(daemon.status().message()).c_str());
     return 1;
   }
-  std::printf("listening on %s\n", (*daemon)->address().ToString().c_str());
-  if (const auto& metrics = (*daemon)->metrics_address()) {
-    std::printf("metrics on %s\n", metrics->ToString().c_str());
-  }
-  std::fflush(stdout);
+  Announce(**daemon);
+  std::optional<polyest::internal::Watchdog> watchdog(
+      std::in_place, [&daemon](auto timeout) { return (*daemon)->IsAlive(timeout); });
 
   int signal_number = 0;
   while (sigwait(&signals, &signal_number) == 0 && signal_number == SIGHUP) (*daemon)->Reload();
   spdlog::info("{}: draining", strsignal(signal_number));
+  polyest::internal::ReportStopping();
+  watchdog.reset();
   (*daemon)->Stop();
   spdlog::info("stopped");
   return 0;

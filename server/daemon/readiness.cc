@@ -3,18 +3,20 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr std::chrono::seconds kPause{1};
 
 }  // namespace
 
-void Readiness::Start(grpc::HealthCheckServiceInterface* health) {
+void Readiness::Start(grpc::HealthCheckServiceInterface* health, LogFields daemon) {
   const absl::Status writable = check_writable_();
   const std::lock_guard lock(mutex_);
   health_ = health;
+  daemon_ = std::move(daemon);
   writable_ = writable.ok();
   health_->SetServingStatus(kService, false);
   Tell();
@@ -44,7 +46,7 @@ void Readiness::Tell() {
   ready_ = writable_;
   health_->SetServingStatus(kService, ready_);
   if (ready_) {
-    spdlog::info("ready");
+    Log(spdlog::level::info, "ready", daemon_);
   } else {
     spdlog::warn("not ready: the journal cannot be written");
   }
@@ -66,4 +68,4 @@ void Readiness::Run(std::stop_token stop) {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

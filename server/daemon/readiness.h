@@ -13,7 +13,9 @@
 #include <mutex>
 #include <thread>
 
-namespace polyest {
+#include "server/telemetry/structured_log.h"
+
+namespace polyest::internal {
 
 class Readiness {
  public:
@@ -26,8 +28,8 @@ class Readiness {
   Readiness(const Readiness&) = delete;
   Readiness& operator=(const Readiness&) = delete;
 
-  // From here on `health` is told; until Drain.
-  void Start(grpc::HealthCheckServiceInterface* health);
+  // Tells `health` from here on until Drain. `daemon` goes with "ready" into the log.
+  void Start(grpc::HealthCheckServiceInterface* health, LogFields daemon = {});
   // After each commit, from the journal's thread.
   void OnCommit(bool kept);
   void Drain();
@@ -43,9 +45,10 @@ class Readiness {
   std::mutex mutex_;
   std::condition_variable_any failed_;
   grpc::HealthCheckServiceInterface* health_ = nullptr;
+  LogFields daemon_;
   bool writable_ = false;  // as the last commit was
   std::atomic<bool> ready_ = false;
   std::jthread thread_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

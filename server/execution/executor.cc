@@ -8,9 +8,9 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // What a full queue takes to have room again, or more.
@@ -150,4 +150,4 @@ void Strand::RunOne() {
   executor_.Release(lane_);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 using Task = std::function<void()>;
 
@@ -91,4 +91,4 @@ class Strand : public std::enable_shared_from_this<Strand> {
   std::deque<Task> tasks_;  // the first is running, or next
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

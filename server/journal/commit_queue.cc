@@ -5,11 +5,11 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Of one commit: what has to be written again when it fails, and how long others wait for it.
-constexpr size_t kMostWrites = 512;
+constexpr size_t kMaxWrites = 512;
 
 bool ConcernsOnlyItself(const absl::Status& status) {
   return absl::IsNotFound(status) || absl::IsAlreadyExists(status) ||
@@ -51,7 +51,7 @@ std::vector<CommitQueue::Item> CommitQueue::Take() {
   std::vector<Item> items;
   std::unique_lock lock(mutex_);
   submitted_.wait(lock, [this] { return !queue_.empty() || ending_; });
-  while (!queue_.empty() && items.size() < kMostWrites) {
+  while (!queue_.empty() && items.size() < kMaxWrites) {
     items.push_back(std::move(queue_.front()));
     queue_.pop_front();
   }
@@ -81,4 +81,4 @@ absl::Status CommitQueue::WriteAll(const std::vector<Item>& items,
   return database_->Execute("COMMIT");
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

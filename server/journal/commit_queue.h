@@ -16,7 +16,7 @@
 
 #include "server/journal/sqlite_database.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct CommitReport {
   size_t writes = 0;
@@ -66,4 +66,4 @@ class CommitQueue {
   std::jthread thread_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

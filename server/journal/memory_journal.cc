@@ -9,7 +9,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::StatusOr<const MemoryJournal::Kept*> MemoryJournal::Find(int64_t session) const {
   const auto found = sessions_.find(session);
@@ -132,4 +132,4 @@ absl::StatusOr<std::optional<JournalSnapshot>> MemoryJournal::ReadSnapshot(int64
   return kept->snapshot;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "server/journal/session_journal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class MemoryJournal final : public SessionJournal {
  public:
@@ -46,4 +46,4 @@ class MemoryJournal final : public SessionJournal {
   int64_t last_number_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,7 +4,8 @@
 // acknowledged once it is here; an estimator can be made anew from what is here, to the same bits.
 //
 // A journal is written in order: what is appended later is never kept without what was appended to
-// the same session before. Every implementation passes tests/unit/server/journal_contract_test.cc.
+// the same session before. Every implementation passes
+// tests/unit/server/journal/journal_contract_test.cc.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -16,11 +17,11 @@
 #include <string>
 #include <vector>
 
-#include "core/estimator/samples.h"
+#include "polyest/samples.h"
 #include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // How far a session has come.
 struct SessionPlace {
@@ -102,4 +103,4 @@ class SessionJournal {
   virtual absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "core/common/status.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // For a lock that another connection of this process holds for a moment.
@@ -170,4 +170,4 @@ std::string SqliteQuery::Bytes(int column) const {
                          : std::string(static_cast<const char*>(data), static_cast<size_t>(size));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -15,7 +15,7 @@
 struct sqlite3;
 struct sqlite3_stmt;
 
-namespace polyest {
+namespace polyest::internal {
 
 // RESOURCE_EXHAUSTED: full; DATA_LOSS: damaged; ALREADY_EXISTS: not unique; UNAVAILABLE: the disk
 // or a lock.
@@ -80,4 +80,4 @@ class SqliteQuery {
   absl::Status failure_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,21 +2,15 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <fcntl.h>
 #include <sqlite3.h>
-#include <sys/file.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/journal/digest.h"
+#include "server/digest/digest.h"
 #include "server/journal/sqlite_schema.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Pages in the write-ahead log from which on they are copied into the file.
@@ -26,8 +20,6 @@ constexpr int64_t kPageBytes = 4'096;
 constexpr int64_t kRemovedBatches = 256;
 
 absl::Status NotThere() { return absl::NotFoundError("the journal has no such session"); }
-
-std::string ErrnoText() { return std::strerror(errno); }
 
 absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
   SqliteQuery query(database,
@@ -70,46 +62,17 @@ absl::Status DeleteHidden(SqliteDatabase& database) {
       "DELETE FROM session WHERE hidden = 1; COMMIT");
 }
 
-absl::Status SetUpWriter(SqliteDatabase& database, int64_t most_mb) {
+absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
   POLYEST_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
-  if (most_mb > 0) {
-    const int64_t pages = most_mb * 1024 * 1024 / kPageBytes;
+  if (max_mb > 0) {
+    const int64_t pages = max_mb * 1024 * 1024 / kPageBytes;
     POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", pages)));
   }
   return DeleteHidden(database);
 }
 
 }  // namespace
-
-class SqliteJournal::FolderLock {
- public:
-  static absl::StatusOr<std::unique_ptr<FolderLock>> Take(const std::string& folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) {
-      return absl::FailedPreconditionError(
-          absl::StrFormat("cannot make the folder %s: %s", folder, error.message()));
-    }
-    const std::string file = absl::StrCat(folder, "/lock");
-    const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-    if (descriptor < 0) {
-      return absl::FailedPreconditionError(
-          absl::StrFormat("cannot write to the folder %s: %s", folder, ErrnoText()));
-    }
-    std::unique_ptr<FolderLock> lock(new FolderLock(descriptor));
-    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return lock;
-    return absl::FailedPreconditionError(
-        absl::StrFormat("another daemon uses the folder %s; give each one its own", folder));
-  }
-  ~FolderLock() { close(descriptor_); }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
- private:
-  explicit FolderLock(int descriptor) : descriptor_(descriptor) {}
-  int descriptor_;
-};
 
 class SqliteJournal::Reader {
  public:
@@ -129,7 +92,7 @@ class SqliteJournal::Reader {
 
   absl::StatusOr<SqliteDatabase*> database() {
     if (database_ == nullptr) {
-      POLYEST_ASSIGN_OR_RETURN(database_, SqliteDatabase::Open(journal_.file_));
+      POLYEST_ASSIGN_OR_RETURN(database_, SqliteDatabase::Open(journal_.folder_->journal_file()));
     }
     return database_.get();
   }
@@ -141,27 +104,26 @@ class SqliteJournal::Reader {
 
 absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
     const SqliteJournalOptions& options) {
-  POLYEST_ASSIGN_OR_RETURN(auto lock, FolderLock::Take(options.folder));
-  std::string file = absl::StrCat(options.folder, "/journal.db");
+  POLYEST_ASSIGN_OR_RETURN(auto folder, DataFolder::Take(options.folder));
+  const std::string& file = folder->journal_file();
   const auto named = [&](const absl::Status& status) {
     return absl::Status(status.code(), absl::StrFormat("%s: %s", file, status.message()));
   };
   auto writer = SqliteDatabase::Open(file);
   if (!writer.ok()) return named(writer.status());
-  const absl::Status prepared = SetUpWriter(**writer, options.most_mb);
+  const absl::Status prepared = SetUpWriter(**writer, options.max_mb);
   if (!prepared.ok()) return named(prepared);
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
-  return std::unique_ptr<SqliteJournal>(
-      new SqliteJournal(std::move(file), std::move(lock), *std::move(writer),
-                        *std::move(maintainer), options.on_commit));
+  return std::unique_ptr<SqliteJournal>(new SqliteJournal(
+      std::move(folder), *std::move(writer), *std::move(maintainer), options.on_commit));
 }
 
-SqliteJournal::SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
+SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
                              std::unique_ptr<SqliteDatabase> writer,
                              std::unique_ptr<SqliteDatabase> maintainer,
                              CommitQueue::OnCommit on_commit)
-    : file_(std::move(file)), lock_(std::move(lock)), maintainer_(std::move(maintainer)) {
+    : folder_(std::move(folder)), maintainer_(std::move(maintainer)) {
   // In place of SQLite's own checkpoint, which would delay the commit that it follows.
   sqlite3_wal_hook(
       writer->handle(),
@@ -388,4 +350,4 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
   return true;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

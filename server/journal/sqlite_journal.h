@@ -11,22 +11,23 @@
 #include <vector>
 
 #include "server/journal/commit_queue.h"
+#include "server/journal/data_folder.h"
 #include "server/journal/session_journal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct SqliteJournalOptions {
-  // The journal is `folder`/journal.db. The folder is made if there is none.
+  // The journal is `folder`/journal.db. The folder is made if there is none, for its owner only.
   std::string folder;
   // Largest size of that file, MiB; 0: as large as the disk. Past it: RESOURCE_EXHAUSTED.
-  int64_t most_mb = 0;
+  int64_t max_mb = 0;
   CommitQueue::OnCommit on_commit{};
 };
 
 class SqliteJournal final : public SessionJournal {
  public:
-  // FAILED_PRECONDITION: another daemon has the folder, or the file is no journal or one of a later
-  // version; DATA_LOSS: the file is damaged. It is then as it was.
+  // FAILED_PRECONDITION: what DataFolder::Take says of the folder, or the file is no journal or one
+  // of a later version; DATA_LOSS: the file is damaged. It is then as it was.
   static absl::StatusOr<std::unique_ptr<SqliteJournal>> Open(const SqliteJournalOptions& options);
   // Writes what was appended.
   ~SqliteJournal() override;
@@ -50,19 +51,15 @@ class SqliteJournal final : public SessionJournal {
  private:
   // A connection to read with; given back when it goes.
   class Reader;
-  // Exclusive use of the folder.
-  class FolderLock;
 
-  SqliteJournal(std::string file, std::unique_ptr<FolderLock> lock,
-                std::unique_ptr<SqliteDatabase> writer, std::unique_ptr<SqliteDatabase> maintainer,
-                CommitQueue::OnCommit on_commit);
+  SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
+                std::unique_ptr<SqliteDatabase> maintainer, CommitQueue::OnCommit on_commit);
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
   void WakeMaintenance();
 
-  const std::string file_;
-  const std::unique_ptr<FolderLock> lock_;
+  const std::unique_ptr<DataFolder> folder_;
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
 
@@ -76,4 +73,4 @@ class SqliteJournal final : public SessionJournal {
   std::jthread maintenance_thread_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

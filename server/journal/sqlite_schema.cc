@@ -7,7 +7,7 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // "poly", in the file's header, by which it is known as ours.
@@ -83,4 +83,4 @@ absl::Status PrepareSchema(SqliteDatabase& database, int version) {
   return migrated;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "server/journal/sqlite_database.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // The newest there is.
 int JournalSchemaVersion();
@@ -18,4 +18,4 @@ int JournalSchemaVersion();
 // or to a later version; DATA_LOSS when it is no database or a damaged one.
 absl::Status PrepareSchema(SqliteDatabase& database, int version = JournalSchemaVersion());
 
-}  // namespace polyest
+}  // namespace polyest::internal

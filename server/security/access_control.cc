@@ -11,9 +11,8 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "polyest/v1/estimation_service.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr absl::string_view kScheme = "Bearer ";
@@ -41,8 +40,7 @@ Identification IdentificationOf(const grpc::ServerContextBase& call) {
 
 absl::StatusOr<std::unique_ptr<AccessControl>> AccessControl::Open(AccessOptions options) {
   std::unique_ptr<AccessControl> control(new AccessControl(std::move(options)));
-  POLYEST_CHECK(CoversAllMethods(
-      *v1::EstimateRequest::descriptor()->file()->FindServiceByName("EstimationService")));
+  POLYEST_CHECK(CoversAllMethods(Services()));
   POLYEST_RETURN_IF_ERROR(control->Reload());
   return control;
 }
@@ -100,4 +98,4 @@ absl::StatusOr<Caller> AccessControl::Authorize(const grpc::ServerContextBase& c
   return Authorize(IdentificationOf(call), method);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -15,7 +15,7 @@
 #include "server/security/method_roles.h"
 #include "server/security/token_table.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct AccessOptions {
   std::string token_file{};          // empty: no tokens are asked for
@@ -55,4 +55,4 @@ class AccessControl {
   std::shared_ptr<const TokenTable> tokens_;  // null when none are asked for
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

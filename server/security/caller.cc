@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace polyest {
+namespace polyest::internal {
 
 std::string RoleName(Role role) {
   switch (role) {
@@ -34,4 +34,4 @@ bool IsCallerWord(absl::string_view word) {
          });
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

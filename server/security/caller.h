@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Each may do what those before it may.
 enum class Role { kReader, kWriter, kAdmin };
@@ -28,4 +28,4 @@ struct Caller {
 // letter or a digit.
 bool IsCallerWord(absl::string_view word);
 
-}  // namespace polyest
+}  // namespace polyest::internal

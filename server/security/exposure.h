@@ -6,11 +6,7 @@
 
 #include <string>
 
-namespace polyest {
-
-// 127.0.0.0/8, ::1 (in brackets or not) and localhost. Other names, whatever they resolve to, and
-// shortened addresses are not.
-bool IsLoopback(const std::string& host);
+namespace polyest::internal {
 
 struct Exposure {
   std::string host;  // to listen on
@@ -22,4 +18,4 @@ struct Exposure {
 // FAILED_PRECONDITION, naming what is missing, beyond loopback without both, unless it is wished.
 absl::Status CheckExposure(const Exposure& exposure);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 
 FileChanges::FileChanges(std::vector<std::string> files)
     : files_(std::move(files)), told_(Look()), seen_(told_) {}
@@ -44,4 +44,4 @@ void FileWatch::Run(const std::stop_token& stop, std::chrono::milliseconds inter
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 // By time, size and inode, so that files replaced by others of the same time are noticed too.
 class FileChanges {
@@ -59,4 +59,4 @@ class FileWatch {
   std::jthread thread_;  // last: stopped and joined before the rest goes
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

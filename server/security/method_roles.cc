@@ -1,14 +1,38 @@
 #include "server/security/method_roles.h"
 
 #include <iterator>
+#include <set>
 
-namespace polyest {
+#include "polyest/v1/model_service.pb.h"
+#include "polyest/v1/operation_service.pb.h"
+#include "polyest/v1/problem_service.pb.h"
+#include "polyest/v1/session_service.pb.h"
+#include "polyest/v1/status_service.pb.h"
+#include "polyest/v1/study_service.pb.h"
 
-bool CoversAllMethods(const google::protobuf::ServiceDescriptor& service) {
-  for (int k = 0; k < service.method_count(); ++k) {
-    if (FindMethodRole(service.method(k)->name()) == nullptr) return false;
-  }
-  return static_cast<size_t>(service.method_count()) == std::size(kMethodRoles);
+namespace polyest::internal {
+
+ServiceDescriptors Services() {
+  return {v1::ListModelsRequest::descriptor()->file()->service(0),
+          v1::CheckProblemRequest::descriptor()->file()->service(0),
+          v1::CreateSessionRequest::descriptor()->file()->service(0),
+          v1::ComputeEstimateRequest::descriptor()->file()->service(0),
+          v1::StartComputationRequest::descriptor()->file()->service(0),
+          v1::GetStatusRequest::descriptor()->file()->service(0)};
 }
 
-}  // namespace polyest
+bool CoversAllMethods(const ServiceDescriptors& services) {
+  std::set<std::string_view> names;
+  size_t methods = 0;
+  for (const google::protobuf::ServiceDescriptor* const service : services) {
+    for (int k = 0; k < service->method_count(); ++k) {
+      const std::string_view name = service->method(k)->name();
+      if (FindMethodRole(name) == nullptr) return false;
+      names.insert(name);
+      ++methods;
+    }
+  }
+  return methods == names.size() && methods == std::size(kMethodRoles);
+}
+
+}  // namespace polyest::internal

@@ -5,30 +5,52 @@
 #include <google/protobuf/descriptor.h>
 
 #include <string_view>
+#include <vector>
 
 #include "server/security/caller.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// The one table of the service's methods. A method that is not in it cannot be served: naming it
-// does not compile, and the daemon does not start while one is missing.
+// The one table of the services' methods, whose names no two services share. A method that is not
+// in it cannot be served: naming it does not compile, and the daemon does not start while one is
+// missing.
+//
+// Operations need no more than the computations that they are: who may start them may end them, or
+// could not make room for others.
 struct MethodRole {
   std::string_view method;
   Role needed;
 };
 
 inline constexpr MethodRole kMethodRoles[] = {
-    {"ListModels", Role::kReader},       {"GetModel", Role::kReader},
-    {"Estimate", Role::kReader},         {"Propagate", Role::kReader},
-    {"EvaluateCost", Role::kReader},     {"AnalyzeSensitivity", Role::kReader},
-    {"DesignExperiment", Role::kReader}, {"GetSession", Role::kReader},
-    {"ListSessions", Role::kReader},     {"GetEstimate", Role::kReader},
-    {"WatchSession", Role::kReader},     {"GetPosterior", Role::kReader},
-    {"ProfileCost", Role::kReader},      {"SweepRegularization", Role::kReader},
-    {"GetStatus", Role::kReader},        {"CreateSession", Role::kWriter},
-    {"AddMeasurements", Role::kWriter},  {"StreamMeasurements", Role::kWriter},
-    {"DeleteSession", Role::kAdmin},     {"ExportSession", Role::kAdmin},
+    {"ListModels", Role::kReader},
+    {"GetModel", Role::kReader},
+    {"CheckProblem", Role::kReader},
+    {"GetProblemSchema", Role::kReader},
+    {"CreateSession", Role::kWriter},
+    {"GetSession", Role::kReader},
+    {"ListSessions", Role::kReader},
+    {"DeleteSession", Role::kAdmin},
+    {"ExportSession", Role::kAdmin},
     {"ImportSession", Role::kAdmin},
+    {"AddMeasurements", Role::kWriter},
+    {"GetEstimate", Role::kReader},
+    {"StreamMeasurements", Role::kWriter},
+    {"WatchSession", Role::kReader},
+    {"ComputeEstimate", Role::kReader},
+    {"ComputePropagation", Role::kReader},
+    {"ComputeCostGrid", Role::kReader},
+    {"ComputeSensitivity", Role::kReader},
+    {"ComputeExperimentDesign", Role::kReader},
+    {"ComputePosterior", Role::kReader},
+    {"ComputeCostProfiles", Role::kReader},
+    {"ComputeRegularizationSweep", Role::kReader},
+    {"StartComputation", Role::kReader},
+    {"GetOperation", Role::kReader},
+    {"ListOperations", Role::kReader},
+    {"CancelOperation", Role::kReader},
+    {"DeleteOperation", Role::kReader},
+    {"GetStatus", Role::kReader},
 };
 
 // Null when there is no such method.
@@ -52,7 +74,12 @@ class Method {
   const MethodRole& entry_;
 };
 
-// Whether the table has an entry for every method of the service, and no others.
-bool CoversAllMethods(const google::protobuf::ServiceDescriptor& service);
+using ServiceDescriptors = std::vector<const google::protobuf::ServiceDescriptor*>;
 
-}  // namespace polyest
+// The services of polyest.v1.
+ServiceDescriptors Services();
+
+// Whether the table has one entry for every method of the services, and no others.
+bool CoversAllMethods(const ServiceDescriptors& services);
+
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr unsigned kPollInterval_s = 1;  // the least that gRPC takes
@@ -84,4 +84,4 @@ std::shared_ptr<grpc::ServerCredentials> ServerTls::Credentials() const {
   return grpc::experimental::TlsServerCredentials(options);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,7 +10,7 @@
 
 #include "server/security/tls_material.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // gRPC reads the files anew every second and takes whatever it finds: with half a file, or a
 // certificate before its key, no client would get in. So it is given files in memory instead, into
@@ -52,4 +52,4 @@ class ServerTls {
   MemoryFile client_ca_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,9 +9,9 @@
 #include <memory>
 
 #include "core/common/status.h"
-#include "server/security/file_text.h"
+#include "proto/wire/transport/file_text.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 template <auto Free>
@@ -110,4 +110,4 @@ absl::StatusOr<TlsMaterial> ReadTlsMaterial(const TlsFiles& files) {
   return material;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Names of PEM files.
 struct TlsFiles {
@@ -27,4 +27,4 @@ struct TlsMaterial {
 // sooner than in a handshake, and tell nobody.
 absl::StatusOr<TlsMaterial> ReadTlsMaterial(const TlsFiles& files);
 
-}  // namespace polyest
+}  // namespace polyest::internal

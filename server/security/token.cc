@@ -10,7 +10,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 absl::string_view Bytes(const TokenDigest& digest) {
@@ -46,4 +46,4 @@ bool SameDigest(const TokenDigest& a, const TokenDigest& b) {
   return CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

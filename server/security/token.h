@@ -11,9 +11,9 @@
 #include <optional>
 #include <string>
 
-#include "server/digest/sha256.h"
+#include "server/digest/digest.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 using TokenDigest = Sha256Digest;
 
@@ -27,4 +27,4 @@ std::optional<TokenDigest> DigestFromHex(absl::string_view hex);
 // In the same time whatever the digests are.
 bool SameDigest(const TokenDigest& a, const TokenDigest& b);
 
-}  // namespace polyest
+}  // namespace polyest::internal

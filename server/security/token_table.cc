@@ -8,9 +8,9 @@
 #include <set>
 
 #include "core/common/status.h"
-#include "server/security/file_text.h"
+#include "proto/wire/transport/file_text.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kWordRule[] =
@@ -65,10 +65,15 @@ absl::StatusOr<TokenTable> TokenTable::Parse(absl::string_view text, const std::
     if (!digests.insert(token->digest).second) {
       return refuse("the same token stands on a line before");
     }
-    if (table.tokens_.size() == kMostTokens) {
-      return refuse(absl::StrCat("there may be ", kMostTokens, " tokens"));
+    if (table.tokens_.size() == kMaxTokens) {
+      return refuse(absl::StrCat("there may be ", kMaxTokens, " tokens"));
     }
     table.tokens_.push_back(*std::move(token));
+  }
+  if (table.tokens_.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        file, ": there is no token in it, so that nobody could get in; polyestd --new-token makes ",
+        "one"));
   }
   return table;
 }
@@ -102,4 +107,4 @@ absl::StatusOr<NewToken> MakeTokenFor(absl::string_view words) {
   return token;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

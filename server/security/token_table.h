@@ -14,14 +14,15 @@
 #include "server/security/caller.h"
 #include "server/security/token.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class TokenTable {
  public:
-  static constexpr size_t kMostTokens = 10'000;
+  static constexpr size_t kMaxTokens = 10'000;
 
   // INVALID_ARGUMENT names file, line and rule, and quotes nothing: what stands in a wrong place
-  // may be a secret. NOT_FOUND when the file cannot be read.
+  // may be a secret. A file without a token is INVALID_ARGUMENT, too. NOT_FOUND when the file
+  // cannot be read.
   static absl::StatusOr<TokenTable> Read(const std::string& file);
   static absl::StatusOr<TokenTable> Parse(absl::string_view text, const std::string& file);
 
@@ -49,4 +50,4 @@ struct NewToken {
 };
 absl::StatusOr<NewToken> MakeTokenFor(absl::string_view words);
 
-}  // namespace polyest
+}  // namespace polyest::internal

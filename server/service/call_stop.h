@@ -11,18 +11,18 @@
 #include <stop_token>
 #include <utility>
 
-#include "core/common/stop.h"
-#include "server/refusal/refusal.h"
+#include "polyest/stop.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // When the work of a call stops: at its cancellation, at its deadline, or when a piece of it has
 // been computed for as long as one may.
 class CallStop {
  public:
   CallStop(const grpc::CallbackServerContext& context, std::stop_token token,
-           std::chrono::seconds most_computing)
-      : token_(std::move(token)), most_computing_(most_computing) {
+           std::chrono::seconds max_computing)
+      : token_(std::move(token)), max_computing_(max_computing) {
     // Not by the clock on the wall, which may be set meanwhile.
     const gpr_timespec deadline =
         gpr_convert_clock_type(context.raw_deadline(), GPR_CLOCK_MONOTONIC);
@@ -32,9 +32,13 @@ class CallStop {
                 std::chrono::nanoseconds(remaining.tv_nsec);
   }
 
+  // Without a call, and so without a deadline.
+  CallStop(std::stop_token token, std::chrono::seconds max_computing)
+      : token_(std::move(token)), max_computing_(max_computing) {}
+
   // For a piece of work that begins now.
   Stop Begin() const {
-    const Stop::Clock::time_point limit = Stop::Clock::now() + most_computing_;
+    const Stop::Clock::time_point limit = Stop::Clock::now() + max_computing_;
     return Stop(token_, deadline_ ? std::min(*deadline_, limit) : limit);
   }
 
@@ -46,13 +50,13 @@ class CallStop {
         "--max-compute-s",
         absl::StrFormat(
             "the request was computed for %d s, the longest that one may be (--max-compute-s)",
-            most_computing_.count()));
+            max_computing_.count()));
   }
 
  private:
   std::stop_token token_;
-  std::chrono::seconds most_computing_;
+  std::chrono::seconds max_computing_;
   std::optional<Stop::Clock::time_point> deadline_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

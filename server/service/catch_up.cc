@@ -3,7 +3,7 @@
 #include "core/common/status.h"
 #include "server/service/guarded.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 void CatchUp(const std::shared_ptr<Session>& session, const std::stop_token& stop) {
   const auto compute = [session, stop]() -> absl::Status {
@@ -14,4 +14,4 @@ void CatchUp(const std::shared_ptr<Session>& session, const std::stop_token& sto
   session->strand().Submit([compute] { Guarded(compute).IgnoreError(); }).IgnoreError();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,10 +5,10 @@
 
 #include "server/sessions/session.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Soon computes, on the session's strand, what has been added and nobody waits for, and an estimate
 // of it if somebody watches.
 void CatchUp(const std::shared_ptr<Session>& session, const std::stop_token& stop);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,7 +2,7 @@
 
 #include "server/telemetry/process_info.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 v1::DaemonStatus DescribeDaemon(const ServiceContext& context, const std::string& tenant) {
   v1::DaemonStatus status;
@@ -10,16 +10,16 @@ v1::DaemonStatus DescribeDaemon(const ServiceContext& context, const std::string
   status.set_durable(context.sessions.services().journal.durable());
   for (const auto& session : context.sessions.All()) {
     if (session->tenant() != tenant) continue;
-    status.set_sessions(status.sessions() + 1);
-    if (session->loaded()) status.set_sessions_loaded(status.sessions_loaded() + 1);
+    status.set_session_count(status.session_count() + 1);
+    if (session->loaded()) status.set_loaded_session_count(status.loaded_session_count() + 1);
   }
-  status.set_writers(context.calls.Count(OpenCalls::Kind::kWriter));
-  status.set_watchers(context.calls.Count(OpenCalls::Kind::kWatcher));
-  status.set_waiting_tasks(context.executor.waiting());
+  status.set_writer_count(context.calls.Count(OpenCalls::Kind::kWriter));
+  status.set_watcher_count(context.calls.Count(OpenCalls::Kind::kWatcher));
+  status.set_waiting_task_count(context.executor.waiting());
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - context.start;
-  status.set_uptime(uptime.count());
+  status.set_uptime_s(uptime.count());
   status.set_memory_bytes(ResidentMemoryBytes());
   return status;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/status_service.pb.h"
 #include "server/service/service_context.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // How the daemon is, for a caller of that tenant.
 v1::DaemonStatus DescribeDaemon(const ServiceContext& context, const std::string& tenant);
 
-}  // namespace polyest
+}  // namespace polyest::internal

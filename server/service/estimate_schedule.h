@@ -9,9 +9,10 @@
 #include <chrono>
 #include <optional>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "core/common/field_error.h"
+#include "polyest/v1/session_service.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class EstimateSchedule {
  public:
@@ -19,19 +20,19 @@ class EstimateSchedule {
   using Policy = v1::StreamMeasurementsRequest::EstimatePolicy;
 
   absl::Status Set(const Policy& policy) {
-    if (policy.every_batches() < 0) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "estimates.everyBatches: %d must not be negative", policy.every_batches()));
+    if (policy.batch_count() < 0) {
+      return InvalidField("estimates.batchCount",
+                          absl::StrFormat("%d must not be negative", policy.batch_count()));
     }
     // Before the conversion to nanoseconds, which would overflow.
     const int64_t seconds = policy.min_interval().seconds();
     const int32_t nanos = policy.min_interval().nanos();
     if (seconds < 0 || seconds > kLongestIntervalSeconds || nanos < 0 || nanos >= 1'000'000'000) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "estimates.minInterval: must lie between 0 and %d s", kLongestIntervalSeconds));
+      return InvalidField("estimates.minInterval",
+                          absl::StrFormat("must lie between 0 and %d s", kLongestIntervalSeconds));
     }
     const auto interval = std::chrono::seconds(seconds) + std::chrono::nanoseconds(nanos);
-    every_batches_ = std::max(1, policy.every_batches());
+    every_batches_ = std::max(1, policy.batch_count());
     min_interval_ = interval;
     only_last_ = policy.only_last();
     return absl::OkStatus();
@@ -57,4 +58,4 @@ class EstimateSchedule {
   std::optional<Clock::time_point> last_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,11 +6,11 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/operations/names.h"
+#include "proto/wire/operations/names.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 void ExportFlow::OnStart(ExportReactor* reactor, const grpc::CallbackServerContext& call,
                          const absl::Status& admitted, const std::string& session) {
@@ -123,4 +123,4 @@ void ExportCall::OnDone() {
   delete this;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 #include "server/service/service_context.h"
 #include "server/sessions/session_export.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 using ExportReactor = grpc::ServerWriteReactor<v1::SessionRecord>;
 
@@ -65,4 +65,4 @@ class ExportCall final : public ExportReactor {
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,9 +5,9 @@
 #include <new>
 #include <utility>
 
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // A request may be within every limit and still need more memory than there is: then it fails, and
 // not the daemon.
@@ -21,4 +21,4 @@ absl::Status Guarded(Work&& work) {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 void ImportFlow::OnStart(ImportReactor* reactor, const grpc::CallbackServerContext& call,
                          const absl::Status& admitted) {
@@ -110,4 +110,4 @@ void ImportCall::OnDone() {
   delete this;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,7 +11,7 @@
 #include "server/service/service_context.h"
 #include "server/sessions/session_import.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 using ImportReactor = grpc::ServerReadReactor<v1::ImportSessionRequest>;
 
@@ -67,4 +67,4 @@ class ImportCall final : public ImportReactor {
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

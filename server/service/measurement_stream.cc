@@ -5,18 +5,19 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "server/operations/names.h"
+#include "proto/wire/operations/names.h"
 #include "server/service/catch_up.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 MeasurementFlow::MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call)
     : context_(context),
       call_(call),
-      stop_(call, stop_source_.get_token(), context.most_computing) {}
+      stop_(call, stop_source_.get_token(), context.max_computing) {}
 
 absl::StatusOr<Caller> MeasurementFlow::Authorize() const {
   POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "StreamMeasurements"));
@@ -39,7 +40,7 @@ void MeasurementFlow::OnRead(bool ok) {
   if (!ok) {
     half_closed_ = true;
     if (session_ == nullptr) {
-      End(absl::InvalidArgumentError("session: the first message of a stream must name one"));
+      End(InvalidField("session", "the first message of a stream must name one"));
     }
   } else if (!draining_ && !end_) {
     Accept(std::move(reading_into_));
@@ -58,16 +59,17 @@ absl::Status MeasurementFlow::Attach(const Caller& caller,
                                      const v1::StreamMeasurementsRequest& request) {
   if (session_ != nullptr) {
     if (request.session().empty() || request.session() == session_->name()) return absl::OkStatus();
-    return absl::InvalidArgumentError(absl::StrFormat("session: \"%s\" is not the stream's own, %s",
-                                                      request.session(), session_->name()));
+    return InvalidField("session", absl::StrFormat("\"%s\" is not the stream's own, %s",
+                                                   request.session(), session_->name()));
   }
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", request.session()).status());
   if (request.writer().size() > kLongestWriter) {
-    return absl::InvalidArgumentError(absl::StrFormat("writer: %d characters are more than %d",
-                                                      request.writer().size(), kLongestWriter));
+    return InvalidField("writer", absl::StrFormat("%d characters are more than %d",
+                                                  request.writer().size(), kLongestWriter));
   }
   POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(caller.tenant, request.session()));
   POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));
+  losses_ = session->losses();
   session_ = std::move(session);
   return absl::OkStatus();
 }
@@ -139,7 +141,7 @@ void MeasurementFlow::Advance() {
 }
 
 bool MeasurementFlow::HasRoom() const {
-  return outbox_.size() < kOutbox && uncomputed_.size() < kMostUncomputed;
+  return outbox_.size() < kOutbox && uncomputed_.size() < kMaxUncomputed;
 }
 
 bool MeasurementFlow::AllTaken() const {
@@ -227,12 +229,11 @@ absl::StatusOr<std::optional<MeasurementFlow::Uncomputed>> MeasurementFlow::Answ
   if (request.has_estimates()) POLYEST_RETURN_IF_ERROR(schedule_.Set(request.estimates()));
   if (!request.has_measurements()) {
     if (request.sequence() == 0) return std::nullopt;
-    return absl::InvalidArgumentError(
-        absl::StrFormat("measurements: batch %d has none", request.sequence()));
+    return InvalidField("measurements", absl::StrFormat("batch %d has none", request.sequence()));
   }
   v1::StreamMeasurementsResponse response;
   POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
-                           session_->Add(request.sequence(), request.measurements()));
+                           session_->Add(request.sequence(), request.measurements(), losses_));
   Send(std::move(response), request.sequence());
   return Uncomputed{request.sequence(), schedule_.Due(EstimateSchedule::Clock::now())};
 }
@@ -319,4 +320,4 @@ void MeasurementStream::OnDone() {
   delete this;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

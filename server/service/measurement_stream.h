@@ -20,12 +20,12 @@
 #include <stop_token>
 #include <vector>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/session_service.pb.h"
 #include "server/service/call_stop.h"
 #include "server/service/estimate_schedule.h"
 #include "server/service/service_context.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 using MeasurementReactor =
     grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>;
@@ -60,7 +60,7 @@ class MeasurementFlow final : public SessionObserver,
   static constexpr size_t kOutbox = 64;
   // Batches acknowledged before they are computed: enough for the pauses in which an expansion
   // moves, at the pace of a rig.
-  static constexpr size_t kMostUncomputed = 256;
+  static constexpr size_t kMaxUncomputed = 256;
   // Of one turn on the strand: other sessions wait for theirs.
   static constexpr size_t kTurn = 8;
 
@@ -112,6 +112,7 @@ class MeasurementFlow final : public SessionObserver,
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;  // set once, before any work
+  uint64_t losses_ = 0;               // of the session, when the stream began
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;
@@ -143,4 +144,4 @@ class MeasurementStream final : public MeasurementReactor {
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

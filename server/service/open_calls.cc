@@ -5,9 +5,9 @@
 #include <chrono>
 #include <utility>
 
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 namespace {
 
@@ -26,9 +26,9 @@ absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
   std::lock_guard lock(mutex_);
   if (draining_) return ShuttingDown();
   if (kind != Kind::kUnary) {
-    if (open(kind) >= kMostStreams) {
+    if (open(kind) >= kMaxStreams) {
       return Refuse(absl::StatusCode::kResourceExhausted,
-                    absl::StrCat("the daemon serves at most ", kMostStreams, " streams at a time"),
+                    absl::StrCat("the daemon serves at most ", kMaxStreams, " streams at a time"),
                     {.reason = kBusy, .retry_delay = kRetryDelay});
     }
     auto& streams = streams_[static_cast<int>(kind)];
@@ -81,4 +81,4 @@ void OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
   left_.wait_until(lock, deadline, [this] { return open(Kind::kWatcher) == 0; });
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,7 +11,7 @@
 #include <mutex>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 // A stream that can be asked to come to its end. Called from any thread; must not wait.
 class Drainable {
@@ -37,7 +37,7 @@ class OpenCalls {
     const Kind kind_;
   };
 
-  // UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED past kMostStreams of a kind.
+  // UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED past kMaxStreams of a kind.
   absl::StatusOr<std::unique_ptr<Ticket>> Enter(Kind kind, std::weak_ptr<Drainable> stream = {});
 
   // Refuses new calls from here on, asks the streams to end and waits until all calls have left, or
@@ -46,7 +46,7 @@ class OpenCalls {
 
   int Count(Kind kind) const;
 
-  static constexpr int kMostStreams = 10'000;
+  static constexpr int kMaxStreams = 10'000;
 
  private:
   static constexpr int kKinds = 3;
@@ -64,4 +64,4 @@ class OpenCalls {
 
 absl::Status ShuttingDown();
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <google/protobuf/timestamp.pb.h>
+
 #include <chrono>
+#include <functional>
 #include <stop_token>
 
 #include "core/fmu/model_library.h"
@@ -9,7 +12,7 @@
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // What the service's calls share; outlives them all.
 struct ServiceContext {
@@ -22,8 +25,10 @@ struct ServiceContext {
   std::stop_token stop;
   const ModelLibrary& models;
   // Of one unary call, or of one batch of a stream.
-  std::chrono::seconds most_computing;
+  std::chrono::seconds max_computing;
+  // For what is shown.
+  std::function<google::protobuf::Timestamp()> wall_clock;
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,16 +5,16 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/operations/names.h"
+#include "proto/wire/operations/names.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 WatchFlow::WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call)
     : context_(context),
       call_(call),
-      stop_(call, stop_source_.get_token(), context.most_computing) {}
+      stop_(call, stop_source_.get_token(), context.max_computing) {}
 
 absl::StatusOr<Caller> WatchFlow::Authorize() const {
   POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "WatchSession"));
@@ -135,4 +135,4 @@ void SessionWatch::OnDone() {
   delete this;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,13 +11,13 @@
 #include <optional>
 #include <stop_token>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/session_service.pb.h"
 #include "server/service/call_stop.h"
 #include "server/service/service_context.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-using WatchReactor = grpc::ServerWriteReactor<v1::EstimateResponse>;
+using WatchReactor = grpc::ServerWriteReactor<v1::WatchSessionResponse>;
 
 // The state of one watch; outlives its reactor, for the session may still hold it.
 class WatchFlow final : public SessionObserver,
@@ -56,7 +56,7 @@ class WatchFlow final : public SessionObserver,
   WatchReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;
   SharedEstimate pending_, last_;
-  v1::EstimateResponse written_;  // gRPC's while writing_
+  v1::WatchSessionResponse written_;  // gRPC's while writing_
   bool writing_ = false;
   bool registering_ = false;
   bool finished_ = false;
@@ -77,4 +77,4 @@ class SessionWatch final : public WatchReactor {
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,21 +1,21 @@
 #include "server/service/status_mapping.h"
 
-#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/string_view.h>
 #include <google/protobuf/util/time_util.h>
 #include <grpcpp/support/error_details.h>
 
-#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <string>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "polyest/rpc/error_details.pb.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/convert/wire_fields.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 grpc::StatusCode ToGrpc(absl::StatusCode code) {
@@ -72,18 +72,6 @@ std::string Shortened(absl::string_view text, size_t longest) {
   return absl::StrCat(text.substr(0, longest), "…");
 }
 
-// The path of the field that a message begins with, "uncertain[0].uniform: …"; empty: none.
-absl::string_view FieldOf(absl::string_view message) {
-  const absl::string_view path = message.substr(0, message.find(": "));
-  const auto in_path = [](unsigned char c) {
-    return absl::ascii_isalnum(c) || c == '_' || c == '.' || c == '[' || c == ']';
-  };
-  const bool is_path = path.size() < message.size() && !path.empty() &&
-                       path.size() <= kLongestDescription && absl::ascii_islower(path.front()) &&
-                       std::all_of(path.begin(), path.end(), in_path);
-  return is_path ? path : "";
-}
-
 template <typename Detail>
 void AddDetail(const Detail& detail, rpc::Status& status) {
   google::protobuf::Any& any = *status.add_details();
@@ -91,12 +79,11 @@ void AddDetail(const Detail& detail, rpc::Status& status) {
   detail.SerializeToString(any.mutable_value());
 }
 
-void AddBadRequest(absl::string_view field, rpc::Status& status) {
+void AddBadRequest(const std::string& field, absl::string_view sentence, rpc::Status& status) {
   rpc::BadRequest bad;
   auto& violation = *bad.add_field_violations();
-  violation.set_field(std::string(field));
-  violation.set_description(
-      Shortened(absl::string_view(status.message()).substr(field.size() + 2), kLongestDescription));
+  violation.set_field(Shortened(field, kLongestDescription));
+  violation.set_description(Shortened(sentence, kLongestDescription));
   AddDetail(bad, status);
 }
 
@@ -125,24 +112,32 @@ void AddRetryInfo(std::chrono::milliseconds delay, rpc::Status& status) {
 
 }  // namespace
 
-grpc::Status ToGrpc(const absl::Status& status) {
-  if (status.ok()) return grpc::Status::OK;
+rpc::Status ToRpcStatus(const absl::Status& given) {
+  const absl::Status status = WireFields(given);
   rpc::Status detailed;
   detailed.set_code(ToGrpc(status.code()));
   detailed.set_message(Shortened(status.message(), kLongestMessage));
   const std::optional<Refusal> refusal = RefusalOf(status);
-  const std::string field(FieldOf(status.message()));
-  if (absl::IsInvalidArgument(status) && !field.empty()) AddBadRequest(field, detailed);
+  const std::string field = FieldOf(status).value_or(FieldPath()).ToString();
+  if (absl::IsInvalidArgument(status) && !field.empty()) {
+    AddBadRequest(field, SentenceOf(status), detailed);
+  }
   if (absl::IsResourceExhausted(status)) {
     const std::string& subject = refusal && !refusal->limit.empty() ? refusal->limit : field;
     if (!subject.empty()) AddQuotaFailure(subject, detailed);
   }
   if (refusal) AddErrorInfo(*refusal, detailed);
   if (refusal && refusal->retry_delay) AddRetryInfo(*refusal->retry_delay, detailed);
+  return detailed;
+}
+
+grpc::Status ToGrpc(const absl::Status& status) {
+  if (status.ok()) return grpc::Status::OK;
+  const rpc::Status detailed = ToRpcStatus(status);
   if (detailed.details().empty()) return grpc::Status(ToGrpc(status.code()), detailed.message());
   grpc::Status result;
   POLYEST_CHECK(grpc::SetErrorDetails(detailed, &result).ok());
   return result;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service,
                                            grpc::CallbackServerContext* context,
@@ -17,7 +17,7 @@ grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service,
   call->state_->reactor = call;
   auto run = [state = call->state_, work = std::move(work),
               call_stop =
-                  CallStop(*context, call->state_->stop.get_token(), service.most_computing)] {
+                  CallStop(*context, call->state_->stop.get_token(), service.max_computing)] {
     const Stop stop = call_stop.Begin();
     const auto finish = [state, call_stop](const absl::Status& outcome) {
       Finish(*state, call_stop.Name(outcome));
@@ -53,4 +53,4 @@ grpc::ServerUnaryReactor* FinishAtOnce(grpc::CallbackServerContext* context,
   return reactor;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,12 +11,12 @@
 #include <stop_token>
 #include <utility>
 
-#include "core/common/stop.h"
+#include "polyest/stop.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
 #include "server/service/service_context.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Only the work finishes the call (or Start, when the work is refused), once; until then the
 // request and the response of the call live, and the work may use them.
@@ -62,4 +62,4 @@ absl::Status Deliver(absl::StatusOr<Response> answer, Response* response) {
   return absl::OkStatus();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

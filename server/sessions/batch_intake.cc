@@ -4,9 +4,10 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/convert/measurements.h"
+#include "proto/wire/convert/measurements.h"
+#include "proto/wire/convert/wire_fields.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 BatchIntake::BatchIntake(ResolvedProblem problem)
     : problem_(std::move(problem)), checks_(problem_), runs_(problem_.runs()) {
@@ -26,7 +27,7 @@ double BatchIntake::measured_s() const {
 absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits) {
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch));
   const std::lock_guard lock(mutex_);
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, WireFields(checks_.Check(samples)));
   POLYEST_RETURN_IF_ERROR(CheckRuns(checked.after.run + 1, limits));
   checks_.Accept(checked);
   Advance(samples);
@@ -74,4 +75,4 @@ int64_t BatchIntake::CountValues(const Samples& samples) const {
   return values;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,14 +12,14 @@
 #include <set>
 #include <string>
 
-#include "core/estimator/problem.h"
-#include "core/estimator/sample_checks.h"
-#include "core/estimator/samples.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/sample_checks.h"
+#include "polyest/samples.h"
 #include "polyest/v1/measurements.pb.h"
-#include "server/convert/problem_limits.h"
+#include "proto/wire/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct TakenBatch {
   Samples samples;
@@ -60,4 +60,4 @@ class BatchIntake {
   std::deque<TakenBatch> waiting_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,9 +5,10 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 SessionPlace BatchLedger::kept() const {
   const std::lock_guard lock(mutex_);
@@ -30,12 +31,13 @@ uint64_t BatchLedger::losses() const {
 }
 
 absl::StatusOr<BatchLedger::Kind> BatchLedger::Check(
-    int64_t sequence, const std::string& digest,
+    int64_t sequence, const std::string& digest, uint64_t losses,
     const std::function<absl::StatusOr<std::string>(int64_t)>& kept_digest) const {
   int64_t next = 0;
   std::string known;
   {
     const std::lock_guard lock(mutex_);
+    if (losses != losses_) return last_loss_;
     next = taken_.sequence + 1;
     if (sequence > kept_.sequence && sequence < next) {
       known = under_way_[static_cast<size_t>(sequence - kept_.sequence - 1)].digest;
@@ -43,8 +45,8 @@ absl::StatusOr<BatchLedger::Kind> BatchLedger::Check(
   }
   if (sequence == next) return Kind::kNext;
   if (sequence < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("sequence: %d must be at least 1; the next batch is %d", sequence, next));
+    return InvalidField(
+        "sequence", absl::StrFormat("%d must be at least 1; the next batch is %d", sequence, next));
   }
   if (sequence > next) {
     return absl::FailedPreconditionError(
@@ -60,7 +62,7 @@ absl::StatusOr<BatchLedger::Kind> BatchLedger::Check(
 
 absl::Status BatchLedger::Take(const SessionPlace& place, std::string digest, uint64_t losses) {
   const std::lock_guard lock(mutex_);
-  if (losses != losses_) return absl::UnavailableError(last_loss_.message());
+  if (losses != losses_) return last_loss_;
   POLYEST_CHECK(place.sequence == taken_.sequence + 1);
   taken_ = place;
   under_way_.push_back({place, std::move(digest)});
@@ -117,4 +119,4 @@ void BatchLedger::WhenAllKept(uint64_t losses, Done done) {
   done(now);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -19,7 +19,7 @@
 
 #include "server/journal/session_journal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Threads may share it.
 class BatchLedger {
@@ -35,15 +35,17 @@ class BatchLedger {
   // Counts the times that taken batches were not kept.
   uint64_t losses() const;
 
+  // Says what a batch is to who has seen `losses` of them. When taken batches were lost since, the
+  // answer is why: the number may then follow one of those and says nothing. Otherwise
   // FAILED_PRECONDITION, naming the number expected, for a number further ahead than the next;
   // INVALID_ARGUMENT for one below 1; ALREADY_EXISTS for the number of another batch.
   // `kept_digest` looks up that of a batch that is kept.
   absl::StatusOr<Kind> Check(
-      int64_t sequence, const std::string& digest,
+      int64_t sequence, const std::string& digest, uint64_t losses,
       const std::function<absl::StatusOr<std::string>(int64_t)>& kept_digest) const;
 
-  // The next batch is taken and leads to `place`. UNAVAILABLE when taken batches were lost since
-  // `losses` of them were seen.
+  // Takes the next batch, which leads to `place`. When taken batches were lost since `losses` of
+  // them were seen, takes nothing and answers why they were lost.
   absl::Status Take(const SessionPlace& place, std::string digest, uint64_t losses);
   // What became of a batch taken after that many losses.
   void Settle(uint64_t losses, int64_t sequence, const absl::Status& kept);
@@ -69,4 +71,4 @@ class BatchLedger {
   absl::Status last_loss_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // How often it looks, as a part of the time after which a session is idle.
@@ -60,4 +60,4 @@ void Housekeeper::MakeRoom() {
   malloc_trim(0);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

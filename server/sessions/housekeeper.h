@@ -11,7 +11,7 @@
 
 #include "server/sessions/session_registry.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct HousekeepingOptions {
   // An estimator that was not used for so long is unloaded.
@@ -37,4 +37,4 @@ class Housekeeper {
   std::jthread thread_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "server/convert/problem_limits.h"
+#include "proto/wire/convert/problem_limits.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct SessionLimits {
   int64_t sessions = 10'000;                // --max-sessions: of all tenants
@@ -21,4 +21,4 @@ struct SessionLimits {
   ProblemLimits problem{.parameters = 64, .states = 1'000};
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/convert/estimate.h"
-#include "server/convert/posterior.h"
-#include "server/convert/regularization.h"
+#include "core/estimator/estimator_access.h"
+#include "proto/wire/convert/estimate.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
                                                                    const ModelLibrary& models,
@@ -21,7 +20,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
     if (session->save_) session->save_(std::move(snapshot));
   };
   POLYEST_ASSIGN_OR_RETURN(loaded->estimator_,
-                           Estimator::Make(std::move(resolved), std::move(options)));
+                           EstimatorAccess::Make(std::move(resolved), std::move(options)));
   return loaded;
 }
 
@@ -67,8 +66,9 @@ absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
   return estimator_->Process(stop);
 }
 
-absl::Status LoadedSession::ProcessAll(const Stop& stop) {
-  return ProcessUpTo(std::numeric_limits<int64_t>::max(), stop);
+absl::Status LoadedSession::WithEstimator(const Work& work) {
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max()));
+  return work(*estimator_, sequence_);
 }
 
 absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
@@ -89,38 +89,4 @@ absl::StatusOr<SharedEstimate> LoadedSession::CurrentEstimate(const Stop& stop) 
   return latest_;
 }
 
-absl::StatusOr<v1::GetPosteriorResponse> LoadedSession::CurrentPosterior(
-    const v1::GetPosteriorRequest& request, const Stop& stop) {
-  const PosteriorOptions options = ToPosteriorOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
-  POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator_->CurrentPosterior(options, stop));
-  v1::GetPosteriorResponse response = ToProto(posterior, options);
-  response.set_sequence(sequence_);
-  return response;
-}
-
-absl::StatusOr<v1::ProfileCostResponse> LoadedSession::CurrentProfiles(
-    const v1::ProfileCostRequest& request, const Stop& stop) {
-  const ProfileOptions options = ToProfileOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate(estimator_->problem().prior()));
-  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
-  POLYEST_ASSIGN_OR_RETURN(const CostProfiles profiles, estimator_->CurrentProfiles(options, stop));
-  v1::ProfileCostResponse response = ToProto(profiles);
-  response.set_sequence(sequence_);
-  return response;
-}
-
-absl::StatusOr<v1::SweepRegularizationResponse> LoadedSession::CurrentRegularizationSweep(
-    const v1::SweepRegularizationRequest& request, const Stop& stop) {
-  const RegularizationOptions options = ToRegularizationOptions(request);
-  POLYEST_RETURN_IF_ERROR(options.Validate());
-  POLYEST_RETURN_IF_ERROR(ProcessAll(stop));
-  POLYEST_ASSIGN_OR_RETURN(const RegularizationSweep sweep,
-                           estimator_->CurrentRegularizationSweep(options, stop));
-  v1::SweepRegularizationResponse response = ToProto(sweep);
-  response.set_sequence(sequence_);
-  return response;
-}
-
-}  // namespace polyest
+}  // namespace polyest::internal

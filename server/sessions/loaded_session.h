@@ -9,17 +9,17 @@
 #include <memory>
 #include <string>
 
-#include "core/common/stop.h"
-#include "core/estimator/estimator.h"
 #include "core/fmu/model_library.h"
-#include "polyest/v1/estimation_service.pb.h"
-#include "server/convert/problem_limits.h"
+#include "polyest/estimator.h"
+#include "polyest/stop.h"
+#include "polyest/v1/estimate.pb.h"
+#include "polyest/v1/problem.pb.h"
+#include "proto/wire/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
 #include "server/sessions/batch_intake.h"
+#include "server/sessions/session_observer.h"
 
-namespace polyest {
-
-using SharedEstimate = std::shared_ptr<const v1::Estimate>;
+namespace polyest::internal {
 
 // Batches come in from any thread; the estimator is for one thread at a time.
 class LoadedSession {
@@ -54,18 +54,14 @@ class LoadedSession {
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
   // From everything processed, and made only once for it.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
-  // These process everything taken before.
-  absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
-                                                            const Stop& stop);
-  absl::StatusOr<v1::ProfileCostResponse> CurrentProfiles(const v1::ProfileCostRequest& request,
-                                                          const Stop& stop);
-  absl::StatusOr<v1::SweepRegularizationResponse> CurrentRegularizationSweep(
-      const v1::SweepRegularizationRequest& request, const Stop& stop);
+  // Calls `work` with the estimator, to which everything taken is appended, and with the last batch
+  // taken.
+  using Work = std::function<absl::Status(Estimator& estimator, int64_t sequence)>;
+  absl::Status WithEstimator(const Work& work);
 
  private:
   LoadedSession(v1::Problem problem, const ResolvedProblem& resolved);
   void Restore(const SessionJournal& journal, int64_t session);
-  absl::Status ProcessAll(const Stop& stop);
   absl::Status GiveUpTo(int64_t sequence);
 
   const v1::Problem problem_;
@@ -77,4 +73,4 @@ class LoadedSession {
   SharedEstimate latest_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,9 +4,9 @@
 
 #include <chrono>
 
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // In which idle sessions are unloaded.
@@ -19,8 +19,8 @@ absl::Status MemoryLimit::Check() const {
   return Refuse(absl::StatusCode::kResourceExhausted,
                 absl::StrFormat("the daemon has more memory in use than it may have, %d MiB "
                                 "(--max-memory-mb); try later",
-                                most_mb_),
+                                max_mb_),
                 {.reason = kOutOfMemory, .limit = "--max-memory-mb", .retry_delay = kRetryDelay});
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

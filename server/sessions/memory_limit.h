@@ -11,24 +11,24 @@
 
 #include "server/telemetry/process_info.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // From any thread.
 class MemoryLimit {
  public:
-  // most_mb: MiB, --max-memory-mb; 0: none. resident_bytes: of the process.
-  explicit MemoryLimit(int64_t most_mb = 0,
+  // max_mb: MiB, --max-memory-mb; 0: none. resident_bytes: of the process.
+  explicit MemoryLimit(int64_t max_mb = 0,
                        std::function<int64_t()> resident_bytes = ResidentMemoryBytes)
-      : most_mb_(most_mb), resident_bytes_(std::move(resident_bytes)) {}
+      : max_mb_(max_mb), resident_bytes_(std::move(resident_bytes)) {}
 
-  bool limited() const { return most_mb_ > 0; }
-  bool Exceeded() const { return limited() && resident_bytes_() > most_mb_ * 1024 * 1024; }
+  bool limited() const { return max_mb_ > 0; }
+  bool Exceeded() const { return limited() && resident_bytes_() > max_mb_ * 1024 * 1024; }
   // RESOURCE_EXHAUSTED while it is exceeded; trying again later may help.
   absl::Status Check() const;
 
  private:
-  const int64_t most_mb_;
+  const int64_t max_mb_;
   const std::function<int64_t()> resident_bytes_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,11 +6,11 @@
 #include "server/journal/session_journal.h"
 #include "server/sessions/limits.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // RESOURCE_EXHAUSTED, naming the limit, for a batch with too many rows, or too many beside those of
 // the session so far.
 absl::Status CheckRows(const SessionLimits& limits, const SessionPlace& place,
                        const v1::Measurements& batch);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,27 +8,22 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/journal/digest.h"
+#include "server/digest/digest.h"
 #include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/structured_log.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Session::Computing {
  public:
   Computing(Session& session, const LoadedSession& loaded) : session_(session), loaded_(loaded) {}
   ~Computing() {
-    const std::chrono::duration<double> spent = Clock::now() - begin_;
+    const Clock::duration spent = Clock::now() - begin_;
     if (session_.services_.metrics != nullptr) {
-      session_.services_.metrics->CountComputing(spent.count());
+      session_.services_.metrics->CountComputing(std::chrono::duration<double>(spent).count());
     }
-    const std::lock_guard lock(session_.mutex_);
-    session_.activity_.set_compute_time(session_.activity_.compute_time() + spent.count());
-    session_.computed_s_ += spent.count();
-    session_.measured_s_ = loaded_.measured_s() - session_.measured_before_s_;
-    session_.processed_ = loaded_.sequence();
-    session_.last_use_ = Clock::now();
+    session_.activity_.OnComputed(spent, loaded_.sequence(), loaded_.measured_s());
   }
   Computing(const Computing&) = delete;
   Computing& operator=(const Computing&) = delete;
@@ -44,7 +39,9 @@ Session::Session(const SessionServices& services, SessionHead head,
     : services_(services),
       head_(std::move(head)),
       strand_(std::make_shared<Strand>(services.executor, head_.tenant + "/sessions")),
-      ledger_(head_.place) {
+      ledger_(head_.place),
+      writer_(head_.name),
+      observers_(head_.name) {
   if (loaded == nullptr) return;
   loaded->SaveSnapshots(services.journal, number());
   Replace({std::move(loaded), 0});
@@ -56,72 +53,42 @@ v1::Session Session::Describe() const {
   *session.mutable_create_time() = head_.create_time;
   const SessionPlace place = ledger_.kept();
   session.set_last_sequence(place.sequence);
-  session.set_samples(place.samples);
-  session.set_last_time(place.last_row.time_s);
+  session.set_sample_count(place.samples);
+  session.set_last_time_s(place.last_row.time_s);
   session.set_last_run(place.last_row.run);
-  const std::lock_guard lock(mutex_);
+  const SessionActivity::Summary summary = activity_.Summarize();
   v1::Session::Activity& activity = *session.mutable_activity();
-  activity = activity_;
-  activity.set_has_writer(writer_ != nullptr);
-  activity.set_watchers(static_cast<int32_t>(observers_.size()));
-  activity.set_batches(place.sequence - head_.place.sequence);
-  if (activity_.loaded()) {
-    activity.set_unprocessed_batches(std::max<int64_t>(0, place.sequence - processed_));
+  activity.set_loaded(summary.loaded);
+  activity.set_has_writer(writer_.is_held());
+  activity.set_watcher_count(static_cast<int32_t>(observers_.size()));
+  activity.set_batch_count(place.sequence - head_.place.sequence);
+  activity.set_estimate_count(summary.estimates);
+  activity.set_reexpansion_count(summary.reexpansions);
+  activity.set_compute_time_s(summary.compute_s);
+  if (summary.sequence) {
+    activity.set_unprocessed_batch_count(std::max<int64_t>(0, place.sequence - *summary.sequence));
   }
-  if (measured_s_ > 0) activity.set_real_time_factor(measured_s_ / computed_s_);
-  const std::chrono::duration<double> idle = Clock::now() - last_use_;
-  activity.set_idle_time(idle.count());
+  activity.set_real_time_factor(summary.real_time_factor);
+  activity.set_idle_time_s(std::chrono::duration<double>(activity_.idle()).count());
   return session;
 }
 
-bool Session::loaded() const {
-  const std::lock_guard lock(mutex_);
-  return activity_.loaded();
-}
-
 std::optional<Session::Clock::duration> Session::IdleTime() const {
-  if (!ledger_.all_kept()) return std::nullopt;
-  const std::lock_guard lock(mutex_);
-  if (writer_ != nullptr || !observers_.empty()) return std::nullopt;
-  return Clock::now() - last_use_;
-}
-
-absl::Status Session::ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id) {
-  std::shared_ptr<SessionObserver> replaced;
-  {
-    const std::lock_guard lock(mutex_);
-    if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
-    if (writer_ != nullptr && (id.empty() || id != writer_id_)) {
-      return absl::AbortedError(absl::StrCat(name(), " has a writer already; one at a time"));
-    }
-    replaced = std::exchange(writer_, std::move(writer));
-    writer_id_ = id;
-  }
-  if (replaced != nullptr) replaced->OnReplaced();
-  return absl::OkStatus();
+  if (!ledger_.all_kept() || writer_.is_held() || observed()) return std::nullopt;
+  return activity_.idle();
 }
 
 void Session::ReleaseWriter(const SessionObserver* writer) {
-  std::shared_ptr<SessionObserver> released;
-  const std::lock_guard lock(mutex_);
-  if (writer_.get() != writer) return;
-  released.swap(writer_);
-  last_use_ = Clock::now();
+  if (writer_.Release(writer)) activity_.OnUsed();
 }
 
 void Session::Close() {
-  std::vector<std::shared_ptr<SessionObserver>> observers;
-  {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    observers.swap(observers_);
-    if (writer_ != nullptr) observers.push_back(writer_);
-  }
-  for (const auto& observer : observers) observer->OnClosed();
+  closed_ = true;
+  for (const auto& observer : observers_.Close()) observer->OnClosed();
+  if (const auto writer = writer_.Close(); writer != nullptr) writer->OnClosed();
 }
 
 absl::Status Session::CheckOpen() const {
-  const std::lock_guard lock(mutex_);
   if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   return absl::OkStatus();
 }
@@ -133,16 +100,13 @@ Session::InMemory Session::Present() const {
 
 // What was in memory before is destroyed after the lock.
 void Session::Replace(InMemory in_memory) {
-  const std::lock_guard lock(mutex_);
-  const bool loaded = in_memory.loaded != nullptr;
-  if (loaded) {
-    processed_ = in_memory.loaded->sequence();
-    measured_before_s_ = in_memory.loaded->measured_s();
+  if (in_memory.loaded != nullptr) {
+    activity_.OnLoaded(in_memory.loaded->sequence(), in_memory.loaded->measured_s());
+  } else {
+    activity_.OnUnloaded();
   }
-  in_memory_.losses = in_memory.losses;
-  in_memory_.loaded.swap(in_memory.loaded);
-  activity_.set_loaded(loaded);
-  measured_s_ = computed_s_ = 0;
+  const std::lock_guard lock(mutex_);
+  std::swap(in_memory_, in_memory);
 }
 
 absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop) {
@@ -166,14 +130,15 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const {
   POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, place, batch));
   if (services_.rows == nullptr) return absl::OkStatus();
-  return services_.rows->Take(number(), tenant(), batch.time_size());
+  return services_.rows->Take(number(), tenant(), batch.time_s_size());
 }
 
 void Session::ReleaseRoom(int64_t rows) const {
   if (services_.rows != nullptr) services_.rows->Release(number(), rows);
 }
 
-absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch) {
+absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,
+                                                 std::optional<uint64_t> losses) {
   JournalEntry entry;
   entry.session = number();
   entry.measurements = DeterministicBytes(batch);
@@ -181,29 +146,30 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
   const std::lock_guard taking(taking_);
   POLYEST_RETURN_IF_ERROR(CheckOpen());
   const InMemory present = Present();
-  if (present.loaded == nullptr)
+  POLYEST_ASSIGN_OR_RETURN(
+      const BatchLedger::Kind kind,
+      ledger_.Check(sequence, entry.digest, losses.value_or(present.losses),
+                    [this](int64_t kept) { return services_.journal.ReadDigest(number(), kept); }));
+  if (present.loaded == nullptr) {
     return absl::UnavailableError(name() + " is not loaded; try again");
+  }
   BatchIntake& intake = present.loaded->intake();
-  POLYEST_ASSIGN_OR_RETURN(const BatchLedger::Kind kind,
-                           ledger_.Check(sequence, entry.digest, [this](int64_t kept) {
-                             return services_.journal.ReadDigest(number(), kept);
-                           }));
   if (kind == BatchLedger::Kind::kNext) {
     const SessionPlace before = intake.place();
     const double measured_s = intake.measured_s();
     POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch));
-    absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_size()); };
+    absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_s_size()); };
     POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem));
     entry.place = intake.place();
     POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, present.losses));
     const int64_t values = entry.place.samples - before.samples;
     std::move(release_room).Cancel();
-    Keep(std::move(entry), present.losses, batch.time_size(), values,
+    Keep(std::move(entry), present.losses, batch.time_s_size(), values,
          intake.measured_s() - measured_s);
   }
   v1::Acknowledgement acknowledgement;
   acknowledgement.set_sequence(sequence);
-  acknowledgement.set_samples(intake.place().samples);
+  acknowledgement.set_sample_count(intake.place().samples);
   return acknowledgement;
 }
 
@@ -249,51 +215,23 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
   passed_on_ = latest;
   CountEstimate(*latest, Clock::now() - begin);
   WhenKept(latest->sequence(), [self = shared_from_this(), latest](const absl::Status& kept) {
-    if (kept.ok()) self->PassOn(latest);
+    if (kept.ok()) self->observers_.OnEstimate(latest);
   });
   return latest;
 }
 
 void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration duration) {
-  const int64_t reexpansions = estimate.expansion().reexpansions();
-  const std::lock_guard lock(mutex_);
+  const int64_t reexpansions = activity_.OnEstimate(estimate.expansion().reexpansions());
   if (services_.metrics != nullptr) {
     services_.metrics->Count(
-        Metrics::NewEstimate{std::chrono::duration<double>(duration).count(),
-                             std::max<int64_t>(0, reexpansions - activity_.reexpansions())});
+        Metrics::NewEstimate{std::chrono::duration<double>(duration).count(), reexpansions});
   }
-  activity_.set_estimates(activity_.estimates() + 1);
-  activity_.set_reexpansions(reexpansions);
 }
 
-void Session::PassOn(const SharedEstimate& estimate) {
-  std::vector<std::shared_ptr<SessionObserver>> observers;
-  {
-    const std::lock_guard lock(mutex_);
-    observers = observers_;
-  }
-  for (const auto& observer : observers) observer->OnEstimate(estimate);
-}
-
-absl::StatusOr<v1::GetPosteriorResponse> Session::CurrentPosterior(
-    const v1::GetPosteriorRequest& request, const Stop& stop) {
+absl::Status Session::WithEstimator(const LoadedSession::Work& work, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
   const Computing computing(*this, *loaded);
-  return loaded->CurrentPosterior(request, stop);
-}
-
-absl::StatusOr<v1::ProfileCostResponse> Session::CurrentProfiles(
-    const v1::ProfileCostRequest& request, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
-  const Computing computing(*this, *loaded);
-  return loaded->CurrentProfiles(request, stop);
-}
-
-absl::StatusOr<v1::SweepRegularizationResponse> Session::CurrentRegularizationSweep(
-    const v1::SweepRegularizationRequest& request, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
-  const Computing computing(*this, *loaded);
-  return loaded->CurrentRegularizationSweep(request, stop);
+  return loaded->WithEstimator(work);
 }
 
 absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop) {
@@ -304,21 +242,12 @@ absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const S
       if (kept.ok()) observer->OnEstimate(present);
     });
   }
-  const std::lock_guard lock(mutex_);
-  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
-  observers_.push_back(std::move(observer));
-  return absl::OkStatus();
+  return observers_.Add(std::move(observer));
 }
 
 void Session::Unobserve(const SessionObserver* observer) {
-  const std::lock_guard lock(mutex_);
-  std::erase_if(observers_, [&](const auto& one) { return one.get() == observer; });
-  last_use_ = Clock::now();
-}
-
-bool Session::observed() const {
-  const std::lock_guard lock(mutex_);
-  return !observers_.empty();
+  observers_.Remove(observer);
+  activity_.OnUsed();
 }
 
 void Session::Unload() {
@@ -328,4 +257,4 @@ void Session::Unload() {
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,38 +5,31 @@
 
 #include <absl/status/statusor.h>
 
-#include <chrono>
+#include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "core/common/stop.h"
 #include "core/fmu/model_library.h"
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/stop.h"
+#include "polyest/v1/session_service.pb.h"
 #include "server/execution/executor.h"
 #include "server/journal/session_journal.h"
 #include "server/sessions/batch_ledger.h"
 #include "server/sessions/limits.h"
 #include "server/sessions/loaded_session.h"
 #include "server/sessions/memory_limit.h"
+#include "server/sessions/observer_list.h"
+#include "server/sessions/session_activity.h"
+#include "server/sessions/session_observer.h"
 #include "server/sessions/stored_rows.h"
+#include "server/sessions/writer_lease.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Metrics;
-
-// Called from the session's strand, from the journal, or from whoever closes it; must not wait.
-class SessionObserver {
- public:
-  virtual ~SessionObserver() = default;
-  virtual void OnEstimate(const SharedEstimate& estimate) = 0;
-  // The last call.
-  virtual void OnClosed() = 0;
-  // To a writer; the last call.
-  virtual void OnReplaced() {}
-};
 
 // What all sessions need; outlives them.
 struct SessionServices {
@@ -52,7 +45,7 @@ struct SessionServices {
 
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = SessionActivity::Clock;
 
   // One that the journal keeps; `loaded` when it has just been made.
   Session(const SessionServices& services, SessionHead head,
@@ -64,7 +57,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Strand& strand() { return *strand_; }
 
   // From any thread.
-  // Without the problem.
+  // All fields but the problem.
   v1::Session Describe() const;
   absl::StatusOr<v1::Problem> ReadProblem() const {
     return services_.journal.ReadProblem(number());
@@ -77,14 +70,14 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionPlace place() const { return ledger_.kept(); }
   // Batches taken, acknowledged or about to be.
   SessionPlace taken() const { return ledger_.taken(); }
-  bool loaded() const;
+  bool loaded() const { return activity_.loaded(); }
   // Since it was last used; none while it is in use.
   std::optional<Clock::duration> IdleTime() const;
 
-  // One writer at a time: ABORTED while another has it. A writer hears of the closing, and of being
-  // replaced by one with the same id that is not empty.
-  absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id);
-  // Nothing when it was replaced.
+  // As WriterLease::Claim.
+  absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id) {
+    return writer_.Claim(std::move(writer), id);
+  }
   void ReleaseWriter(const SessionObserver* writer);
 
   // Ends the session for everybody: calls on it are NOT_FOUND from here on.
@@ -104,7 +97,11 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Takes the batch, all of it or nothing. It may be acknowledged as the answer says WhenKept its
   // sequence. No numerics: ProcessUpTo does them. UNAVAILABLE when the session is not loaded.
-  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch);
+  // After batches were lost, refuses with the reason of the loss: until the session is loaded
+  // again, or for good where `losses` (those seen when a stream began) is given, because what the
+  // stream sends next follows a batch that is lost.
+  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch,
+                                          std::optional<uint64_t> losses = std::nullopt);
 
   // The following only on the strand. Each brings the estimator back into memory if it is not
   // there.
@@ -119,17 +116,13 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<SharedEstimate> LatestEstimate(const Stop& stop);
   // The same from everything added.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
-  // The posterior in detail, from everything added.
-  absl::StatusOr<v1::GetPosteriorResponse> CurrentPosterior(const v1::GetPosteriorRequest& request,
-                                                            const Stop& stop);
-  absl::StatusOr<v1::ProfileCostResponse> CurrentProfiles(const v1::ProfileCostRequest& request,
-                                                          const Stop& stop);
-  absl::StatusOr<v1::SweepRegularizationResponse> CurrentRegularizationSweep(
-      const v1::SweepRegularizationRequest& request, const Stop& stop);
+  // Calls `work` with the estimator, which has everything added and has yet to process it, and with
+  // the last batch added. Returns what `work` returns.
+  absl::Status WithEstimator(const LoadedSession::Work& work, const Stop& stop);
   // Passes on the present estimate, if there are samples, and every new one from here on.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   void Unobserve(const SessionObserver* observer);
-  bool observed() const;
+  bool observed() const { return observers_.size() > 0; }
   // Takes the estimator out of memory if the session is not in use.
   void Unload();
 
@@ -148,7 +141,6 @@ class Session : public std::enable_shared_from_this<Session> {
   void ReleaseRoom(int64_t rows) const;
   // What is in memory, brought there if need be; batches taken may wait in it for the numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);
-  void PassOn(const SharedEstimate& estimate);
   // In the journal, with what is to be counted once it is there.
   void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
   InMemory Present() const;
@@ -162,21 +154,15 @@ class Session : public std::enable_shared_from_this<Session> {
 
   SharedEstimate passed_on_;  // the strand's own
 
+  std::atomic<bool> closed_ = false;
+  WriterLease writer_;
+  ObserverList observers_;
+  SessionActivity activity_;
+
   std::mutex taking_;  // held while a batch is taken
 
   mutable std::mutex mutex_;
   InMemory in_memory_;  // changed on the strand only
-  bool closed_ = false;
-  std::shared_ptr<SessionObserver> writer_;
-  std::string writer_id_;
-  std::vector<std::shared_ptr<SessionObserver>> observers_;
-  Clock::time_point last_use_ = Clock::now();
-  v1::Session::Activity activity_;
-  // Seconds of measurements processed, and computed for them, since the estimator is in memory.
-  double measured_s_ = 0;
-  double computed_s_ = 0;
-  double measured_before_s_ = 0;  // and before that
-  int64_t processed_ = 0;         // the last batch
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

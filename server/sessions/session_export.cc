@@ -4,7 +4,7 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Of one answer, so that a long session is not all in memory: it ends with the batch that passes
@@ -22,7 +22,7 @@ v1::SessionRecord SessionExport::Head(const v1::Problem& problem) const {
   head.set_name(described_.name());
   *head.mutable_problem() = problem;
   *head.mutable_create_time() = described_.create_time();
-  head.set_batches(described_.last_sequence());
+  head.set_batch_count(described_.last_sequence());
   return record;
 }
 
@@ -48,4 +48,4 @@ absl::StatusOr<std::vector<v1::SessionRecord>> SessionExport::Next() {
   return records;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 
 #include "server/sessions/session.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // For one thread at a time.
 class SessionExport {
@@ -29,4 +29,4 @@ class SessionExport {
   int64_t given_ = 0;  // batches
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

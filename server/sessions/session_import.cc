@@ -6,11 +6,12 @@
 #include <future>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "server/journal/digest.h"
+#include "server/digest/digest.h"
 #include "server/sessions/row_limits.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : registry_(registry) {
   head_.tenant = std::move(tenant);
@@ -31,27 +32,27 @@ absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
     case v1::SessionRecord::RECORD_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("record: must be a head or a batch");
+  return InvalidField("record", "must be a head or a batch");
 }
 
 absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head) {
   if (loaded_ != nullptr) {
-    return absl::InvalidArgumentError("record.head: there is one already; batches follow it");
+    return InvalidField("record.head", "there is one already; batches follow it");
   }
   head_.name = id.empty() ? head.name() : absl::StrCat("sessions/", id);
   const std::string prefix = "sessions/";
   if (!head_.name.starts_with(prefix)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("record.head.name: \"%s\" must be sessions/{id}", head_.name));
+    return InvalidField("record.head.name",
+                        absl::StrFormat("\"%s\" must be sessions/{id}", head_.name));
   }
   POLYEST_RETURN_IF_ERROR(CheckSessionId(head_.name.substr(prefix.size())));
-  if (head.batches() < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("record.head.batches: %d must not be negative", head.batches()));
+  if (head.batch_count() < 0) {
+    return InvalidField("record.head.batchCount",
+                        absl::StrFormat("%d must not be negative", head.batch_count()));
   }
   POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
   head_.create_time = head.create_time();
-  promised_ = head.batches();
+  promised_ = head.batch_count();
   const SessionServices& services = registry_.services();
   POLYEST_ASSIGN_OR_RETURN(
       auto loaded, LoadedSession::Make(head.problem(), services.models, services.limits.problem));
@@ -63,19 +64,19 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
 
 absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   if (loaded_ == nullptr) {
-    return absl::InvalidArgumentError("record: the first must be a session's head");
+    return InvalidField("record", "the first must be a session's head");
   }
   const int64_t next = loaded_->intake().place().sequence + 1;
   if (batch.sequence() != next || next > promised_) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("record.batch.sequence: %d must be %d, and the head promises %d batches",
-                        batch.sequence(), next, promised_));
+    return InvalidField("record.batch.sequence",
+                        absl::StrFormat("%d must be %d, and the head promises %d batches",
+                                        batch.sequence(), next, promised_));
   }
   const SessionServices& services = registry_.services();
   BatchIntake& intake = loaded_->intake();
   POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, intake.place(), batch.measurements()));
   POLYEST_RETURN_IF_ERROR(
-      services.rows->Take(head_.number, head_.tenant, batch.measurements().time_size()));
+      services.rows->Take(head_.number, head_.tenant, batch.measurements().time_s_size()));
   POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements(), services.limits.problem));
   JournalEntry entry;
   entry.session = head_.number;
@@ -91,8 +92,8 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
 absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
   const int64_t batches = loaded_ == nullptr ? 0 : loaded_->intake().place().sequence;
   if (loaded_ == nullptr || batches < promised_) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("record: the session breaks off after batch %d of %d", batches, promised_));
+    return InvalidField("record", absl::StrFormat("the session breaks off after batch %d of %d",
+                                                  batches, promised_));
   }
   const absl::Status shown = registry_.services().journal.Show(head_.number);
   if (absl::IsAlreadyExists(shown)) {
@@ -104,4 +105,4 @@ absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
   return registry_.Adopt(std::move(head_), std::move(loaded_));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

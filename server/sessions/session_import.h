@@ -9,7 +9,7 @@
 
 #include "server/sessions/session_registry.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // For one thread at a time.
 class SessionImport {
@@ -37,4 +37,4 @@ class SessionImport {
   std::unique_ptr<LoadedSession> loaded_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

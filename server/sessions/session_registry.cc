@@ -7,10 +7,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr size_t kLongestId = 63;
@@ -27,8 +28,9 @@ absl::Status CheckSessionId(const std::string& id) {
                       return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-';
                     });
   if (good) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "sessionId: \"%s\" must be 1 to %d of a-z, 0-9 and -, first a letter", id, kLongestId));
+  return InvalidField(
+      "sessionId",
+      absl::StrFormat("\"%s\" must be 1 to %d of a-z, 0-9 and -, first a letter", id, kLongestId));
 }
 
 SessionRegistry::SessionRegistry(const SessionServices& services, WallClock clock)
@@ -166,4 +168,4 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {
   return all;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,7 +14,7 @@
 
 #include "server/sessions/session.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // From any thread. A session of another tenant is NOT_FOUND.
 class SessionRegistry {
@@ -67,4 +67,4 @@ class SessionRegistry {
 // INVALID_ARGUMENT for an id that a session cannot have.
 absl::Status CheckSessionId(const std::string& id);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,28 +4,29 @@
 
 #include <algorithm>
 
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::Status StoredRows::Take(int64_t session, const std::string& tenant, int64_t rows) {
   const std::lock_guard lock(mutex_);
   const auto found = tenants_.find(tenant);
   const int64_t present = found == tenants_.end() ? 0 : found->second;
-  if (present + rows > most_per_tenant_) {
+  if (present + rows > max_per_tenant_) {
     return LimitExceeded(
         "--max-tenant-rows",
-        absl::StrFormat("measurements.time: %d rows beside the %d that the tenant has stored are "
+        absl::StrFormat("measurements.timeS: %d rows beside the %d that the tenant has stored are "
                         "more than it may have, %d (--max-tenant-rows); delete a session",
-                        rows, present, most_per_tenant_));
+                        rows, present, max_per_tenant_));
   }
-  if (in_all_ + rows > most_in_all_) {
+  if (in_all_ + rows > max_in_all_) {
     // How much the others have is not told.
     return LimitExceeded(
         "--max-total-rows",
-        absl::StrFormat("measurements.time: %d rows beside all that the daemon has stored are more "
-                        "than it may have, %d (--max-total-rows); delete a session",
-                        rows, most_in_all_));
+        absl::StrFormat(
+            "measurements.timeS: %d rows beside all that the daemon has stored are more "
+            "than it may have, %d (--max-total-rows); delete a session",
+            rows, max_in_all_));
   }
   Add(session, tenant, rows);
   return absl::OkStatus();
@@ -70,4 +71,4 @@ void StoredRows::Remove(std::map<int64_t, Share>::iterator share, int64_t rows) 
   if ((share->second.rows -= rows) == 0) sessions_.erase(share);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

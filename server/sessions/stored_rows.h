@@ -9,13 +9,13 @@
 #include <mutex>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // From any thread. Sessions go by their number in the journal.
 class StoredRows {
  public:
-  StoredRows(int64_t most_per_tenant, int64_t most_in_all)
-      : most_per_tenant_(most_per_tenant), most_in_all_(most_in_all) {}
+  StoredRows(int64_t max_per_tenant, int64_t max_in_all)
+      : max_per_tenant_(max_per_tenant), max_in_all_(max_in_all) {}
 
   // Takes room for so many rows more; RESOURCE_EXHAUSTED, naming the limit, where there is none.
   absl::Status Take(int64_t session, const std::string& tenant, int64_t rows);
@@ -38,8 +38,8 @@ class StoredRows {
   void Add(int64_t session, const std::string& tenant, int64_t rows);
   void Remove(std::map<int64_t, Share>::iterator share, int64_t rows);
 
-  const int64_t most_per_tenant_;
-  const int64_t most_in_all_;
+  const int64_t max_per_tenant_;
+  const int64_t max_in_all_;
   mutable std::mutex mutex_;
   // Those that have rows.
   std::map<int64_t, Share> sessions_;
@@ -47,4 +47,4 @@ class StoredRows {
   int64_t in_all_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

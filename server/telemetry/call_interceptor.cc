@@ -16,18 +16,23 @@
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using grpc::experimental::InterceptionHookPoints;
 using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerRpcInfo;
 
-constexpr char kPrefix[] = "/polyest.v1.EstimationService/";
+constexpr char kPrefix[] = "/polyest.v1.";
 
 std::string CodeName(const grpc::Status& status) {
   // The codes of both are the same numbers.
   return absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code()));
+}
+
+// Without its service: no two services share a name.
+std::string MethodName(absl::string_view path) {
+  return std::string(path.substr(path.rfind('/') + 1));
 }
 
 // The session that a message names, if it does: of a request or a response.
@@ -41,7 +46,9 @@ std::string SessionNamed(const google::protobuf::Message& message) {
     std::string value = message.GetReflection()->GetString(message, field);
     if (absl::StartsWith(value, "sessions/")) return value;
   }
-  return "";
+  const auto* subject = message.GetDescriptor()->FindFieldByName("subject");
+  if (subject == nullptr || subject->message_type() == nullptr) return "";
+  return SessionNamed(message.GetReflection()->GetMessage(message, subject));
 }
 
 spdlog::level::level_enum LevelOf(grpc::StatusCode code, bool changes_sessions) {
@@ -67,16 +74,14 @@ spdlog::level::level_enum LevelOf(grpc::StatusCode code, bool changes_sessions) 
 // What a refusal says of the daemon. What others say repeats the request.
 bool MayTellReason(grpc::StatusCode code) {
   return code == grpc::StatusCode::RESOURCE_EXHAUSTED || code == grpc::StatusCode::UNAVAILABLE ||
-         code == grpc::StatusCode::INTERNAL || code == grpc::StatusCode::DATA_LOSS;
+         code == grpc::StatusCode::INTERNAL || code == grpc::StatusCode::DATA_LOSS ||
+         code == grpc::StatusCode::UNAUTHENTICATED || code == grpc::StatusCode::PERMISSION_DENIED;
 }
 
 class CallInterceptor final : public grpc::experimental::Interceptor {
  public:
-  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const TenantOf& tenant_of)
-      : call_(call),
-        metrics_(metrics),
-        tenant_of_(tenant_of),
-        method_(call.method() + sizeof(kPrefix) - 1) {}
+  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const CallerOf& caller_of)
+      : call_(call), metrics_(metrics), caller_of_(caller_of), method_(MethodName(call.method())) {}
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
@@ -122,11 +127,14 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
         method_ == "CreateSession" || method_ == "DeleteSession" || method_ == "ImportSession";
     const auto level = LevelOf(status.error_code(), changes_sessions);
     if (!IsLogged(level)) return;
+    const LoggedCaller caller = caller_of_(*call_.server_context());
     Log(level, "call",
         {{"request", id_},
          {"method", method_},
          {"session", session_},
-         {"tenant", tenant_of_(*call_.server_context())},
+         {"tenant", caller.tenant},
+         {"caller", caller.name},
+         {"peer", call_.server_context()->peer()},
          {"code", CodeName(status)},
          {"duration_s", absl::StrFormat("%.6f", duration.count())},
          {"reason", MayTellReason(status.error_code()) ? status.error_message() : ""}});
@@ -134,7 +142,7 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
 
   ServerRpcInfo& call_;
   Metrics& metrics_;
-  const TenantOf& tenant_of_;
+  const CallerOf& caller_of_;
   const std::string method_;
   const bool one_response_ = call_.type() == ServerRpcInfo::Type::UNARY ||
                              call_.type() == ServerRpcInfo::Type::CLIENT_STREAMING;
@@ -145,26 +153,26 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
 
 class CallInterceptors final : public grpc::experimental::ServerInterceptorFactoryInterface {
  public:
-  CallInterceptors(Metrics& metrics, TenantOf tenant_of)
-      : metrics_(metrics), tenant_of_(std::move(tenant_of)) {}
+  CallInterceptors(Metrics& metrics, CallerOf caller_of)
+      : metrics_(metrics), caller_of_(std::move(caller_of)) {}
 
   // None for calls of health and reflection, whose messages are of other kinds.
   grpc::experimental::Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     if (!absl::StartsWith(call->method(), kPrefix)) return nullptr;
-    return new CallInterceptor(*call, metrics_, tenant_of_);
+    return new CallInterceptor(*call, metrics_, caller_of_);
   }
 
  private:
   Metrics& metrics_;
-  const TenantOf tenant_of_;
+  const CallerOf caller_of_;
 };
 
 }  // namespace
 
-void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, TenantOf tenant_of) {
+void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, CallerOf caller_of) {
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> creators;
-  creators.push_back(std::make_unique<CallInterceptors>(metrics, std::move(tenant_of)));
+  creators.push_back(std::make_unique<CallInterceptors>(metrics, std::move(caller_of)));
   builder.experimental().SetInterceptorCreators(std::move(creators));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,12 +11,16 @@
 
 #include "server/telemetry/metrics.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// The tenant who calls, for the log; empty for a caller who is not let in.
-using TenantOf = std::function<std::string(const grpc::ServerContextBase&)>;
+// Who calls, for the log; empty for a caller who is not let in.
+struct LoggedCaller {
+  std::string tenant{};
+  std::string name{};  // of the token, or of the client's certificate
+};
+using CallerOf = std::function<LoggedCaller(const grpc::ServerContextBase&)>;
 
 // Before the server is built; `metrics` outlives the server.
-void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, TenantOf tenant_of);
+void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, CallerOf caller_of);
 
-}  // namespace polyest
+}  // namespace polyest::internal

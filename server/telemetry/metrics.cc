@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using prometheus::Counter;
@@ -146,4 +146,4 @@ void Metrics::Count(const Commit& commit) {
   if (commit.failed) Increment(families_->commit_failures, 1);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@ class Collectable;
 class Registry;
 }  // namespace prometheus
 
-namespace polyest {
+namespace polyest::internal {
 
 // From any thread.
 class Metrics {
@@ -65,4 +65,4 @@ class Metrics {
   std::unique_ptr<Families> families_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
                                                                         Collectables collectables) {
@@ -32,4 +32,4 @@ MetricsEndpoint::MetricsEndpoint(std::unique_ptr<prometheus::Exposer> exposer,
 
 MetricsEndpoint::~MetricsEndpoint() = default;
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -13,7 +13,7 @@ class Collectable;
 class Exposer;
 }  // namespace prometheus
 
-namespace polyest {
+namespace polyest::internal {
 
 class MetricsEndpoint {
  public:
@@ -36,4 +36,4 @@ class MetricsEndpoint {
   int port_ = 0;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-namespace polyest {
+namespace polyest::internal {
 
 std::string Version() { return POLYEST_VERSION; }
 
@@ -17,4 +17,4 @@ int64_t ResidentMemoryBytes() {
   return resident * sysconf(_SC_PAGESIZE);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Of polyest.
 std::string Version();
@@ -11,4 +11,4 @@ std::string Version();
 // Of this process, resident; 0 where the operating system does not say.
 int64_t ResidentMemoryBytes();
 
-}  // namespace polyest
+}  // namespace polyest::internal

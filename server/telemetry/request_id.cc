@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <random>
 
-namespace polyest {
+namespace polyest::internal {
 
 bool IsRequestId(std::string_view text) {
   constexpr size_t kLongest = 64;
@@ -25,4 +25,4 @@ std::string MakeRequestId() {
   return absl::StrFormat("%08x-%d", process, ++calls);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

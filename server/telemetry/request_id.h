@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-namespace polyest {
+namespace polyest::internal {
 
 // Of metadata, both ways.
 inline constexpr char kRequestIdKey[] = "x-request-id";
@@ -14,4 +14,4 @@ bool IsRequestId(std::string_view text);
 // One that no other call of any daemon is likely to have.
 std::string MakeRequestId();
 
-}  // namespace polyest
+}  // namespace polyest::internal

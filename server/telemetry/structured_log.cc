@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <memory>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Those of the line that this thread is logging: spdlog's own messages have no room for them.
@@ -143,4 +143,4 @@ void Log(spdlog::level::level_enum level, const std::string& message, const LogF
   current_fields = nullptr;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

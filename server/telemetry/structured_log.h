@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 enum class LogFormat { kText, kJson };
 
@@ -29,4 +29,4 @@ std::string FieldsAsJson(const LogFields& fields);
 // With its quotes; bytes that are no UTF-8 are replaced.
 std::string JsonString(const std::string& text);
 
-}  // namespace polyest
+}  // namespace polyest::internal

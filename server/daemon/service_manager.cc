@@ -1,0 +1,57 @@
+#include "server/daemon/service_manager.h"
+
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <utility>
+
+namespace polyest::internal {
+namespace {
+
+// So that two reports in a row may come late before the manager acts.
+constexpr int kReportsPerTimeout = 3;
+
+// The time-out that the manager asks for; zero without a watchdog.
+std::chrono::microseconds WatchdogTimeout() {
+  uint64_t timeout_us = 0;
+  if (sd_watchdog_enabled(/*unset_environment=*/0, &timeout_us) <= 0) return {};
+  return std::chrono::microseconds(timeout_us);
+}
+
+void Report(const std::string& state) {
+  const int sent = sd_notify(/*unset_environment=*/0, state.c_str());
+  if (sent < 0) spdlog::warn("cannot report to the service manager: {}", strerror(-sent));
+}
+
+}  // namespace
+
+void ReportReady(const std::string& status) { Report("READY=1\nSTATUS=" + status); }
+
+void ReportStopping() { Report("STOPPING=1\nSTATUS=draining"); }
+
+Watchdog::Watchdog(IsAlive is_alive) : is_alive_(std::move(is_alive)) {
+  const auto timeout = std::chrono::duration_cast<std::chrono::milliseconds>(WatchdogTimeout());
+  if (timeout.count() == 0) return;
+  const auto interval = std::max(timeout / kReportsPerTimeout, std::chrono::milliseconds(1));
+  thread_ = std::jthread([this, interval](std::stop_token stop) { Run(stop, interval); });
+}
+
+void Watchdog::Run(std::stop_token stop, std::chrono::milliseconds interval) const {
+  std::mutex mutex;
+  std::condition_variable_any stopped;
+  while (!stop.stop_requested()) {
+    if (is_alive_(interval)) {
+      Report("WATCHDOG=1");
+    } else {
+      spdlog::warn("the daemon does not answer itself: the service manager's watchdog is not fed");
+    }
+    std::unique_lock lock(mutex);
+    stopped.wait_for(lock, stop, interval, [] { return false; });
+  }
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,149 @@
+#include "server/journal/data_folder.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <fcntl.h>
+#include <spdlog/spdlog.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kJournal[] = "journal.db";
+constexpr char kLock[] = "lock";
+constexpr mode_t kFolderMode = 0700;
+constexpr mode_t kFileMode = 0600;
+// The bits of a mode by which the group and all others may read, write or enter.
+constexpr mode_t kOthers = 0077;
+constexpr mode_t kPermissions = 07777;
+
+std::string ErrnoText() { return std::strerror(errno); }
+
+// A journal's own file: its lock, SQLite's file, and those that SQLite puts beside it.
+bool IsOwn(const std::string& name) { return name == kLock || absl::StartsWith(name, kJournal); }
+
+// The permissions of a file or folder.
+absl::StatusOr<mode_t> ModeOf(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0) return status.st_mode & kPermissions;
+  return absl::FailedPreconditionError(absl::StrFormat("cannot read %s: %s", path, ErrnoText()));
+}
+
+// Closes a file or folder to others. Some file systems take a new mode without an error and keep
+// the old one, so the mode is read again.
+absl::Status ClosePath(const std::string& path, mode_t old_mode, mode_t mode) {
+  const bool changed = chmod(path.c_str(), mode) == 0;
+  const std::string why = changed ? "its file system keeps no permissions" : ErrnoText();
+  POLYEST_ASSIGN_OR_RETURN(const mode_t now, ModeOf(path));
+  if ((now & kOthers) == 0) {
+    spdlog::warn("{} was open to other users (mode {:04o}), and is no more ({:04o})", path,
+                 static_cast<unsigned>(old_mode), static_cast<unsigned>(now));
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "%s is open to other users (mode %04o) and cannot be closed to them (%s); as its owner, "
+      "chmod %04o it",
+      path, now, why, mode));
+}
+
+absl::Status MakeFolder(const std::string& folder) {
+  std::error_code error;
+  fs::path path = fs::path(folder).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();  // without the slash at the end
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  if (!error && mkdir(path.c_str(), kFolderMode) != 0 && errno != EEXIST) {
+    error = std::error_code(errno, std::generic_category());
+  }
+  if (!error && !fs::is_directory(path, error) && !error) {
+    error = std::make_error_code(std::errc::not_a_directory);
+  }
+  if (!error) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrFormat("cannot make the folder %s: %s", folder, error.message()));
+}
+
+absl::Status MakeFolderPrivate(const std::string& folder) {
+  POLYEST_ASSIGN_OR_RETURN(const mode_t mode, ModeOf(folder));
+  if ((mode & kOthers) == 0) return absl::OkStatus();
+  // Something else may be there for others to use: /tmp, say.
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (IsOwn(name)) continue;
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "the folder %s is open to other users (mode %04o) and holds other files (%s); chmod %04o "
+        "it, or give the daemon a folder of its own",
+        folder, mode, name, kFolderMode));
+  }
+  return ClosePath(folder, mode, kFolderMode);
+}
+
+// What is in the folder already is from a version that left its files to the umask.
+absl::Status MakeFilesPrivate(const std::string& folder) {
+  for (const char* name : {kLock, kJournal, "journal.db-wal", "journal.db-shm"}) {
+    const std::string file = absl::StrCat(folder, "/", name);
+    std::error_code ignored;
+    if (!fs::exists(file, ignored)) continue;
+    POLYEST_ASSIGN_OR_RETURN(const mode_t mode, ModeOf(file));
+    if ((mode & kOthers) != 0) POLYEST_RETURN_IF_ERROR(ClosePath(file, mode, kFileMode));
+  }
+  return absl::OkStatus();
+}
+
+// Before SQLite, which would leave the mode to the umask, makes the file.
+absl::Status MakeJournalFile(const std::string& file) {
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kFileMode);
+  if (descriptor >= 0) {
+    close(descriptor);
+  } else if (errno != EEXIST) {
+    return absl::FailedPreconditionError(
+        absl::StrFormat("cannot make the file %s: %s", file, ErrnoText()));
+  }
+  return absl::OkStatus();
+}
+
+// The descriptor of the locked file.
+absl::StatusOr<int> Lock(const std::string& folder) {
+  const std::string file = absl::StrCat(folder, "/", kLock);
+  const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kFileMode);
+  if (descriptor < 0) {
+    return absl::FailedPreconditionError(
+        absl::StrFormat("cannot write to the folder %s: %s", folder, ErrnoText()));
+  }
+  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  close(descriptor);
+  return absl::FailedPreconditionError(
+      absl::StrFormat("another daemon uses the folder %s; give each one its own", folder));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Take(const std::string& folder) {
+  POLYEST_RETURN_IF_ERROR(MakeFolder(folder));
+  POLYEST_RETURN_IF_ERROR(MakeFolderPrivate(folder));
+  POLYEST_ASSIGN_OR_RETURN(const int lock, Lock(folder));
+  std::unique_ptr<DataFolder> taken(new DataFolder(folder, lock));
+  POLYEST_RETURN_IF_ERROR(MakeFilesPrivate(folder));
+  POLYEST_RETURN_IF_ERROR(MakeJournalFile(taken->journal_file()));
+  return taken;
+}
+
+DataFolder::DataFolder(const std::string& folder, int lock)
+    : journal_file_(absl::StrCat(folder, "/", kJournal)), lock_(lock) {}
+
+DataFolder::~DataFolder() { close(lock_); }
+
+}  // namespace polyest::internal

@@ -1,0 +1,37 @@
+#pragma once
+
+// The folder in which a journal is kept. Measurements are their owner's business: only the user the
+// daemon runs as may read the folder and the files in it, and only one daemon at a time uses it.
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+#include <string>
+
+namespace polyest::internal {
+
+class DataFolder {
+ public:
+  // Takes the folder for this process and makes its files private: mode 0700, and 0600 for the
+  // files. Makes the folder, and its parents, if there is none. A folder that others may read is
+  // closed to them when it holds nothing but a journal.
+  //
+  // FAILED_PRECONDITION names the folder or file and what to do: if it cannot be made or written
+  // to, if another daemon uses it, or if others may read it and this process may not change that.
+  static absl::StatusOr<std::unique_ptr<DataFolder>> Take(const std::string& folder);
+  // Releases the folder for another daemon.
+  ~DataFolder();
+  DataFolder(const DataFolder&) = delete;
+  DataFolder& operator=(const DataFolder&) = delete;
+
+  // The file of the journal; SQLite gives those that it puts beside it the same mode.
+  const std::string& journal_file() const { return journal_file_; }
+
+ private:
+  DataFolder(const std::string& folder, int lock);
+
+  const std::string journal_file_;
+  const int lock_;  // the descriptor of the file that is locked
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,44 @@
+#pragma once
+
+// How the unary calls of all services run: each finds what it works on, hands the work to the
+// executor, or to a session's strand, and is finished with the outcome.
+
+#include <grpcpp/support/server_callback.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "server/service/service_context.h"
+#include "server/service/unary_call.h"
+
+namespace polyest::internal {
+
+// Where work runs, and what it is.
+struct Job {
+  UnaryCall::Submit submit;
+  UnaryCall::Work work;
+};
+
+using CallerWork = std::function<absl::Status(const Caller&, const Stop&)>;
+using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
+
+// NOT_FOUND; INVALID_ARGUMENT, naming `field`, when it is no name of a session.
+absl::StatusOr<std::shared_ptr<Session>> FindSession(const ServiceContext& context,
+                                                     const Caller& caller, const std::string& field,
+                                                     const std::string& name);
+
+// What may take long, in the lane of the caller's requests.
+Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
+// What is soon done, in the lane of the caller's sessions: it does not wait for long requests.
+Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
+// On the session's strand; finished when everything is kept that the work may have seen.
+Job JobOfSession(std::shared_ptr<Session> session, SessionWork work);
+
+// Starts a unary call with the job that is made for its caller. A caller who may not call the
+// method is refused before anything else.
+grpc::ServerUnaryReactor* StartCall(
+    const ServiceContext& context, grpc::CallbackServerContext* call, Method method,
+    const std::function<absl::StatusOr<Job>(const Caller&)>& make_job);
+
+}  // namespace polyest::internal

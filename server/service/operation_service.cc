@@ -1,0 +1,122 @@
+#include "core/common/status.h"
+#include "polyest/v1/operation_service.grpc.pb.h"
+#include "proto/wire/operations/names.h"
+#include "proto/wire/operations/pages.h"
+#include "server/service/operation_store.h"
+#include "server/service/services.h"
+#include "server/service/study_jobs.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::StatusOr<v1::ListOperationsResponse> ListPage(OperationStore& operations,
+                                                    const std::string& tenant,
+                                                    const v1::ListOperationsRequest& request) {
+  POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+  // One more than asked for tells whether there is another page.
+  auto page = operations.List(tenant, request.page_token(), page_size + 1);
+  if (!page.ok()) return UnknownPageToken(request.page_token());
+  v1::ListOperationsResponse response;
+  if (page->size() > page_size) {
+    page->pop_back();
+    response.set_next_page_token(page->back().name());
+  }
+  for (v1::Operation& operation : *page) *response.add_operations() = std::move(operation);
+  return response;
+}
+
+class OperationService final : public v1::OperationService::CallbackService {
+ public:
+  using Unary = grpc::ServerUnaryReactor;
+  using Context = grpc::CallbackServerContext;
+
+  explicit OperationService(const ServiceContext& context)
+      : context_(context),
+        operations_({.max_computing = context.max_computing}, context.wall_clock) {}
+
+  Unary* StartComputation(Context* call, const v1::StartComputationRequest* request,
+                          v1::Operation* response) override {
+    return Soon(call, "StartComputation", response,
+                [=, this](const Caller& caller) { return Start(caller, *request); });
+  }
+
+  Unary* GetOperation(Context* call, const v1::GetOperationRequest* request,
+                      v1::Operation* response) override {
+    return Soon(call, "GetOperation", response,
+                [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
+                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  return operations_.Get(caller.tenant, request->name());
+                });
+  }
+
+  Unary* ListOperations(Context* call, const v1::ListOperationsRequest* request,
+                        v1::ListOperationsResponse* response) override {
+    return Soon(call, "ListOperations", response, [=, this](const Caller& caller) {
+      return ListPage(operations_, caller.tenant, *request);
+    });
+  }
+
+  Unary* CancelOperation(Context* call, const v1::CancelOperationRequest* request,
+                         v1::Operation* response) override {
+    return Soon(call, "CancelOperation", response,
+                [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
+                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  return operations_.Cancel(caller.tenant, request->name());
+                });
+  }
+
+  Unary* DeleteOperation(Context* call, const v1::DeleteOperationRequest* request,
+                         google::protobuf::Empty* response) override {
+    return Soon(call, "DeleteOperation", response,
+                [=, this](const Caller& caller) -> absl::StatusOr<google::protobuf::Empty> {
+                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  POLYEST_RETURN_IF_ERROR(operations_.Delete(caller.tenant, request->name()));
+                  return google::protobuf::Empty();
+                });
+  }
+
+ private:
+  static absl::Status CheckName(const std::string& name) {
+    return ResourceId("name", "operations", name).status();
+  }
+
+  absl::StatusOr<v1::Operation> Start(const Caller& caller,
+                                      const v1::StartComputationRequest& given) {
+    // The call's own request goes with the call.
+    const auto request = std::make_shared<v1::StartComputationRequest>(given);
+    return operations_.Start(caller.tenant, MethodOf(*request),
+                             [&](v1::ComputationResult* result) -> absl::StatusOr<Job> {
+                               POLYEST_ASSIGN_OR_RETURN(
+                                   Job job,
+                                   ComputationJob(context_, caller, request.get(), result));
+                               job.work = [request, work = std::move(job.work)](
+                                              const Stop& stop, const UnaryCall::Finisher& finish) {
+                                 return work(stop, finish);
+                               };
+                               return job;
+                             });
+  }
+
+  // A call whose answer is at hand.
+  template <typename Response, typename Answer>
+  Unary* Soon(Context* call, Method method, Response* response, const Answer& answer) {
+    return StartCall(context_, call, method, [&](const Caller& caller) {
+      return ShortJobOfCaller(context_, caller, [=](const Caller& known, const Stop&) {
+        return Deliver(absl::StatusOr<Response>(answer(known)), response);
+      });
+    });
+  }
+
+  const ServiceContext context_;
+  OperationStore operations_;
+  std::stop_callback<std::function<void()>> stopping_{context_.stop,
+                                                      [this] { operations_.CancelAll(); }};
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeOperationService(const ServiceContext& context) {
+  return std::make_unique<OperationService>(context);
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,233 @@
+#include "server/service/operation_store.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <limits>
+#include <optional>
+
+#include "core/common/status.h"
+#include "proto/wire/refusal/refusal.h"
+#include "server/service/call_stop.h"
+#include "server/service/guarded.h"
+#include "server/service/status_mapping.h"
+#include "server/telemetry/request_id.h"
+
+namespace polyest::internal {
+namespace {
+
+// Until an operation may have ended.
+constexpr std::chrono::seconds kRetryLater{1};
+
+}  // namespace
+
+// One operation. What is under way holds it, too, so that it may be forgotten meanwhile.
+class OperationStore::Entry {
+ public:
+  Entry(std::string name, std::string method, google::protobuf::Timestamp created,
+        Clock::time_point now)
+      : begin_(now) {
+    operation_.set_name(std::move(name));
+    operation_.set_method(std::move(method));
+    operation_.set_state(v1::Operation::QUEUED);
+    *operation_.mutable_create_time() = std::move(created);
+  }
+
+  const std::string& name() const { return operation_.name(); }
+  // The job's own until its end.
+  v1::ComputationResult* result() { return &result_; }
+  std::stop_token token() const { return stop_.get_token(); }
+  void RequestStop() { stop_.request_stop(); }
+
+  void Begin() {
+    const std::lock_guard lock(mutex_);
+    operation_.set_state(v1::Operation::RUNNING);
+  }
+
+  // Whether this was its end: the first one counts.
+  bool End(const absl::Status& status, const google::protobuf::Timestamp& time,
+           Clock::time_point now) {
+    const std::lock_guard lock(mutex_);
+    if (end_) return false;
+    end_ = now;
+    *operation_.mutable_end_time() = time;
+    if (status.ok()) {
+      operation_.set_state(v1::Operation::SUCCEEDED);
+      return true;
+    }
+    const bool cancelled = absl::IsCancelled(status) && stop_.stop_requested();
+    operation_.set_state(cancelled ? v1::Operation::CANCELLED : v1::Operation::FAILED);
+    *operation_.mutable_error() = ToRpcStatus(status);
+    result_.Clear();
+    return true;
+  }
+
+  v1::Operation Describe(bool with_result, Clock::time_point now) const {
+    const std::lock_guard lock(mutex_);
+    v1::Operation operation = operation_;
+    const std::chrono::duration<double> elapsed = end_.value_or(now) - begin_;
+    operation.set_elapsed_time_s(elapsed.count());
+    if (!with_result) operation.clear_result();
+    if (with_result && operation.state() == v1::Operation::SUCCEEDED) {
+      *operation.mutable_response() = result_;
+    }
+    return operation;
+  }
+
+  // None while it is under way.
+  std::optional<Clock::time_point> end() const {
+    const std::lock_guard lock(mutex_);
+    return end_;
+  }
+
+ private:
+  const Clock::time_point begin_;
+  std::stop_source stop_;
+  v1::ComputationResult result_;
+
+  mutable std::mutex mutex_;
+  v1::Operation operation_;
+  std::optional<Clock::time_point> end_;
+};
+
+OperationStore::OperationStore(const OperationLimits& limits, WallClock wall_clock, Now now)
+    : limits_(limits), wall_clock_(std::move(wall_clock)), now_(std::move(now)) {}
+
+OperationStore::~OperationStore() {
+  CancelAll();
+  std::unique_lock lock(mutex_);
+  ended_.wait(lock, [this] { return under_way_ == 0; });
+}
+
+void OperationStore::CancelAll() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, entry] : entries_) entry->RequestStop();
+}
+
+void OperationStore::ForgetOld() {
+  const Clock::time_point oldest = now_() - limits_.kept_for;
+  std::erase_if(entries_, [&](const auto& one) {
+    const auto end = one.second->end();
+    return end && *end < oldest;
+  });
+}
+
+std::pair<OperationStore::Entries::iterator, OperationStore::Entries::iterator>
+OperationStore::OfTenant(const std::string& tenant) {
+  return {entries_.lower_bound({tenant, 0}),
+          entries_.upper_bound({tenant, std::numeric_limits<int64_t>::max()})};
+}
+
+absl::Status OperationStore::MakeRoom(const std::string& tenant) {
+  const auto [first, last] = OfTenant(tenant);
+  if (static_cast<size_t>(std::distance(first, last)) < limits_.per_tenant) return absl::OkStatus();
+  auto oldest = last;
+  for (auto one = first; one != last; ++one) {
+    const auto end = one->second->end();
+    if (end && (oldest == last || *end < *oldest->second->end())) oldest = one;
+  }
+  if (oldest == last) {
+    return Refuse(
+        absl::StatusCode::kResourceExhausted,
+        absl::StrCat("a tenant has at most ", limits_.per_tenant, " operations under way"),
+        {.reason = kBusy, .retry_delay = kRetryLater});
+  }
+  entries_.erase(oldest);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
+                                                    const std::string& method,
+                                                    const MakeJob& make_job) {
+  const auto entry = std::make_shared<Entry>(absl::StrCat("operations/", MakeRequestId()), method,
+                                             wall_clock_(), now_());
+  POLYEST_ASSIGN_OR_RETURN(const Job job, make_job(entry->result()));
+  Key key;
+  {
+    const std::lock_guard lock(mutex_);
+    ForgetOld();
+    POLYEST_RETURN_IF_ERROR(MakeRoom(tenant));
+    key = {tenant, ++started_};
+    entries_[key] = entry;
+    ++under_way_;
+  }
+  const v1::Operation started = entry->Describe(/*with_result=*/false, now_());
+  const absl::Status accepted = job.submit([this, entry, work = job.work] { Run(entry, work); });
+  if (accepted.ok()) return started;
+  End(*entry, accepted);
+  const std::lock_guard lock(mutex_);
+  entries_.erase(key);
+  return accepted;
+}
+
+void OperationStore::Run(const std::shared_ptr<Entry>& entry, const UnaryCall::Work& work) {
+  const CallStop call_stop(entry->token(), limits_.max_computing);
+  const Stop stop = call_stop.Begin();
+  const auto finish = [this, entry, call_stop](const absl::Status& outcome) {
+    End(*entry, call_stop.Name(outcome));
+  };
+  absl::Status status = stop.Check();
+  if (status.ok()) {
+    entry->Begin();
+    status = Guarded([&] { return work(stop, finish); });
+  }
+  if (!status.ok()) finish(status);
+}
+
+void OperationStore::End(Entry& entry, const absl::Status& status) {
+  if (!entry.End(status, wall_clock_(), now_())) return;
+  const std::lock_guard lock(mutex_);
+  --under_way_;
+  ended_.notify_all();
+}
+
+absl::StatusOr<OperationStore::Entries::iterator> OperationStore::Find(const std::string& tenant,
+                                                                       const std::string& name) {
+  ForgetOld();
+  const auto [first, last] = OfTenant(tenant);
+  for (auto one = first; one != last; ++one) {
+    if (one->second->name() == name) return one;
+  }
+  return absl::NotFoundError(absl::StrCat(name, " does not exist or has been forgotten"));
+}
+
+absl::StatusOr<v1::Operation> OperationStore::Get(const std::string& tenant,
+                                                  const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
+  return found->second->Describe(/*with_result=*/true, now_());
+}
+
+absl::StatusOr<std::vector<v1::Operation>> OperationStore::List(const std::string& tenant,
+                                                                const std::string& after,
+                                                                size_t count) {
+  const std::lock_guard lock(mutex_);
+  ForgetOld();
+  auto [one, last] = OfTenant(tenant);
+  if (!after.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(one, Find(tenant, after));
+    ++one;
+  }
+  std::vector<v1::Operation> page;
+  for (; one != last && page.size() < count; ++one) {
+    page.push_back(one->second->Describe(/*with_result=*/false, now_()));
+  }
+  return page;
+}
+
+absl::StatusOr<v1::Operation> OperationStore::Cancel(const std::string& tenant,
+                                                     const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
+  found->second->RequestStop();
+  return found->second->Describe(/*with_result=*/false, now_());
+}
+
+absl::Status OperationStore::Delete(const std::string& tenant, const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
+  found->second->RequestStop();
+  entries_.erase(found);
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,86 @@
+#pragma once
+
+// Computations that no call waits for: started, asked for, and fetched when they are done.
+
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "polyest/v1/operation_service.pb.h"
+#include "server/service/calls.h"
+
+namespace polyest::internal {
+
+struct OperationLimits {
+  size_t per_tenant = 64;                // operations, done or under way
+  std::chrono::seconds kept_for{3'600};  // after their end
+  std::chrono::seconds max_computing;    // of one
+};
+
+// Keeps the operations of all tenants in memory, while they run and for an hour after their end.
+// Any thread may call it. An operation of another tenant is NOT_FOUND.
+class OperationStore {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using WallClock = std::function<google::protobuf::Timestamp()>;
+  using Now = std::function<Clock::time_point()>;
+  // Makes the job that writes into the result given.
+  using MakeJob = std::function<absl::StatusOr<Job>(v1::ComputationResult*)>;
+
+  OperationStore(const OperationLimits& limits, WallClock wall_clock, Now now = Clock::now);
+  // Cancels the operations under way and waits for their ends.
+  ~OperationStore();
+  OperationStore(const OperationStore&) = delete;
+  OperationStore& operator=(const OperationStore&) = delete;
+
+  // Starts the job. The answer is make_job's when that fails; RESOURCE_EXHAUSTED when all of the
+  // tenant's operations are under way, or the job finds no room in its queue.
+  absl::StatusOr<v1::Operation> Start(const std::string& tenant, const std::string& method,
+                                      const MakeJob& make_job);
+  // Returns an operation, with its result if it has ended.
+  absl::StatusOr<v1::Operation> Get(const std::string& tenant, const std::string& name);
+  // Returns at most `count` operations, without results, in the order in which they were started,
+  // after the one named; after = "": from the first. NOT_FOUND when that one is not there.
+  absl::StatusOr<std::vector<v1::Operation>> List(const std::string& tenant,
+                                                  const std::string& after, size_t count);
+  // Asks an operation to end early, and returns it; one that has ended stays as it is.
+  absl::StatusOr<v1::Operation> Cancel(const std::string& tenant, const std::string& name);
+  // Forgets an operation, and cancels it if it is under way.
+  absl::Status Delete(const std::string& tenant, const std::string& name);
+  // Cancels all operations under way.
+  void CancelAll();
+
+ private:
+  class Entry;
+  using Key = std::pair<std::string, int64_t>;  // tenant, number
+  using Entries = std::map<Key, std::shared_ptr<Entry>>;
+
+  // The caller holds the mutex.
+  void ForgetOld();
+  absl::Status MakeRoom(const std::string& tenant);
+  std::pair<Entries::iterator, Entries::iterator> OfTenant(const std::string& tenant);
+  absl::StatusOr<Entries::iterator> Find(const std::string& tenant, const std::string& name);
+
+  void Run(const std::shared_ptr<Entry>& entry, const UnaryCall::Work& work);
+  void End(Entry& entry, const absl::Status& status);
+
+  const OperationLimits limits_;
+  const WallClock wall_clock_;
+  const Now now_;
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  Entries entries_;
+  int64_t started_ = 0;
+  int under_way_ = 0;
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,171 @@
+#include "core/common/status.h"
+#include "polyest/v1/session_service.grpc.pb.h"
+#include "proto/wire/convert/annotate.h"
+#include "proto/wire/operations/names.h"
+#include "proto/wire/operations/pages.h"
+#include "server/service/calls.h"
+#include "server/service/catch_up.h"
+#include "server/service/export_call.h"
+#include "server/service/import_call.h"
+#include "server/service/measurement_stream.h"
+#include "server/service/services.h"
+#include "server/service/session_watch.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& sessions,
+                                                  const std::string& tenant,
+                                                  const v1::ListSessionsRequest& request) {
+  POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+  if (!request.page_token().empty() &&
+      !ResourceId("pageToken", "sessions", request.page_token()).ok()) {
+    return UnknownPageToken(request.page_token());
+  }
+  // One more than asked for tells whether there is another page.
+  auto page = sessions.List(tenant, request.page_token(), page_size + 1);
+  v1::ListSessionsResponse response;
+  if (page.size() > page_size) {
+    page.pop_back();
+    response.set_next_page_token(page.back()->name());
+  }
+  for (const auto& session : page) *response.add_sessions() = session->Describe();
+  return response;
+}
+
+class SessionService final : public v1::SessionService::CallbackService {
+ public:
+  explicit SessionService(const ServiceContext& context) : context_(context) {}
+
+  using Unary = grpc::ServerUnaryReactor;
+  using Context = grpc::CallbackServerContext;
+
+  Unary* CreateSession(Context* call, const v1::CreateSessionRequest* request,
+                       v1::Session* response) override;
+  Unary* GetSession(Context* call, const v1::GetSessionRequest* request,
+                    v1::Session* response) override;
+  Unary* ListSessions(Context* call, const v1::ListSessionsRequest* request,
+                      v1::ListSessionsResponse* response) override;
+  Unary* DeleteSession(Context* call, const v1::DeleteSessionRequest* request,
+                       google::protobuf::Empty* response) override;
+
+  grpc::ServerWriteReactor<v1::SessionRecord>* ExportSession(
+      Context* call, const v1::ExportSessionRequest* request) override {
+    return new ExportCall(context_, *call, request->name());
+  }
+  grpc::ServerReadReactor<v1::ImportSessionRequest>* ImportSession(Context* call,
+                                                                   v1::Session* response) override {
+    return new ImportCall(context_, *call, response);
+  }
+
+  Unary* AddMeasurements(Context* call, const v1::AddMeasurementsRequest* request,
+                         v1::AddMeasurementsResponse* response) override;
+  Unary* GetEstimate(Context* call, const v1::GetEstimateRequest* request,
+                     v1::Estimate* response) override;
+  grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>*
+  StreamMeasurements(Context* call) override {
+    return new MeasurementStream(context_, *call);
+  }
+  grpc::ServerWriteReactor<v1::WatchSessionResponse>* WatchSession(
+      Context* call, const v1::WatchSessionRequest* request) override {
+    return new SessionWatch(context_, *call, request->session());
+  }
+
+ private:
+  // What is soon done.
+  Unary* ForCaller(Context* call, Method method, CallerWork work) {
+    return StartCall(context_, call, method, [&](const Caller& caller) {
+      return ShortJobOfCaller(context_, caller, std::move(work));
+    });
+  }
+  Unary* OnStrand(Context* call, Method method, const std::string& session, SessionWork work) {
+    return StartCall(context_, call, method, [&](const Caller& caller) -> absl::StatusOr<Job> {
+      POLYEST_ASSIGN_OR_RETURN(auto found, FindSession(context_, caller, "session", session));
+      return JobOfSession(std::move(found), std::move(work));
+    });
+  }
+
+  ServiceContext context_;
+};
+
+SessionService::Unary* SessionService::CreateSession(Context* call,
+                                                     const v1::CreateSessionRequest* request,
+                                                     v1::Session* response) {
+  return ForCaller(call, "CreateSession",
+                   [=, this](const Caller& caller, const Stop&) -> absl::Status {
+                     const v1::Problem& problem = request->session().problem();
+                     POLYEST_ASSIGN_OR_RETURN(
+                         const auto session,
+                         context_.sessions.Create(caller.tenant, request->session_id(), problem));
+                     *response = session->Describe();
+                     *response->mutable_problem() = problem;
+                     return absl::OkStatus();
+                   });
+}
+
+SessionService::Unary* SessionService::GetSession(Context* call,
+                                                  const v1::GetSessionRequest* request,
+                                                  v1::Session* response) {
+  return ForCaller(
+      call, "GetSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+        POLYEST_ASSIGN_OR_RETURN(const auto session,
+                                 FindSession(context_, caller, "name", request->name()));
+        *response = session->Describe();
+        POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
+        return absl::OkStatus();
+      });
+}
+
+SessionService::Unary* SessionService::ListSessions(Context* call,
+                                                    const v1::ListSessionsRequest* request,
+                                                    v1::ListSessionsResponse* response) {
+  const auto caller = context_.access.Authorize(*call, "ListSessions");
+  if (!caller.ok()) return FinishAtOnce(call, caller.status());
+  return FinishAtOnce(call,
+                      Deliver(ListPage(context_.sessions, caller->tenant, *request), response));
+}
+
+SessionService::Unary* SessionService::DeleteSession(Context* call,
+                                                     const v1::DeleteSessionRequest* request,
+                                                     google::protobuf::Empty*) {
+  return ForCaller(
+      call, "DeleteSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
+        return context_.sessions.Delete(caller.tenant, request->name());
+      });
+}
+
+SessionService::Unary* SessionService::AddMeasurements(Context* call,
+                                                       const v1::AddMeasurementsRequest* request,
+                                                       v1::AddMeasurementsResponse* response) {
+  return OnStrand(
+      call, "AddMeasurements", request->session(),
+      [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(session->Load(stop));
+        POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
+                                 session->Add(request->sequence(), request->measurements()));
+        POLYEST_RETURN_IF_ERROR(session->Process(stop));
+        if (session->observed()) CatchUp(session, context_.stop);
+        return absl::OkStatus();
+      });
+}
+
+SessionService::Unary* SessionService::GetEstimate(Context* call,
+                                                   const v1::GetEstimateRequest* request,
+                                                   v1::Estimate* response) {
+  return OnStrand(call, "GetEstimate", request->session(),
+                  [=](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
+                    POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate,
+                                             session->CurrentEstimate(stop));
+                    *response = *estimate;
+                    return absl::OkStatus();
+                  });
+}
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeSessionService(const ServiceContext& context) {
+  return std::make_unique<SessionService>(context);
+}
+
+}  // namespace polyest::internal

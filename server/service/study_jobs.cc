@@ -1,0 +1,216 @@
+#include "server/service/study_jobs.h"
+
+#include <concepts>
+#include <optional>
+#include <utility>
+
+#include "core/common/status.h"
+#include "proto/wire/convert/annotate.h"
+#include "proto/wire/convert/measurements.h"
+#include "proto/wire/operations/operations.h"
+
+namespace polyest::internal {
+namespace {
+
+// Propagations of one call run on the call's own thread: the executor's threads serve the calls.
+constexpr int kThreadsPerCall = 1;
+
+// One name for all studies; what follows the request says what of.
+auto Run(const v1::ComputeEstimateRequest& request, auto&&... of) {
+  return ComputeEstimate(request, of...);
+}
+auto Run(const v1::ComputePropagationRequest& request, auto&&... of) {
+  return ComputePropagation(request, of...);
+}
+auto Run(const v1::ComputeCostGridRequest& request, auto&&... of) {
+  return ComputeCostGrid(request, of...);
+}
+auto Run(const v1::ComputeSensitivityRequest& request, auto&&... of) {
+  return ComputeSensitivity(request, of...);
+}
+auto Run(const v1::ComputeExperimentDesignRequest& request, auto&&... of) {
+  return ComputeExperimentDesign(request, of...);
+}
+auto Run(const v1::ComputePosteriorRequest& request, auto&&... of) {
+  return ComputePosterior(request, of...);
+}
+auto Run(const v1::ComputeCostProfilesRequest& request, auto&&... of) {
+  return ComputeCostProfiles(request, of...);
+}
+auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
+  return ComputeRegularizationSweep(request, of...);
+}
+
+// Studies of a session's problem and rows, which run the model themselves and need no estimator.
+template <typename Request>
+concept RunsTheModel = std::same_as<Request, v1::ComputePropagationRequest> ||
+    std::same_as<Request, v1::ComputeCostGridRequest> ||
+    std::same_as<Request, v1::ComputeSensitivityRequest>;
+
+// The answers about a session from its estimator, on its strand.
+
+absl::Status OnStrand(const v1::ComputeEstimateRequest&, Session& session, const ServiceContext&,
+                      const Stop& stop, v1::ComputeEstimateResponse& response) {
+  POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session.CurrentEstimate(stop));
+  *response.mutable_estimate() = *estimate;
+  return absl::OkStatus();
+}
+
+absl::Status OnStrand(const v1::ComputeExperimentDesignRequest& request, Session& session,
+                      const ServiceContext& context, const Stop& stop,
+                      v1::ComputeExperimentDesignResponse& response) {
+  POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, session.ReadProblem());
+  const auto design = [&](Estimator& estimator, int64_t sequence) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+    std::optional<Estimate> known;
+    if (estimator.rows_processed() > 0) {
+      POLYEST_ASSIGN_OR_RETURN(known, estimator.CurrentEstimate(stop));
+    }
+    POLYEST_ASSIGN_OR_RETURN(
+        response,
+        ComputeExperimentDesign(request, problem, known, kThreadsPerCall, stop, context.models));
+    response.set_sequence(sequence);
+    return absl::OkStatus();
+  };
+  return session.WithEstimator(design, stop);
+}
+
+template <typename Request, typename Response>
+absl::Status OnStrand(const Request& request, Session& session, const ServiceContext&,
+                      const Stop& stop, Response& response) {
+  const auto answer = [&](Estimator& estimator, int64_t sequence) -> absl::Status {
+    POLYEST_ASSIGN_OR_RETURN(response, Run(request, estimator, stop));
+    response.set_sequence(sequence);
+    return absl::OkStatus();
+  };
+  return session.WithEstimator(answer, stop);
+}
+
+// Adds the session's rows to the experiment; returns the last batch.
+absl::StatusOr<int64_t> ReadRows(const Session& session, const Stop& stop,
+                                 v1::Measurements& measurements) {
+  int64_t sequence = 0;
+  const auto append = [&](const JournalBatch& batch) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    AppendRows(batch.measurements, measurements);
+    sequence = batch.sequence;
+    return absl::OkStatus();
+  };
+  POLYEST_RETURN_IF_ERROR(session.ReadBatches(0, append));
+  return sequence;
+}
+
+// The study of the experiment that the session is. A session that is there stays within the limits,
+// whatever they are now.
+template <RunsTheModel Request, typename Response>
+absl::Status OfStoredExperiment(Request request, const Session& session,
+                                const ServiceContext& context, const Stop& stop,
+                                Response& response) {
+  v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
+  POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_problem(), session.ReadProblem());
+  int64_t sequence = 0;
+  if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
+    POLYEST_ASSIGN_OR_RETURN(sequence, ReadRows(session, stop, *experiment.mutable_measurements()));
+  }
+  POLYEST_ASSIGN_OR_RETURN(response,
+                           Run(request, kThreadsPerCall, stop, context.models, ProblemLimits()));
+  if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
+    response.set_sequence(sequence);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+template <typename Request, typename Response>
+absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller,
+                             const Request* request, Response* response) {
+  const v1::Subject& subject = request->subject();
+  if (!subject.has_session()) {
+    return JobOfCaller(context, caller, [=, &context](const Caller&, const Stop& stop) {
+      const SessionServices& services = context.sessions.services();
+      const absl::Status room = services.memory.Check();
+      if (!room.ok()) return room;
+      return Deliver(Run(*request, kThreadsPerCall, stop, context.models, services.limits.problem),
+                     response);
+    });
+  }
+  POLYEST_ASSIGN_OR_RETURN(auto session,
+                           FindSession(context, caller, "subject.session", subject.session()));
+  if constexpr (RunsTheModel<Request>) {
+    return JobOfCaller(context, caller, [=, &context](const Caller&, const Stop& stop) {
+      const absl::Status room = context.sessions.services().memory.Check();
+      if (!room.ok()) return room;
+      return OfStoredExperiment(*request, *session, context, stop, *response);
+    });
+  } else {
+    return JobOfSession(std::move(session),
+                        [=, &context](const std::shared_ptr<Session>& found, const Stop& stop) {
+                          return OnStrand(*request, *found, context, stop, *response);
+                        });
+  }
+}
+
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeEstimateRequest*,
+                                      v1::ComputeEstimateResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputePropagationRequest*,
+                                      v1::ComputePropagationResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeCostGridRequest*,
+                                      v1::ComputeCostGridResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeSensitivityRequest*,
+                                      v1::ComputeSensitivityResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeExperimentDesignRequest*,
+                                      v1::ComputeExperimentDesignResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputePosteriorRequest*,
+                                      v1::ComputePosteriorResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeCostProfilesRequest*,
+                                      v1::ComputeCostProfilesResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeRegularizationSweepRequest*,
+                                      v1::ComputeRegularizationSweepResponse*);
+
+absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& caller,
+                                   const v1::StartComputationRequest* request,
+                                   v1::ComputationResult* result) {
+  const auto job = [&](const auto& study, auto* answer) {
+    return StudyJob(context, caller, &study, answer);
+  };
+  switch (request->computation_case()) {
+    case v1::StartComputationRequest::kEstimate:
+      return job(request->estimate(), result->mutable_estimate());
+    case v1::StartComputationRequest::kPropagation:
+      return job(request->propagation(), result->mutable_propagation());
+    case v1::StartComputationRequest::kCostGrid:
+      return job(request->cost_grid(), result->mutable_cost_grid());
+    case v1::StartComputationRequest::kSensitivity:
+      return job(request->sensitivity(), result->mutable_sensitivity());
+    case v1::StartComputationRequest::kExperimentDesign:
+      return job(request->experiment_design(), result->mutable_experiment_design());
+    case v1::StartComputationRequest::kPosterior:
+      return job(request->posterior(), result->mutable_posterior());
+    case v1::StartComputationRequest::kCostProfiles:
+      return job(request->cost_profiles(), result->mutable_cost_profiles());
+    case v1::StartComputationRequest::kRegularizationSweep:
+      return job(request->regularization_sweep(), result->mutable_regularization_sweep());
+    case v1::StartComputationRequest::COMPUTATION_NOT_SET:
+      break;
+  }
+  return InvalidField("computation", "one must be given, such as estimate or posterior");
+}
+
+std::string MethodOf(const v1::StartComputationRequest& request) {
+  const auto* const given = v1::StartComputationRequest::GetReflection()->GetOneofFieldDescriptor(
+      request, v1::StartComputationRequest::descriptor()->FindOneofByName("computation"));
+  if (given == nullptr) return "";
+  const std::string& message = given->message_type()->name();
+  return message.substr(0, message.size() - std::string("Request").size());
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,60 @@
+#pragma once
+
+// What a session has done since the daemon started, for those who run the daemon.
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+
+namespace polyest::internal {
+
+// Threads may share it.
+class SessionActivity {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // Notes that the estimator came into memory with the batches up to `sequence`, which span so many
+  // seconds of measurements, or that it left memory.
+  void OnLoaded(int64_t sequence, double measured_s);
+  void OnUnloaded();
+  // Notes a computation of this duration, after which the estimator has processed the batches and
+  // the seconds of measurements given.
+  void OnComputed(Clock::duration spent, int64_t sequence, double measured_s);
+  // Notes an estimate after so many re-expansions of the session in all. Returns how many of them
+  // are new since the estimate before.
+  int64_t OnEstimate(int64_t reexpansions);
+  // Notes that a user of the session has left, so that its idle time starts again.
+  void OnUsed();
+
+  bool loaded() const;
+  // Returns the time since the session was last used or computed.
+  Clock::duration idle() const;
+
+  struct Summary {
+    bool loaded = false;
+    int64_t estimates = 0;
+    int64_t reexpansions = 0;         // that the latest estimate needed
+    double compute_s = 0;             // computed in all
+    std::optional<int64_t> sequence;  // of the last batch processed; none while not loaded
+    // Seconds of measurements ÷ seconds computed for them, since the estimator is in memory; 0
+    // before anything is computed.
+    double real_time_factor = 0;
+  };
+  Summary Summarize() const;
+
+ private:
+  mutable std::mutex mutex_;
+  bool loaded_ = false;
+  int64_t estimates_ = 0;
+  int64_t reexpansions_ = 0;
+  double compute_s_ = 0;
+  int64_t processed_ = 0;  // the last batch
+  // Seconds of measurements processed, and computed for them, since the estimator is in memory.
+  double measured_s_ = 0;
+  double computed_s_ = 0;
+  double measured_before_s_ = 0;  // and before that
+  Clock::time_point last_use_ = Clock::now();
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,19 @@
+#pragma once
+
+// gRPC's own messages in the daemon's log.
+
+#include <absl/strings/string_view.h>
+
+#include <string>
+
+namespace polyest::internal {
+
+// Sends gRPC's messages to the log, at level debug: its errors, or those that GRPC_VERBOSITY asks
+// for. A connection that fails in its TLS handshake is logged as a warning, at most one a second:
+// gRPC says nothing of it to the program, and nothing by default to the log.
+void StartGrpcLog();
+
+// Returns why a handshake failed, out of gRPC's message about it; empty for any other message.
+std::string FailedHandshake(absl::string_view message);
+
+}  // namespace polyest::internal
