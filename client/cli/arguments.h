@@ -7,13 +7,14 @@
 #include <variant>
 #include <vector>
 
+#include "client/cli/screen.h"
 #include "client/paper/paper_command.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 enum class Format { kTable, kJson, kJsonLines, kCsv };
 
-// How to get into a daemon. Empty: without.
+// Names how to get into a daemon; an empty field is not used.
 struct ServerAccess {
   std::string ca_file;
   std::string certificate_file;
@@ -22,13 +23,13 @@ struct ServerAccess {
   std::string token_file;
 };
 
-// Where a command runs.
+// Says where a command runs.
 struct Place {
   std::string server;     // HOST:PORT; empty: in this process
-  ServerAccess access;    // to it
+  ServerAccess access;    // to the server
   double deadline_s = 0;  // 0: none
-  int threads = 1;        // in this process
-  std::string fmu_dir;    // of FMUs, in this process; empty: none
+  int threads = 1;        // for computing in this process
+  std::string fmu_dir;    // folder of FMUs for this process; empty: none
 };
 
 struct EstimateArguments {
@@ -42,6 +43,7 @@ struct ExplainArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  std::string session;  // its id, in place of the files; empty: none
 };
 
 struct StreamArguments {
@@ -119,6 +121,7 @@ struct PosteriorArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  std::string session;  // its id, in place of the files; empty: none
   int samples = 0;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
   std::vector<std::string> joints;    // of two parameters each, "k,c"
@@ -129,6 +132,7 @@ struct ProfileArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  std::string session;  // its id, in place of the files; empty: none
   std::vector<std::string> parameters;
   int points = 0;  // 0: the default
   Format format = Format::kTable;
@@ -138,9 +142,10 @@ struct RegularizationArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
-  double lowest = 0;   // 0: the default
-  double highest = 0;  // 0: the default
-  int points = 0;      // 0: the default
+  std::string session;  // its id, in place of the files; empty: none
+  double lowest = 0;    // 0: the default
+  double highest = 0;   // 0: the default
+  int points = 0;       // 0: the default
   std::string plot_file;
   Format format = Format::kTable;
 };
@@ -162,6 +167,18 @@ struct DeleteArguments {
   std::string session;  // its id
 };
 
+struct ListArguments {
+  Place place;
+  Format format = Format::kTable;
+};
+
+struct WatchArguments {
+  Place place;
+  std::string session;  // its id
+  bool once = false;
+  Format format = Format::kTable;
+};
+
 struct TopArguments {
   Place place;
   bool once = false;
@@ -173,10 +190,15 @@ using Command =
                  ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
                  SensitivityArguments, DesignArguments, PosteriorArguments, ProfileArguments,
                  RegularizationArguments, ExplainArguments, ExportArguments, ImportArguments,
-                 DeleteArguments, TopArguments, PaperOptions>;
+                 DeleteArguments, ListArguments, WatchArguments, TopArguments, PaperOptions>;
 
-// A command, or the exit status after help, version or an error have been printed.
-std::variant<Command, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,
-                                          std::ostream& err);
+struct CommandLine {
+  Command command;
+  ColorChoice color = ColorChoice::kAuto;
+};
 
-}  // namespace polyest
+// Returns the command, or the exit status after help, version or an error have been printed.
+std::variant<CommandLine, int> ParseArguments(int argc, const char* const* argv, std::ostream& out,
+                                              std::ostream& err);
+
+}  // namespace polyest::internal

@@ -5,17 +5,21 @@
 #include <chrono>
 #include <cstdlib>
 
+#include "client/cli/progress_line.h"
 #include "core/common/status.h"
-#include "core/common/stop.h"
-#include "server/operations/operations.h"
-#include "server/refusal/refusal.h"
+#include "polyest/stop.h"
+#include "proto/wire/operations/operations.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class LocalBackend : public Backend {
  public:
-  explicit LocalBackend(const Place& place) : threads_(place.threads), models_(OpenModels(place)) {
+  explicit LocalBackend(const Place& place)
+      : threads_(place.threads),
+        models_(OpenModels(place)),
+        line_([progress = progress_] { return progress->Describe(); }) {
     if (place.deadline_s > 0) {
       const std::chrono::duration<double> length(place.deadline_s);
       stop_ =
@@ -23,66 +27,79 @@ class LocalBackend : public Backend {
     }
   }
 
-  absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) override {
+  absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
+      const v1::ComputeEstimateRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunEstimate(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeEstimate(request, threads_, stop_, *models_, {}, MakeStore());
   }
-  absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) override {
+  absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
+      const v1::ComputePropagationRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunPropagate(request, threads_, stop_, *models_);
+    return polyest::internal::ComputePropagation(request, threads_, stop_, *models_);
   }
-  absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
-      const v1::EvaluateCostRequest& request) override {
+  absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
+      const v1::ComputeCostGridRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunEvaluateCost(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeCostGrid(request, threads_, stop_, *models_);
   }
-  absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
-      const v1::AnalyzeSensitivityRequest& request) override {
+  absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
+      const v1::ComputeSensitivityRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunAnalyzeSensitivity(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeSensitivity(request, threads_, stop_, *models_);
   }
-  absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
-      const v1::DesignExperimentRequest& request) override {
+  absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
+      const v1::ComputeExperimentDesignRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunDesignExperiment(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeExperimentDesign(request, threads_, stop_, *models_);
   }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return polyest::ListModels(request, *models_);
+    return polyest::internal::ListModels(request, *models_);
   }
   absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return polyest::GetModel(request, *models_);
+    return polyest::internal::GetModel(request, *models_);
   }
-  absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
-      const v1::GetPosteriorRequest& request) override {
+  absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
+      const v1::ComputePosteriorRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunGetPosterior(request, threads_, stop_, *models_);
+    return polyest::internal::ComputePosterior(request, threads_, stop_, *models_, {}, MakeStore());
   }
-  absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
-      const v1::ProfileCostRequest& request) override {
+  absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
+      const v1::ComputeCostProfilesRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunProfileCost(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeCostProfiles(request, threads_, stop_, *models_, {},
+                                                  MakeStore());
   }
-  absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
-      const v1::SweepRegularizationRequest& request) override {
+  absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
+      const v1::ComputeRegularizationSweepRequest& request) override {
     POLYEST_RETURN_IF_ERROR(models_.status());
-    return RunSweepRegularization(request, threads_, stop_, *models_);
+    return polyest::internal::ComputeRegularizationSweep(request, threads_, stop_, *models_, {},
+                                                         MakeStore());
   }
 
  private:
+  std::shared_ptr<SampleStore> MakeStore() const {
+    return std::make_shared<WatchedStore>(progress_);
+  }
+
   int threads_;
   absl::StatusOr<ModelLibrary> models_;
   Stop stop_;
+  const std::shared_ptr<EstimationProgress> progress_ = std::make_shared<EstimationProgress>();
+  ProgressLine line_;  // the last, so that it ends first
 };
 
 class RemoteBackend : public Backend {
  public:
-  explicit RemoteBackend(const Place& place) : client_(place.server, ToClientOptions(place)) {}
+  explicit RemoteBackend(const Place& place)
+      : client_(place.server, ToClientOptions(place)),
+        line_([server = place.server] { return absl::StrCat("waiting for ", server); }) {}
 
-  absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) override {
-    auto response = client_.Estimate(request);
-    // What gRPC itself refuses, before the daemon sees it.
+  absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
+      const v1::ComputeEstimateRequest& request) override {
+    auto response = client_.ComputeEstimate(request);
+    // gRPC itself refuses this, before the daemon sees it.
     if (absl::IsResourceExhausted(response.status()) && !RefusalOf(response.status())) {
       return absl::ResourceExhaustedError(
           absl::StrCat(response.status().message(),
@@ -90,20 +107,21 @@ class RemoteBackend : public Backend {
     }
     return response;
   }
-  absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) override {
-    return client_.Propagate(request);
+  absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
+      const v1::ComputePropagationRequest& request) override {
+    return client_.ComputePropagation(request);
   }
-  absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
-      const v1::EvaluateCostRequest& request) override {
-    return client_.EvaluateCost(request);
+  absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
+      const v1::ComputeCostGridRequest& request) override {
+    return client_.ComputeCostGrid(request);
   }
-  absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
-      const v1::AnalyzeSensitivityRequest& request) override {
-    return client_.AnalyzeSensitivity(request);
+  absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
+      const v1::ComputeSensitivityRequest& request) override {
+    return client_.ComputeSensitivity(request);
   }
-  absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
-      const v1::DesignExperimentRequest& request) override {
-    return client_.DesignExperiment(request);
+  absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
+      const v1::ComputeExperimentDesignRequest& request) override {
+    return client_.ComputeExperimentDesign(request);
   }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
     return client_.ListModels(request);
@@ -111,21 +129,22 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) override {
     return client_.GetModel(request);
   }
-  absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
-      const v1::GetPosteriorRequest& request) override {
-    return client_.GetPosterior(request);
+  absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
+      const v1::ComputePosteriorRequest& request) override {
+    return client_.ComputePosterior(request);
   }
-  absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
-      const v1::ProfileCostRequest& request) override {
-    return client_.ProfileCost(request);
+  absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
+      const v1::ComputeCostProfilesRequest& request) override {
+    return client_.ComputeCostProfiles(request);
   }
-  absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
-      const v1::SweepRegularizationRequest& request) override {
-    return client_.SweepRegularization(request);
+  absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
+      const v1::ComputeRegularizationSweepRequest& request) override {
+    return client_.ComputeRegularizationSweep(request);
   }
 
  private:
   Client client_;
+  ProgressLine line_;
 };
 
 }  // namespace
@@ -163,4 +182,4 @@ std::unique_ptr<Backend> MakeBackend(const Place& place) {
   return std::make_unique<RemoteBackend>(place);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

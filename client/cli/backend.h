@@ -7,32 +7,35 @@
 #include <memory>
 
 #include "client/cli/arguments.h"
-#include "client/cpp/client.h"
 #include "core/fmu/model_library.h"
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/client.h"
+#include "polyest/v1/model_service.pb.h"
+#include "polyest/v1/study_service.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class Backend {
  public:
   virtual ~Backend() = default;
-  virtual absl::StatusOr<v1::EstimateResponse> Estimate(const v1::EstimateRequest& request) = 0;
-  virtual absl::StatusOr<v1::PropagateResponse> Propagate(const v1::PropagateRequest& request) = 0;
-  virtual absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(
-      const v1::EvaluateCostRequest& request) = 0;
-  virtual absl::StatusOr<v1::AnalyzeSensitivityResponse> AnalyzeSensitivity(
-      const v1::AnalyzeSensitivityRequest& request) = 0;
-  virtual absl::StatusOr<v1::DesignExperimentResponse> DesignExperiment(
-      const v1::DesignExperimentRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
+      const v1::ComputeEstimateRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
+      const v1::ComputePropagationRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
+      const v1::ComputeCostGridRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
+      const v1::ComputeSensitivityRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
+      const v1::ComputeExperimentDesignRequest& request) = 0;
   virtual absl::StatusOr<v1::ListModelsResponse> ListModels(
       const v1::ListModelsRequest& request) = 0;
   virtual absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request) = 0;
-  virtual absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(
-      const v1::GetPosteriorRequest& request) = 0;
-  virtual absl::StatusOr<v1::ProfileCostResponse> ProfileCost(
-      const v1::ProfileCostRequest& request) = 0;
-  virtual absl::StatusOr<v1::SweepRegularizationResponse> SweepRegularization(
-      const v1::SweepRegularizationRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
+      const v1::ComputePosteriorRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
+      const v1::ComputeCostProfilesRequest& request) = 0;
+  virtual absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
+      const v1::ComputeRegularizationSweepRequest& request) = 0;
 };
 
 ClientOptions ToClientOptions(const Place& place);
@@ -43,4 +46,4 @@ absl::StatusOr<ModelLibrary> OpenModels(const Place& place);
 
 std::unique_ptr<Backend> MakeBackend(const Place& place);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,21 +10,24 @@
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
-#include "client/cli/problem_summary.h"
-#include "client/cli/record_summary.h"
-#include "client/cpp/data_file.h"
-#include "client/cpp/problem_file.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/screen.h"
+#include "client/cli/text_table.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "core/estimator/sample_checks.h"
-#include "server/convert/measurements.h"
-#include "server/convert/problem.h"
+#include "core/estimator/record/sample_checks.h"
+#include "polyest/data_file.h"
+#include "polyest/problem_file.h"
+#include "proto/wire/check/data_summary.h"
+#include "proto/wire/check/problem_summary.h"
+#include "proto/wire/convert/measurements.h"
+#include "proto/wire/convert/problem.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Errors in the lines of one data file that are shown; the others are only counted.
-constexpr int kMostLines = 20;
+constexpr int kMaxLines = 20;
 
 struct Findings {
   std::vector<std::string> errors;
@@ -38,36 +41,52 @@ struct Findings {
   }
 };
 
-// As much of the data as can be read.
+// Reads as much of the data as can be read.
 std::optional<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
                                          Findings& findings) {
   int refused = 0;
   const auto note = [&](const absl::Status& refusal) {
-    if (++refused <= kMostLines) findings.AddError(refusal, file);
+    if (++refused <= kMaxLines) findings.AddError(refusal, file);
     return absl::OkStatus();
   };
   auto data = ReadDataFile(file, columns, note);
   if (!data.ok()) findings.AddError(data.status(), file);
-  if (refused > kMostLines) {
-    findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMostLines, " more"));
+  if (refused > kMaxLines) {
+    findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMaxLines, " more"));
   }
   if (!data.ok()) return std::nullopt;
   return *std::move(data);
+}
+
+// The first is the model, each topic's name is said once.
+void Print(const Remarks& remarks, std::ostream& out) {
+  const auto& model = remarks.front();
+  TextTable table({model.topic(), model.name(), model.description()});
+  for (size_t i = 1; i < remarks.size(); ++i) {
+    const bool first = remarks[i].topic() != remarks[i - 1].topic();
+    table.AddRow({first ? remarks[i].topic() : "", remarks[i].name(), remarks[i].description()});
+  }
+  table.Print(out);
 }
 
 absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements& data,
                          Findings& findings, std::ostream& out) {
   POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(data));
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, SampleChecks(problem).Check(samples));
-  RecordSummary record = Summarize(problem, checked);
+  DataSummary record = Summarize(problem, checked);
   out << "\ndata: " << record.rows << '\n';
   for (const std::string& channel : record.channels) out << "  " << channel << '\n';
   for (std::string& warning : record.warnings) findings.warnings.push_back(std::move(warning));
   return absl::OkStatus();
 }
 
-Findings Check(const CheckArguments& arguments) {
+Findings Check(const CheckArguments& arguments, std::ostream& out) {
   Findings findings;
+  const absl::Status order = CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file);
+  if (!order.ok()) {
+    findings.errors.emplace_back(order.message());
+    return findings;
+  }
   const auto problem = ReadProblemFile(arguments.problem_file);
   if (!problem.ok()) {
     findings.AddError(problem.status(), arguments.problem_file);
@@ -89,8 +108,13 @@ Findings Check(const CheckArguments& arguments) {
   const auto resolved = ToProblem(*problem, *models);
   POLYEST_CHECK(resolved.ok());
   std::ostringstream summary;
-  const absl::Status printed = PrintProblem(*problem, *resolved, summary);
-  if (!printed.ok()) findings.AddError(printed, arguments.problem_file);
+  summary.copyfmt(out);  // for the width of its tables
+  const auto remarks = SummarizeProblem(*problem, *resolved);
+  if (remarks.ok()) {
+    Print(*remarks, summary);
+  } else {
+    findings.AddError(remarks.status(), arguments.problem_file);
+  }
   if (problem->measured().empty()) {
     findings.warnings.emplace_back(
         "nothing is measured: the problem can be propagated, but not estimated");
@@ -118,19 +142,23 @@ std::string AsJson(const Findings& findings) {
 }  // namespace
 
 int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream& err) {
-  const Findings findings = Check(arguments);
+  const Findings findings = Check(arguments, out);
   const bool ok = findings.errors.empty();
   if (arguments.format == Format::kJson) {
     out << AsJson(findings) << '\n';
   } else if (ok) {
     out << findings.summary;
-    for (const std::string& warning : findings.warnings) out << "warning: " << warning << '\n';
+    for (const std::string& warning : findings.warnings) {
+      out << Paint(out, Color::kYellow, "warning:") << ' ' << warning << '\n';
+    }
   }
   if (ok) return kExitOk;
-  for (const std::string& error : findings.errors) err << "polyest: " << error << '\n';
+  for (const std::string& error : findings.errors) {
+    err << Paint(err, Color::kRed, "polyest:") << ' ' << error << '\n';
+  }
   const size_t count = findings.errors.size();
   err << "polyest: " << count << (count == 1 ? " error" : " errors") << std::endl;
   return kExitBadInput;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

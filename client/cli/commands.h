@@ -7,7 +7,7 @@
 
 #include "client/cli/arguments.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 int RunCommand(const EstimateArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream& err);
@@ -26,6 +26,8 @@ int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std:
 int RunCommand(const ExportArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ImportArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const DeleteArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const ListArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const TopArguments& arguments, std::ostream& out, std::ostream& err);
 
-}  // namespace polyest
+}  // namespace polyest::internal

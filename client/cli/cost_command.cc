@@ -4,29 +4,24 @@
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
-#include "client/cpp/data_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-absl::StatusOr<v1::EvaluateCostResponse> EvaluateCost(const CostArguments& arguments) {
-  v1::EvaluateCostRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+absl::StatusOr<v1::ComputeCostGridResponse> EvaluateCost(const CostArguments& arguments) {
+  v1::ComputeCostGridRequest request;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
-  request.set_grid_points(arguments.grid_points);
-  auto response = MakeBackend(arguments.place)->EvaluateCost(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+  request.set_point_count(arguments.grid_points);
+  auto response = MakeBackend(arguments.place)->ComputeCostGrid(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
   return response;
 }
 
-// One row a point of the grid: its coordinates and the three costs.
-void PrintCsv(const v1::EvaluateCostResponse& cost, std::ostream& out) {
+// Prints one row a point of the grid: its coordinates and the three costs.
+void PrintCsv(const v1::ComputeCostGridResponse& cost, std::ostream& out) {
   for (const auto& axis : cost.axes()) out << axis.parameter() << ',';
   out << "mismatch,prior,total\n";
   const int inner = cost.axes_size() == 2 ? cost.axes(1).value_size() : 1;
@@ -51,4 +46,4 @@ int RunCommand(const CostArguments& arguments, std::ostream& out, std::ostream& 
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 int RunCommand(const DeleteArguments& arguments, std::ostream& out, std::ostream& err) {
   Client client(arguments.place.server, ToClientOptions(arguments.place));
@@ -18,4 +18,4 @@ int RunCommand(const DeleteArguments& arguments, std::ostream& out, std::ostream
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

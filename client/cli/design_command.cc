@@ -13,27 +13,28 @@
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
-#include "client/cpp/data_file.h"
-#include "client/cpp/problem_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
+#include "polyest/problem_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-using Design = v1::DesignExperimentResponse;
+using Design = v1::ComputeExperimentDesignResponse;
 
 bool HasStreamedInput(const v1::Problem& problem) {
   return std::any_of(problem.inputs().begin(), problem.inputs().end(),
                      [](const v1::Input& input) { return input.has_streamed(); });
 }
 
-// The problem's own inputs, unless the data had to carry one, and those of further files.
-absl::Status AddCandidates(const DesignArguments& arguments, v1::DesignExperimentRequest& request) {
+// Adds the problem's own inputs, unless the data had to carry one, and those of further files.
+absl::Status AddCandidates(const DesignArguments& arguments,
+                           v1::ComputeExperimentDesignRequest& request) {
   if (arguments.candidate_files.empty()) return absl::OkStatus();
-  if (!HasStreamedInput(request.problem())) {
+  if (!HasStreamedInput(request.subject().experiment().problem())) {
     auto& own = *request.add_candidates();
     own.set_name(arguments.problem_file);
-    *own.mutable_inputs() = request.problem().inputs();
+    *own.mutable_inputs() = request.subject().experiment().problem().inputs();
   }
   for (const std::string& file : arguments.candidate_files) {
     POLYEST_ASSIGN_OR_RETURN(const v1::Problem other, ReadProblemFile(file));
@@ -45,26 +46,28 @@ absl::Status AddCandidates(const DesignArguments& arguments, v1::DesignExperimen
 }
 
 absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
-  v1::DesignExperimentRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+  v1::ComputeExperimentDesignRequest request;
+  POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file));
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
   if (!arguments.data_file.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                             ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+    POLYEST_ASSIGN_OR_RETURN(
+        *request.mutable_subject()->mutable_experiment()->mutable_measurements(),
+        ReadDataFile(arguments.data_file, ColumnsOf(request.subject().experiment().problem())));
   }
   POLYEST_RETURN_IF_ERROR(AddCandidates(arguments, request));
-  request.set_until(arguments.until_s);
-  request.set_step(arguments.step_s);
-  request.set_samples(arguments.samples);
+  request.set_until_s(arguments.until_s);
+  request.set_step_s(arguments.step_s);
+  request.set_sample_count(arguments.samples);
   for (const std::string& output : arguments.outputs) request.add_possible()->set_output(output);
-  auto response = MakeBackend(arguments.place)->DesignExperiment(request);
+  auto response = MakeBackend(arguments.place)->ComputeExperimentDesign(request);
   if (!response.ok()) {
     return InFile(response.status(), arguments.problem_file, arguments.data_file);
   }
   return response;
 }
 
-// The gain and the expected standard deviation of each parameter.
+// Adds the gain and the expected standard deviation of each parameter.
 void AddGain(const Design::Gain& gain, std::vector<std::string>& row) {
   row.push_back(FormatNumber(gain.bits(), 3));
   for (const double sd : gain.std_dev()) row.push_back(FormatNumber(sd, 2));
@@ -105,14 +108,14 @@ void PrintOutputs(const Design& design, const Design::Candidate& candidate, std:
 void PrintSamples(const Design& design, const Design::Candidate& candidate, std::ostream& out) {
   TextTable table(Header(design, {"t (s)"}));
   for (const auto& sample : candidate.samples()) {
-    std::vector<std::string> row = {FormatNumber(sample.time(), 6)};
+    std::vector<std::string> row = {FormatNumber(sample.time_s(), 6)};
     AddGain(sample.gain(), row);
     table.AddRow(std::move(row));
   }
   table.Print(out);
 }
 
-// The outputs that are sampled in any case.
+// Returns the outputs that are sampled in any case.
 std::string Planned(const Design::Candidate& candidate) {
   std::vector<std::string> measured;
   for (const auto& output : candidate.outputs()) {
@@ -128,14 +131,14 @@ void PrintTables(const Design& design, std::ostream& out) {
   PrintCandidates(design, out);
   const std::string of_best =
       design.candidates_size() > 1 ? absl::StrCat(" with ", best.name()) : "";
-  out << "\nOf each output at all times" << of_best
+  out << "\nEach output at all times" << of_best
       << ", alone, and together with all that is measured:\n\n";
   PrintOutputs(design, best, out);
   out << "\nThe best times for samples of " << Planned(best) << of_best
       << ", each beside those above it:\n\n";
   PrintSamples(design, best, out);
-  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", best.order(), best.terms(),
-                         best.points());
+  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", best.expansion().order(),
+                         best.expansion().term_count(), best.expansion().point_count());
   PrintDiagnostics(design.diagnostics(), out);
   PrintDiagnostics(best.diagnostics(), out);
 }
@@ -153,4 +156,4 @@ int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

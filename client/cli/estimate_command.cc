@@ -4,22 +4,17 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
 #include "client/cli/problem_input.h"
-#include "client/cpp/data_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-absl::StatusOr<v1::EstimateResponse> Estimate(const EstimateArguments& arguments) {
-  v1::EstimateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
-  auto response = MakeBackend(arguments.place)->Estimate(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+absl::StatusOr<v1::ComputeEstimateResponse> Estimate(const EstimateArguments& arguments) {
+  v1::ComputeEstimateRequest request;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  auto response = MakeBackend(arguments.place)->ComputeEstimate(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
   return response;
 }
 
@@ -36,4 +31,4 @@ int RunCommand(const EstimateArguments& arguments, std::ostream& out, std::ostre
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

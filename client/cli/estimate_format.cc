@@ -6,12 +6,13 @@
 #include <cmath>
 
 #include "client/cli/number_format.h"
+#include "client/cli/screen.h"
 #include "client/cli/text_table.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// A plain number has the unit "1", which nobody reads.
+// Returns the unit to print: none for a plain number, whose unit is "1".
 std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
 
 std::string DiagnosticText(v1::Diagnostic::Code code) {
@@ -53,12 +54,13 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
                   absl::StrCat(FormatValue(p.lower95(), p.std_dev()), " … ",
                                FormatValue(p.upper95(), p.std_dev())),
                   FormatUncertain(p.prior_mean(), p.prior_std_dev()),
-                  FormatNumber(p.contraction(), 2), VerdictText(p.verdict())});
+                  FormatNumber(p.contraction(), 2),
+                  PaintVerdict(out, p.verdict(), VerdictText(p.verdict()))});
   }
   table.Print(out);
 }
 
-// What α² ≠ 1 has moved the estimates by.
+// Prints by how much α² ≠ 1 has moved the estimates.
 void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.regularization() == 1) return;
   TextTable table({"parameter", "bias", "unit", "bias/sd"});
@@ -71,7 +73,8 @@ void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   table.Print(out);
 }
 
-// The pieces of a posterior in several; what is above is of the heaviest or of all.
+// Prints each component of a posterior that is a mixture. What is printed above describes the
+// heaviest component or all of them together.
 void PrintComponents(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.components().empty()) return;
   TextTable table({"piece", "weight", "parameter", "estimate", "sd", "unit", "mean"});
@@ -117,8 +120,8 @@ void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.directions().empty()) return;
   TextTable table({"direction (in prior sd)", "data/prior information", "verdict"});
   for (const v1::Direction& d : estimate.directions()) {
-    table.AddRow(
-        {DirectionText(d, estimate), FormatNumber(d.information(), 2), VerdictText(d.verdict())});
+    table.AddRow({DirectionText(d, estimate), FormatNumber(d.information(), 2),
+                  PaintVerdict(out, d.verdict(), VerdictText(d.verdict()))});
   }
   out << '\n';
   table.Print(out);
@@ -130,10 +133,11 @@ void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
   out << absl::StrFormat("\ncost: %.4g = %.4g mismatch + %.4g × %.4g prior\n", cost.total(),
                          cost.mismatch(), estimate.regularization(), cost.prior());
   const v1::ExpansionSummary& e = estimate.expansion();
-  out << absl::StrFormat(
-      "expansion: order %d, %d terms, %d points, %d re-expansions, %d trajectories; differs from "
-      "the model by %.2g of the noise\n",
-      e.order(), e.terms(), e.points(), e.reexpansions(), e.trajectories(), e.residual_to_noise());
+  PrintSentence(
+      out, absl::StrFormat("expansion: order %d, %d terms, %d points, %d re-expansions, %d "
+                           "trajectories; differs from the model by %.2g of the noise",
+                           e.order(), e.terms(), e.points(), e.reexpansions(), e.trajectories(),
+                           e.residual_to_noise()));
 }
 
 }  // namespace
@@ -148,6 +152,20 @@ std::string VerdictText(v1::Identifiability::Verdict verdict) {
       return "not identified";
     default:
       return "-";
+  }
+}
+
+std::string PaintVerdict(std::ostream& out, v1::Identifiability::Verdict verdict,
+                         absl::string_view text) {
+  switch (verdict) {
+    case v1::Identifiability::IDENTIFIED:
+      return Paint(out, Color::kGreen, text);
+    case v1::Identifiability::WEAK:
+      return Paint(out, Color::kYellow, text);
+    case v1::Identifiability::NOT_IDENTIFIED:
+      return Paint(out, Color::kRed, text);
+    default:
+      return std::string(text);
   }
 }
 
@@ -170,7 +188,8 @@ void PrintDiagnostics(const google::protobuf::RepeatedPtrField<v1::Diagnostic>& 
                       std::ostream& out) {
   if (!diagnostics.empty()) out << '\n';
   for (const v1::Diagnostic& diagnostic : diagnostics) {
-    out << "note: " << DiagnosticText(diagnostic.code()) << ": " << diagnostic.message() << '\n';
+    PrintSentence(out, absl::StrCat(Paint(out, Color::kYellow, "note:"), " ",
+                                    DiagnosticText(diagnostic.code()), ": ", diagnostic.message()));
   }
 }
 
@@ -187,10 +206,11 @@ void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
 
 void PrintTradeOffs(const v1::Estimate& estimate, std::ostream& out) {
   for (const v1::TradeOff& t : estimate.trade_offs()) {
-    out << absl::StrFormat(
-        "%s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%\n",
-        t.combination(), 100 * t.relative_std_dev(), t.first(), t.second(), 100 * t.first_alone(),
-        100 * t.second_alone());
+    PrintSentence(
+        out,
+        absl::StrFormat("%s is known to %.2g %%, %s and %s separately only to %.2g %% and %.2g %%",
+                        t.combination(), 100 * t.relative_std_dev(), t.first(), t.second(),
+                        100 * t.first_alone(), 100 * t.second_alone()));
   }
 }
 
@@ -204,4 +224,4 @@ std::string EstimateLine(const v1::Estimate& estimate) {
   return line;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,10 +1,13 @@
 #include "client/cli/exit_status.h"
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
-namespace polyest {
+#include <optional>
+
+#include "core/common/field_error.h"
+
+namespace polyest::internal {
 
 ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
   switch (status.code()) {
@@ -43,12 +46,11 @@ int Report(const absl::Status& status, absl::string_view server, std::ostream& e
 
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file) {
-  if (!absl::IsInvalidArgument(status) || absl::StartsWith(status.message(), data_file)) {
-    return status;
-  }
-  const bool of_data = absl::StartsWith(status.message(), "measurements");
+  const std::optional<FieldPath> field = FieldOf(status);
+  if (!absl::IsInvalidArgument(status) || !field) return status;
+  const bool is_of_data = !field->empty() && field->steps().front() == FieldStep("measurements");
   return absl::InvalidArgumentError(
-      absl::StrCat(of_data ? data_file : problem_file, ": ", status.message()));
+      absl::StrCat(is_of_data ? data_file : problem_file, ": ", status.message()));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

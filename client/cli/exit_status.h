@@ -1,6 +1,6 @@
 #pragma once
 
-// What a script learns from a command: its exit status, and one line on stderr.
+// Turns a status into what a script learns from a command: its exit status and one line on stderr.
 
 #include <absl/status/status.h>
 #include <absl/strings/string_view.h>
@@ -8,7 +8,7 @@
 #include <ostream>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 enum ExitStatus : int {
   kExitOk = 0,
@@ -23,9 +23,9 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 // Prints the error in one line and returns its exit status. Not for an OK status.
 int Report(const absl::Status& status, absl::string_view server, std::ostream& err);
 
-// The estimator's messages start with a field of the problem or of the measurements: puts the name
-// of the file in front. Other errors, and those of reading the data file, are left alone.
+// Puts the name of the file in front of the refusal of a field of the problem or of the
+// measurements. Other errors, and those of reading a file, are left alone.
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,42 +10,48 @@
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/explain_input.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
-#include "client/cpp/data_file.h"
+#include "client/cli/screen.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-using Design = v1::DesignExperimentResponse;
+using Design = v1::ComputeExperimentDesignResponse;
 
 // A remedy counts when it is expected to leave less than this of the prior's standard deviation.
 constexpr double kHelps = 0.5;
-constexpr int kMostTimes = 400;
+constexpr int kMaxTimes = 400;
 
-// In words what the data say of one parameter.
-std::string Describe(const v1::ParameterEstimate& p) {
+// Says in words what the data tell of one parameter.
+std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
   const std::string unit = p.unit().empty() || p.unit() == "1" ? "" : " " + p.unit();
   const std::string value = FormatUncertain(p.map(), p.std_dev()) + unit;
+  const std::string verdict = PaintVerdict(
+      out, p.verdict(),
+      p.verdict() == v1::Identifiability::WEAK ? "weakly identified" : VerdictText(p.verdict()));
   switch (p.verdict()) {
     case v1::Identifiability::IDENTIFIED:
-      return absl::StrFormat("%s is identified: %s, %.*f times narrower than your prior.", p.name(),
-                             value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
+      return absl::StrFormat("%s is %s: %s, %.*f times narrower than your prior.", p.name(),
+                             verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
     case v1::Identifiability::WEAK:
-      return absl::StrFormat(
-          "%s is weakly identified: %s; the data say little more than your prior, %s%s.", p.name(),
-          value, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+      return absl::StrFormat("%s is %s: %s; the data say little more than your prior, %s%s.",
+                             p.name(), verdict, value,
+                             FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
     default:
       return absl::StrFormat(
-          "%s is not identified: the data say less than your prior, %s%s, which is what stands.",
-          p.name(), FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+          "%s is %s: the data say less than your prior, %s%s, which is what stands.", p.name(),
+          verdict, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
   }
 }
 
-// The inputs that the data carry, as the first run has them, become tables: a design has no data.
+// Returns the problem with each input that the data carry as a table of the first run: a design has
+// no data.
 v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& measurements) {
-  int rows = measurements.time_size();
+  int rows = measurements.time_s_size();
   for (int k = 0; k < measurements.run_size() && k < rows; ++k) {
     if (measurements.run(k) != measurements.run(0)) rows = k;
   }
@@ -59,7 +65,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
     if (!streamed.hold()) {
       table.set_interpolation(preset ? v1::Input::CUBIC : streamed.interpolation());
     }
-    table.mutable_time_s()->Add(measurements.time().begin(), measurements.time().begin() + rows);
+    table.mutable_time_s()->Add(measurements.time_s().begin(),
+                                measurements.time_s().begin() + rows);
     for (const v1::Measurements::Channel& channel : measurements.channels()) {
       if (channel.name() != input.name()) continue;
       table.mutable_value()->Add(channel.values().begin(), channel.values().begin() + rows);
@@ -68,15 +75,16 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
   return problem;
 }
 
-// The same experiment with every output of the model measured, and driven by each input alone.
-v1::DesignExperimentRequest Alternatives(const v1::Problem& problem, const v1::Estimate& estimate,
-                                         const v1::Measurements& measurements) {
-  v1::DesignExperimentRequest request;
-  *request.mutable_problem() = problem;
-  request.set_until(estimate.time());
-  const int times = std::clamp(measurements.time_size(), 1, kMostTimes);
-  request.set_step(estimate.time() / times);
-  request.set_samples(1);
+// Asks about the same experiment with every output of the model measured, and driven by each input
+// alone.
+v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem,
+                                                const v1::Estimate& estimate, int rows) {
+  v1::ComputeExperimentDesignRequest request;
+  *request.mutable_subject()->mutable_experiment()->mutable_problem() = problem;
+  request.set_until_s(estimate.time());
+  const int times = std::clamp(rows, 1, kMaxTimes);
+  request.set_step_s(estimate.time() / times);
+  request.set_sample_count(1);
   request.add_candidates()->mutable_inputs()->CopyFrom(problem.inputs());
   if (problem.inputs_size() < 2) return request;
   for (const v1::Input& input : problem.inputs()) {
@@ -87,7 +95,7 @@ v1::DesignExperimentRequest Alternatives(const v1::Problem& problem, const v1::E
   return request;
 }
 
-// What would tell the i-th parameter, or that nothing looked at would.
+// Says what would tell the i-th parameter, or that nothing looked at would.
 std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) {
   const auto helps = [&](double sd) { return sd < kHelps * p.prior_std_dev(); };
   std::string best;
@@ -125,34 +133,27 @@ std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) 
 }
 
 absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
-  v1::EstimateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
-  const auto backend = MakeBackend(arguments.place);
-  const auto response = backend->Estimate(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
-  const v1::Estimate& estimate = response->estimate();
+  auto backend = MakeBackend(arguments.place);
+  POLYEST_ASSIGN_OR_RETURN(const ExplainInput input, ReadExplainInput(arguments, *backend));
+  const v1::Estimate& estimate = input.estimate;
   std::vector<int> open;
   for (int i = 0; i < estimate.parameters_size(); ++i) {
-    out << Describe(estimate.parameters(i)) << '\n';
     // What would help the first run would help the others.
-    if (i >= request.problem().uncertain_size()) continue;
+    if (i >= input.problem.uncertain_size()) break;
     if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
   }
+  Design design;
+  if (!open.empty()) {
+    const v1::Problem problem = WithoutStreamedInputs(input.problem, input.measurements);
+    auto answer = backend->ComputeExperimentDesign(Alternatives(problem, estimate, input.rows));
+    if (!answer.ok()) return InInput(answer.status(), arguments);
+    design = *std::move(answer);
+  }
+  backend.reset();  // with its progress line
+  for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
   PrintTradeOffs(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);
-  if (open.empty()) return absl::OkStatus();
-  const v1::Problem problem = WithoutStreamedInputs(request.problem(), request.measurements());
-  const auto design =
-      backend->DesignExperiment(Alternatives(problem, estimate, request.measurements()));
-  if (!design.ok()) return InFile(design.status(), arguments.problem_file, "");
-  for (const int i : open) {
-    out << Remedy(*design, i, estimate.parameters(i)) << '\n';
-  }
+  for (const int i : open) PrintSentence(out, Remedy(design, i, estimate.parameters(i)));
   return absl::OkStatus();
 }
 
@@ -163,4 +164,4 @@ int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostrea
   return status.ok() ? kExitOk : Report(status, arguments.place.server, err);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,9 +8,9 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/starting_problem.h"
 #include "core/common/status.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 absl::StatusOr<std::string> Text(const InitArguments& arguments) {
@@ -56,4 +56,4 @@ int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& 
   return written.ok() ? kExitOk : Report(written, "", err);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

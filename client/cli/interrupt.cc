@@ -9,15 +9,18 @@
 #include <cerrno>
 #include <stdexcept>
 
+#include "client/cli/keyboard.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // The signal handler writes a byte into this pipe, and nobody reads it: it stays readable.
 int signal_pipe[2] = {-1, -1};
 
 void OnSignal(int) {
+  // A second signal ends the process before anybody else can.
+  RestoreTerminal();
   const int saved = errno;
   const char byte = 0;
   // The pipe cannot be full: the handler runs once.
@@ -53,12 +56,12 @@ bool Interrupt::Requested() const {
 
 void Interrupt::WaitUntil(std::chrono::steady_clock::time_point time) const {
   using std::chrono::milliseconds;
-  constexpr milliseconds kLongest{3'600'000};
+  constexpr milliseconds kMaxWait{3'600'000};
   while (true) {
     const auto left = std::chrono::ceil<milliseconds>(time - std::chrono::steady_clock::now());
     if (left <= milliseconds::zero()) return;
     pollfd wanted = {descriptor(), POLLIN, 0};
-    if (poll(&wanted, 1, static_cast<int>(std::min(left, kLongest).count())) > 0) return;
+    if (poll(&wanted, 1, static_cast<int>(std::min(left, kMaxWait).count())) > 0) return;
   }
 }
 
@@ -82,4 +85,4 @@ InterruptibleInput::int_type InterruptibleInput::underflow() {
   throw std::runtime_error("read error");
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,10 +4,11 @@
 #include <streambuf>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
-// Ctrl-C as something to wait for. While it lives the first SIGINT asks for an orderly end; a
-// second one ends the process as usual. One at a time.
+// Turns Ctrl-C into something to wait for. While it lives the first SIGINT asks for an orderly end
+// (and restores the terminal's mode, keyboard.h); a second one ends the process as usual. One at a
+// time.
 class Interrupt {
  public:
   Interrupt();
@@ -16,9 +17,9 @@ class Interrupt {
   Interrupt& operator=(const Interrupt&) = delete;
 
   bool Requested() const;
-  // Readable once the signal has come.
+  // Returns a descriptor that is readable once the signal has come.
   int descriptor() const;
-  // Waits until then; at once when requested.
+  // Waits until `time` or the signal.
   void WaitUntil(std::chrono::steady_clock::time_point time) const;
 };
 
@@ -37,4 +38,4 @@ class InterruptibleInput : public std::streambuf {
   std::vector<char> buffer_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

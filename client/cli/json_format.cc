@@ -10,7 +10,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kUrlPrefix[] = "type.googleapis.com";
@@ -46,4 +46,4 @@ std::string ToJson(const google::protobuf::Message& message, bool several_lines)
   return json;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

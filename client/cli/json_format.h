@@ -4,10 +4,10 @@
 
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
-// The canonical JSON of a message, fields with their default value included and maps in the order
-// of their keys, over several lines or in one; without a line end.
+// Returns the canonical JSON of a message, fields with their default value included and maps in the
+// order of their keys, over several lines or in one; without a line end.
 std::string ToJson(const google::protobuf::Message& message, bool several_lines);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,7 @@
 // The `polyest` command.
 
 #include <grpc/support/log.h>
+#include <unistd.h>
 
 #include <exception>
 #include <iostream>
@@ -10,17 +11,19 @@
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/screen.h"
 #include "client/paper/paper_command.h"
 
 namespace {
 
-int Run(const polyest::Command& command) {
+int Run(const polyest::internal::Command& command) {
   return std::visit(
       [](const auto& arguments) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(arguments)>, polyest::PaperOptions>) {
-          return polyest::RunPaper(arguments, std::cout, std::cerr);
+        if constexpr (std::is_same_v<std::decay_t<decltype(arguments)>,
+                                     polyest::internal::PaperOptions>) {
+          return polyest::internal::RunPaper(arguments, std::cout, std::cerr);
         } else {
-          return polyest::RunCommand(arguments, std::cout, std::cerr);
+          return polyest::internal::RunCommand(arguments, std::cout, std::cerr);
         }
       },
       command);
@@ -32,17 +35,20 @@ int main(int argc, char** argv) {
   // What matters of gRPC's own messages comes back as a status.
   gpr_set_log_function([](gpr_log_func_args*) {});
   try {
-    const auto parsed = polyest::ParseArguments(argc, argv, std::cout, std::cerr);
+    const auto parsed = polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr);
     if (const int* status = std::get_if<int>(&parsed)) return *status;
-    const int status = Run(std::get<polyest::Command>(parsed));
+    const auto& line = std::get<polyest::internal::CommandLine>(parsed);
+    polyest::internal::SetScreen(std::cout, polyest::internal::ScreenOf(STDOUT_FILENO, line.color));
+    polyest::internal::SetScreen(std::cerr, polyest::internal::ScreenOf(STDERR_FILENO, line.color));
+    const int status = Run(line.command);
     std::cout.flush();
-    if (status == polyest::kExitOk && !std::cout) {
+    if (status == polyest::internal::kExitOk && !std::cout) {
       std::cerr << "polyest: the answer could not be written to the standard output" << std::endl;
-      return polyest::kExitFailure;
+      return polyest::internal::kExitFailure;
     }
     return status;
   } catch (const std::exception& error) {
     std::cerr << "polyest: " << error.what() << std::endl;
-    return polyest::kExitFailure;
+    return polyest::internal::kExitFailure;
   }
 }

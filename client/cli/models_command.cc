@@ -8,18 +8,20 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
+#include "client/cli/screen.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// All pages as one.
-absl::StatusOr<v1::ListModelsResponse> ListAll(Backend& backend) {
+// Returns all pages as one.
+absl::StatusOr<v1::ListModelsResponse> ListAll(const Place& place) {
+  const std::unique_ptr<Backend> backend = MakeBackend(place);
   v1::ListModelsResponse all;
   v1::ListModelsRequest request;
   do {
-    POLYEST_ASSIGN_OR_RETURN(const v1::ListModelsResponse page, backend.ListModels(request));
+    POLYEST_ASSIGN_OR_RETURN(const v1::ListModelsResponse page, backend->ListModels(request));
     all.mutable_models()->MergeFrom(page.models());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
@@ -57,7 +59,8 @@ void PrintQuantities(const std::string& title,
 }
 
 void PrintModel(const v1::Model& model, std::ostream& out) {
-  out << ShortName(model) << ": " << model.summary() << "\n\n" << model.equations() << '\n';
+  PrintSentence(out, absl::StrCat(ShortName(model), ": ", model.summary()));
+  out << '\n' << model.equations() << '\n';
   PrintQuantities("state", model.states(), false, out);
   PrintQuantities("parameter", model.parameters(), true, out);
   PrintQuantities("input", model.inputs(), false, out);
@@ -81,11 +84,12 @@ int Print(const absl::StatusOr<Response>& response, const ModelsArguments& argum
 }  // namespace
 
 int RunCommand(const ModelsArguments& arguments, std::ostream& out, std::ostream& err) {
-  const std::unique_ptr<Backend> backend = MakeBackend(arguments.place);
-  if (arguments.name.empty()) return Print(ListAll(*backend), arguments, PrintList, out, err);
+  if (arguments.name.empty())
+    return Print(ListAll(arguments.place), arguments, PrintList, out, err);
   v1::GetModelRequest request;
   request.set_name(absl::StrCat("models/", arguments.name));
-  return Print(backend->GetModel(request), arguments, PrintModel, out, err);
+  const auto model = MakeBackend(arguments.place)->GetModel(request);
+  return Print(model, arguments, PrintModel, out, err);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

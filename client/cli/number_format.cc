@@ -8,11 +8,11 @@
 #include <charconv>
 #include <cmath>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// The decimal exponent of the leading digit after rounding to two significant digits, so that
-// 0.0996 counts as 0.10.
+// Returns the decimal exponent of the leading digit after rounding to two significant digits, so
+// that 0.0996 counts as 0.10.
 int LeadingExponent(double value) {
   const std::string text = absl::StrFormat("%.1e", value);
   int exponent = 0;
@@ -20,7 +20,7 @@ int LeadingExponent(double value) {
   return exponent;
 }
 
-// Whether it reads better without an exponent.
+// Returns whether the value reads better without an exponent.
 bool IsPlain(double value, int decimals) {
   return decimals >= -4 && decimals <= 8 && std::abs(value) < 1e7;
 }
@@ -56,4 +56,6 @@ std::string FormatExact(double value) {
   return std::string(text, result.ptr);
 }
 
-}  // namespace polyest
+std::string FormatPercent(double probability) { return FormatNumber(100 * probability) + " %"; }
+
+}  // namespace polyest::internal

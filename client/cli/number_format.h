@@ -4,17 +4,19 @@
 
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
-// A value with the decimals that its uncertainty leaves: two significant digits of
+// Returns a value with the decimals that its uncertainty leaves: two significant digits of
 // `standard_deviation`, as in 40.6612 beside 0.0052. Six significant digits when the uncertainty is
 // 0 or not finite.
 std::string FormatValue(double value, double standard_deviation);
-// "40.6612 ± 0.0052".
+// Returns "40.6612 ± 0.0052".
 std::string FormatUncertain(double value, double standard_deviation);
-// At most `digits` significant digits.
+// Returns at most `digits` significant digits.
 std::string FormatNumber(double value, int digits = 4);
-// All digits that tell it from its neighbours: what is read back is the same number.
+// Returns a probability as "97.5 %".
+std::string FormatPercent(double probability);
+// Returns all digits that tell the value from its neighbours: what is read back is the same number.
 std::string FormatExact(double value);
 
-}  // namespace polyest
+}  // namespace polyest::internal

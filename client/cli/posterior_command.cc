@@ -14,16 +14,16 @@
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
-#include "client/cpp/data_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kSketchWidth = 30;  // characters
 
-absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(const PosteriorArguments& arguments) {
-  v1::GetPosteriorRequest request;
+absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArguments& arguments) {
+  v1::ComputePosteriorRequest request;
   for (const std::string& joint : arguments.joints) {
     const std::vector<std::string> names = absl::StrSplit(joint, ',');
     if (names.size() != 2) {
@@ -34,24 +34,17 @@ absl::StatusOr<v1::GetPosteriorResponse> GetPosterior(const PosteriorArguments& 
     pair.set_first(names[0]);
     pair.set_second(names[1]);
   }
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
                                        arguments.probabilities.end());
-  request.set_samples(arguments.samples);
-  if (arguments.format == Format::kTable) request.set_density_bins(kSketchWidth);
-  auto response = MakeBackend(arguments.place)->GetPosterior(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+  request.set_sample_count(arguments.samples);
+  if (arguments.format == Format::kTable) request.set_density_bin_count(kSketchWidth);
+  auto response = MakeBackend(arguments.place)->ComputePosterior(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
   return response;
 }
 
-std::string Percent(double probability) { return FormatNumber(100 * probability) + " %"; }
-
-// A density as a line of bars.
+// Draws a density as a line of bars.
 std::string Sketch(const google::protobuf::RepeatedField<double>& density) {
   static constexpr std::array<const char*, 9> kBars = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   const double highest = density.empty() ? 0 : *std::max_element(density.begin(), density.end());
@@ -63,11 +56,11 @@ std::string Sketch(const google::protobuf::RepeatedField<double>& density) {
   return text;
 }
 
-void PrintTable(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
-  const bool chains = posterior.method() == v1::GetPosteriorResponse::MARKOV_CHAINS;
+void PrintTable(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
+  const bool chains = posterior.method() == v1::ComputePosteriorResponse::MARKOV_CHAINS;
   std::vector<std::string> header = {"parameter", "mean ± sd", "unit"};
   for (const double probability : posterior.probabilities()) {
-    header.push_back(Percent(probability));
+    header.push_back(FormatPercent(probability));
   }
   header.insert(header.end(), {"density over the central 99.9 %", "effective samples"});
   if (chains) header.push_back("R̂");
@@ -84,13 +77,13 @@ void PrintTable(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
   }
   table.Print(out);
   out << absl::StrFormat(
-      "\n%d measured values up to t = %.6g s; %d draws by %s\n", posterior.measured_values(),
-      posterior.time(), posterior.draws(),
+      "\n%d measured values up to t = %.6g s; %d draws by %s\n", posterior.measured_value_count(),
+      posterior.time_s(), posterior.draw_count(),
       chains ? "Markov chains" : "importance sampling from the curvature's Gaussian");
   PrintDiagnostics(posterior.diagnostics(), out);
 }
 
-void PrintSamples(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+void PrintSamples(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
   const int columns = posterior.parameters_size();
   for (int j = 0; j < columns; ++j) {
     out << posterior.parameters(j).name() << (j + 1 < columns ? ',' : '\n');
@@ -100,7 +93,7 @@ void PrintSamples(const v1::GetPosteriorResponse& posterior, std::ostream& out) 
   }
 }
 
-void PrintJoints(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+void PrintJoints(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
   out << "first,second,firstValue,secondValue,density\n";
   for (const auto& joint : posterior.joints()) {
     const int inner = joint.second_value_size();
@@ -113,7 +106,7 @@ void PrintJoints(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
   }
 }
 
-void PrintParameters(const v1::GetPosteriorResponse& posterior, std::ostream& out) {
+void PrintParameters(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
   out << "parameter,mean,stdDev";
   for (const double probability : posterior.probabilities()) {
     out << ",q" << FormatExact(probability);
@@ -147,4 +140,4 @@ int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostr
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

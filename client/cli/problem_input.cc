@@ -3,11 +3,13 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/cli/backend.h"
-#include "client/cpp/problem_file.h"
+#include "client/cpp/file_kind.h"
 #include "core/common/status.h"
-#include "server/convert/problem.h"
+#include "polyest/data_file.h"
+#include "polyest/problem_file.h"
+#include "proto/wire/convert/problem.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Place& place) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, ReadProblemFile(path));
@@ -18,4 +20,23 @@ absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Pl
   return problem;
 }
 
-}  // namespace polyest
+absl::Status CheckFilesAreNotSwapped(const std::string& problem_file,
+                                     const std::string& data_file) {
+  if (KindOfFile(problem_file) != FileKind::kCsv || KindOfFile(data_file) != FileKind::kJson) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat("the first file, ", problem_file,
+                                                 ", is CSV data and the second, ", data_file,
+                                                 ", a problem: swap them"));
+}
+
+absl::Status ReadProblemAndData(const std::string& problem_file, const std::string& data_file,
+                                const Place& place, v1::Problem& problem,
+                                v1::Measurements& measurements) {
+  POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(problem_file, data_file));
+  POLYEST_ASSIGN_OR_RETURN(problem, ReadCheckedProblem(problem_file, place));
+  POLYEST_ASSIGN_OR_RETURN(measurements, ReadDataFile(data_file, ColumnsOf(problem)));
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal

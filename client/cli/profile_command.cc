@@ -12,39 +12,34 @@
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
-#include "client/cpp/data_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr int kTablePoints = 17;
 
-absl::StatusOr<v1::ProfileCostResponse> Profile(const ProfileArguments& arguments) {
-  v1::ProfileCostRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& arguments) {
+  v1::ComputeCostProfilesRequest request;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
-  request.set_points(arguments.points);
+  request.set_point_count(arguments.points);
   // A person reads fewer rows than a plot takes.
-  if (arguments.format == Format::kTable && arguments.points == 0) request.set_points(kTablePoints);
-  auto response = MakeBackend(arguments.place)->ProfileCost(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+  if (arguments.format == Format::kTable && arguments.points == 0)
+    request.set_point_count(kTablePoints);
+  auto response = MakeBackend(arguments.place)->ComputeCostProfiles(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
   return response;
 }
 
-// Without the minus sign of a rounding error.
+// Returns the rise without the minus sign of a rounding error.
 double Rise(double total, double least) {
   const double rise = total - least;
   return std::abs(rise) < 5e-4 ? 0 : rise;
 }
 
-// One table a parameter: its values, the rise of the cost and where the others are then.
-void PrintTables(const v1::ProfileCostResponse& response, std::ostream& out) {
+// Prints one table a parameter: its values, the rise of the cost and where the others are then.
+void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& out) {
   const int columns = response.parameters_size();
   for (const auto& profile : response.profiles()) {
     const int count = profile.value_size();
@@ -74,8 +69,9 @@ void PrintTables(const v1::ProfileCostResponse& response, std::ostream& out) {
   PrintDiagnostics(response.diagnostics(), out);
 }
 
-// One row a value: the parameter profiled, its value, the costs and all parameters at the minimum.
-void PrintCsv(const v1::ProfileCostResponse& response, std::ostream& out) {
+// Prints one row a value: the parameter profiled, its value, the costs and all parameters at the
+// minimum.
+void PrintCsv(const v1::ComputeCostProfilesResponse& response, std::ostream& out) {
   out << "parameter,value,total,mismatch,prior";
   for (const std::string& name : response.parameters()) out << ',' << name;
   out << '\n';
@@ -108,4 +104,4 @@ int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostrea
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

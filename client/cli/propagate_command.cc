@@ -13,37 +13,35 @@
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-absl::StatusOr<v1::PropagateResponse> Propagate(const PropagateArguments& arguments) {
-  v1::PropagateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArguments& arguments) {
+  v1::ComputePropagationRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
-  request.set_until(arguments.until_s);
-  request.set_step(arguments.step_s);
-  auto response = MakeBackend(arguments.place)->Propagate(request);
+  request.set_until_s(arguments.until_s);
+  request.set_step_s(arguments.step_s);
+  auto response = MakeBackend(arguments.place)->ComputePropagation(request);
   if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
   return response;
 }
 
-std::string Percent(double probability) { return FormatNumber(100 * probability) + " %"; }
-
-// One table an output.
-void PrintTables(const v1::PropagateResponse& propagation, std::ostream& out) {
+// Prints one table an output.
+void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   const int quantiles = propagation.probabilities_size();
   for (const auto& output : propagation.outputs()) {
     const std::string unit = output.unit() == "1" ? "" : absl::StrCat(" (", output.unit(), ")");
     out << output.name() << unit << '\n';
     std::vector<std::string> header = {"t (s)", "mean", "sd"};
     for (const double probability : propagation.probabilities()) {
-      header.push_back(Percent(probability));
+      header.push_back(FormatPercent(probability));
     }
     header.push_back("residual");
     TextTable table(std::move(header), TextTable::Align::kRight);
-    for (int k = 0; k < propagation.time_size(); ++k) {
+    for (int k = 0; k < propagation.time_s_size(); ++k) {
       const double sd = output.std_dev(k);
-      std::vector<std::string> row = {FormatNumber(propagation.time(k), 6),
+      std::vector<std::string> row = {FormatNumber(propagation.time_s(k), 6),
                                       FormatValue(output.mean(k), sd), FormatNumber(sd, 3)};
       for (int q = 0; q < quantiles; ++q) {
         row.push_back(FormatValue(output.quantiles(k * quantiles + q), sd));
@@ -54,13 +52,14 @@ void PrintTables(const v1::PropagateResponse& propagation, std::ostream& out) {
     table.Print(out);
     out << '\n';
   }
-  out << absl::StrFormat("expansion: order %d, %d terms, %d points\n", propagation.order(),
-                         propagation.terms(), propagation.points());
+  out << absl::StrFormat("expansion: order %d, %d terms, %d points\n",
+                         propagation.expansion().order(), propagation.expansion().term_count(),
+                         propagation.expansion().point_count());
   PrintDiagnostics(propagation.diagnostics(), out);
 }
 
-// One row a time: x.mean, x.stdDev, x.q0.025 …, x.residual for each output.
-void PrintCsv(const v1::PropagateResponse& propagation, std::ostream& out) {
+// Prints one row a time: x.mean, x.stdDev, x.q0.025 …, x.residual for each output.
+void PrintCsv(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   out << 't';
   for (const auto& output : propagation.outputs()) {
     out << ',' << output.name() << ".mean," << output.name() << ".stdDev";
@@ -71,8 +70,8 @@ void PrintCsv(const v1::PropagateResponse& propagation, std::ostream& out) {
   }
   out << '\n';
   const int quantiles = propagation.probabilities_size();
-  for (int k = 0; k < propagation.time_size(); ++k) {
-    out << FormatExact(propagation.time(k));
+  for (int k = 0; k < propagation.time_s_size(); ++k) {
+    out << FormatExact(propagation.time_s(k));
     for (const auto& output : propagation.outputs()) {
       out << ',' << FormatExact(output.mean(k)) << ',' << FormatExact(output.std_dev(k));
       for (int q = 0; q < quantiles; ++q) {
@@ -99,4 +98,4 @@ int RunCommand(const PropagateArguments& arguments, std::ostream& out, std::ostr
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

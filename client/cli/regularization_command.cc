@@ -13,33 +13,27 @@
 #include "client/cli/problem_input.h"
 #include "client/cli/regularization_plot.h"
 #include "client/cli/text_table.h"
-#include "client/cpp/data_file.h"
 #include "core/common/status.h"
+#include "polyest/data_file.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-using Sweep = v1::SweepRegularizationResponse;
+using Sweep = v1::ComputeRegularizationSweepResponse;
 
-constexpr int kTablePoints = 17;
 
 absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
-  v1::SweepRegularizationRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
-                           ReadCheckedProblem(arguments.problem_file, arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_measurements(),
-                           ReadDataFile(arguments.data_file, ColumnsOf(request.problem())));
+  v1::ComputeRegularizationSweepRequest request;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.set_lowest(arguments.lowest);
   request.set_highest(arguments.highest);
-  request.set_points(arguments.points);
+  request.set_point_count(arguments.points);
   // A person reads fewer rows than a plot takes.
   if (arguments.format == Format::kTable && arguments.points == 0 && arguments.plot_file.empty()) {
-    request.set_points(kTablePoints);
+    request.set_point_count(kTablePoints);
   }
-  auto response = MakeBackend(arguments.place)->SweepRegularization(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+  auto response = MakeBackend(arguments.place)->ComputeRegularizationSweep(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
   return response;
 }
 
@@ -47,7 +41,7 @@ std::string WithUnit(const std::string& name, const std::string& unit) {
   return unit == "1" ? name : absl::StrCat(name, " (", unit, ")");
 }
 
-// Without the minus sign of a rounding error.
+// Formats the evidence without the minus sign of a rounding error.
 std::string FormatLogEvidence(double value) {
   return absl::StrFormat("%.2f", value > -5e-3 ? 0 : value);
 }
@@ -86,7 +80,7 @@ void PrintTable(const Sweep& sweep, std::ostream& out) {
   PrintDiagnostics(sweep.diagnostics(), out);
 }
 
-// One row a weight; then the estimates and their standard deviations.
+// Prints one row a weight; then the estimates and their standard deviations.
 void PrintCsv(const Sweep& sweep, std::ostream& out) {
   out << "regularization,mismatch,prior,effectiveParameters,logEvidence";
   for (const std::string& name : sweep.parameters()) out << ',' << name << ',' << name << "_stdDev";
@@ -129,4 +123,4 @@ int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std:
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,15 +6,15 @@
 #include <limits>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-using Sweep = v1::SweepRegularizationResponse;
+using Sweep = v1::ComputeRegularizationSweepResponse;
 
 constexpr char kLineColor[] = "#1f4e9c", kLCurveColor[] = "#d95f02",
                kDiscrepancyColor[] = "#1b9e77", kEvidenceColor[] = "#c2185b";
 constexpr char kWeight[] = "log₁₀ α²";
-constexpr double kLeastLogEvidence = -20;  // drawn; what is below is as good as impossible
+constexpr double kMinLogEvidence = -20;  // drawn; what is below is as good as impossible
 
 struct Rule {
   const char* name;
@@ -32,7 +32,7 @@ std::vector<Rule> RulesThatChoose(const Sweep& sweep) {
   return rules;
 }
 
-// A panel over log₁₀ α², with the rules' choices.
+// Returns a panel over log₁₀ α², with the rules' choices.
 LinePanel PanelOverWeight(const Sweep& sweep, std::string title, std::string y_label) {
   LinePanel panel;
   panel.title = std::move(title);
@@ -64,7 +64,7 @@ LinePanel EvidencePanel(const Sweep& sweep) {
   LinePanel panel = PanelOverWeight(sweep, "Evidence", "log evidence − greatest");
   LineSeries series{"", kLineColor, LineStyle::kSolid, {}, {}};
   for (const Sweep::Point& point : sweep.points()) {
-    const bool seen = point.log_evidence() > kLeastLogEvidence;
+    const bool seen = point.log_evidence() > kMinLogEvidence;
     series.x.push_back(std::log10(point.regularization()));
     series.y.push_back(seen ? point.log_evidence() : std::numeric_limits<double>::quiet_NaN());
   }
@@ -103,4 +103,4 @@ Plot MakePlot(const Sweep& sweep) {
   return plot;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,11 +2,11 @@
 #include "client/cli/exit_status.h"
 #include "proto/problem_schema.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 int RunCommand(const SchemaArguments&, std::ostream& out, std::ostream&) {
   out << kProblemSchema;
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

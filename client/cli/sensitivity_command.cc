@@ -14,34 +14,34 @@
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-using Analysis = v1::AnalyzeSensitivityResponse;
+using Analysis = v1::ComputeSensitivityResponse;
 
-constexpr int kMostTableRows = 21;  // of an output; the other formats have all times
+constexpr int kMaxTableRows = 21;  // of an output; the other formats have all times
 
 absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& arguments) {
-  v1::AnalyzeSensitivityRequest request;
-  POLYEST_ASSIGN_OR_RETURN(*request.mutable_problem(),
+  v1::ComputeSensitivityRequest request;
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
-  request.set_until(arguments.until_s);
-  request.set_step(arguments.step_s);
+  request.set_until_s(arguments.until_s);
+  request.set_step_s(arguments.step_s);
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
-  auto response = MakeBackend(arguments.place)->AnalyzeSensitivity(request);
+  auto response = MakeBackend(arguments.place)->ComputeSensitivity(request);
   if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
   return response;
 }
 
 std::string Share(double share) { return absl::StrFormat("%.3f", share); }
 
-// First-order and total index of each parameter; none where the output does not vary.
+// Returns the first-order and total index of each parameter; none where the output does not vary.
 std::vector<std::string> Row(const Analysis& analysis, const Analysis::Output& output, int k) {
   const int n = analysis.parameters_size();
   const auto totals = output.total().begin() + k * n;
   const bool varies = std::any_of(totals, totals + n, [](double share) { return share > 0; });
   const double sd = varies ? output.std_dev(k) : 0;
-  std::vector<std::string> row = {FormatNumber(analysis.time(k), 6),
+  std::vector<std::string> row = {FormatNumber(analysis.time_s(k), 6),
                                   FormatValue(output.mean(k), sd), FormatNumber(sd, 3),
                                   FormatNumber(varies ? output.residual(k) : 0, 2)};
   for (int i = k * n; i < (k + 1) * n; ++i) {
@@ -60,8 +60,8 @@ void PrintOutput(const Analysis& analysis, const Analysis::Output& output, std::
     header.push_back("total");
   }
   TextTable table(std::move(header), TextTable::Align::kRight);
-  const int times = analysis.time_size();
-  const int stride = std::max(1, (times + kMostTableRows - 3) / (kMostTableRows - 1));
+  const int times = analysis.time_s_size();
+  const int stride = std::max(1, (times + kMaxTableRows - 3) / (kMaxTableRows - 1));
   for (int k = 0; k < times; k += stride) table.AddRow(Row(analysis, output, k));
   table.Print(out);
   out << '\n';
@@ -80,12 +80,14 @@ void PrintTables(const Analysis& analysis, std::ostream& out) {
   out << "Shares of the variance that each parameter has alone, and in all (total)\n\n";
   for (const auto& output : analysis.outputs()) PrintOutput(analysis, output, out);
   PrintActivity(analysis, out);
-  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", analysis.order(),
-                         analysis.terms(), analysis.points());
+  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n",
+                         analysis.expansion().order(), analysis.expansion().term_count(),
+                         analysis.expansion().point_count());
   PrintDiagnostics(analysis.diagnostics(), out);
 }
 
-// One row a time: x.mean, x.stdDev, x.residual, x.noise, x.first.k, x.total.k … for each output.
+// Prints one row a time: x.mean, x.stdDev, x.residual, x.noise, x.first.k, x.total.k … for each
+// output.
 void PrintCsv(const Analysis& analysis, std::ostream& out) {
   out << 't';
   for (const auto& output : analysis.outputs()) {
@@ -99,8 +101,8 @@ void PrintCsv(const Analysis& analysis, std::ostream& out) {
   }
   out << '\n';
   const int n = analysis.parameters_size();
-  for (int k = 0; k < analysis.time_size(); ++k) {
-    out << FormatExact(analysis.time(k));
+  for (int k = 0; k < analysis.time_s_size(); ++k) {
+    out << FormatExact(analysis.time_s(k));
     for (const auto& output : analysis.outputs()) {
       out << ',' << FormatExact(output.mean(k)) << ',' << FormatExact(output.std_dev(k)) << ','
           << FormatExact(output.residual(k)) << ',' << FormatExact(output.noise_std_dev(k));
@@ -127,4 +129,4 @@ int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::os
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstring>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kFirstLine[] = "polyest session 1";
@@ -72,4 +72,4 @@ absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::Read() {
       absl::StrFormat("%s: breaks off in the midst of a record", file_));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,16 +11,16 @@
 #include <optional>
 #include <string>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/session_service.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class SessionFileWriter {
  public:
-  // Beside the file first, so that an export that fails leaves what was there. INVALID_ARGUMENT
-  // when that cannot be written.
+  // Writes beside the file first, so that an export that fails leaves what was there.
+  // INVALID_ARGUMENT when that cannot be written.
   static absl::StatusOr<std::unique_ptr<SessionFileWriter>> Open(const std::string& file);
-  // What was not finished is removed.
+  // Removes what was not finished.
   ~SessionFileWriter();
   SessionFileWriter(const SessionFileWriter&) = delete;
   SessionFileWriter& operator=(const SessionFileWriter&) = delete;
@@ -42,7 +42,7 @@ class SessionFileReader {
   // INVALID_ARGUMENT when the file cannot be read or is something else.
   static absl::StatusOr<std::unique_ptr<SessionFileReader>> Open(const std::string& file);
 
-  // None at the end of the file; INVALID_ARGUMENT where it breaks off.
+  // Returns none at the end of the file; INVALID_ARGUMENT where it breaks off.
   absl::StatusOr<std::optional<v1::SessionRecord>> Read();
 
  private:
@@ -53,4 +53,4 @@ class SessionFileReader {
   std::unique_ptr<google::protobuf::io::IstreamInputStream> input_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

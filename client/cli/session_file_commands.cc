@@ -8,7 +8,7 @@
 #include "client/cli/session_file.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 absl::StatusOr<int64_t> Export(const ExportArguments& arguments) {
@@ -50,8 +50,8 @@ int RunCommand(const ImportArguments& arguments, std::ostream& out, std::ostream
   const auto session = Import(arguments);
   if (!session.ok()) return Report(session.status(), arguments.place.server, err);
   out << "imported " << session->name() << " with " << session->last_sequence() << " batches and "
-      << session->samples() << " samples" << std::endl;
+      << session->sample_count() << " samples" << std::endl;
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

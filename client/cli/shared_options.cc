@@ -3,7 +3,7 @@
 #include <charconv>
 #include <map>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 const std::map<std::string, Format> kFormats = {{"table", Format::kTable},
@@ -64,19 +64,48 @@ CLI::Option* AddFmuFolder(CLI::App& command, Place& place) {
                             "Folder of the FMUs that problems may name here");
 }
 
-void AddPlace(CLI::App& command, Place& place) {
+void AddThreads(CLI::App& command, int& threads) {
+  command.add_option("--threads", threads, "Threads for computing in this process")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+}
+
+CLI::Option* AddPlace(CLI::App& command, Place& place) {
   CLI::Option* const server = AddServer(command, place);
   command.add_flag("--local")
       ->description("Compute in this process (the default)")
       ->excludes(server);
   AddFmuFolder(command, place)->excludes(server);
-  command.add_option("--threads", place.threads, "Threads for computing in this process")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  AddThreads(command, place.threads);
+  return server;
 }
 
 void AddProblem(CLI::App& command, std::string& file) {
   command.add_option("problem", file, "The problem, a JSON file")->required();
+}
+
+void AddData(CLI::App& command, std::string& file) {
+  command.add_option("data", file, "The measurements, a CSV file")->required();
+}
+
+void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
+                   std::string& data_file, std::string& session) {
+  CLI::Option* const problem =
+      command.add_option("problem", problem_file, "The problem, a JSON file");
+  CLI::Option* const data = command.add_option("data", data_file, "The measurements, a CSV file");
+  CLI::Option* const server = AddPlace(command, place);
+  CLI::Option* const name =
+      command
+          .add_option("--session", session,
+                      "A session of the daemon, in place of the problem and the data")
+          ->needs(server)
+          ->excludes(problem)
+          ->excludes(data);
+  command.callback([problem, data, name] {
+    if (name->count() > 0 || data->count() > 0) return;
+    throw CLI::RequiredError(problem->count() > 0 ? "data"
+                                                  : "problem and data, or else --session,");
+  });
 }
 
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {
@@ -101,4 +130,4 @@ void AddFormat(CLI::App& command, Format& format, const std::vector<std::string>
       ->check(CLI::Validator(check, "FORMAT"));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

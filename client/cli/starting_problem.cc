@@ -16,15 +16,15 @@
 #include "client/cli/number_format.h"
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// Where `polyest schema > problem.schema.json` puts it, beside the problem.
+// `polyest schema > problem.schema.json` puts the schema there, beside the problem.
 constexpr char kSchema[] = "./problem.schema.json";
-constexpr size_t kMostUnknowns = 2;
+constexpr size_t kMaxUnknowns = 2;
 constexpr double kPriorHalfWidth = 0.3;  // of the default
 
-// As a JSON string: the names of an FMU may have anything in them.
+// Returns a JSON string: the names of an FMU may have anything in them.
 std::string Quoted(const std::string& name) {
   google::protobuf::Value value;
   value.set_string_value(name);
@@ -52,7 +52,7 @@ std::vector<Quantity> ChooseUnknowns(const ModelDescription& model) {
     (typical ? unknowns : others).push_back(parameter);
   }
   if (unknowns.empty() && !others.empty()) unknowns.push_back(others.front());
-  if (unknowns.size() > kMostUnknowns) unknowns.resize(kMostUnknowns);
+  if (unknowns.size() > kMaxUnknowns) unknowns.resize(kMaxUnknowns);
   return unknowns;
 }
 
@@ -89,7 +89,7 @@ std::vector<std::string> Fixed(const ModelDescription& model,
   return fixed;
 }
 
-// A signal of the size usual for its unit; bumps come one after the other.
+// Returns a signal of the size usual for its unit; bumps come one after the other.
 std::string Input(const Quantity& input, int index) {
   std::string signal = R"("sinusoid": {"amplitude": 1, "frequencyHz": 1})";
   if (input.unit == "m") {
@@ -179,4 +179,4 @@ const char kStartingEquations[] = R"({
 }
 )";
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -19,19 +19,21 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/json_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/progress_line.h"
+#include "client/cli/stream_progress.h"
 #include "client/cli/stream_session.h"
-#include "client/cpp/client.h"
-#include "client/cpp/data_file.h"
-#include "client/cpp/measurement_stream.h"
 #include "core/common/status.h"
-#include "server/refusal/refusal.h"
+#include "polyest/client.h"
+#include "polyest/data_file.h"
+#include "polyest/measurement_stream.h"
+#include "proto/wire/refusal/refusal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// From one attempt to open a session to the next.
+// The pauses between attempts to open a session.
 constexpr std::chrono::milliseconds kFirstPause{500};
-constexpr std::chrono::milliseconds kLongestPause{5'000};
+constexpr std::chrono::milliseconds kMaxPause{5'000};
 
 // Says when a batch is due, by the data's own time.
 class Pace {
@@ -41,12 +43,12 @@ class Pace {
   // Waits until the batch's last row would have been measured. Runs follow upon one another.
   void Wait(const v1::Measurements& batch) {
     if (rate_ == 0) return;
-    for (int row = 0; row < batch.time_size(); ++row) {
+    for (int row = 0; row < batch.time_s_size(); ++row) {
       const int run = batch.run().empty() ? 0 : batch.run(row);
-      if (run_ < 0) elapsed_s_ = -batch.time(row);
-      elapsed_s_ += batch.time(row) - (run_ == run ? time_s_ : 0);
+      if (run_ < 0) elapsed_s_ = -batch.time_s(row);
+      elapsed_s_ += batch.time_s(row) - (run_ == run ? time_s_ : 0);
       run_ = run;
-      time_s_ = batch.time(row);
+      time_s_ = batch.time_s(row);
     }
     const std::chrono::duration<double> due(elapsed_s_ / rate_);
     interrupt_.WaitUntil(start_ +
@@ -70,16 +72,23 @@ class StreamCommand {
         err_(err),
         client_(arguments.place.server, ToClientOptions(arguments.place)) {}
 
-  // The last estimate, none without samples.
+  // Returns the last estimate, none without samples.
   absl::StatusOr<std::optional<v1::Estimate>> Run() {
+    if (arguments_.data_file != "-") {
+      POLYEST_RETURN_IF_ERROR(
+          CheckFilesAreNotSwapped(arguments_.problem_file, arguments_.data_file));
+    }
     POLYEST_ASSIGN_OR_RETURN(problem_,
                              ReadCheckedProblem(arguments_.problem_file, arguments_.place));
+    ProgressLine line([this] { return progress_.Describe(); });
+    line_ = &line;
     if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
     const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {
       return absl::InvalidArgumentError(
           absl::StrCat(arguments_.data_file, ": cannot be opened: ", std::strerror(errno)));
     }
+    if (isatty(STDERR_FILENO) != 0) progress_.CountRowsOf(descriptor);
     auto last = Read(descriptor, arguments_.data_file);
     close(descriptor);
     return last;
@@ -111,13 +120,12 @@ class StreamCommand {
   absl::StatusOr<StreamSession> WaitForSession() {
     auto session = OpenSession(client_, problem_, arguments_.session);
     for (std::chrono::milliseconds pause = kFirstPause; !session.ok();
-         pause = std::min(2 * pause, kLongestPause)) {
+         pause = std::min(2 * pause, kMaxPause)) {
       const auto refusal = RefusalOf(session.status());
       if (!absl::IsResourceExhausted(session.status()) || !refusal || !refusal->retry_delay) break;
       pause = std::max(pause, *refusal->retry_delay);
-      err_ << absl::StrFormat("polyest: the daemon takes no session now (%s); trying again in %g s",
-                              session.status().message(), static_cast<double>(pause.count()) / 1000)
-           << std::endl;
+      Tell(absl::StrFormat("the daemon takes no session now (%s); trying again in %g s",
+                           session.status().message(), static_cast<double>(pause.count()) / 1000));
       interrupt_.WaitUntil(std::chrono::steady_clock::now() + pause);
       if (interrupted()) break;
       session = OpenSession(client_, problem_, arguments_.session);
@@ -133,13 +141,16 @@ class StreamCommand {
     };
     MeasurementStream stream(client_, session.name, std::move(options), Callbacks());
     POLYEST_RETURN_IF_ERROR(stream.Open());
-    if (isatty(STDERR_FILENO) != 0) err_ << "streaming to " << session.name << std::endl;
+    if (isatty(STDERR_FILENO) != 0) {
+      line_->Interject([&] { err_ << "streaming to " << session.name << std::endl; });
+    }
     Pace pace(arguments_.rate, interrupt_);
     int64_t skipped = 0;
     bool any_sent = false;
-    while (batch.time_size() > 0) {
+    while (batch.time_s_size() > 0) {
+      progress_.AddRows(batch.time_s_size());
       if (session.resumed_after) skipped += RemoveRowsUpTo(*session.resumed_after, batch);
-      if (batch.time_size() > 0) {
+      if (batch.time_s_size() > 0) {
         pace.Wait(batch);
         POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
         any_sent = true;
@@ -150,9 +161,9 @@ class StreamCommand {
       POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
     }
     if (session.resumed_after) {
-      err_ << absl::StrFormat(
-          "polyest: resumed %s after t = %g s of run %d, %d rows were there already\n",
-          session.name, session.resumed_after->time_s, session.resumed_after->run, skipped);
+      Tell(absl::StrFormat("resumed %s after t = %g s of run %d, %d rows were there already",
+                           session.name, session.resumed_after->time_s, session.resumed_after->run,
+                           skipped));
     }
     if (EndsRun() && any_sent && !interrupted()) {
       v1::Measurements end;
@@ -162,8 +173,8 @@ class StreamCommand {
     return stream.Finish();
   }
 
-  // Whether the last rows would wait for rows that will not come. A session with a name of its own
-  // may be resumed, by data that go on.
+  // Returns whether the last rows would wait for rows that will not come. A session with a name of
+  // its own may be resumed, by data that go on.
   bool EndsRun() const {
     if (!arguments_.session.empty()) return false;
     return std::any_of(problem_.inputs().begin(), problem_.inputs().end(),
@@ -174,16 +185,19 @@ class StreamCommand {
     return {
         .estimate =
             [this](const v1::Estimate& estimate) {
-              if (arguments_.format == Format::kJsonLines) {
-                out_ << ToJson(estimate, /*several_lines=*/false) << std::endl;
-              } else {
-                out_ << EstimateLine(estimate) << std::endl;
-              }
+              progress_.SetEstimateTime(estimate.time());
+              const std::string line = arguments_.format == Format::kJsonLines
+                                           ? ToJson(estimate, /*several_lines=*/false)
+                                           : EstimateLine(estimate);
+              line_->Interject([&] { out_ << line << std::endl; });
             },
         .acknowledgement = nullptr,
-        .connection =
-            [this](const std::string& sentence) { err_ << "polyest: " << sentence << std::endl; },
+        .connection = [this](const std::string& sentence) { Tell(sentence); },
     };
+  }
+
+  void Tell(const std::string& sentence) {
+    line_->Interject([&] { err_ << "polyest: " << sentence << std::endl; });
   }
 
   const StreamArguments& arguments_;
@@ -192,6 +206,8 @@ class StreamCommand {
   const Interrupt interrupt_;
   Client client_;
   v1::Problem problem_;
+  StreamProgress progress_;
+  ProgressLine* line_ = nullptr;  // as long as Run() runs
 };
 
 }  // namespace
@@ -214,4 +230,4 @@ int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream
   return kExitOk;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,12 +5,12 @@
 
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id) {
   v1::CreateSessionRequest create;
-  *create.mutable_problem() = problem;
+  *create.mutable_session()->mutable_problem() = problem;
   create.set_session_id(id);
   const auto created = client.CreateSession(create);
   if (created.ok()) return StreamSession{created->name(), std::nullopt};
@@ -25,8 +25,8 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
                                                  "needs the same one, or choose another name"));
   }
   StreamSession resumed{session.name(), std::nullopt};
-  if (session.samples() > 0) {
-    resumed.resumed_after = RowPlace{session.last_run(), session.last_time()};
+  if (session.sample_count() > 0) {
+    resumed.resumed_after = RowPlace{session.last_run(), session.last_time_s()};
   }
   return resumed;
 }
@@ -34,11 +34,11 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch) {
   const auto is_there = [&](int row) {
     const int run = batch.run().empty() ? 0 : batch.run(row);
-    return run < place.run || (run == place.run && batch.time(row) <= place.time_s);
+    return run < place.run || (run == place.run && batch.time_s(row) <= place.time_s);
   };
   int rows = 0;
-  while (rows < batch.time_size() && is_there(rows)) ++rows;
-  batch.mutable_time()->erase(batch.time().begin(), batch.time().begin() + rows);
+  while (rows < batch.time_s_size() && is_there(rows)) ++rows;
+  batch.mutable_time_s()->erase(batch.time_s().begin(), batch.time_s().begin() + rows);
   if (!batch.run().empty()) {
     batch.mutable_run()->erase(batch.run().begin(), batch.run().begin() + rows);
   }
@@ -54,4 +54,4 @@ int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch) {
   return rows;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

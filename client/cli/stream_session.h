@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct RowPlace {
   int run = 0;
@@ -27,7 +27,7 @@ struct StreamSession {
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id);
 
-// Takes the leading rows up to and including `place` away; returns how many.
+// Removes the leading rows up to and including `place`; returns how many.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
 
-}  // namespace polyest
+}  // namespace polyest::internal

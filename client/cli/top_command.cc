@@ -9,27 +9,28 @@
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/keyboard.h"
+#include "client/cli/screen.h"
+#include "client/cli/session_list.h"
 #include "client/cli/top_table.h"
-#include "client/cpp/client.h"
 #include "core/common/status.h"
+#include "polyest/client.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Home, and nothing below: a terminal that is cleared first would flicker.
+// Moves to the first place and clears what is below: a terminal that is cleared first would
+// flicker.
 constexpr char kHome[] = "\x1b[H\x1b[J";
 
 absl::StatusOr<DaemonView> Look(Client& client) {
   DaemonView view;
   POLYEST_ASSIGN_OR_RETURN(view.status, client.GetStatus({}));
-  v1::ListSessionsRequest request;
-  do {
-    POLYEST_ASSIGN_OR_RETURN(const v1::ListSessionsResponse page, client.ListSessions(request));
-    view.sessions.insert(view.sessions.end(), page.sessions().begin(), page.sessions().end());
-    request.set_page_token(page.next_page_token());
-  } while (!request.page_token().empty());
+  POLYEST_ASSIGN_OR_RETURN(v1::ListSessionsResponse list, ListAllSessions(client));
+  view.sessions.assign(std::make_move_iterator(list.mutable_sessions()->begin()),
+                       std::make_move_iterator(list.mutable_sessions()->end()));
   view.time_s = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
   return view;
 }
@@ -37,18 +38,32 @@ absl::StatusOr<DaemonView> Look(Client& client) {
 absl::Status Show(const TopArguments& arguments, const Interrupt& interrupt, std::ostream& out) {
   Client client(arguments.place.server, ToClientOptions(arguments.place));
   const bool redraw = !arguments.once && isatty(STDOUT_FILENO) != 0;
+  std::optional<Keyboard> keyboard;
+  if (redraw) keyboard.emplace();
   std::optional<DaemonView> before;
   while (!interrupt.Requested()) {
     POLYEST_ASSIGN_OR_RETURN(DaemonView now, Look(client));
-    // In one piece, so that no half of it is ever seen.
+    // The window may have another size by now.
+    if (redraw) {
+      Screen screen = ScreenOf(STDOUT_FILENO, ColorChoice::kNever);
+      screen.color = GetScreen(out).color;
+      SetScreen(out, screen);
+    }
+    // Printed in one piece, so that no half of it is ever seen.
     std::ostringstream text;
-    PrintTop(now, before ? &*before : nullptr, text);
+    text.copyfmt(out);
+    PrintTop(now, before ? &*before : nullptr, redraw, text);
     if (before && !redraw) out << '\n';
     out << (redraw ? kHome : "") << text.str() << std::flush;
     if (arguments.once || !out) break;
     before = std::move(now);
-    interrupt.WaitUntil(Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                           std::chrono::duration<double>(arguments.interval_s)));
+    const auto next = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                         std::chrono::duration<double>(arguments.interval_s));
+    if (!keyboard) {
+      interrupt.WaitUntil(next);
+    } else if (keyboard->WaitForQuit(next, interrupt)) {
+      break;
+    }
   }
   return absl::OkStatus();
 }
@@ -61,4 +76,4 @@ int RunCommand(const TopArguments& arguments, std::ostream& out, std::ostream& e
   return shown.ok() ? kExitOk : Report(shown, arguments.place.server, err);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

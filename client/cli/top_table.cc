@@ -4,22 +4,31 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/strip.h>
 
+#include <algorithm>
+#include <functional>
+#include <utility>
+
 #include "client/cli/number_format.h"
+#include "client/cli/screen.h"
 #include "client/cli/text_table.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kUnknown[] = "-";
+// The header of three lines, the table's own, the count of those left out, and the last line.
+constexpr int kRowsBesidesSessions = 6;
+
+std::string YesOrUnknown(bool yes) { return yes ? "yes" : kUnknown; }
 
 void PrintHeader(const v1::DaemonStatus& status, std::ostream& out) {
   out << absl::StrFormat("polyestd %s, up %s, %s, %s\n", status.version(),
-                         FormatDuration(status.uptime()), FormatBytes(status.memory_bytes()),
+                         FormatDuration(status.uptime_s()), FormatBytes(status.memory_bytes()),
                          status.durable() ? "sessions on disk" : "sessions in memory only");
   out << absl::StrFormat(
       "%d sessions, %d of them loaded; %d writers, %d watchers, %d tasks waiting\n\n",
-      status.sessions(), status.sessions_loaded(), status.writers(), status.watchers(),
-      status.waiting_tasks());
+      status.session_count(), status.loaded_session_count(), status.writer_count(),
+      status.watcher_count(), status.waiting_task_count());
 }
 
 const v1::Session* Find(const DaemonView& view, const std::string& name) {
@@ -33,10 +42,63 @@ std::string SampleRate(const v1::Session& session, const DaemonView& now,
                        const DaemonView* before) {
   if (before == nullptr || now.time_s <= before->time_s) return kUnknown;
   const v1::Session* const earlier = Find(*before, session.name());
-  // A smaller number is of another session that had the name.
-  if (earlier == nullptr || earlier->samples() > session.samples()) return kUnknown;
-  const auto samples = static_cast<double>(session.samples() - earlier->samples());
+  // A smaller number belongs to another session that had the name.
+  if (earlier == nullptr || earlier->sample_count() > session.sample_count()) return kUnknown;
+  const auto samples = static_cast<double>(session.sample_count() - earlier->sample_count());
   return FormatNumber(samples / (now.time_s - before->time_s), 3);
+}
+
+struct Column {
+  const char* title;
+  int importance;  // the least important is left out first
+  std::function<std::string(const v1::Session&)> cell;
+};
+
+// Returns the columns from left to right.
+std::vector<Column> Columns(const DaemonView& now, const DaemonView* before) {
+  using Session = v1::Session;
+  return {
+      {"session", 12,
+       [](const Session& s) { return std::string(absl::StripPrefix(s.name(), "sessions/")); }},
+      {"batches", 5, [](const Session& s) { return absl::StrCat(s.activity().batch_count()); }},
+      {"samples", 9, [](const Session& s) { return absl::StrCat(s.sample_count()); }},
+      {"samples/s", 10, [&now, before](const Session& s) { return SampleRate(s, now, before); }},
+      {"estimates", 2,
+       [](const Session& s) { return absl::StrCat(s.activity().estimate_count()); }},
+      {"re-expansions", 1,
+       [](const Session& s) { return absl::StrCat(s.activity().reexpansion_count()); }},
+      {"real-time", 11,
+       [](const Session& s) {
+         const double factor = s.activity().real_time_factor();
+         return factor > 0 ? FormatNumber(factor, 3) : kUnknown;
+       }},
+      {"unprocessed", 8,
+       [](const Session& s) {
+         return s.activity().loaded() ? absl::StrCat(s.activity().unprocessed_batch_count())
+                                      : kUnknown;
+       }},
+      {"writer", 6, [](const Session& s) { return YesOrUnknown(s.activity().has_writer()); }},
+      {"watchers", 4, [](const Session& s) { return absl::StrCat(s.activity().watcher_count()); }},
+      {"loaded", 3, [](const Session& s) { return YesOrUnknown(s.activity().loaded()); }},
+      {"idle", 7, [](const Session& s) { return FormatDuration(s.activity().idle_time_s()); }},
+  };
+}
+
+// Returns a table of the first sessions whose first column is at most a third of the screen.
+TextTable MakeTable(const DaemonView& now, const std::vector<Column>& columns, size_t sessions,
+                    int screen_columns) {
+  std::vector<std::string> cells;
+  for (const Column& column : columns) cells.emplace_back(column.title);
+  TextTable table(std::move(cells));
+  for (size_t i = 0; i < sessions; ++i) {
+    cells.clear();
+    for (const Column& column : columns) cells.push_back(column.cell(now.sessions[i]));
+    // Session names are ASCII.
+    const size_t limit = screen_columns > 0 ? static_cast<size_t>(screen_columns) / 3 : 0;
+    if (limit > 0 && cells[0].size() > limit) cells[0] = cells[0].substr(0, limit - 1) + "…";
+    table.AddRow(std::move(cells));
+  }
+  return table;
 }
 
 }  // namespace
@@ -60,23 +122,25 @@ std::string FormatBytes(int64_t bytes) {
   return absl::StrFormat("%.1f %s", value, unit);
 }
 
-void PrintTop(const DaemonView& now, const DaemonView* before, std::ostream& out) {
+void PrintTop(const DaemonView& now, const DaemonView* before, bool fit_rows, std::ostream& out) {
+  const Screen screen = GetScreen(out);
   PrintHeader(now.status, out);
-  TextTable table({"session", "batches", "samples", "samples/s", "estimates", "re-expansions",
-                   "real-time", "unprocessed", "writer", "watchers", "loaded", "idle"});
-  for (const v1::Session& session : now.sessions) {
-    const v1::Session::Activity& activity = session.activity();
-    const double factor = activity.real_time_factor();
-    table.AddRow({std::string(absl::StripPrefix(session.name(), "sessions/")),
-                  absl::StrCat(activity.batches()), absl::StrCat(session.samples()),
-                  SampleRate(session, now, before), absl::StrCat(activity.estimates()),
-                  absl::StrCat(activity.reexpansions()),
-                  factor > 0 ? FormatNumber(factor, 3) : kUnknown,
-                  activity.loaded() ? absl::StrCat(activity.unprocessed_batches()) : kUnknown,
-                  activity.has_writer() ? "yes" : kUnknown, absl::StrCat(activity.watchers()),
-                  activity.loaded() ? "yes" : kUnknown, FormatDuration(activity.idle_time())});
+  const size_t sessions = now.sessions.size();
+  size_t shown = sessions;
+  if (fit_rows && screen.rows > 0) {
+    shown = std::min(shown, static_cast<size_t>(std::max(1, screen.rows - kRowsBesidesSessions)));
+  }
+  std::vector<Column> columns = Columns(now, before);
+  TextTable table = MakeTable(now, columns, shown, screen.columns);
+  while (screen.columns > 0 && table.Width() > screen.columns && columns.size() > 1) {
+    columns.erase(std::min_element(
+        columns.begin(), columns.end(),
+        [](const Column& a, const Column& b) { return a.importance < b.importance; }));
+    table = MakeTable(now, columns, shown, screen.columns);
   }
   table.Print(out);
+  if (shown < sessions) out << "… and " << sessions - shown << " more\n";
+  if (fit_rows) out << Paint(out, Color::kFaint, "q ends");
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

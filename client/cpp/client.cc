@@ -1,4 +1,4 @@
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 
 #include <google/protobuf/util/time_util.h>
 #include <grpc/support/time.h>
@@ -7,14 +7,16 @@
 #include <chrono>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "polyest/rpc/error_details.pb.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
 namespace polyest {
-namespace {
 
-using Stub = v1::EstimationService::Stub;
+using namespace internal;
+
+namespace {
 
 template <typename Detail>
 bool Unpack(const google::protobuf::Any& any, Detail& detail) {
@@ -22,11 +24,9 @@ bool Unpack(const google::protobuf::Any& any, Detail& detail) {
          detail.ParseFromString(any.value());
 }
 
-// What the details of a status say; without a reason: nothing.
-Refusal RefusalIn(const grpc::Status& status) {
+// Returns what the details of a status say; an empty refusal without a reason.
+Refusal RefusalIn(const rpc::Status& detailed) {
   Refusal refusal;
-  rpc::Status detailed;
-  if (!grpc::ExtractErrorDetails(status, &detailed).ok()) return refusal;
   rpc::ErrorInfo info;
   rpc::RetryInfo retry;
   for (const google::protobuf::Any& detail : detailed.details()) {
@@ -42,13 +42,31 @@ Refusal RefusalIn(const grpc::Status& status) {
   return refusal;
 }
 
+// The field that the details of a status refuse; empty: none.
+std::string RefusedField(const rpc::Status& detailed) {
+  rpc::BadRequest bad;
+  for (const google::protobuf::Any& detail : detailed.details()) {
+    if (Unpack(detail, bad) && !bad.field_violations().empty()) {
+      return bad.field_violations(0).field();
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 absl::Status FromGrpc(const grpc::Status& status) {
   // The codes of both are the same numbers.
   const auto code = static_cast<absl::StatusCode>(status.error_code());
-  const Refusal refusal = RefusalIn(status);
-  if (status.ok() || refusal.reason.empty()) return absl::Status(code, status.error_message());
+  rpc::Status detailed;
+  if (status.ok() || !grpc::ExtractErrorDetails(status, &detailed).ok()) {
+    return absl::Status(code, status.error_message());
+  }
+  const std::string field = RefusedField(detailed);
+  // The daemon's message begins with the field already, where it is to be seen.
+  if (!field.empty()) return NamedInWords(field, absl::Status(code, status.error_message()));
+  const Refusal refusal = RefusalIn(detailed);
+  if (refusal.reason.empty()) return absl::Status(code, status.error_message());
   return Refuse(code, status.error_message(), refusal);
 }
 
@@ -56,11 +74,19 @@ Client::Client(const std::string& server, ClientOptions options)
     : server_(server),
       options_(std::move(options)),
       connection_(DaemonConnection::Open(server, options_)) {
-  if (connection_.ok()) stub_ = v1::EstimationService::NewStub(connection_->channel());
+  if (!connection_.ok()) return;
+  const auto channel = connection_->channel();
+  models_ = v1::ModelService::NewStub(channel);
+  problems_ = v1::ProblemService::NewStub(channel);
+  sessions_ = v1::SessionService::NewStub(channel);
+  studies_ = v1::StudyService::NewStub(channel);
+  operations_ = v1::OperationService::NewStub(channel);
+  statuses_ = v1::StatusService::NewStub(channel);
 }
 
-template <typename Response, typename Request>
-absl::StatusOr<Response> Client::Call(Method<Response, Request> method, const Request& request) {
+template <typename Stub, typename Response, typename Request>
+absl::StatusOr<Response> Client::Call(Stub* stub, Method<Stub, Response, Request> method,
+                                      const Request& request) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
   connection_->Identify(context);
@@ -70,94 +96,130 @@ absl::StatusOr<Response> Client::Call(Method<Response, Request> method, const Re
                      gpr_time_from_millis(options_.deadline->count(), GPR_TIMESPAN)));
   }
   Response response;
-  const grpc::Status status = (stub_.get()->*method)(&context, request, &response);
-  if (!status.ok()) return FromGrpc(status);
+  const grpc::Status status = (stub->*method)(&context, request, &response);
+  if (!status.ok()) return WithConnectionHint(FromGrpc(status), options_.tls);
   return response;
 }
 
 absl::StatusOr<v1::ListModelsResponse> Client::ListModels(const v1::ListModelsRequest& request) {
-  return Call(&Stub::ListModels, request);
+  return Call(models_.get(), &v1::ModelService::Stub::ListModels, request);
 }
 
 absl::StatusOr<v1::Model> Client::GetModel(const v1::GetModelRequest& request) {
-  return Call(&Stub::GetModel, request);
+  return Call(models_.get(), &v1::ModelService::Stub::GetModel, request);
 }
 
-absl::StatusOr<v1::EstimateResponse> Client::Estimate(const v1::EstimateRequest& request) {
-  return Call(&Stub::Estimate, request);
+absl::StatusOr<v1::CheckProblemResponse> Client::CheckProblem(
+    const v1::CheckProblemRequest& request) {
+  return Call(problems_.get(), &v1::ProblemService::Stub::CheckProblem, request);
 }
 
-absl::StatusOr<v1::PropagateResponse> Client::Propagate(const v1::PropagateRequest& request) {
-  return Call(&Stub::Propagate, request);
+absl::StatusOr<v1::GetProblemSchemaResponse> Client::GetProblemSchema(
+    const v1::GetProblemSchemaRequest& request) {
+  return Call(problems_.get(), &v1::ProblemService::Stub::GetProblemSchema, request);
 }
 
-absl::StatusOr<v1::EvaluateCostResponse> Client::EvaluateCost(
-    const v1::EvaluateCostRequest& request) {
-  return Call(&Stub::EvaluateCost, request);
+absl::StatusOr<v1::ComputeEstimateResponse> Client::ComputeEstimate(
+    const v1::ComputeEstimateRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeEstimate, request);
 }
 
-absl::StatusOr<v1::AnalyzeSensitivityResponse> Client::AnalyzeSensitivity(
-    const v1::AnalyzeSensitivityRequest& request) {
-  return Call(&Stub::AnalyzeSensitivity, request);
+absl::StatusOr<v1::ComputePropagationResponse> Client::ComputePropagation(
+    const v1::ComputePropagationRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputePropagation, request);
 }
 
-absl::StatusOr<v1::DesignExperimentResponse> Client::DesignExperiment(
-    const v1::DesignExperimentRequest& request) {
-  return Call(&Stub::DesignExperiment, request);
+absl::StatusOr<v1::ComputeCostGridResponse> Client::ComputeCostGrid(
+    const v1::ComputeCostGridRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeCostGrid, request);
+}
+
+absl::StatusOr<v1::ComputeSensitivityResponse> Client::ComputeSensitivity(
+    const v1::ComputeSensitivityRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeSensitivity, request);
+}
+
+absl::StatusOr<v1::ComputeExperimentDesignResponse> Client::ComputeExperimentDesign(
+    const v1::ComputeExperimentDesignRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeExperimentDesign, request);
+}
+
+absl::StatusOr<v1::ComputePosteriorResponse> Client::ComputePosterior(
+    const v1::ComputePosteriorRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputePosterior, request);
+}
+
+absl::StatusOr<v1::ComputeCostProfilesResponse> Client::ComputeCostProfiles(
+    const v1::ComputeCostProfilesRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeCostProfiles, request);
+}
+
+absl::StatusOr<v1::ComputeRegularizationSweepResponse> Client::ComputeRegularizationSweep(
+    const v1::ComputeRegularizationSweepRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeRegularizationSweep, request);
+}
+
+absl::StatusOr<v1::Operation> Client::StartComputation(const v1::StartComputationRequest& request) {
+  return Call(operations_.get(), &v1::OperationService::Stub::StartComputation, request);
+}
+
+absl::StatusOr<v1::Operation> Client::GetOperation(const v1::GetOperationRequest& request) {
+  return Call(operations_.get(), &v1::OperationService::Stub::GetOperation, request);
+}
+
+absl::StatusOr<v1::ListOperationsResponse> Client::ListOperations(
+    const v1::ListOperationsRequest& request) {
+  return Call(operations_.get(), &v1::OperationService::Stub::ListOperations, request);
+}
+
+absl::StatusOr<v1::Operation> Client::CancelOperation(const v1::CancelOperationRequest& request) {
+  return Call(operations_.get(), &v1::OperationService::Stub::CancelOperation, request);
+}
+
+absl::Status Client::DeleteOperation(const v1::DeleteOperationRequest& request) {
+  return Call(operations_.get(), &v1::OperationService::Stub::DeleteOperation, request).status();
 }
 
 absl::StatusOr<v1::Session> Client::CreateSession(const v1::CreateSessionRequest& request) {
-  return Call(&Stub::CreateSession, request);
+  return Call(sessions_.get(), &v1::SessionService::Stub::CreateSession, request);
 }
 
 absl::StatusOr<v1::Session> Client::GetSession(const v1::GetSessionRequest& request) {
-  return Call(&Stub::GetSession, request);
+  return Call(sessions_.get(), &v1::SessionService::Stub::GetSession, request);
 }
 
 absl::StatusOr<v1::ListSessionsResponse> Client::ListSessions(
     const v1::ListSessionsRequest& request) {
-  return Call(&Stub::ListSessions, request);
+  return Call(sessions_.get(), &v1::SessionService::Stub::ListSessions, request);
 }
 
 absl::Status Client::DeleteSession(const v1::DeleteSessionRequest& request) {
-  return Call(&Stub::DeleteSession, request).status();
-}
-
-absl::StatusOr<v1::DaemonStatus> Client::GetStatus(const v1::GetStatusRequest& request) {
-  return Call(&Stub::GetStatus, request);
+  return Call(sessions_.get(), &v1::SessionService::Stub::DeleteSession, request).status();
 }
 
 absl::StatusOr<v1::AddMeasurementsResponse> Client::AddMeasurements(
     const v1::AddMeasurementsRequest& request) {
-  return Call(&Stub::AddMeasurements, request);
+  return Call(sessions_.get(), &v1::SessionService::Stub::AddMeasurements, request);
 }
 
-absl::StatusOr<v1::EstimateResponse> Client::GetEstimate(const v1::GetEstimateRequest& request) {
-  return Call(&Stub::GetEstimate, request);
+absl::StatusOr<v1::Estimate> Client::GetEstimate(const v1::GetEstimateRequest& request) {
+  return Call(sessions_.get(), &v1::SessionService::Stub::GetEstimate, request);
 }
 
-absl::StatusOr<v1::GetPosteriorResponse> Client::GetPosterior(
-    const v1::GetPosteriorRequest& request) {
-  return Call(&Stub::GetPosterior, request);
-}
-
-absl::StatusOr<v1::ProfileCostResponse> Client::ProfileCost(const v1::ProfileCostRequest& request) {
-  return Call(&Stub::ProfileCost, request);
-}
-
-absl::StatusOr<v1::SweepRegularizationResponse> Client::SweepRegularization(
-    const v1::SweepRegularizationRequest& request) {
-  return Call(&Stub::SweepRegularization, request);
+absl::StatusOr<v1::DaemonStatus> Client::GetStatus(const v1::GetStatusRequest& request) {
+  return Call(statuses_.get(), &v1::StatusService::Stub::GetStatus, request);
 }
 
 absl::Status Client::WatchSession(
     const v1::WatchSessionRequest& request,
-    const std::function<bool(const v1::EstimateResponse&)>& estimate) {
+    const std::function<bool(const v1::WatchSessionResponse&)>& estimate,
+    grpc::ClientContext* call) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
-  grpc::ClientContext context;
+  grpc::ClientContext own;
+  grpc::ClientContext& context = call != nullptr ? *call : own;
   connection_->Identify(context);
-  const auto reader = stub_->WatchSession(&context, request);
-  v1::EstimateResponse response;
+  const auto reader = sessions_->WatchSession(&context, request);
+  v1::WatchSessionResponse response;
   while (reader->Read(&response)) {
     if (estimate(response)) continue;
     context.TryCancel();
@@ -173,7 +235,7 @@ absl::Status Client::ExportSession(
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
   connection_->Identify(context);
-  const auto reader = stub_->ExportSession(&context, request);
+  const auto reader = sessions_->ExportSession(&context, request);
   v1::SessionRecord record;
   while (reader->Read(&record)) {
     const absl::Status taken = take(record);
@@ -192,7 +254,7 @@ absl::StatusOr<v1::Session> Client::ImportSession(
   grpc::ClientContext context;
   connection_->Identify(context);
   v1::Session session;
-  const auto writer = stub_->ImportSession(&context, &session);
+  const auto writer = sessions_->ImportSession(&context, &session);
   v1::ImportSessionRequest request;
   request.set_session_id(session_id);
   while (true) {
@@ -208,7 +270,7 @@ absl::StatusOr<v1::Session> Client::ImportSession(
   }
   writer->WritesDone();
   const grpc::Status status = writer->Finish();
-  if (!status.ok()) return FromGrpc(status);
+  if (!status.ok()) return WithConnectionHint(FromGrpc(status), options_.tls);
   return session;
 }
 

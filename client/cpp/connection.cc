@@ -1,6 +1,7 @@
-#include "client/cpp/connection.h"
+#include "polyest/connection.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
@@ -8,13 +9,17 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/security/exposure.h"
-#include "server/security/file_text.h"
+#include "proto/wire/transport/file_text.h"
+#include "proto/wire/transport/loopback.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 grpc::ChannelArguments Arguments(const ClientOptions& options) {
@@ -24,7 +29,7 @@ grpc::ChannelArguments Arguments(const ClientOptions& options) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  arguments.SetMaxReceiveMessageSize(options.most_response_bytes);
+  arguments.SetMaxReceiveMessageSize(options.max_response_bytes);
   // A connection of its own, which others cannot block.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // A stream that reconnects has delays of its own; the channel's must not outlast them.
@@ -77,9 +82,51 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Clie
   return grpc::SslCredentials(options);
 }
 
+// What may be wrong where no connection came about, by what gRPC and the TLS library say of it.
+// They say it in words only.
+std::string ConnectionHint(absl::string_view message, const std::optional<ClientTls>& tls) {
+  const auto says = [&](absl::string_view words) {
+    return absl::StrContains(absl::AsciiStrToLower(message), absl::AsciiStrToLower(words));
+  };
+  const bool closed =
+      says("Socket closed") || says("Connection reset by peer") || says("Broken pipe");
+  if (!tls) {
+    return closed ? "what listens there closed the connection unanswered, as a daemon does that "
+                    "serves TLS only: name its CA with --tls-ca; the daemon's log says more"
+                  : "";
+  }
+  if (says("wrong version number") || says("WRONG_VERSION_NUMBER")) {
+    return "what listens there does not speak TLS: leave out --tls-ca, or start the daemon with "
+           "--tls-certificate and --tls-key";
+  }
+  if (says("certificate verify failed") || says("CERTIFICATE_VERIFY_FAILED")) {
+    return "the daemon's certificate has expired or is not of the CA in --tls-ca: compare that "
+           "file with the daemon's --tls-certificate";
+  }
+  if (says("is not in peer certificate")) {
+    return "the daemon's certificate is for another name: connect by that, or give it with "
+           "--tls-server-name";
+  }
+  if (!closed) return "";
+  return tls->certificate_file.empty()
+             ? "the daemon broke off after the TLS handshake, as one does that asks for a client's "
+               "certificate: give yours with --tls-certificate and --tls-key; its log says more"
+             : "the daemon broke off after the TLS handshake, as one does that does not know the "
+               "CA of the client's certificate (its --tls-client-ca); its log says more";
+}
+
 }  // namespace
 
-// From any thread.
+absl::Status WithConnectionHint(const absl::Status& status, const std::optional<ClientTls>& tls) {
+  constexpr absl::string_view kNoConnection = "failed to connect to all addresses";
+  if (!absl::IsUnavailable(status) || !absl::StartsWith(status.message(), kNoConnection)) {
+    return status;
+  }
+  const std::string hint = ConnectionHint(status.message(), tls);
+  return hint.empty() ? status : absl::UnavailableError(absl::StrCat(status.message(), "; ", hint));
+}
+
+// Any thread may call it.
 class DaemonConnection::TokenSource {
  public:
   TokenSource(const ClientOptions& options, std::string token)

@@ -1,4 +1,4 @@
-#include "client/cpp/data_file.h"
+#include "polyest/data_file.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
@@ -15,19 +15,23 @@
 #include <limits>
 #include <utility>
 
+#include "client/cpp/file_kind.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 // Longer lines are refused: a file without line ends must not be read into memory whole.
-constexpr std::streamsize kLongestLine = 1 << 16;
+constexpr std::streamsize kMaxLineBytes = 1 << 16;
 
-// As much of a cell as a message can show.
+// Quotes as much of a cell as a message can show.
 std::string Quoted(absl::string_view cell) {
-  constexpr size_t kShown = 40;
-  return absl::StrCat("\"", cell.substr(0, kShown), cell.size() > kShown ? "…" : "", "\"");
+  constexpr size_t kMaxShown = 40;
+  return absl::StrCat("\"", cell.substr(0, kMaxShown), cell.size() > kMaxShown ? "…" : "", "\"");
 }
 
 bool Contains(const std::vector<std::string>& names, absl::string_view name) {
@@ -55,22 +59,22 @@ DataColumns ColumnsOf(const v1::Problem& problem) {
 }
 
 DataReader::DataReader(std::istream& in, std::string name)
-    : in_(&in), name_(std::move(name)), buffer_(std::make_unique<char[]>(kLongestLine)) {}
+    : in_(&in), name_(std::move(name)), buffer_(std::make_unique<char[]>(kMaxLineBytes)) {}
 
 absl::Status DataReader::LineError(absl::string_view message) const {
   return absl::InvalidArgumentError(absl::StrCat(name_, ":", line_, ": ", message));
 }
 
-// The next line that is not blank; false at the end of the data.
+// Reads the next line that is not blank; false at the end of the data.
 absl::StatusOr<bool> DataReader::NextLine(absl::string_view& line) {
   do {
-    in_->getline(buffer_.get(), kLongestLine);
+    in_->getline(buffer_.get(), kMaxLineBytes);
     const std::streamsize count = in_->gcount();
     if (in_->bad()) return absl::InvalidArgumentError(absl::StrCat(name_, ": cannot be read"));
     if (in_->eof() && count == 0) return false;
     ++line_;
     if (in_->fail() && !in_->eof()) {
-      return LineError(absl::StrCat("the line is longer than ", kLongestLine - 1, " bytes"));
+      return LineError(absl::StrCat("the line is longer than ", kMaxLineBytes - 1, " bytes"));
     }
     // gcount includes the line end, which is not in the buffer.
     line = absl::string_view(buffer_.get(), static_cast<size_t>(in_->eof() ? count : count - 1));
@@ -88,6 +92,10 @@ absl::StatusOr<DataReader> DataReader::Open(std::istream& in, std::string name,
   if (!found) {
     return absl::InvalidArgumentError(
         absl::StrCat(reader.name_, ": is empty; the first line must name the columns, t first"));
+  }
+  if (KindOfText(header) == FileKind::kJson) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        reader.name_, ": is JSON; data are CSV, and the first line names the columns, t first"));
   }
   for (const absl::string_view cell : absl::StrSplit(header, ',')) {
     const absl::string_view column = absl::StripAsciiWhitespace(cell);
@@ -144,12 +152,12 @@ absl::Status DataReader::CheckStreamed(const DataColumns& known, RefusedLine ref
   return absl::OkStatus();
 }
 
-absl::StatusOr<v1::Measurements> DataReader::Read(int64_t most_rows, RefusedLine refused) {
-  POLYEST_CHECK(most_rows > 0);
-  most_rows = std::min<int64_t>(most_rows, std::numeric_limits<int32_t>::max());
+absl::StatusOr<v1::Measurements> DataReader::Read(int64_t max_rows, RefusedLine refused) {
+  POLYEST_CHECK(max_rows > 0);
+  max_rows = std::min<int64_t>(max_rows, std::numeric_limits<int32_t>::max());
   v1::Measurements batch;
   absl::string_view line;
-  while (batch.time_size() < most_rows) {
+  while (batch.time_s_size() < max_rows) {
     POLYEST_ASSIGN_OR_RETURN(const bool found, NextLine(line));
     if (!found) break;
     if (batch.channels_size() == 0) {
@@ -180,7 +188,7 @@ absl::Status DataReader::ParseRow(absl::string_view line, v1::Measurements& batc
   if (!parsed.ok()) {
     time_s_ = previous_time_s_;
     run_ = previous_run;
-    const int rows = batch.time_size();
+    const int rows = batch.time_s_size();
     for (v1::Measurements::Channel& channel : *batch.mutable_channels()) {
       if (channel.values_size() > rows) channel.mutable_values()->Truncate(rows);
       if (!channel.missing().empty() && *channel.missing().rbegin() == rows) {
@@ -189,7 +197,7 @@ absl::Status DataReader::ParseRow(absl::string_view line, v1::Measurements& batc
     }
     return parsed;
   }
-  batch.add_time(time_s_);
+  batch.add_time_s(time_s_);
   if (has_run_) batch.add_run(run_);
   return absl::OkStatus();
 }

@@ -1,4 +1,4 @@
-#include "client/cpp/measurement_stream.h"
+#include "polyest/measurement_stream.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -10,9 +10,12 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
 std::string RandomId() {
@@ -22,12 +25,14 @@ std::string RandomId() {
   return id;
 }
 
-// Whether a new connection may help: the daemon is away, or has cut its calls off on its way out.
+// Returns whether a new connection may help: the daemon is away, or has cut its calls off on its
+// way out.
 bool IsBreak(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsCancelled(status);
 }
 
-// How long to wait where waiting helps, although the daemon answers: its disk is full, it is busy.
+// Returns how long to wait where waiting helps, although the daemon answers: its disk is full, it
+// is busy.
 std::optional<std::chrono::milliseconds> DelayOfRefusal(const absl::Status& status) {
   if (!absl::IsResourceExhausted(status)) return std::nullopt;
   const std::optional<Refusal> refusal = RefusalOf(status);
@@ -53,7 +58,7 @@ class MeasurementStream::Connection
     if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
     authorization_ = stream_.client_.Authorization();
     if (!authorization_.empty()) context_.AddMetadata("authorization", authorization_);
-    stream_.client_.stub().async()->StreamMeasurements(&context_, this);
+    stream_.client_.sessions().async()->StreamMeasurements(&context_, this);
     StartRead(&response_);
     Write(std::move(hello));
     StartCall();
@@ -62,7 +67,7 @@ class MeasurementStream::Connection
   bool writable() const { return !writing_ && !ended_ && !half_closed_; }
   bool done() const { return status_.has_value(); }
   const absl::Status& status() const { return *status_; }
-  // Whether the client would be known by another token now.
+  // Returns whether the client would be known by another token now.
   bool Outdated() const { return authorization_ != stream_.client_.Authorization(); }
 
   void Write(std::shared_ptr<const v1::StreamMeasurementsRequest> request) {
@@ -115,8 +120,8 @@ MeasurementStream::MeasurementStream(Client& client, std::string session,
       writer_(RandomId()),
       options_(std::move(options)),
       callbacks_(std::move(callbacks)) {
-  POLYEST_CHECK(options_.most_unacknowledged >= 1);
-  POLYEST_CHECK(options_.most_attempts >= 0);
+  POLYEST_CHECK(options_.max_unacknowledged >= 1);
+  POLYEST_CHECK(options_.max_attempts >= 0);
 }
 
 MeasurementStream::~MeasurementStream() {
@@ -219,12 +224,12 @@ absl::Status MeasurementStream::Open() {
 
 // Locked.
 bool MeasurementStream::MayRecover(const absl::Status& status) const {
-  if (IsBreak(status)) return attempts_ < options_.most_attempts;
+  if (IsBreak(status)) return attempts_ < options_.max_attempts;
   // After a break the daemon may still hold the old connection as the session's writer.
-  if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.most_attempts;
+  if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.max_attempts;
   // The daemon may have the new one a moment later.
   if (absl::IsUnauthenticated(status)) {
-    return attempts_ < options_.most_attempts && connection_ && connection_->Outdated();
+    return attempts_ < options_.max_attempts && connection_ && connection_->Outdated();
   }
   return DelayOfRefusal(status).has_value();
 }
@@ -247,9 +252,8 @@ std::string MeasurementStream::CountAttempt(const absl::Status& status) {
 absl::Status MeasurementStream::ConnectAgain(Lock& lock, absl::Status status) {
   while (MayRecover(status)) {
     const int before = std::min(attempts_ + refusals_, 20);
-    const auto delay =
-        std::max(std::min(options_.longest_delay, options_.first_delay * (1 << before)),
-                 DelayOfRefusal(status).value_or(std::chrono::milliseconds(0)));
+    const auto delay = std::max(std::min(options_.max_delay, options_.first_delay * (1 << before)),
+                                DelayOfRefusal(status).value_or(std::chrono::milliseconds(0)));
     const std::string what = CountAttempt(status);
     const char* const back = connection_ ? "connected again" : "connected";
     lock.unlock();
@@ -286,8 +290,8 @@ absl::Status MeasurementStream::Send(v1::Measurements batch) {
 
   Lock lock(mutex_);
   POLYEST_CHECK(connection_ && !finishing_);
-  const size_t most = static_cast<size_t>(options_.most_unacknowledged);
-  while (connection_->done() || pending_.size() >= most) {
+  const size_t max = static_cast<size_t>(options_.max_unacknowledged);
+  while (connection_->done() || pending_.size() >= max) {
     if (connection_->done()) {
       POLYEST_RETURN_IF_ERROR(Recover(lock));
     } else {

@@ -1,9 +1,10 @@
-#include "client/cpp/problem_file.h"
+#include "polyest/problem_file.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 #include <google/protobuf/util/json_util.h>
@@ -12,17 +13,24 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <vector>
 
-#include "client/cpp/field_names.h"
+#include "client/cpp/file_kind.h"
+#include "client/cpp/unknown_fields.h"
 #include "core/common/status.h"
+#include "proto/wire/transport/automatic_order.h"
 
 namespace polyest {
+
+using namespace internal;
+
 namespace {
 
-constexpr size_t kLongestFile = size_t{16} << 20;
+constexpr size_t kMaxFileBytes = size_t{16} << 20;
 
-// The parser's message of a syntax error has three parts: what is wrong, the text around it, and a
-// caret under the place. Where that text occurs once, it tells the line; otherwise 0.
+// Returns the line of a syntax error, or 0 when it is not known. The parser's message has three
+// parts: what is wrong, the text around it, and a caret under the place. Where that text occurs
+// once, it tells the line.
 int64_t LineOf(absl::string_view json, absl::string_view message) {
   const size_t first = message.find('\n');
   const size_t last = message.rfind('\n');
@@ -35,7 +43,7 @@ int64_t LineOf(absl::string_view json, absl::string_view message) {
   return 1 + std::count(json.begin(), json.begin() + static_cast<std::ptrdiff_t>(caret), '\n');
 }
 
-// "(uncertain[0]) unifrm: Cannot find field." reads better as "uncertain[0].unifrm: …".
+// Rewrites the parser's "(uncertain[0].uniform) lower: …" as "uncertain[0].uniform.lower: …".
 std::string FieldMessage(absl::string_view message) {
   absl::ConsumePrefix(&message, ": ");
   std::string text(message);
@@ -46,12 +54,6 @@ std::string FieldMessage(absl::string_view message) {
       const bool member = absl::ConsumePrefix(&rest, " ");
       text = absl::StrCat(message.substr(0, close), member ? "." : "", rest);
     }
-  }
-  absl::string_view path = text;
-  if (absl::ConsumeSuffix(&path, ": Cannot find field.")) {
-    const std::string suggestion = SuggestFieldName(path);
-    return absl::StrCat(path, ": there is no field of this name",
-                        suggestion.empty() ? "" : absl::StrCat("; ", suggestion));
   }
   return absl::StrReplaceAll(
       text, {{"type.googleapis.com/polyest.v1.", ""},
@@ -65,6 +67,23 @@ absl::Status ParseError(absl::string_view json, absl::string_view name, absl::st
   return absl::InvalidArgumentError(absl::StrCat(name, ":", line, ": ", what));
 }
 
+// Names all of them in one line.
+absl::Status UnknownFieldsError(absl::string_view name, const std::vector<UnknownField>& fields) {
+  const auto note = [](const UnknownField& field, const char* before, const char* after) {
+    return field.suggestion.empty() ? "" : absl::StrCat(before, field.suggestion, after);
+  };
+  if (fields.size() == 1) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, ": ", fields[0].path, ": there is no field of this name", note(fields[0], "; ", "")));
+  }
+  const auto append = [&](std::string* out, const UnknownField& field) {
+    absl::StrAppend(out, field.path, note(field, " (", ")"));
+  };
+  return absl::InvalidArgumentError(absl::StrCat(name, ": there are no fields of these ",
+                                                 fields.size(),
+                                                 " names: ", absl::StrJoin(fields, ", ", append)));
+}
+
 }  // namespace
 
 absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_view name) {
@@ -76,11 +95,15 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
   const auto status =
-      google::protobuf::util::JsonStringToMessage({json.data(), json.size()}, &problem, options);
-  if (!status.ok()) {
-    return ParseError(json, name, {status.message().data(), status.message().size()});
+      google::protobuf::util::JsonStringToMessage(WithoutAutomaticOrder(json), &problem, options);
+  if (status.ok()) return problem;
+  if (KindOfText(json) == FileKind::kCsv) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": is CSV data; a problem is one JSON object"));
   }
-  return problem;
+  const auto unknown = FindUnknownFields(json, *v1::Problem::descriptor());
+  if (!unknown.empty()) return UnknownFieldsError(name, unknown);
+  return ParseError(json, name, {status.message().data(), status.message().size()});
 }
 
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path) {
@@ -89,11 +112,11 @@ absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path) {
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": cannot be opened: ", std::strerror(errno)));
   }
-  std::string json(kLongestFile + 1, '\0');
+  std::string json(kMaxFileBytes + 1, '\0');
   in.read(json.data(), static_cast<std::streamsize>(json.size()));
   if (in.bad()) return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
   json.resize(static_cast<size_t>(in.gcount()));
-  if (json.size() > kLongestFile) {
+  if (json.size() > kMaxFileBytes) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": is longer than 16 MiB"));
   }
   return ParseProblem(json, path);

@@ -6,7 +6,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using EdgeId = Eigen::Index;
@@ -133,4 +133,4 @@ std::vector<double> BowlLevels(const Matrix& value, int count) {
   return levels;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct ContourLine {
   std::vector<std::array<double, 2>> points;  // (x, y), along the line
@@ -25,4 +25,4 @@ std::vector<ContourLine> ContourLines(const Vector& x, const Vector& y, const Ma
 // quadratic bowl are then evenly spaced. None when the values do not vary.
 std::vector<double> BowlLevels(const Matrix& value, int count);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 
 #include "client/paper/experiments.h"
 
-namespace polyest::paper_experiments {
+namespace polyest::internal::paper_experiments {
 
 // Sections 3.1 and 3.2: a mass on a spring, struck at t = 0; its initial velocity is uncertain.
 absl::StatusOr<Experiment> Figure4();
@@ -36,4 +36,4 @@ NoiseModel PaperNoise(double percent);
 // output that is zero stays zero for the estimator as well.
 Problem PaperProblem(std::shared_ptr<const Model> model, int order);
 
-}  // namespace polyest::paper_experiments
+}  // namespace polyest::internal::paper_experiments

@@ -10,9 +10,9 @@
 #include "client/paper/experiment_definitions.h"
 #include "core/chaos/germ.h"
 #include "core/common/status.h"
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using paper_experiments::Figure11;
@@ -75,7 +75,8 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem, ResolvedProblem::Make(variant.problem));
   POLYEST_ASSIGN_OR_RETURN(result.response, Respond(problem, reference, until_s));
   POLYEST_ASSIGN_OR_RETURN(
-      auto estimator, Estimator::Make(problem, {.threads = threads, .store = {}, .snapshot = {}}));
+      auto estimator,
+      Estimator::Make(variant.problem, {.threads = threads, .store = {}, .snapshot = {}}));
   POLYEST_RETURN_IF_ERROR(estimator->Append(result.samples));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   POLYEST_ASSIGN_OR_RETURN(result.estimate, estimator->CurrentEstimate(stop));
@@ -92,6 +93,7 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
   result.std_dev_germ = std_dev.cwiseQuotient(slope.diagonal());
   CostGridOptions options;
   options.threads = threads;
+  options.regularization = result.estimate.regularization;
   POLYEST_ASSIGN_OR_RETURN(result.cost, EvaluateCostGrid(problem, result.samples, options, stop));
   return result;
 }
@@ -179,4 +181,4 @@ absl::StatusOr<ExperimentResult> RunExperiment(const Experiment& experiment, int
   return result;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -16,13 +16,13 @@
 #include <string_view>
 #include <vector>
 
-#include "core/common/stop.h"
-#include "core/estimator/estimate.h"
-#include "core/estimator/problem.h"
-#include "core/estimator/samples.h"
-#include "core/estimator/studies.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/studies/cost_grid.h"
+#include "polyest/estimate.h"
+#include "polyest/samples.h"
+#include "polyest/stop.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // One way to put the question: what is measured, when and how well.
 struct ExperimentVariant {
@@ -32,7 +32,7 @@ struct ExperimentVariant {
   bool noise_free = false;             // ε = 0; the estimator's R_k stays as specified
 };
 
-// What is drawn of the cost.
+// Says what is drawn of the cost.
 enum class CostPicture {
   kCurves,                // mismatch, prior and total over one unknown, for each variant
   kContours,              // contours of the total over two unknowns, for each variant
@@ -83,7 +83,7 @@ std::vector<std::string> PaperFigures();
 // INVALID_ARGUMENT, listing the figures there are, for one that is not among them.
 absl::StatusOr<Experiment> MakeExperiment(std::string_view figure);
 
-// The same for any number of threads.
+// The result is the same for any number of threads.
 absl::StatusOr<ExperimentResult> RunExperiment(const Experiment& experiment, int threads,
                                                const Stop& stop = {});
 
@@ -99,4 +99,4 @@ inline constexpr uint64_t kNoiseSeed = 2007;
 absl::StatusOr<Samples> SyntheticSamples(const ExperimentVariant& variant, const Vector& reference,
                                          uint64_t seed = kNoiseSeed);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,9 +6,9 @@
 
 #include "client/paper/experiment_definitions.h"
 #include "core/common/status.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest::paper_experiments {
+namespace polyest::internal::paper_experiments {
 namespace {
 
 constexpr double kReferenceGerm = 0.23;
@@ -192,4 +192,4 @@ absl::StatusOr<Experiment> Figure12() {
                  .noise_percents = {0.01, 10}});
 }
 
-}  // namespace polyest::paper_experiments
+}  // namespace polyest::internal::paper_experiments

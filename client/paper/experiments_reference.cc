@@ -2,9 +2,9 @@
 
 #include "client/paper/experiment_definitions.h"
 #include "core/common/status.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest::paper_experiments {
+namespace polyest::internal::paper_experiments {
 
 absl::StatusOr<Experiment> ReferenceScenario() {
   POLYEST_ASSIGN_OR_RETURN(auto model, FindBuiltinModel("roll_plane_4dof"));
@@ -41,4 +41,4 @@ absl::StatusOr<Experiment> ReferenceScenario() {
   return experiment;
 }
 
-}  // namespace polyest::paper_experiments
+}  // namespace polyest::internal::paper_experiments

@@ -7,9 +7,9 @@
 
 #include "client/paper/experiment_definitions.h"
 #include "core/common/status.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest::paper_experiments {
+namespace polyest::internal::paper_experiments {
 namespace {
 
 // Section 3.4, 0.01 √(K0/M0), and the number that the paper prints for it.
@@ -174,4 +174,4 @@ Problem PaperProblem(std::shared_ptr<const Model> model, int order) {
   return problem;
 }
 
-}  // namespace polyest::paper_experiments
+}  // namespace polyest::internal::paper_experiments

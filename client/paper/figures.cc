@@ -6,7 +6,7 @@
 
 #include "client/paper/contours.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr char kTotalColor[] = "#1f4e9c", kMismatchColor[] = "#d95f02", kPriorColor[] = "#1b9e77",
@@ -135,4 +135,4 @@ Plot MakePlot(const ExperimentResult& result) {
   return plot;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

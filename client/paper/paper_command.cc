@@ -10,7 +10,7 @@
 #include "client/paper/report.h"
 #include "core/common/status.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 absl::Status WriteFile(const std::string& file, const std::string& text) {
@@ -60,4 +60,4 @@ int RunPaper(const PaperOptions& options, std::ostream& out, std::ostream& err) 
   return 0;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

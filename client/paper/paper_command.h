@@ -5,7 +5,7 @@
 #include <ostream>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 struct PaperOptions {
   std::string figure;     // empty: all
@@ -17,4 +17,4 @@ struct PaperOptions {
 // figure that there is not or a plot without a figure; 1 for anything else.
 int RunPaper(const PaperOptions& options, std::ostream& out, std::ostream& err);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr size_t kLineWidth = 100;
@@ -62,10 +62,10 @@ size_t Letters(std::string_view text) {
 }
 
 // "value ± deviation" to the digits that the deviation leaves meaning to, and no fewer decimals
-// than `least_decimals`.
-std::string WithDeviation(double value, double deviation, int least_decimals) {
+// than `min_decimals`.
+std::string WithDeviation(double value, double deviation, int min_decimals) {
   const int leading = deviation > 0 ? static_cast<int>(std::floor(std::log10(deviation))) : -6;
-  const int decimals = std::clamp(1 - leading, least_decimals, 9);
+  const int decimals = std::clamp(1 - leading, min_decimals, 9);
   if (std::abs(value) < 0.5 * std::pow(10.0, -decimals)) value = 0;  // no "-0.00"
   return absl::StrFormat("%.*f ± %.*f", decimals, value, decimals, deviation);
 }
@@ -181,4 +181,4 @@ void PrintExperiment(const ExperimentResult& result, std::ostream& out) {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -4,10 +4,10 @@
 
 #include "client/paper/experiments.h"
 
-namespace polyest {
+namespace polyest::internal {
 
-// What was asked, a table of what the estimator answers for each variant, what it remarks, and
-// beside it what the paper says.
+// Prints what was asked, a table of what the estimator answers for each variant, what it remarks,
+// and beside it what the paper says.
 void PrintExperiment(const ExperimentResult& result, std::ostream& out);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // The least of 1, 2, 5 · 10^n that is at least `step`.
@@ -53,4 +53,4 @@ std::string PowerOfTenText(int exponent) {
   return text;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 struct AxisTick {
   double value = 0;
@@ -32,4 +32,4 @@ Axis MakeAxis(double lower, double upper, int count, double first_pixel, double 
 // 10^exponent with raised digits, as in "×10⁻³".
 std::string PowerOfTenText(int exponent);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,7 +11,7 @@
 #include "client/paper/svg_axis.h"
 #include "client/paper/svg_writer.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Pixels.
@@ -128,7 +128,7 @@ struct Range {
   }
 };
 
-// A panel's frame at (x, y): axes, grid and labels; `Draw` puts the content in.
+// Draws a panel's frame at (x, y): axes, grid and labels; `Draw` puts the content in.
 class PanelFrame {
  public:
   PanelFrame(double x, double y, const Range& xs, const Range& ys)
@@ -364,4 +364,4 @@ std::string RenderSvg(const Plot& plot) {
   return svg.Finish();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,7 +10,7 @@
 
 #include "core/common/types.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 enum class LineStyle { kSolid, kDashed, kDotted, kMarkers };
 
@@ -77,4 +77,4 @@ struct Plot {
 // same text.
 std::string RenderSvg(const Plot& plot);
 
-}  // namespace polyest
+}  // namespace polyest::internal

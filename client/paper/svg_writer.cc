@@ -5,10 +5,10 @@
 
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-// A coordinate to a hundredth of a pixel.
+// Formats a coordinate to a hundredth of a pixel.
 std::string Number(double value) {
   std::string text = absl::StrFormat("%.2f", value);
   while (text.back() == '0') text.pop_back();
@@ -126,4 +126,4 @@ std::string SvgWriter::Finish() {
   return std::move(text_);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 struct SvgStroke {
   std::string color = "#000000";
@@ -34,7 +34,7 @@ class SvgWriter {
                  double opacity = 1);
   void Circle(double x, double y, double radius, std::string_view fill, std::string_view stroke);
   void Text(double x, double y, std::string_view text, const SvgTextStyle& style);
-  // What is drawn until EndClip shows only inside the rectangle.
+  // Shows what is drawn until EndClip only inside the rectangle.
   void BeginClip(double x, double y, double width, double height);
   void EndClip();
 
@@ -46,7 +46,7 @@ class SvgWriter {
   int clips_ = 0;
 };
 
-// For a text node or an attribute: & < > " ' as entities, control characters as spaces.
+// Returns text for a node or an attribute: & < > " ' as entities, control characters as spaces.
 std::string EscapeXml(std::string_view text);
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,11 +11,12 @@
 
 namespace polyest {
 
-// INVALID_ARGUMENT, in one line that opens with `name` and, where the parser tells, the line or the
-// field: text that is not JSON, a field that the schema lacks, a value of the wrong type.
+// Reads a problem from text. INVALID_ARGUMENT, in one line that opens with `name` and, where the
+// parser tells, the line or the field: text that is not JSON, fields that the schema lacks (all of
+// them, each with the nearest name there is), a value of the wrong type.
 absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_view name);
 
-// The same from a file, which may be up to 16 MiB long.
+// Reads a problem from a file of at most 16 MiB; its name opens every message.
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path);
 
 }  // namespace polyest

@@ -21,31 +21,36 @@
 #include <optional>
 #include <string>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 
 namespace polyest {
 
+// How a stream sends and connects again.
 struct MeasurementStreamOptions {
   // Send waits while this many batches are not acknowledged, ≥ 1.
-  int most_unacknowledged = 16;
+  int max_unacknowledged = 16;
   // How often estimates are wanted; none: after every batch.
   std::optional<v1::StreamMeasurementsRequest::EstimatePolicy> estimates;
-  // Before the first attempt to connect again; doubles up to the longest.
+  // Before the first attempt to connect again; doubles from one attempt to the next.
   std::chrono::milliseconds first_delay{100};
-  std::chrono::milliseconds longest_delay{5'000};
+  // Up to this delay.
+  std::chrono::milliseconds max_delay{5'000};
   // Attempts to reach the daemon without an acknowledgement in between, ≥ 0; then the stream fails.
   // While the daemon answers, and asks to try later, it is tried without end.
-  int most_attempts = 16;
+  int max_attempts = 16;
   // Waits so long; false: give up, the stream then fails. Null: sleeps.
   std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };
 
-// Called from a thread of gRPC, one at a time, except `connection`: from within Open,
-// Send and Finish.
+// What a stream tells, each of them optional. Called from a thread of gRPC, one at a time, except
+// `connection`: from within Open, Send and Finish.
 struct MeasurementStreamCallbacks {
+  // A new estimate, as often as MeasurementStreamOptions::estimates says.
   std::function<void(const v1::Estimate&)> estimate;
+  // The daemon has stored batches up to a sequence number.
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
-  // One sentence on a connection that fails or is back, or a daemon that has no room, or again.
+  // Receives one sentence on a connection that fails or is back, or a daemon that has no room, or
+  // again.
   std::function<void(const std::string&)> connection;
 };
 

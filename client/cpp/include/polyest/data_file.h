@@ -25,16 +25,18 @@ namespace polyest {
 
 // The columns that data for a problem may have besides `t` and `run`.
 struct DataColumns {
-  std::vector<std::string> measured;
-  std::vector<std::string> streamed;
+  std::vector<std::string> measured;  // outputs; each may have missing cells, or no column
+  std::vector<std::string> streamed;  // inputs; each must have a column and a value in every row
 };
 
+// Returns the columns that data for this problem may have.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
-// Is told of a line that is refused, in words. OK: the line is left out and reading goes on;
+// Receives the error of a line that is refused. OK: the line is left out and reading goes on;
 // anything else ends the reading.
 using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
 
+// Ends the reading at the first refused line, whose refusal is the answer.
 inline absl::Status StopAtRefusedLine(absl::Status refusal) { return refusal; }
 
 // Reads batches of rows, so that neither a long file nor an endless pipe is ever held whole.
@@ -46,11 +48,11 @@ class DataReader {
                                          const DataColumns& columns,
                                          RefusedLine refused = StopAtRefusedLine);
 
-  // The next rows, at most `most_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT names
-  // file, line, column, value and rule: a cell that is not a finite number, a time that does not
-  // increase within its run, a run that decreases, a row with too few or too many cells, a streamed
-  // input without a value, data without any row.
-  absl::StatusOr<v1::Measurements> Read(int64_t most_rows, RefusedLine refused = StopAtRefusedLine);
+  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT
+  // names file, line, column, value and rule: a cell that is not a finite number, a time that does
+  // not increase within its run, a run that decreases, a row with too few or too many cells, a
+  // streamed input without a value, data without any row.
+  absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
 
  private:
   enum class Role { kTime, kRun, kMeasured, kStreamed, kRefused };
@@ -87,7 +89,7 @@ class DataReader {
   int32_t run_ = 0;
 };
 
-// A whole file.
+// Reads a whole file.
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
                                               RefusedLine refused = StopAtRefusedLine);
 

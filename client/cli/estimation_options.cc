@@ -1,0 +1,137 @@
+// The options of the commands that estimate from measurements, and of those that study an estimate.
+
+#include <memory>
+
+#include "client/cli/command_registry.h"
+#include "client/cli/shared_options.h"
+
+namespace polyest::internal {
+namespace {
+
+void AddEstimate(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<EstimateArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "estimate",
+       .summary = "Estimate from a data file",
+       .examples = {"estimate problem.json data.csv",
+                    "estimate problem.json data.csv --server rig:50051 --format json"}},
+      arguments);
+  AddProblem(command, arguments->problem_file);
+  AddData(command, arguments->data_file);
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json"});
+}
+
+void AddExplain(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<ExplainArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "explain",
+       .summary = "Say in words what the data tell, what they do not, and what would help",
+       .examples = {"explain problem.json data.csv", "explain --session rig-1 --server rig:50051"}},
+      arguments);
+  AddStudyInput(command, *arguments);
+}
+
+void AddPosterior(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<PosteriorArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "posterior",
+       .summary = "The posterior in detail: densities, quantiles and samples",
+       .examples = {"posterior problem.json data.csv --quantiles 0.05,0.5,0.95",
+                    "posterior problem.json data.csv --samples 1000 --format csv > samples.csv",
+                    "posterior --session rig-1 --server rig:50051 --joint k,c --format csv"},
+       .notes = "As csv: the samples if --samples is given, else the joint densities if --joint\n"
+                "is, else one row a parameter. The densities of single parameters are in json."},
+      arguments);
+  AddStudyInput(command, *arguments);
+  command.add_option("--samples", arguments->samples, "Samples of the posterior to print")
+      ->check(CLI::Range(0, 100'000));
+  command
+      .add_option("--quantiles", arguments->probabilities,
+                  "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
+      ->delimiter(',');
+  command
+      .add_option("--joint", arguments->joints,
+                  "Two parameters whose joint density is wanted, NAME,NAME; may be repeated")
+      ->expected(1)
+      ->take_all();
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+void AddProfile(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<ProfileArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "profile",
+       .summary = "The cost over each parameter, minimized over all the others",
+       .examples = {"profile problem.json data.csv --parameter k",
+                    "profile --session rig-1 --server rig:50051 --format csv"},
+       .notes = "On the expansion, over four posterior standard deviations to each side of the\n"
+                "minimum as far as the prior and the region go in which the expansion is trusted."},
+      arguments);
+  AddStudyInput(command, *arguments);
+  command
+      .add_option("--parameter", arguments->parameters,
+                  "A parameter to profile; may be repeated (default: all)")
+      ->expected(1)
+      ->take_all();
+  command.add_option("--points", arguments->points, "Values of each parameter (default 41)")
+      ->check(CLI::Range(3, 1'001));
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+void AddCost(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<CostArguments>();
+  CLI::App& command =
+      registry.Add({.name = "cost",
+                    .summary = "The cost over one or two uncertain parameters",
+                    .examples = {"cost problem.json data.csv --parameter k --format csv"}},
+                   arguments);
+  AddProblem(command, arguments->problem_file);
+  AddData(command, arguments->data_file);
+  command
+      .add_option("--parameter", arguments->parameters,
+                  "A parameter to vary, at most two (default: the first two)")
+      ->expected(1)
+      ->take_all();
+  command
+      .add_option("--grid", arguments->grid_points, "Points an axis; 0: 201 for one, 41 for two")
+      ->check(CLI::Range(0, 1001));
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"json", "csv"});
+}
+
+void AddRegularization(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<RegularizationArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "regularization",
+       .summary = "The estimate over the weight α² of the prior, and which α² to choose",
+       .examples = {"regularization problem.json data.csv --plot sweep.svg",
+                    "regularization --session rig-1 --server rig:50051"},
+       .notes = "On the expansion where the posterior of α² = 1 is: an α² that pulls the estimate\n"
+                "out of the region in which it is trusted is left out. The rules choose from\n"
+                "1e-4 … 1e4."},
+      arguments);
+  AddStudyInput(command, *arguments);
+  command.add_option("--lowest", arguments->lowest, "The least α² (default 1e-4)")
+      ->check(CLI::Range(1e-8, 1e8));
+  command.add_option("--highest", arguments->highest, "The greatest α² (default 1e4)")
+      ->check(CLI::Range(1e-8, 1e8));
+  command.add_option("--points", arguments->points, "Values of α² (default 33)")
+      ->check(CLI::Range(2, 1'001));
+  command.add_option("--plot", arguments->plot_file, "Draw the sweep into this SVG file");
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+}  // namespace
+
+void AddEstimationCommands(CommandRegistry& registry) {
+  registry.StartGroup("Estimate");
+  AddEstimate(registry);
+  AddExplain(registry);
+  AddPosterior(registry);
+  AddProfile(registry);
+  AddCost(registry);
+  AddRegularization(registry);
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,138 @@
+// The options of the commands for the time before anything is measured.
+
+#include <memory>
+
+#include "client/cli/command_registry.h"
+#include "client/cli/shared_options.h"
+
+namespace polyest::internal {
+namespace {
+
+void AddModels(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<ModelsArguments>();
+  CLI::App& command = registry.Add({.name = "models",
+                                    .summary = "List the models there are, or describe one",
+                                    .examples = {"models", "models quarter_car"}},
+                                   arguments);
+  command.add_option("name", arguments->name, "A model's name");
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json"});
+}
+
+void AddInit(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<InitArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "init",
+       .summary = "Write a problem file to start from; list the models",
+       .examples = {"init quarter_car -o problem.json", "init --equations -o problem.json"}},
+      arguments);
+  CLI::Option* const model = command.add_option("model", arguments->model, "A model's name");
+  command.add_flag("--equations", arguments->equations, "With a model given by its equations")
+      ->excludes(model);
+  command.add_option("-o,--output", arguments->output_file, "The file (default: standard output)");
+  command.add_flag("--force", arguments->force, "Overwrite the file if it is there");
+  AddFmuFolder(command, arguments->place);
+}
+
+void AddCheck(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<CheckArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "check",
+       .summary =
+           "Say all that is wrong with a problem, and with data for it, before anything runs",
+       .examples = {"check problem.json", "check problem.json data.csv"}},
+      arguments);
+  AddProblem(command, arguments->problem_file);
+  command.add_option("data", arguments->data_file, "The measurements, a CSV file");
+  AddFmuFolder(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json"});
+}
+
+void AddPropagate(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<PropagateArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "propagate",
+       .summary = "Predict the outputs over time from the prior",
+       .examples = {"propagate problem.json --until 10 --step 0.1",
+                    "propagate problem.json --until 10 --step 0.01 --format csv > band.csv"}},
+      arguments);
+  AddProblem(command, arguments->problem_file);
+  command.add_option("--until", arguments->until_s, "The last time, s")->required();
+  command.add_option("--step", arguments->step_s, "From one time to the next, s")->required();
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+void AddSensitivity(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<SensitivityArguments>();
+  CLI::App& command =
+      registry.Add({.name = "sensitivity",
+                    .summary = "Say which uncertain parameters the outputs depend on, and when",
+                    .examples = {"sensitivity problem.json --until 10"}},
+                   arguments);
+  AddProblem(command, arguments->problem_file);
+  command.add_option("--until", arguments->until_s, "The last time, s")->required();
+  command.add_option("--step", arguments->step_s,
+                     "From one time to the next, s (default: a hundredth of the last)");
+  AddOutputs(command, arguments->outputs, "The outputs, comma-separated (default: measured)");
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+void AddDesign(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<DesignArguments>();
+  CLI::App& command =
+      registry.Add({.name = "design",
+                    .summary = "Say which samples of a next experiment would tell most",
+                    .examples = {"design problem.json --until 10 --samples 20",
+                                 "design problem.json data.csv --until 10 --candidate chirp.json"}},
+                   arguments);
+  AddProblem(command, arguments->problem_file);
+  command.add_option("data", arguments->data_file, "What has been measured so far, a CSV file");
+  command.add_option("--until", arguments->until_s, "The last possible sample time, s")->required();
+  command.add_option(
+      "--step", arguments->step_s,
+      "From one possible sample time to the next, s (default: a hundredth of the last)");
+  command.add_option("--samples", arguments->samples, "Sample times to choose (default: 10)")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--candidate", arguments->candidate_files,
+                  "A problem file whose inputs are another candidate")
+      ->expected(1)
+      ->take_all();
+  AddOutputs(command, arguments->outputs,
+             "Further outputs that could be measured, comma-separated (default: all)");
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "json"});
+}
+
+}  // namespace
+
+void AddPlanningCommands(CommandRegistry& registry) {
+  registry.StartGroup("Before you measure");
+  AddModels(registry);
+  AddInit(registry);
+  AddCheck(registry);
+  AddPropagate(registry);
+  AddSensitivity(registry);
+  AddDesign(registry);
+}
+
+void AddOtherCommands(CommandRegistry& registry) {
+  registry.StartGroup("Other");
+  registry.Add({.name = "schema",
+                .summary = "Print the JSON schema of problem files, for editors",
+                .examples = {"schema > problem.schema.json"}},
+               std::make_shared<SchemaArguments>());
+  const auto paper = std::make_shared<PaperOptions>();
+  paper->threads = registry.threads();
+  CLI::App& command = registry.Add({.name = "paper",
+                                    .summary = "Rerun the paper's experiments",
+                                    .examples = {"paper 14 --plot figure14.svg"}},
+                                   paper);
+  command.add_option("figure", paper->figure, "One experiment's name (default: all)");
+  command.add_option("--plot", paper->plot_file, "Draw the figure into this SVG file");
+  AddThreads(command, paper->threads);
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,76 @@
+// `polyest watch`: the estimates of a session, as they come.
+
+#include <absl/strings/str_cat.h>
+#include <poll.h>
+
+#include <optional>
+#include <thread>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/json_format.h"
+#include "client/cli/progress_line.h"
+
+namespace polyest::internal {
+namespace {
+
+// Cancels a call once Ctrl-C is pressed, for as long as it lives.
+class CancelOnInterrupt {
+ public:
+  CancelOnInterrupt(const Interrupt& interrupt, grpc::ClientContext& call)
+      : thread_([&interrupt, &call](const std::stop_token& ended) {
+          while (!ended.stop_requested()) {
+            pollfd wanted = {interrupt.descriptor(), POLLIN, 0};
+            if (poll(&wanted, 1, kIntervalMs) <= 0) continue;
+            call.TryCancel();
+            return;
+          }
+        }) {}
+
+ private:
+  static constexpr int kIntervalMs = 100;
+  std::jthread thread_;
+};
+
+}  // namespace
+
+int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream& err) {
+  const Interrupt interrupt;
+  Client client(arguments.place.server, ToClientOptions(arguments.place));
+  v1::WatchSessionRequest request;
+  request.set_session(absl::StrCat("sessions/", arguments.session));
+  std::optional<v1::Estimate> last;
+  grpc::ClientContext call;
+  if (arguments.place.deadline_s > 0) {
+    call.set_deadline(gpr_time_from_millis(static_cast<int64_t>(1000 * arguments.place.deadline_s),
+                                           GPR_TIMESPAN));
+  }
+  absl::Status status;
+  {
+    ProgressLine progress([&] { return absl::StrCat("watching ", request.session()); });
+    const CancelOnInterrupt cancel(interrupt, call);
+    const auto print = [&](const v1::WatchSessionResponse& response) {
+      last = response.estimate();
+      // The table below says it all.
+      if (arguments.once && arguments.format == Format::kTable) return false;
+      progress.Interject([&] {
+        out << (arguments.format == Format::kJsonLines ? ToJson(*last, /*several_lines=*/false)
+                                                       : EstimateLine(*last))
+            << std::endl;
+      });
+      return !arguments.once && !out.fail();
+    };
+    status = client.WatchSession(request, print, &call);
+  }
+  if (!status.ok() && !interrupt.Requested()) return Report(status, arguments.place.server, err);
+  if (arguments.format == Format::kTable && last) {
+    if (!arguments.once) out << '\n';
+    PrintEstimate(*last, out);
+  }
+  return kExitOk;
+}
+
+}  // namespace polyest::internal

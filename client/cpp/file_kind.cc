@@ -1,0 +1,34 @@
+#include "client/cpp/file_kind.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/strip.h>
+
+#include <fstream>
+
+namespace polyest::internal {
+namespace {
+
+// Limits how much of a file is looked at.
+constexpr std::streamsize kMaxBeginning = 4096;
+
+}  // namespace
+
+FileKind KindOfText(absl::string_view text) {
+  absl::ConsumePrefix(&text, "\xEF\xBB\xBF");
+  text = absl::StripLeadingAsciiWhitespace(text);
+  if (text.empty()) return FileKind::kUnknown;
+  if (text.front() == '{' || text.front() == '[') return FileKind::kJson;
+  const absl::string_view line = absl::StripAsciiWhitespace(text.substr(0, text.find('\n')));
+  const bool has_cells = line.find_first_of(",;\t") != absl::string_view::npos;
+  return has_cells || line == "t" ? FileKind::kCsv : FileKind::kUnknown;
+}
+
+FileKind KindOfFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kMaxBeginning, '\0');
+  in.read(text.data(), kMaxBeginning);
+  text.resize(static_cast<size_t>(in.gcount()));
+  return KindOfText(text);
+}
+
+}  // namespace polyest::internal
