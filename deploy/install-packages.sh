@@ -3,27 +3,33 @@
 #
 #   deploy/install-packages.sh            to build and run
 #   deploy/install-packages.sh --tests    to test, benchmark and check the formatting as well
-#   deploy/install-packages.sh --fuzz     to fuzz as well: libFuzzer comes with Clang
+#   deploy/install-packages.sh --sanitizers  for the fuzzers as well: Clang
 #   deploy/install-packages.sh --threads  to look for races as well
+#   deploy/install-packages.sh --package  to make Debian packages, and to try them
 set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build ccache pkg-config
   libeigen3-dev libsundials-dev libnlopt-dev libnlopt-cxx-dev libabsl-dev libcereal-dev zlib1g-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libspdlog-dev prometheus-cpp-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
+  libsystemd-dev libspdlog-dev prometheus-cpp-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format python3-yaml openssl sqlite3 libfaketime
 )
 # SUNDIALS' CMake configuration wants OpenMP of whatever compiler there is.
-fuzz_packages=(
+sanitizer_packages=(
   clang-14 libclang-rt-14-dev libomp-14-dev
 )
 
 # gRPC's CMake project asks for libprotoc, whether or not it is used.
 thread_packages=(
   libprotoc-dev
+)
+# The packages are tried in a clean root, and under systemd in a virtual machine.
+packaging_packages=(
+  debhelper dpkg-dev help2man lintian
+  bash-completion debootstrap iproute2 kmod systemd user-mode-linux
 )
 
 say() { echo "install-packages: $*" >&2; }
@@ -64,10 +70,11 @@ install_missing() {
 for argument in "$@"; do
   case "$argument" in
     --tests) packages+=("${test_packages[@]}") ;;
-    --fuzz) packages+=("${fuzz_packages[@]}") ;;
+    --sanitizers) packages+=("${sanitizer_packages[@]}") ;;
     --threads) packages+=("${thread_packages[@]}") ;;
+    --package) packages+=("${packaging_packages[@]}") ;;
     *)
-      say "unknown argument '$argument'; there are --tests, --fuzz and --threads"
+      say "unknown argument '$argument'; there are --tests, --sanitizers, --threads and --package"
       exit 2
       ;;
   esac
