@@ -6,7 +6,7 @@
 #   --preset NAME      of CMakePresets.json; release by default
 #   --werror           compiler warnings are errors
 #   --target TARGET    build no more than this, such as polyest_unit_tests; everything by default
-#   --label LABEL      run only the tests with this label: unit, paper, integration
+#   --label LABEL      run only the tests with this label: unit, paper, integration, long
 #
 # tests/threads/run.sh runs those in which threads meet under the thread sanitizer.
 set -euo pipefail

@@ -25,16 +25,16 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "polyest/v1/session_service.grpc.pb.h"
 #include "server/daemon/daemon.h"
 #include "server/journal/commit_queue.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Stub = v1::EstimationService::Stub;
+using Stub = v1::SessionService::Stub;
 
 constexpr int kRows = 100;
 constexpr int kBatchesASecond = 10;
@@ -74,7 +74,7 @@ v1::StreamMeasurementsRequest Batch(int session, int index) {
     const double v = -fade * kStiffness / omega * std::sin(omega * t);
     const double values[] = {x, v, -kStiffness * x - kDamping * v, kStiffness * x};
     const double noise[] = {0.01, 0.05, 0.3, 0.3};
-    rows.add_time(t);
+    rows.add_time_s(t);
     for (int c = 0; c < 4; ++c) {
       const double ripple = std::sin(12.9898 * number + 78.233 * c + session);
       rows.mutable_channels(c)->add_values(values[c] + noise[c] * ripple);
@@ -84,7 +84,7 @@ v1::StreamMeasurementsRequest Batch(int session, int index) {
 }
 
 // Commits every message, and does nothing else with it.
-class BareService final : public v1::EstimationService::Service {
+class BareService final : public v1::SessionService::Service {
  public:
   explicit BareService(const std::string& file) {
     auto database = SqliteDatabase::Open(file);
@@ -122,7 +122,7 @@ class BareService final : public v1::EstimationService::Service {
 std::unique_ptr<Stub> Connect(int port) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return v1::EstimationService::NewStub(grpc::CreateCustomChannel(
+  return v1::SessionService::NewStub(grpc::CreateCustomChannel(
       "127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials(), arguments));
 }
 
@@ -206,7 +206,7 @@ void CreateSessions(Stub& stub, int sessions) {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_session_id("rig-" + std::to_string(session));
-    *request.mutable_problem() = FourChannels();
+    *request.mutable_session()->mutable_problem() = FourChannels();
     v1::Session created;
     POLYEST_CHECK(stub.CreateSession(&context, request, &created).ok());
   }
@@ -227,7 +227,7 @@ double SlowestRealTimeFactor(Stub& stub) {
 
 std::unique_ptr<Daemon> StartDaemon(const std::string& folder) {
   DaemonOptions options;
-  options.listen = {"127.0.0.1", 0};
+  options.listen = {{"127.0.0.1", 0}};
   options.data_dir = folder;
   auto daemon = Daemon::Start(options);
   POLYEST_CHECK(daemon.ok());
@@ -236,8 +236,8 @@ std::unique_ptr<Daemon> StartDaemon(const std::string& folder) {
 
 Outcome AsFastAsItGoes(const std::string& folder, int sessions, int batches) {
   const auto daemon = StartDaemon(folder);
-  CreateSessions(*Connect(daemon->address().port), sessions);
-  return StreamAll(daemon->address().port, sessions, batches, /*paced=*/false);
+  CreateSessions(*Connect(daemon->addresses().front().port), sessions);
+  return StreamAll(daemon->addresses().front().port, sessions, batches, /*paced=*/false);
 }
 
 double BareThroughput(const std::string& file, int sessions, int batches) {
@@ -255,10 +255,10 @@ double BareThroughput(const std::string& file, int sessions, int batches) {
 
 void Paced(const std::string& folder, int sessions, int seconds) {
   const auto daemon = StartDaemon(folder);
-  const auto stub = Connect(daemon->address().port);
+  const auto stub = Connect(daemon->addresses().front().port);
   CreateSessions(*stub, sessions);
-  const Outcome outcome =
-      StreamAll(daemon->address().port, sessions, seconds * kBatchesASecond, /*paced=*/true);
+  const Outcome outcome = StreamAll(daemon->addresses().front().port, sessions,
+                                    seconds * kBatchesASecond, /*paced=*/true);
   const auto quantile = [&](double p) {
     return 1e3 *
            outcome.delays[static_cast<size_t>(p * static_cast<double>(outcome.delays.size() - 1))];
@@ -284,9 +284,9 @@ void Run(int sessions, int seconds) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 int main(int argc, char** argv) {
   spdlog::set_level(spdlog::level::off);
-  polyest::Run(argc > 1 ? std::atoi(argv[1]) : 100, argc > 2 ? std::atoi(argv[2]) : 10);
+  polyest::internal::Run(argc > 1 ? std::atoi(argv[1]) : 100, argc > 2 ? std::atoi(argv[2]) : 10);
 }

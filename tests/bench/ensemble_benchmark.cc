@@ -16,7 +16,7 @@
 #include "tests/bench/point_by_point.h"
 #include "tests/bench/simd_lanes.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 namespace {
 
 constexpr int kPoints = 64;
@@ -135,6 +135,6 @@ int Main() {
 }
 
 }  // namespace
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench
 
-int main() { return polyest::bench::Main(); }
+int main() { return polyest::internal::bench::Main(); }

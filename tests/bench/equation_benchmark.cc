@@ -14,7 +14,7 @@
 #include "tests/bench/half_car.h"
 #include "tests/bench/half_car_equations.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 namespace {
 
 constexpr Eigen::Index kRows = 64;
@@ -83,6 +83,6 @@ int Main() {
 }
 
 }  // namespace
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench
 
-int main() { return polyest::bench::Main(); }
+int main() { return polyest::internal::bench::Main(); }

@@ -10,10 +10,11 @@
 #include <random>
 
 #include "core/common/check.h"
-#include "core/estimator/estimator.h"
-#include "core/model/catalogue.h"
+#include "core/estimator/estimator_access.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int64_t kShort = 1'000;
@@ -68,7 +69,7 @@ class Rig {
         inputs_(resolved_.MakeInputs()) {
     EstimatorOptions options;
     options.store = store_;
-    estimator_ = *Estimator::Make(resolved_, options);
+    estimator_ = *EstimatorAccess::Make(resolved_, options);
     Matrix truth(1, 2);
     truth << 40, 1;
     truth_ = std::make_unique<EnsemblePropagator>(
@@ -169,12 +170,12 @@ class RatioReporter final : public benchmark::ConsoleReporter {
 };
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  polyest::RatioReporter reporter;
+  polyest::internal::RatioReporter reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);
   benchmark::Shutdown();
   return 0;

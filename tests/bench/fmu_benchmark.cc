@@ -10,7 +10,7 @@
 #include "core/model/equations/equation_model.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // The best of some, in µs a trajectory; starting the workers is a part of it.
@@ -56,9 +56,9 @@ void Run(int points, double until_s) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 int main(int argc, char** argv) {
-  polyest::Run(argc > 1 ? std::atoi(argv[1]) : 64, argc > 2 ? std::atof(argv[2]) : 10);
+  polyest::internal::Run(argc > 1 ? std::atoi(argv[1]) : 64, argc > 2 ? std::atof(argv[2]) : 10);
   return 0;
 }

@@ -9,7 +9,7 @@
 
 #include "core/model/lane_model.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 
 struct HalfCar {
   static constexpr int kStates = 8;
@@ -89,4 +89,4 @@ inline double Road(int side, double time_s, double step_middle_s) {
   return kBumpHeight * std::sin(M_PI * (time_s - start) / kBumpDuration);
 }
 
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench

@@ -2,9 +2,9 @@
 
 // half_car.h as a user would write it.
 
-#include "core/model/equations/equation_specification.h"
+#include "polyest/equation_model.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 
 inline EquationSpecification HalfCarEquations() {
   return {.states = {{"x1", "v1"},
@@ -31,4 +31,4 @@ inline EquationSpecification HalfCarEquations() {
           .inputs = {"y1", "y2"}};
 }
 
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "core/estimator/estimator.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kStiffness = 41.3, kDamping = 0.23;  // of 1 kg that starts 1 m off, at rest
@@ -139,9 +139,7 @@ void TakeDay(const Rig& rig, Estimator& estimator) {
 
 void Run(int rate_hz) {
   const auto rig = std::make_shared<Rig>(rate_hz);
-  const auto estimator =
-      Estimator::Make(ResolvedProblem::Make(Oscillator()).value(), {.store = rig, .snapshot = {}})
-          .value();
+  const auto estimator = Estimator::Make(Oscillator(), {.store = rig, .snapshot = {}}).value();
   std::printf(
       " day        rows  min to take it   MB  ms an estimate          k - truth      c - truth\n");
   double first_megabytes = 0, first_milliseconds = 0, megabytes = 0, milliseconds = 0;
@@ -168,7 +166,7 @@ void Run(int rate_hz) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 int main(int argc, char** argv) {
   const int rate_hz = argc > 1 ? std::atoi(argv[1]) : 1;
@@ -176,6 +174,6 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: month_benchmark [SAMPLES A SECOND, 1 to 1000]\n");
     return EXIT_FAILURE;
   }
-  polyest::Run(rate_hz);
+  polyest::internal::Run(rate_hz);
   return EXIT_SUCCESS;
 }

@@ -12,7 +12,7 @@
 #include "core/common/check.h"
 #include "tests/bench/half_car.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 namespace {
 
 struct Trajectory {
@@ -98,4 +98,4 @@ void PropagatePointByPoint(Formula formula, double relative_tolerance, const Mat
   N_VDestroy(states);
 }
 
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench

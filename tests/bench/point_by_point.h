@@ -5,7 +5,7 @@
 
 #include "core/common/types.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 
 // Adams with functional iteration, or BDF with Newton's iteration and a dense Jacobian. Outputs are
 // points × (4 · samples) at 100 Hz.
@@ -13,4 +13,4 @@ enum class Formula { kAdams, kBdf };
 void PropagatePointByPoint(Formula formula, double relative_tolerance, const Matrix& parameters,
                            int samples, Matrix& outputs);
 
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench

@@ -12,7 +12,7 @@
 #include "core/common/types.h"
 #include "tests/bench/half_car.h"
 
-namespace polyest::bench {
+namespace polyest::internal::bench {
 
 class SimdLanes {
  public:
@@ -107,4 +107,4 @@ class SimdLanes {
   int steps_ = 4;
 };
 
-}  // namespace polyest::bench
+}  // namespace polyest::internal::bench

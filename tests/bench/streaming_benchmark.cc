@@ -12,13 +12,13 @@
 #include <thread>
 
 #include "core/common/check.h"
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "polyest/v1/session_service.grpc.pb.h"
 #include "server/daemon/daemon.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-class BareService final : public v1::EstimationService::Service {
+class BareService final : public v1::SessionService::Service {
   grpc::Status StreamMeasurements(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamMeasurementsResponse, v1::StreamMeasurementsRequest>*
@@ -27,9 +27,9 @@ class BareService final : public v1::EstimationService::Service {
     v1::StreamMeasurementsResponse response;
     int64_t samples = 0;
     while (stream->Read(&request)) {
-      samples += request.measurements().time_size();
+      samples += request.measurements().time_s_size();
       response.mutable_acknowledgement()->set_sequence(request.sequence());
-      response.mutable_acknowledgement()->set_samples(samples);
+      response.mutable_acknowledgement()->set_sample_count(samples);
       stream->Write(response);
     }
     return grpc::Status::OK;
@@ -62,14 +62,14 @@ v1::StreamMeasurementsRequest Batch(int index, int rows) {
   x.set_name("x");
   for (int row = 0; row < rows; ++row) {
     const double t = 1e-3 * (index * rows + row + 1);
-    measurements.add_time(t);
+    measurements.add_time_s(t);
     x.add_values(std::exp(-0.1 * t) * std::sin(2 * M_PI * t) / (2 * M_PI));
   }
   return request;
 }
 
 // Batches acknowledged a second.
-double Throughput(v1::EstimationService::Stub& stub, int batches, int rows) {
+double Throughput(v1::SessionService::Stub& stub, int batches, int rows) {
   std::vector<v1::StreamMeasurementsRequest> requests;
   for (int index = 0; index < batches; ++index) requests.push_back(Batch(index, rows));
   const auto begin = std::chrono::steady_clock::now();
@@ -88,17 +88,17 @@ double Throughput(v1::EstimationService::Stub& stub, int batches, int rows) {
   return batches / elapsed.count();
 }
 
-std::unique_ptr<v1::EstimationService::Stub> Connect(int port) {
-  return v1::EstimationService::NewStub(
+std::unique_ptr<v1::SessionService::Stub> Connect(int port) {
+  return v1::SessionService::NewStub(
       grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials()));
 }
 
-void Compare(v1::EstimationService::Stub& daemon, v1::EstimationService::Stub& bare, int batches,
+void Compare(v1::SessionService::Stub& daemon, v1::SessionService::Stub& bare, int batches,
              int rows) {
   grpc::ClientContext creating, deleting;
   v1::CreateSessionRequest create;
   create.set_session_id("benchmark");
-  *create.mutable_problem() = Oscillator();
+  *create.mutable_session()->mutable_problem() = Oscillator();
   v1::Session session;
   POLYEST_CHECK(daemon.CreateSession(&creating, create, &session).ok());
   const double echoed = Throughput(bare, batches, rows);
@@ -118,15 +118,15 @@ void Run() {
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &bare_port);
   builder.RegisterService(&service);
   const auto bare_server = builder.BuildAndStart();
-  auto daemon = Daemon::Start({.listen = {"127.0.0.1", 0}});
+  auto daemon = Daemon::Start({.listen = {{"127.0.0.1", 0}}});
   POLYEST_CHECK(bare_server != nullptr && daemon.ok());
   const auto bare = Connect(bare_port);
-  const auto streamed = Connect((*daemon)->address().port);
+  const auto streamed = Connect((*daemon)->addresses().front().port);
   Compare(*streamed, *bare, 20'000, 1);
   Compare(*streamed, *bare, 5'000, 64);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
-int main() { polyest::Run(); }
+int main() { polyest::internal::Run(); }

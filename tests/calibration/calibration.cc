@@ -19,10 +19,10 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 #include "tests/calibration/campaigns.h"
 
-namespace polyest::calibration {
+namespace polyest::internal::calibration {
 namespace {
 
 // One value a parameter and campaign.
@@ -61,7 +61,7 @@ double KolmogorovProbability(std::vector<double> ranks) {
 }
 
 Outcomes Estimate(const Campaign& campaign) {
-  const auto estimator = Estimator::Make(ResolvedProblem::Make(campaign.problem).value()).value();
+  const auto estimator = Estimator::Make(campaign.problem).value();
   POLYEST_CHECK(estimator->Append(campaign.record).ok() && estimator->Process().ok());
   PosteriorOptions options;
   options.probabilities = {0.025, 0.975};
@@ -124,10 +124,10 @@ int Run(int campaigns, bool limits) {
 }
 
 }  // namespace
-}  // namespace polyest::calibration
+}  // namespace polyest::internal::calibration
 
 int main(int argc, char** argv) {
   const bool limits = argc < 2 || std::string(argv[argc - 1]) != "--no-limits";
   const int campaigns = argc > 1 ? std::atoi(argv[1]) : 1'000;
-  return polyest::calibration::Run(campaigns > 0 ? campaigns : 1'000, limits);
+  return polyest::internal::calibration::Run(campaigns > 0 ? campaigns : 1'000, limits);
 }

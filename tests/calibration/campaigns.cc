@@ -4,10 +4,10 @@
 #include <random>
 
 #include "core/common/check.h"
-#include "core/model/catalogue.h"
 #include "core/propagation/ensemble_propagator.h"
+#include "polyest/catalogue.h"
 
-namespace polyest::calibration {
+namespace polyest::internal::calibration {
 namespace {
 
 constexpr double kCorrelationIntervals = 3;
@@ -106,4 +106,4 @@ Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed) {
   return campaign;
 }
 
-}  // namespace polyest::calibration
+}  // namespace polyest::internal::calibration

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "core/estimator/problem.h"
-#include "core/estimator/samples.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "polyest/samples.h"
 
-namespace polyest::calibration {
+namespace polyest::internal::calibration {
 
 enum class Noise { kWhite, kUnknown, kCorrelated };
 inline constexpr Noise kNoises[] = {Noise::kWhite, Noise::kUnknown, Noise::kCorrelated};
@@ -34,4 +34,4 @@ struct Campaign {
 // latter three intervals.
 Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed);
 
-}  // namespace polyest::calibration
+}  // namespace polyest::internal::calibration

@@ -87,8 +87,8 @@ void Evaluate(const polyest::StateSpaceModel& model) {
 
 // The intermediates once more, as parameters tied to others.
 void Tie(const EquationSpecification& equations) {
-  const auto expressions =
-      polyest::Expressions::Make("derived", equations.intermediates, {"k1", "m", "u.delay"});
+  const auto expressions = polyest::internal::Expressions::Make("derived", equations.intermediates,
+                                                                {"k1", "m", "u.delay"});
   if (!expressions.ok()) return;
   const polyest::Matrix variables = polyest::Matrix::Random(5, 3);
   polyest::Matrix results(5, std::ssize(expressions->names()));
@@ -106,7 +106,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, size_t size) {
     begin = end + 1;
   }
   const auto model = polyest::MakeEquationModel(equations);
-  POLYEST_CHECK(model.ok() == polyest::CheckEquations(equations).empty());
+  POLYEST_CHECK(model.ok() == polyest::internal::CheckEquations(equations).empty());
   if (model.ok()) Evaluate(**model);
   Tie(equations);
   return 0;

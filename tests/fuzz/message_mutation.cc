@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Of a string that grows by mutation.
@@ -226,4 +226,4 @@ void MessageMutation::MutateBytesOf(std::string& bytes) {
   bytes.resize(mutate_bytes_(reinterpret_cast<uint8_t*>(bytes.data()), size, bytes.size()));
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

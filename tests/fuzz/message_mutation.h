@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 class MessageMutation {
  public:
@@ -54,4 +54,4 @@ class MessageMutation {
   std::vector<const Message*> messages_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr std::chrono::milliseconds kTimeToAnswer{10};
@@ -93,4 +93,4 @@ void OpenRpc::CheckStatus(const grpc::Status& status) const {
   POLYEST_CHECK(!fault);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,7 +14,7 @@
 
 #include "tests/fuzz/rpc_script.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Has ended when it goes: the destructor cancels it and waits.
 class OpenRpc final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
@@ -48,4 +48,4 @@ class OpenRpc final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::Byt
   bool ended_ = false;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -17,7 +17,9 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "polyest/v1/model_service.grpc.pb.h"
+#include "polyest/v1/operation_service.grpc.pb.h"
+#include "polyest/v1/session_service.grpc.pb.h"
 #include "server/daemon/daemon.h"
 #include "tests/fuzz/message_mutation.h"
 #include "tests/fuzz/open_rpc.h"
@@ -25,10 +27,10 @@
 
 extern "C" size_t LLVMFuzzerMutate(uint8_t* data, size_t size, size_t most);
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
-constexpr size_t kMostCalls = 12;
+constexpr size_t kMaxCalls = 12;
 // What is computed for one call. Whoever does not stop at it holds up the next input, until
 // libFuzzer finds that it hangs.
 constexpr std::chrono::milliseconds kDeadline{100};
@@ -41,23 +43,25 @@ class Server {
     google::protobuf::SetLogHandler(nullptr);
     spdlog::set_level(spdlog::level::off);
     DaemonOptions options;
-    options.listen = {"127.0.0.1", 0};
+    options.listen = {{"127.0.0.1", 0}};
     options.threads = 1;
-    options.most_message_mb = 1;
+    options.max_message_mb = 1;
     options.limits = {.sessions = 8, .sessions_per_tenant = 8, .batch_rows = 1'000, .rows = 10'000};
     auto daemon = Daemon::Start(options);
     POLYEST_CHECK(daemon.ok());
     daemon_ = *std::move(daemon);
-    channel_ =
-        grpc::CreateChannel(daemon_->address().ToString(), grpc::InsecureChannelCredentials());
+    channel_ = grpc::CreateChannel(daemon_->addresses().front().ToString(),
+                                   grpc::InsecureChannelCredentials());
     generic_ = std::make_unique<grpc::GenericStub>(channel_);
-    stub_ = v1::EstimationService::NewStub(channel_);
+    models_ = v1::ModelService::NewStub(channel_);
+    sessions_ = v1::SessionService::NewStub(channel_);
+    operations_ = v1::OperationService::NewStub(channel_);
   }
 
   void Run(const RpcScript& script) {
     std::vector<std::unique_ptr<OpenRpc>> calls;
     for (const ScriptCall& call : script) {
-      if (calls.size() == kMostCalls) break;
+      if (calls.size() == kMaxCalls) break;
       calls.push_back(std::make_unique<OpenRpc>(*generic_, call, kDeadline));
       calls.back()->Await();
     }
@@ -69,13 +73,14 @@ class Server {
   // The next input finds the daemon as this one did.
   void Clean() {
     AwaitCalls();
+    DeleteOperations();
     const v1::ListSessionsResponse left = List();
     for (const v1::Session& session : left.sessions()) {
       grpc::ClientContext context;
       v1::DeleteSessionRequest request;
       request.set_name(session.name());
       google::protobuf::Empty response;
-      POLYEST_CHECK(stub_->DeleteSession(&context, request, &response).ok());
+      POLYEST_CHECK(sessions_->DeleteSession(&context, request, &response).ok());
     }
     AwaitCalls();
     POLYEST_CHECK(List().sessions().empty());
@@ -84,32 +89,48 @@ class Server {
   v1::ListSessionsResponse List() {
     grpc::ClientContext context;
     v1::ListSessionsResponse response;
-    POLYEST_CHECK(stub_->ListSessions(&context, {}, &response).ok());
+    POLYEST_CHECK(sessions_->ListSessions(&context, {}, &response).ok());
     return response;
+  }
+
+  void DeleteOperations() {
+    grpc::ClientContext context;
+    v1::ListOperationsRequest all;
+    all.set_page_size(200);
+    v1::ListOperationsResponse left;
+    POLYEST_CHECK(operations_->ListOperations(&context, all, &left).ok());
+    for (const v1::Operation& operation : left.operations()) {
+      grpc::ClientContext deletion;
+      v1::DeleteOperationRequest request;
+      request.set_name(operation.name());
+      google::protobuf::Empty response;
+      POLYEST_CHECK(operations_->DeleteOperation(&deletion, request, &response).ok());
+    }
   }
 
   // One call in each lane of the executor comes after all that were cancelled there.
   void AwaitCalls() {
     grpc::ClientContext of_models, of_sessions;
     v1::ListModelsResponse models;
-    POLYEST_CHECK(stub_->ListModels(&of_models, {}, &models).ok());
+    POLYEST_CHECK(models_->ListModels(&of_models, {}, &models).ok());
     v1::GetSessionRequest none;
     none.set_name("sessions/none");
     v1::Session session;
-    stub_->GetSession(&of_sessions, none, &session);
+    sessions_->GetSession(&of_sessions, none, &session);
   }
 
   std::unique_ptr<Daemon> daemon_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<grpc::GenericStub> generic_;
-  std::unique_ptr<v1::EstimationService::Stub> stub_;
+  std::unique_ptr<v1::ModelService::Stub> models_;
+  std::unique_ptr<v1::SessionService::Stub> sessions_;
+  std::unique_ptr<v1::OperationService::Stub> operations_;
 };
 
 // Another call, with a request of nothing, or one that is there once more.
 void AddCall(RpcScript& script, MessageMutation& mutation) {
-  const auto& service = FuzzedService();
-  const auto method = mutation.Choose(static_cast<size_t>(service.method_count()));
-  ScriptCall call{.method = service.method(static_cast<int>(method)), .requests = {}};
+  const auto methods = FuzzedMethods();
+  ScriptCall call{.method = methods[mutation.Choose(methods.size())], .requests = {}};
   call.requests.push_back({MakeMessage(*call.method->input_type()), ""});
   const size_t at = mutation.Choose(script.size() + 1);
   script.insert(script.begin() + static_cast<std::ptrdiff_t>(at), std::move(call));
@@ -168,13 +189,14 @@ std::string MutateScript(std::string_view text, unsigned seed) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 // OpenSSL keeps the errors of a thread where the leak sanitizer does not look.
 extern "C" const char* __lsan_default_suppressions() { return "leak:CRYPTO_zalloc"; }
 
 extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t most, unsigned seed) {
-  const std::string text = polyest::MutateScript({reinterpret_cast<const char*>(data), size}, seed);
+  const std::string text =
+      polyest::internal::MutateScript({reinterpret_cast<const char*>(data), size}, seed);
   // Too long to be kept whole: as the bytes that it is.
   if (text.size() > most || seed % 16 == 0) return LLVMFuzzerMutate(data, size, most);
   std::memcpy(data, text.data(), text.size());
@@ -182,7 +204,7 @@ extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t mos
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  static polyest::Server server;
-  server.Run(polyest::ParseScript({reinterpret_cast<const char*>(data), size}));
+  static polyest::internal::Server server;
+  server.Run(polyest::internal::ParseScript({reinterpret_cast<const char*>(data), size}));
   return 0;
 }

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "server/security/method_roles.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using google::protobuf::MethodDescriptor;
@@ -34,6 +34,14 @@ ScriptRequest ParseRequest(const MethodDescriptor& method, bool as_bytes, std::s
   return request;
 }
 
+// By its name, which no two services share.
+const MethodDescriptor* FindMethod(std::string_view name) {
+  for (const MethodDescriptor* const method : FuzzedMethods()) {
+    if (method->name() == name) return method;
+  }
+  return nullptr;
+}
+
 // One head line (without its end) and what is below it.
 void ParsePart(std::string_view head, std::string_view body, RpcScript& script) {
   const bool as_bytes = head.front() == '=';
@@ -41,7 +49,7 @@ void ParsePart(std::string_view head, std::string_view body, RpcScript& script) 
   head.remove_prefix(1);
   if (cancelled) head.remove_suffix(1);
   if (!head.empty()) {
-    const MethodDescriptor* method = FuzzedService().FindMethodByName(std::string(head));
+    const MethodDescriptor* method = FindMethod(head);
     if (method == nullptr) return;
     script.push_back({.method = method, .cancelled = cancelled, .requests = {}});
   }
@@ -55,11 +63,12 @@ std::string ScriptRequest::Wire() const {
   return message == nullptr ? bytes : message->SerializePartialAsString();
 }
 
-const google::protobuf::ServiceDescriptor& FuzzedService() {
-  static const auto* const service =
-      google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(
-          v1::EstimationService::service_full_name());
-  return *service;
+std::vector<const MethodDescriptor*> FuzzedMethods() {
+  std::vector<const MethodDescriptor*> methods;
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    for (int k = 0; k < service->method_count(); ++k) methods.push_back(service->method(k));
+  }
+  return methods;
 }
 
 std::unique_ptr<google::protobuf::Message> MakeMessage(const google::protobuf::Descriptor& type) {
@@ -105,4 +114,4 @@ std::string PrintScript(const RpcScript& script) {
   return text;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

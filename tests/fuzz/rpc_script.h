@@ -20,7 +20,7 @@
 #include <string_view>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 // One of the two.
 struct ScriptRequest {
@@ -38,7 +38,8 @@ struct ScriptCall {
 
 using RpcScript = std::vector<ScriptCall>;
 
-const google::protobuf::ServiceDescriptor& FuzzedService();
+// Of all services.
+std::vector<const google::protobuf::MethodDescriptor*> FuzzedMethods();
 std::unique_ptr<google::protobuf::Message> MakeMessage(const google::protobuf::Descriptor& type);
 
 // What can be read of it: a line that names no method ends the request before it, and a request
@@ -46,4 +47,4 @@ std::unique_ptr<google::protobuf::Message> MakeMessage(const google::protobuf::D
 RpcScript ParseScript(std::string_view text);
 std::string PrintScript(const RpcScript& script);
 
-}  // namespace polyest
+}  // namespace polyest::internal

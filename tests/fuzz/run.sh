@@ -15,8 +15,9 @@ done
 [[ $# -eq 0 ]] || shift
 [[ ${#fuzzers[@]} -gt 0 ]] || fuzzers=(equation rpc)
 
+deploy/install-packages.sh --tests --sanitizers
 cmake --preset fuzz >/dev/null
-cmake --build --preset fuzz --target "${fuzzers[@]/%/_fuzzer}"
+cmake --build --preset fuzz --parallel "$(nproc)" --target "${fuzzers[@]/%/_fuzzer}"
 for fuzzer in "${fuzzers[@]}"; do
   case "$fuzzer" in
     equation) options=(-max_len=4096 -rss_limit_mb=512 -timeout=5 -dict=tests/fuzz/equation.dict) ;;

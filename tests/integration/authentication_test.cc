@@ -1,5 +1,7 @@
 // Every method × every caller.
 
+#include <absl/strings/match.h>
+
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -8,7 +10,7 @@
 #include "tests/integration/daemon_fixture.h"
 #include "tests/integration/security_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using grpc::StatusCode;
@@ -71,19 +73,21 @@ TEST_F(AuthenticationTest, LetsAnAdminDoEverything) { ExpectByRole(admin_.secret
 
 // A request about sessions/rig, as bytes; none for methods that are not about a session.
 std::optional<std::string> AboutTheRig(const std::string& method) {
-  const auto& descriptor = *v1::EstimateRequest::descriptor()
-                                ->file()
-                                ->FindServiceByName("EstimationService")
-                                ->FindMethodByName(method)
-                                ->input_type();
+  const auto& descriptor = *FindMethod(method).input_type();
   const bool by_name =
       method == "GetSession" || method == "DeleteSession" || method == "ExportSession";
+  const std::unique_ptr<google::protobuf::Message> request(
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&descriptor)->New());
+  if (const auto* const subject = descriptor.FindFieldByName("subject"); subject != nullptr) {
+    v1::Subject rig;
+    rig.set_session("sessions/rig");
+    request->GetReflection()->MutableMessage(request.get(), subject)->CopyFrom(rig);
+    return request->SerializeAsString();
+  }
   const auto* const field = descriptor.FindFieldByName(by_name ? "name" : "session");
   if (field == nullptr || field->type() != google::protobuf::FieldDescriptor::TYPE_STRING) {
     return std::nullopt;
   }
-  const std::unique_ptr<google::protobuf::Message> request(
-      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&descriptor)->New());
   request->GetReflection()->SetString(request.get(), field, "sessions/rig");
   return request->SerializeAsString();
 }
@@ -92,7 +96,7 @@ TEST_F(AuthenticationTest, HidesTheSessionsOfATenantFromOthers) {
   const auto channel = Connect();
   v1::CreateSessionRequest create;
   create.set_session_id("rig");
-  *create.mutable_problem() = Oscillator();
+  *create.mutable_session()->mutable_problem() = Oscillator();
   ASSERT_TRUE(
       CallRaw(channel, MethodPath("CreateSession"), writer_.secret, create.SerializeAsString())
           .ok());
@@ -105,7 +109,7 @@ TEST_F(AuthenticationTest, HidesTheSessionsOfATenantFromOthers) {
     EXPECT_EQ(CallRaw(channel, MethodPath(method), other_.secret, *request).error_code(),
               StatusCode::NOT_FOUND);
   }
-  EXPECT_GE(methods, 9);  // those of today: the loop does look at sessions
+  EXPECT_GE(methods, 15);  // those of today: the loop does look at sessions
   std::string list;
   EXPECT_TRUE(CallRaw(channel, MethodPath("ListSessions"), other_.secret, "", &list).ok());
   EXPECT_EQ(list, "");
@@ -137,12 +141,35 @@ TEST_F(AuthenticationTest, IsNotTrustedByClientsOfAnotherCa) {
   ExpectNoConnection(Connect(CertificateAuthority("another CA"), authority_.Issue("rig")));
 }
 
-TEST_F(AuthenticationTest, TakesNoConnectionWithoutTls) {
-  ExpectNoConnection(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+TEST_F(AuthenticationTest, TakesNoConnectionWithoutTlsAndLogsIt) {
+  const auto logged = [this] {
+    return absl::StrContains(daemon_->Errors(), "a connection failed in its TLS handshake");
+  };
+  // The client may hear of the end of its connection just before the log does.
+  for (int attempt = 0; attempt < 100 && !logged(); ++attempt) {
+    ExpectNoConnection(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+  }
+  EXPECT_TRUE(logged()) << daemon_->Errors();
+}
+
+TEST_F(AuthenticationTest, LogsWhoWasRefusedAndFromWhere) {
+  EXPECT_EQ(CallRaw(Connect(), MethodPath("DeleteSession"), reader_.secret).error_code(),
+            StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(CallRaw(Connect(), MethodPath("GetStatus"), "guessed").error_code(),
+            StatusCode::UNAUTHENTICATED);
+  const std::string log = daemon_->Errors();
+  EXPECT_THAT(log, testing::ContainsRegex(
+                       "method=DeleteSession tenant=chassis caller=anna peer=ipv4:127.0.0.1:[0-9]+ "
+                       "code=PERMISSION_DENIED .*reason=\"DeleteSession needs the role"));
+  EXPECT_THAT(log, testing::ContainsRegex(
+                       "method=GetStatus peer=ipv4:127.0.0.1:[0-9]+ code=UNAUTHENTICATED "
+                       ".*reason=\"the token is not known\""));
+  EXPECT_THAT(log, testing::ContainsRegex("ready version=[0-9.]+ listen=127.0.0.1:[0-9]+ tls=yes"));
+  EXPECT_THAT(log, Not(HasSubstr("guessed")));
 }
 
 TEST_F(AuthenticationTest, TakesNoTwoTokensAtOnce) {
-  auto stub = v1::EstimationService::NewStub(Connect());
+  auto stub = v1::ModelService::NewStub(Connect());
   grpc::ClientContext context;
   context.AddMetadata("authorization", "Bearer " + admin_.secret);
   context.AddMetadata("authorization", "Bearer " + reader_.secret);
@@ -214,6 +241,8 @@ TEST(SecurityFiles, AreRefusedInOneLineWhenTheyAreNoGood) {
   EXPECT_EQ(Refusal({"--listen", "127.0.0.1:0", "--tokens", tokens}, 1),
             "polyestd: --tokens: " + tokens +
                 ", line 1: the SHA-256 of the token must be 64 hexadecimal digits\n");
+  EXPECT_THAT(Refusal({"--listen", "127.0.0.1:0", "--tokens", folder.Write("none", "# none\n")}, 1),
+              HasSubstr("none: there is no token in it"));
   EXPECT_THAT(Refusal({"--tls-certificate", certificate}, 2), HasSubstr("--tls-key"));
   EXPECT_THAT(Refusal({"--tls-client-ca", certificate}, 2), HasSubstr("--tls-certificate"));
 }
@@ -233,4 +262,4 @@ TEST(NewToken, GivesTheSecretOnStdoutAndItsLineOnStderr) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

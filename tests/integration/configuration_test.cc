@@ -7,7 +7,7 @@
 #include "tests/integration/operations_fixture.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -20,17 +20,17 @@ class ConfigurationTest : public testing::Test {
   }
 
   // The daemon's limit of sessions, as it says itself where it is passed.
-  static int MostSessions(std::vector<std::string> arguments) {
+  static int MaxSessions(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"--listen", "127.0.0.1:0"});
     DaemonProcess daemon(arguments);
     const std::string address = daemon.ReadAddress();
     EXPECT_FALSE(address.empty()) << daemon.Errors();
-    const auto stub = v1::EstimationService::NewStub(
+    const auto stub = v1::SessionService::NewStub(
         grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
     for (int sessions = 0; sessions < 10; ++sessions) {
       grpc::ClientContext context;
       v1::CreateSessionRequest request;
-      *request.mutable_problem() = Oscillator();
+      *request.mutable_session()->mutable_problem() = Oscillator();
       v1::Session session;
       if (!stub->CreateSession(&context, request, &session).ok()) return sessions;
     }
@@ -51,16 +51,16 @@ class ConfigurationTest : public testing::Test {
 
 TEST_F(ConfigurationTest, TakesTheFlagThenTheVariableThenTheFile) {
   const std::string file = File("# a comment\nmax-sessions = 1\n");
-  EXPECT_EQ(MostSessions({}), 10);
-  EXPECT_EQ(MostSessions({"--config", file}), 1);
+  EXPECT_EQ(MaxSessions({}), 10);
+  EXPECT_EQ(MaxSessions({"--config", file}), 1);
   {
     const Variable config("POLYESTD_CONFIG", file);
-    EXPECT_EQ(MostSessions({}), 1);
+    EXPECT_EQ(MaxSessions({}), 1);
   }
   const Variable variable("POLYESTD_MAX_SESSIONS", "2");
-  EXPECT_EQ(MostSessions({}), 2);
-  EXPECT_EQ(MostSessions({"--config", file}), 2);
-  EXPECT_EQ(MostSessions({"--config", file, "--max-sessions", "3"}), 3);
+  EXPECT_EQ(MaxSessions({}), 2);
+  EXPECT_EQ(MaxSessions({"--config", file}), 2);
+  EXPECT_EQ(MaxSessions({"--config", file, "--max-sessions", "3"}), 3);
 }
 
 TEST_F(ConfigurationTest, NamesTheFileAndTheKeyThatIsWrong) {
@@ -79,6 +79,24 @@ TEST_F(ConfigurationTest, NamesTheVariableThatIsWrong) {
   ExpectRefused({}, "POLYESTD_MAX_SESSIONS: ");
 }
 
+TEST_F(ConfigurationTest, NamesAVariableThatIsMisspelledAndTheNearest) {
+  {
+    const Variable variable("POLYESTD_MAX_SESIONS", "1");
+    ExpectRefused({},
+                  "POLYESTD_MAX_SESIONS: no option has this variable; did you mean "
+                  "POLYESTD_MAX_SESSIONS?\n");
+  }
+  {
+    const Variable variable("POLYESTD_COLOUR", "red");
+    ExpectRefused({},
+                  "POLYESTD_COLOUR: no option has this variable; polyestd --help lists the "
+                  "options\n");
+  }
+  // As Kubernetes sets it beside a service of the name.
+  const Variable variable("POLYESTD_SERVICE_HOST", "10.0.0.1");
+  EXPECT_EQ(MaxSessions({"--max-sessions", "1"}), 1);
+}
+
 TEST_F(ConfigurationTest, HasAnExampleThatIsTaken) {
   DaemonProcess daemon({"--config", POLYEST_SOURCE_DIR "/deploy/polyestd.toml", "--listen",
                         "127.0.0.1:0", "--metrics", "127.0.0.1:0"});
@@ -95,4 +113,4 @@ TEST_F(ConfigurationTest, HelpSaysWhatComesFirst) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -13,10 +13,15 @@
 #include <string>
 #include <vector>
 
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "polyest/v1/model_service.grpc.pb.h"
+#include "polyest/v1/operation_service.grpc.pb.h"
+#include "polyest/v1/problem_service.grpc.pb.h"
+#include "polyest/v1/session_service.grpc.pb.h"
+#include "polyest/v1/status_service.grpc.pb.h"
+#include "polyest/v1/study_service.grpc.pb.h"
 #include "tests/integration/daemon_process.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline v1::Problem ProblemFromJson(const std::string& json) {
   v1::Problem problem;
@@ -45,7 +50,7 @@ inline v1::Measurements OscillatorRows(int first, int last) {
   x.set_name("x");
   for (int row = first; row < last; ++row) {
     const double t = 0.05 * (row + 1);
-    rows.add_time(t);
+    rows.add_time_s(t);
     x.add_values(std::exp(-kDecay * t) *
                      (std::cos(omega * t) + kDecay / omega * std::sin(omega * t)) +
                  0.01 * std::sin(12.9898 * row));
@@ -65,17 +70,23 @@ class DaemonTest : public testing::Test {
     address_ = daemon_.ReadAddress();
     ASSERT_FALSE(address_.empty()) << daemon_.Errors();
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
-    stub_ = v1::EstimationService::NewStub(channel_);
+    models_ = v1::ModelService::NewStub(channel_);
+    problems_ = v1::ProblemService::NewStub(channel_);
+    sessions_ = v1::SessionService::NewStub(channel_);
+    studies_ = v1::StudyService::NewStub(channel_);
+    operations_ = v1::OperationService::NewStub(channel_);
+    status_ = v1::StatusService::NewStub(channel_);
   }
 
   // The estimate from the whole record at once.
   v1::Estimate EstimateAtOnce(int rows) {
     grpc::ClientContext context;
-    v1::EstimateRequest request;
-    *request.mutable_problem() = Oscillator();
-    *request.mutable_measurements() = OscillatorRows(0, rows);
-    v1::EstimateResponse response;
-    const grpc::Status status = stub_->Estimate(&context, request, &response);
+    v1::ComputeEstimateRequest request;
+    *request.mutable_subject()->mutable_experiment()->mutable_problem() = Oscillator();
+    *request.mutable_subject()->mutable_experiment()->mutable_measurements() =
+        OscillatorRows(0, rows);
+    v1::ComputeEstimateResponse response;
+    const grpc::Status status = studies_->ComputeEstimate(&context, request, &response);
     EXPECT_TRUE(status.ok()) << status.error_message();
     return response.estimate();
   }
@@ -84,9 +95,9 @@ class DaemonTest : public testing::Test {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_session_id(id);
-    *request.mutable_problem() = problem;
+    *request.mutable_session()->mutable_problem() = problem;
     v1::Session session;
-    return stub_->CreateSession(&context, request, &session);
+    return sessions_->CreateSession(&context, request, &session);
   }
 
   grpc::Status Delete(const std::string& name) {
@@ -94,7 +105,7 @@ class DaemonTest : public testing::Test {
     v1::DeleteSessionRequest request;
     request.set_name(name);
     google::protobuf::Empty empty;
-    return stub_->DeleteSession(&context, request, &empty);
+    return sessions_->DeleteSession(&context, request, &empty);
   }
 
   grpc::Status Add(const std::string& session, int64_t sequence, const v1::Measurements& rows,
@@ -105,7 +116,7 @@ class DaemonTest : public testing::Test {
     request.set_sequence(sequence);
     *request.mutable_measurements() = rows;
     v1::AddMeasurementsResponse response;
-    const grpc::Status status = stub_->AddMeasurements(&context, request, &response);
+    const grpc::Status status = sessions_->AddMeasurements(&context, request, &response);
     if (acknowledgement != nullptr) *acknowledgement = response.acknowledgement();
     return status;
   }
@@ -113,13 +124,18 @@ class DaemonTest : public testing::Test {
   DaemonProcess daemon_;
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;
-  std::unique_ptr<v1::EstimationService::Stub> stub_;
+  std::unique_ptr<v1::ModelService::Stub> models_;
+  std::unique_ptr<v1::ProblemService::Stub> problems_;
+  std::unique_ptr<v1::SessionService::Stub> sessions_;
+  std::unique_ptr<v1::StudyService::Stub> studies_;
+  std::unique_ptr<v1::OperationService::Stub> operations_;
+  std::unique_ptr<v1::StatusService::Stub> status_;
 };
 
 // One stream of measurements, from the client's side.
 class ClientStream {
  public:
-  explicit ClientStream(v1::EstimationService::Stub& stub, const std::string& token = "")
+  explicit ClientStream(v1::SessionService::Stub& stub, const std::string& token = "")
       : stream_([&] {
           if (!token.empty()) context_.AddMetadata("authorization", "Bearer " + token);
           return stub.StreamMeasurements(&context_);
@@ -173,4 +189,4 @@ inline std::string WithoutSequence(v1::Estimate estimate) {
   return bytes;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

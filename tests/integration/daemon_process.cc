@@ -10,7 +10,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 DaemonProcess::DaemonProcess(std::vector<std::string> arguments) {
   int output[2];
@@ -74,4 +74,4 @@ std::string DaemonProcess::Errors() {
   return text;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

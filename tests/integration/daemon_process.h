@@ -10,7 +10,7 @@
 
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class DaemonProcess {
  public:
@@ -40,4 +40,4 @@ class DaemonProcess {
   FILE* errors_ = nullptr;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

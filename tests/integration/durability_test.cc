@@ -10,13 +10,13 @@
 #include <random>
 #include <thread>
 
-#include "client/cpp/client.h"
-#include "client/cpp/measurement_stream.h"
+#include "polyest/client.h"
+#include "polyest/measurement_stream.h"
 #include "tests/integration/daemon_fixture.h"
 #include "tests/testing/hostile_proxy.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kSessions = 8;
@@ -38,7 +38,7 @@ v1::Estimate EstimateOf(const std::string& address, const std::string& session) 
   request.set_session(session);
   const auto estimate = client.GetEstimate(request);
   EXPECT_TRUE(estimate.ok()) << estimate.status();
-  return estimate.ok() ? estimate->estimate() : v1::Estimate();
+  return estimate.ok() ? *estimate : v1::Estimate();
 }
 
 // Eight writers that stream a record each and come back whenever they lose the daemon.
@@ -54,7 +54,7 @@ class Campaign {
     for (int session = 0; session < kSessions; ++session) {
       v1::CreateSessionRequest request;
       request.set_session_id(SessionName(session).substr(9));
-      *request.mutable_problem() = Oscillator();
+      *request.mutable_session()->mutable_problem() = Oscillator();
       ASSERT_TRUE(client.CreateSession(request).ok());
     }
   }
@@ -83,9 +83,9 @@ class Campaign {
     Client client(address_);
     MeasurementStreamOptions options;
     options.first_delay = std::chrono::milliseconds(5);
-    options.longest_delay = std::chrono::milliseconds(100);
-    options.most_attempts = 10'000;
-    options.estimates.emplace().set_every_batches(10);
+    options.max_delay = std::chrono::milliseconds(100);
+    options.max_attempts = 10'000;
+    options.estimates.emplace().set_batch_count(10);
     MeasurementStreamCallbacks callbacks;
     auto& last = acknowledged_[static_cast<size_t>(session)];
     callbacks.acknowledgement = [&](const v1::Acknowledgement& acknowledgement) {
@@ -128,7 +128,7 @@ void ExpectUndisturbed(const Campaign& campaign, const std::string& address) {
     const auto found = client.GetSession(request);
     ASSERT_TRUE(found.ok()) << found.status();
     EXPECT_EQ(found->last_sequence(), campaign.batches());
-    EXPECT_EQ(found->samples(), campaign.batches() * kRowsABatch);
+    EXPECT_EQ(found->sample_count(), campaign.batches() * kRowsABatch);
     EXPECT_EQ(WithoutSequence(EstimateOf(address, SessionName(session))),
               WithoutSequence(EstimateOf(peaceful_address, SessionName(session))));
   }
@@ -190,4 +190,4 @@ TEST(Durability, NothingIsLostOrCountedTwiceOverANetworkThatCutsDelaysAndRepeats
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

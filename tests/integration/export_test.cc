@@ -2,7 +2,7 @@
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -14,7 +14,7 @@ class ExportTest : public DaemonTest {
     grpc::ClientContext context;
     v1::ExportSessionRequest request;
     request.set_name(name);
-    const auto reader = stub_->ExportSession(&context, request);
+    const auto reader = sessions_->ExportSession(&context, request);
     v1::SessionRecord record;
     while (reader->Read(&record)) records.push_back(record);
     return reader->Finish();
@@ -23,7 +23,7 @@ class ExportTest : public DaemonTest {
                       v1::Session* session = nullptr) {
     grpc::ClientContext context;
     v1::Session imported;
-    const auto writer = stub_->ImportSession(&context, &imported);
+    const auto writer = sessions_->ImportSession(&context, &imported);
     v1::ImportSessionRequest request;
     request.set_session_id(id);
     for (const v1::SessionRecord& record : records) {
@@ -39,10 +39,10 @@ class ExportTest : public DaemonTest {
     grpc::ClientContext context;
     v1::GetEstimateRequest request;
     request.set_session(session);
-    v1::EstimateResponse response;
-    const grpc::Status status = stub_->GetEstimate(&context, request, &response);
+    v1::Estimate response;
+    const grpc::Status status = sessions_->GetEstimate(&context, request, &response);
     EXPECT_TRUE(status.ok()) << status.error_message();
-    return response.estimate();
+    return response;
   }
   // A session of three batches, exported.
   std::vector<v1::SessionRecord> Exported() {
@@ -60,7 +60,7 @@ class ExportTest : public DaemonTest {
 TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   const auto records = Exported();
   ASSERT_EQ(records.size(), 4u);
-  EXPECT_EQ(records[0].head().batches(), 3);
+  EXPECT_EQ(records[0].head().batch_count(), 3);
   EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(records[0].head().problem(),
                                                                  Oscillator()));
   EXPECT_EQ(records[3].batch().sequence(), 3);
@@ -69,7 +69,7 @@ TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(imported.name(), "sessions/copy");
   EXPECT_EQ(imported.last_sequence(), 3);
-  EXPECT_EQ(imported.samples(), 30);
+  EXPECT_EQ(imported.sample_count(), 30);
   EXPECT_EQ(WithoutSequence(Estimate("sessions/copy")), WithoutSequence(Estimate("sessions/rig")));
   // It goes on as the first one would.
   EXPECT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
@@ -92,7 +92,7 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
     std::string message;
   };
   v1::SessionRecord bad = records[2];
-  bad.mutable_batch()->mutable_measurements()->set_time(0, 0);
+  bad.mutable_batch()->mutable_measurements()->set_time_s(0, 0);
   for (const Case& one : {
            Case{"nothing", {}, "breaks off after batch 0 of 0"},
            Case{"no head", {records[1]}, "the first must be a session's head"},
@@ -121,7 +121,7 @@ class FewRowsTest : public ExportTest {
 TEST_F(FewRowsTest, AreTheLimitOfAnImportToo) {
   auto records = Exported();
   ASSERT_EQ(records.size(), 4u);
-  records[0].mutable_head()->set_batches(4);
+  records[0].mutable_head()->set_batch_count(4);
   v1::SessionRecord::Batch& more = *records.emplace_back().mutable_batch();
   more.set_sequence(4);
   *more.mutable_measurements() = OscillatorRows(30, 31);
@@ -138,4 +138,4 @@ TEST_F(ExportTest, NamesASessionThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

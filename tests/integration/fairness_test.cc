@@ -4,7 +4,7 @@
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class OneThreadTest : public DaemonTest {
@@ -13,9 +13,9 @@ class OneThreadTest : public DaemonTest {
 };
 
 // Order 8 in four unknowns is 495 terms and a thousand trajectories, over 20,000 rows.
-v1::EstimateRequest LongRequest() {
-  v1::EstimateRequest request;
-  *request.mutable_problem() = ProblemFromJson(R"({
+v1::ComputeEstimateRequest LongRequest() {
+  v1::ComputeEstimateRequest request;
+  *request.mutable_subject()->mutable_experiment()->mutable_problem() = ProblemFromJson(R"({
     "model": {"builtin": "mass_spring_damper"},
     "uncertain": [{"name": "k", "uniform": {"lower": 31.58, "upper": 47.37}},
                   {"name": "c", "uniform": {"lower": 0.1, "upper": 0.3}},
@@ -25,7 +25,8 @@ v1::EstimateRequest LongRequest() {
     "measured": [{"output": "x", "noise": {"absolute": 0.01}}],
     "expansion": {"order": 8, "adaptive": false}
   })");
-  *request.mutable_measurements() = OscillatorRows(0, 20'000);
+  *request.mutable_subject()->mutable_experiment()->mutable_measurements() =
+      OscillatorRows(0, 20'000);
   return request;
 }
 
@@ -36,15 +37,15 @@ TEST_F(OneThreadTest, StreamsWhileLongRequestsAreComputed) {
   for (int i = 0; i < kRequests; ++i) {
     grpc::ClientContext& context = *contexts.emplace_back(std::make_unique<grpc::ClientContext>());
     answers.push_back(std::async(std::launch::async, [this, &context] {
-      v1::EstimateResponse response;
-      return stub_->Estimate(&context, LongRequest(), &response);
+      v1::ComputeEstimateResponse response;
+      return studies_->ComputeEstimate(&context, LongRequest(), &response);
     }));
   }
   ASSERT_TRUE(Create("rig").ok());
   for (int batch = 1; batch <= 10; ++batch) {
     ASSERT_TRUE(Add("sessions/rig", batch, OscillatorRows(5 * (batch - 1), 5 * batch)).ok());
   }
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   ASSERT_TRUE(stream.Send("sessions/rig", 11, OscillatorRows(50, 55)));
   stream.ExpectAcknowledgement(11);
   v1::Estimate estimate;
@@ -68,17 +69,17 @@ class OneSecondTest : public DaemonTest {
 
 TEST_F(OneSecondTest, EndsARequestThatIsComputedForLonger) {
   grpc::ClientContext context;
-  v1::EstimateResponse response;
-  const grpc::Status status = stub_->Estimate(&context, LongRequest(), &response);
+  v1::ComputeEstimateResponse response;
+  const grpc::Status status = studies_->ComputeEstimate(&context, LongRequest(), &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(status.error_message(),
             "the request was computed for 1 s, the longest that one may be (--max-compute-s)");
   // The caller's own deadline is another matter.
   grpc::ClientContext hurried;
   hurried.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(100));
-  EXPECT_EQ(stub_->Estimate(&hurried, LongRequest(), &response).error_code(),
+  EXPECT_EQ(studies_->ComputeEstimate(&hurried, LongRequest(), &response).error_code(),
             grpc::StatusCode::DEADLINE_EXCEEDED);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -43,7 +43,7 @@ class LifecycleTest : public DaemonTest {
 TEST_F(LifecycleTest, AnswersTheHealthCheckForAllAndForTheService) {
   // HealthCheckRequest{service = 1}; HealthCheckResponse{status = 1 (SERVING)}.
   EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check", ""), "\x08\x01");
-  const std::string service = "polyest.v1.EstimationService";
+  const std::string service = "polyest.v1.SessionService";
   EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check",
                     "\x0a" + std::string(1, static_cast<char>(service.size())) + service),
             "\x08\x01");
@@ -53,26 +53,26 @@ TEST_F(LifecycleTest, TellsOfItsServicesByReflection) {
   // ServerReflectionRequest{list_services = 7: ""}.
   const std::string answer = CallRaw(
       "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", std::string("\x3a\x00", 2));
-  EXPECT_THAT(answer, HasSubstr("polyest.v1.EstimationService"));
+  EXPECT_THAT(answer, HasSubstr("polyest.v1.SessionService"));
   EXPECT_THAT(answer, HasSubstr("grpc.health.v1.Health"));
 }
 
 TEST_F(LifecycleTest, GivesEveryStreamItsLastEstimateBeforeItEnds) {
   ASSERT_TRUE(Create("rig").ok());
   ASSERT_TRUE(Create("idle").ok());
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 20),
                           [](auto& request) { request.mutable_estimates()->set_only_last(true); }));
   stream.ExpectAcknowledgement(1);
-  ClientStream idle(*stub_);
+  ClientStream idle(*sessions_);
   v1::StreamMeasurementsRequest hello;
   hello.set_session("sessions/idle");
   ASSERT_TRUE(idle.SendRequest(hello));
   grpc::ClientContext context;
   v1::WatchSessionRequest request;
   request.set_session("sessions/rig");
-  auto watch = stub_->WatchSession(&context, request);
-  v1::EstimateResponse watched;
+  auto watch = sessions_->WatchSession(&context, request);
+  v1::WatchSessionResponse watched;
   ASSERT_TRUE(watch->Read(&watched));
   EXPECT_EQ(watched.estimate().sequence(), 1);
   const v1::Estimate expected = EstimateAtOnce(20);
@@ -140,4 +140,4 @@ TEST(Daemon, PrintsHelpAndVersion) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include "polyest/rpc/error_details.pb.h"
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 template <typename Detail>
@@ -44,20 +44,21 @@ class LimitsTest : public DaemonTest {
 
   grpc::Status Estimate(const v1::Problem& problem = Oscillator()) {
     grpc::ClientContext context;
-    v1::EstimateRequest request;
-    *request.mutable_problem() = problem;
-    *request.mutable_measurements() = OscillatorRows(0, 10);
-    v1::EstimateResponse response;
-    return stub_->Estimate(&context, request, &response);
+    v1::ComputeEstimateRequest request;
+    *request.mutable_subject()->mutable_experiment()->mutable_problem() = problem;
+    *request.mutable_subject()->mutable_experiment()->mutable_measurements() =
+        OscillatorRows(0, 10);
+    v1::ComputeEstimateResponse response;
+    return studies_->ComputeEstimate(&context, request, &response);
   }
   grpc::Status Propagate() {
     grpc::ClientContext context;
-    v1::PropagateRequest request;
-    *request.mutable_problem() = Oscillator();
-    request.set_until(1);
-    request.set_step(0.5);
-    v1::PropagateResponse response;
-    return stub_->Propagate(&context, request, &response);
+    v1::ComputePropagationRequest request;
+    *request.mutable_subject()->mutable_experiment()->mutable_problem() = Oscillator();
+    request.set_until_s(1);
+    request.set_step_s(0.5);
+    v1::ComputePropagationResponse response;
+    return studies_->ComputePropagation(&context, request, &response);
   }
   // With a session, without one, and without measurements.
   void ExpectProblemRefused(const std::string& option) {
@@ -92,7 +93,7 @@ TEST_F(FewPointsTest, NamesTheLimitOfPoints) {
   ExpectProblemRefused("--max-points");
   // Of a lower order it is let through.
   v1::Problem problem = Oscillator();
-  problem.mutable_expansion()->set_order(static_cast<v1::ExpansionOptions::Order>(3));
+  problem.mutable_expansion()->set_order(3);
   EXPECT_TRUE(Create("rig", problem).ok());
   EXPECT_TRUE(Estimate(problem).ok());
 }
@@ -155,7 +156,7 @@ TEST(MemoryLimitTest, AffectsNothingThatIsAcknowledged) {
   struct Served : LimitsTest {
     Served(std::vector<std::string> arguments) : LimitsTest(std::move(arguments)) { SetUp(); }
     void TestBody() override {}
-    using LimitsTest::Add, LimitsTest::Create, LimitsTest::stub_;
+    using LimitsTest::Add, LimitsTest::Create, LimitsTest::sessions_;
   };
   {
     Served daemon({"--data-dir", data.path()});
@@ -170,8 +171,8 @@ TEST(MemoryLimitTest, AffectsNothingThatIsAcknowledged) {
     v1::GetSessionRequest get;
     get.set_name("sessions/rig");
     v1::Session session;
-    ASSERT_TRUE(daemon.stub_->GetSession(&context, get, &session).ok());
-    EXPECT_EQ(session.samples(), 20);
+    ASSERT_TRUE(daemon.sessions_->GetSession(&context, get, &session).ok());
+    EXPECT_EQ(session.sample_count(), 20);
   }
   Served daemon({"--data-dir", data.path()});
   EXPECT_TRUE(daemon.Add("sessions/rig", 2, OscillatorRows(20, 30)).ok());
@@ -201,4 +202,4 @@ TEST_F(UnlimitedTest, NamesTheFieldOfABadRequest) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include "server/telemetry/request_id.h"
 #include "tests/integration/operations_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -25,7 +25,7 @@ class LogTest : public DaemonTest {
     v1::GetSessionRequest request;
     request.set_name(session);
     v1::Session response;
-    stub_->GetSession(&context, request, &response);
+    sessions_->GetSession(&context, request, &response);
     const auto& metadata = context.GetServerInitialMetadata();
     const auto found = metadata.find(kRequestIdKey);
     return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
@@ -89,7 +89,7 @@ TEST_F(LogTest, IsJsonWhateverAClientSends) {
 TEST_F(LogTest, TellsNoMeasurement) {
   ASSERT_TRUE(Create("rig").ok());
   v1::Measurements rows = OscillatorRows(0, 2);
-  rows.set_time(0, 98765.4321);  // later than the next
+  rows.set_time_s(0, 98765.4321);  // later than the next
   EXPECT_FALSE(Add("sessions/rig", 1, rows).ok());
   EXPECT_THAT(daemon_.Errors(), Not(HasSubstr("98765")));
 }
@@ -102,4 +102,4 @@ TEST_F(TextLogTest, KeepsEachLineToItself) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

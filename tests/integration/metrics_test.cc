@@ -8,7 +8,7 @@
 
 #include "tests/integration/operations_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -31,7 +31,7 @@ class MetricsTest : public DaemonTest {
 
 TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   ASSERT_TRUE(Create("rig").ok());
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   constexpr int kBatches = 3;
   for (int batch = 0; batch < kBatches; ++batch) {
     ASSERT_TRUE(
@@ -106,15 +106,15 @@ TEST_F(MetricsTest, GetStatusSaysHowTheDaemonIs) {
   ASSERT_TRUE(Create("rig").ok());
   grpc::ClientContext context;
   v1::DaemonStatus status;
-  ASSERT_TRUE(stub_->GetStatus(&context, {}, &status).ok());
+  ASSERT_TRUE(status_->GetStatus(&context, {}, &status).ok());
   EXPECT_FALSE(status.version().empty());
   EXPECT_TRUE(status.durable());
-  EXPECT_EQ(status.sessions(), 1);
-  EXPECT_EQ(status.sessions_loaded(), 1);
-  EXPECT_EQ(status.writers(), 0);
-  EXPECT_EQ(status.watchers(), 0);
-  EXPECT_EQ(status.waiting_tasks(), 0);
-  EXPECT_GT(status.uptime(), 0);
+  EXPECT_EQ(status.session_count(), 1);
+  EXPECT_EQ(status.loaded_session_count(), 1);
+  EXPECT_EQ(status.writer_count(), 0);
+  EXPECT_EQ(status.watcher_count(), 0);
+  EXPECT_EQ(status.waiting_task_count(), 0);
+  EXPECT_GT(status.uptime_s(), 0);
   EXPECT_GT(status.memory_bytes(), 1 << 20);
 }
 
@@ -132,4 +132,4 @@ TEST_F(MetricsTest, OfASecondDaemonNeedAPortOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -16,7 +16,7 @@
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // The answer to GET /metrics of 127.0.0.1:`port`, with its head; empty when there is none.
 inline std::string Scrape(int port) {
@@ -85,4 +85,4 @@ class Variable {
   const std::string name_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

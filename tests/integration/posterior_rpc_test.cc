@@ -1,9 +1,8 @@
-// GetPosterior, ProfileCost and SweepRegularization: of a session, and from measurements that are
-// all there.
+// The studies: of a session, and from measurements that are all there.
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -13,25 +12,28 @@ class PosteriorRpcTest : public DaemonTest {
   template <typename Request>
   static Request OneShot(int rows) {
     Request request;
-    *request.mutable_problem() = Oscillator();
-    *request.mutable_measurements() = OscillatorRows(0, rows);
+    *request.mutable_subject()->mutable_experiment()->mutable_problem() = Oscillator();
+    *request.mutable_subject()->mutable_experiment()->mutable_measurements() =
+        OscillatorRows(0, rows);
     return request;
   }
 
-  grpc::Status Get(const v1::GetPosteriorRequest& request, v1::GetPosteriorResponse* response) {
+  grpc::Status Get(const v1::ComputePosteriorRequest& request,
+                   v1::ComputePosteriorResponse* response) {
     grpc::ClientContext context;
-    return stub_->GetPosterior(&context, request, response);
+    return studies_->ComputePosterior(&context, request, response);
   }
 
-  grpc::Status Profile(const v1::ProfileCostRequest& request, v1::ProfileCostResponse* response) {
+  grpc::Status Profile(const v1::ComputeCostProfilesRequest& request,
+                       v1::ComputeCostProfilesResponse* response) {
     grpc::ClientContext context;
-    return stub_->ProfileCost(&context, request, response);
+    return studies_->ComputeCostProfiles(&context, request, response);
   }
 
-  grpc::Status Sweep(const v1::SweepRegularizationRequest& request,
-                     v1::SweepRegularizationResponse* response) {
+  grpc::Status Sweep(const v1::ComputeRegularizationSweepRequest& request,
+                     v1::ComputeRegularizationSweepResponse* response) {
     grpc::ClientContext context;
-    return stub_->SweepRegularization(&context, request, response);
+    return studies_->ComputeRegularizationSweep(&context, request, response);
   }
 
   // A session that has taken rows [0, 60).
@@ -43,16 +45,16 @@ class PosteriorRpcTest : public DaemonTest {
 
 TEST_F(PosteriorRpcTest, IsTheSameOfASessionAndFromTheMeasurementsAtOnce) {
   FeedSession();
-  auto one_shot = OneShot<v1::GetPosteriorRequest>(60);
-  v1::GetPosteriorRequest of_session;
-  of_session.set_session("sessions/rig");
-  for (v1::GetPosteriorRequest* request : {&one_shot, &of_session}) {
-    request->set_samples(10);
+  auto one_shot = OneShot<v1::ComputePosteriorRequest>(60);
+  v1::ComputePosteriorRequest of_session;
+  of_session.mutable_subject()->set_session("sessions/rig");
+  for (v1::ComputePosteriorRequest* request : {&one_shot, &of_session}) {
+    request->set_sample_count(10);
     auto& pair = *request->add_joints();
     pair.set_first("k");
     pair.set_second("c");
   }
-  v1::GetPosteriorResponse whole, session;
+  v1::ComputePosteriorResponse whole, session;
   ASSERT_TRUE(Get(one_shot, &whole).ok());
   ASSERT_TRUE(Get(of_session, &session).ok());
   EXPECT_EQ(session.sequence(), 1);
@@ -64,17 +66,17 @@ TEST_F(PosteriorRpcTest, IsTheSameOfASessionAndFromTheMeasurementsAtOnce) {
   EXPECT_EQ(whole.samples_size(), 20);
   ASSERT_EQ(whole.joints_size(), 1);
   EXPECT_EQ(whole.joints(0).density_size(), 40 * 40);
-  EXPECT_EQ(whole.measured_values(), 60);
+  EXPECT_EQ(whole.measured_value_count(), 60);
   // The truth lies within 4 standard deviations.
   EXPECT_NEAR(whole.parameters(0).mean(), 40.66, 4 * whole.parameters(0).std_dev());
 }
 
 TEST_F(PosteriorRpcTest, ProfilesAreTheSameOfASessionAndFromTheMeasurementsAtOnce) {
   FeedSession();
-  auto one_shot = OneShot<v1::ProfileCostRequest>(60);
-  v1::ProfileCostRequest of_session;
-  of_session.set_session("sessions/rig");
-  v1::ProfileCostResponse whole, session;
+  auto one_shot = OneShot<v1::ComputeCostProfilesRequest>(60);
+  v1::ComputeCostProfilesRequest of_session;
+  of_session.mutable_subject()->set_session("sessions/rig");
+  v1::ComputeCostProfilesResponse whole, session;
   ASSERT_TRUE(Profile(one_shot, &whole).ok());
   ASSERT_TRUE(Profile(of_session, &session).ok());
   EXPECT_EQ(session.sequence(), 1);
@@ -89,10 +91,10 @@ TEST_F(PosteriorRpcTest, ProfilesAreTheSameOfASessionAndFromTheMeasurementsAtOnc
 
 TEST_F(PosteriorRpcTest, SweepsAreTheSameOfASessionAndFromTheMeasurementsAtOnce) {
   FeedSession();
-  auto one_shot = OneShot<v1::SweepRegularizationRequest>(60);
-  v1::SweepRegularizationRequest of_session;
-  of_session.set_session("sessions/rig");
-  v1::SweepRegularizationResponse whole, session;
+  auto one_shot = OneShot<v1::ComputeRegularizationSweepRequest>(60);
+  v1::ComputeRegularizationSweepRequest of_session;
+  of_session.mutable_subject()->set_session("sessions/rig");
+  v1::ComputeRegularizationSweepResponse whole, session;
   ASSERT_TRUE(Sweep(one_shot, &whole).ok());
   ASSERT_TRUE(Sweep(of_session, &session).ok());
   EXPECT_EQ(session.sequence(), 1);
@@ -112,38 +114,31 @@ TEST_F(PosteriorRpcTest, SweepsAreTheSameOfASessionAndFromTheMeasurementsAtOnce)
 }
 
 TEST_F(PosteriorRpcTest, RefusesBadRequestsByTheirFields) {
-  v1::GetPosteriorResponse response;
-  auto request = OneShot<v1::GetPosteriorRequest>(20);
-  request.set_samples(-1);
+  v1::ComputePosteriorResponse response;
+  auto request = OneShot<v1::ComputePosteriorRequest>(20);
+  request.set_sample_count(-1);
   grpc::Status status = Get(request, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(status.error_message(), "samples: -1 must be from 0 to 100000");
-  request.set_samples(0);
-  request.set_session("sessions/rig");
-  status = Get(request, &response);
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.error_message(),
-              HasSubstr("session: \"sessions/rig\" is given and a problem"));
-  v1::GetPosteriorRequest missing;
-  missing.set_session("sessions/rig");
+  v1::ComputePosteriorRequest missing;
+  missing.mutable_subject()->set_session("sessions/rig");
   EXPECT_EQ(Get(missing, &response).error_code(), grpc::StatusCode::NOT_FOUND);
-  EXPECT_EQ(Get({}, &response).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  v1::ProfileCostResponse profile;
-  auto profile_request = OneShot<v1::ProfileCostRequest>(20);
-  profile_request.set_points(2);
+  status = Get({}, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("subject: must be given"));
+  v1::ComputeCostProfilesResponse profile;
+  auto profile_request = OneShot<v1::ComputeCostProfilesRequest>(20);
+  profile_request.set_point_count(2);
   status = Profile(profile_request, &profile);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.error_message(), "points: 2 must be from 3 to 1001");
-  v1::SweepRegularizationResponse sweep;
-  auto sweep_request = OneShot<v1::SweepRegularizationRequest>(20);
+  EXPECT_EQ(status.error_message(), "pointCount: 2 must be from 3 to 1001");
+  v1::ComputeRegularizationSweepResponse sweep;
+  auto sweep_request = OneShot<v1::ComputeRegularizationSweepRequest>(20);
   sweep_request.set_lowest(-1);
   status = Sweep(sweep_request, &sweep);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(status.error_message(), "lowest: -1 must be from 1e-08 to 1e+08");
-  sweep_request.set_session("sessions/rig");
-  status = Sweep(sweep_request, &sweep);
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

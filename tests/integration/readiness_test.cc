@@ -6,7 +6,7 @@
 
 #include "tests/integration/operations_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // On the wire a HealthCheckRequest is a StringValue, its response an Int32Value.
@@ -72,7 +72,7 @@ TEST_F(ReadinessTest, EndsWithTheDaemon) {
   HealthWatch readiness(channel_, "readiness");
   EXPECT_EQ(readiness.Read(), kServing);
   ASSERT_TRUE(Create("rig").ok());
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 20)));
   stream.ExpectAcknowledgement(1);
   daemon_.Signal(SIGTERM);
@@ -102,4 +102,4 @@ TEST_F(FullJournalTest, IsNotReadyUntilThereIsRoomAgain) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,19 +14,29 @@
 #include <string>
 #include <vector>
 
-#include "polyest/v1/estimation_service.grpc.pb.h"
+#include "core/common/check.h"
+#include "server/security/method_roles.h"
 #include "server/security/token_table.h"
 #include "tests/integration/daemon_process.h"
 #include "tests/testing/certificates.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // Longer than anything here takes; passed only when it fails.
 inline constexpr std::chrono::seconds kPatience{60};
 
+// By its name, which no two services share.
+inline const google::protobuf::MethodDescriptor& FindMethod(const std::string& name) {
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    const auto* const method = service->FindMethodByName(name);
+    if (method != nullptr) return *method;
+  }
+  POLYEST_CHECK(false);
+}
+
 inline std::string MethodPath(const std::string& method) {
-  return "/polyest.v1.EstimationService/" + method;
+  return "/" + FindMethod(method).service()->full_name() + "/" + method;
 }
 
 // How a call ends, whatever its method: every kind of call looks the same on the wire. `request`
@@ -66,13 +76,11 @@ inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const
   return status;
 }
 
-// The names of all methods of the service, out of the contract.
+// The names of all methods of all services, out of the contract.
 inline std::vector<std::string> AllMethods() {
-  const auto& service =
-      *v1::EstimateRequest::descriptor()->file()->FindServiceByName("EstimationService");
   std::vector<std::string> names;
-  for (int k = 0; k < service.method_count(); ++k) {
-    names.push_back(service.method(k)->name());
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    for (int k = 0; k < service->method_count(); ++k) names.push_back(service->method(k)->name());
   }
   return names;
 }
@@ -134,4 +142,4 @@ class SecureDaemonTest : public testing::Test {
   std::string address_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

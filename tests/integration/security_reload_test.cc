@@ -9,7 +9,7 @@
 #include "tests/integration/daemon_fixture.h"
 #include "tests/integration/security_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using grpc::StatusCode;
@@ -21,7 +21,7 @@ class SecurityReloadTest : public SecureDaemonTest {
   void SetUp() override {
     SecureDaemonTest::SetUp();
     channel_ = Connect();
-    stub_ = v1::EstimationService::NewStub(channel_);
+    sessions_ = v1::SessionService::NewStub(channel_);
   }
 
   StatusCode ListModels(const std::shared_ptr<grpc::Channel>& channel,
@@ -34,9 +34,9 @@ class SecurityReloadTest : public SecureDaemonTest {
     context.AddMetadata("authorization", "Bearer " + writer_.secret);
     v1::CreateSessionRequest request;
     request.set_session_id("rig");
-    *request.mutable_problem() = Oscillator();
+    *request.mutable_session()->mutable_problem() = Oscillator();
     v1::Session session;
-    ASSERT_TRUE(stub_->CreateSession(&context, request, &session).ok());
+    ASSERT_TRUE(sessions_->CreateSession(&context, request, &session).ok());
   }
 
   // Until it holds: each look is a call or more, so that there is no need to sleep.
@@ -53,7 +53,7 @@ class SecurityReloadTest : public SecureDaemonTest {
   }
 
   std::shared_ptr<grpc::Channel> channel_;
-  std::unique_ptr<v1::EstimationService::Stub> stub_;
+  std::unique_ptr<v1::SessionService::Stub> sessions_;
 };
 
 TEST_F(SecurityReloadTest, TakesNewTokensOnSighup) {
@@ -74,7 +74,7 @@ TEST_F(SecurityReloadTest, TakesNewTokensByItself) {
 
 TEST_F(SecurityReloadTest, EndsAStreamWhoseTokenIsTakenBackAtItsNextMessage) {
   CreateRig();
-  ClientStream stream(*stub_, writer_.secret);
+  ClientStream stream(*sessions_, writer_.secret);
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 10)));
   stream.ExpectAcknowledgement(1);
   v1::Estimate estimate;
@@ -106,7 +106,7 @@ TEST_F(SecurityReloadTest, KeepsTheOldTokensAndWarnsOnceWhenTheNewOnesAreNoGood)
 
 TEST_F(SecurityReloadTest, TakesANewCertificateWithoutDroppingAStream) {
   CreateRig();
-  ClientStream stream(*stub_, writer_.secret);
+  ClientStream stream(*sessions_, writer_.secret);
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 10),
                           [](auto& message) { message.mutable_estimates()->set_only_last(true); }));
   stream.ExpectAcknowledgement(1);
@@ -171,4 +171,4 @@ TEST_F(SecretsTest, AreNeverLogged) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class SessionRpcTest : public DaemonTest {
@@ -9,16 +9,16 @@ class SessionRpcTest : public DaemonTest {
     grpc::ClientContext context;
     v1::GetSessionRequest request;
     request.set_name(name);
-    return stub_->GetSession(&context, request, session);
+    return sessions_->GetSession(&context, request, session);
   }
 
   grpc::Status GetEstimate(const std::string& session, v1::Estimate* estimate) {
     grpc::ClientContext context;
     v1::GetEstimateRequest request;
     request.set_session(session);
-    v1::EstimateResponse response;
-    const grpc::Status status = stub_->GetEstimate(&context, request, &response);
-    *estimate = response.estimate();
+    v1::Estimate response;
+    const grpc::Status status = sessions_->GetEstimate(&context, request, &response);
+    *estimate = response;
     return status;
   }
 };
@@ -55,7 +55,7 @@ TEST_F(SessionRpcTest, ListsSessionsInPagesWithoutTheirProblems) {
   do {
     grpc::ClientContext context;
     v1::ListSessionsResponse response;
-    ASSERT_TRUE(stub_->ListSessions(&context, request, &response).ok());
+    ASSERT_TRUE(sessions_->ListSessions(&context, request, &response).ok());
     for (const auto& session : response.sessions()) {
       names.push_back(session.name());
       EXPECT_FALSE(session.has_problem());
@@ -73,7 +73,7 @@ TEST_F(SessionRpcTest, RefusesBadPages) {
   request.set_page_token("somewhere");
   v1::ListSessionsResponse response;
   grpc::ClientContext context;
-  EXPECT_EQ(stub_->ListSessions(&context, request, &response).error_code(),
+  EXPECT_EQ(sessions_->ListSessions(&context, request, &response).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
 }
 
@@ -85,7 +85,7 @@ TEST_F(SessionRpcTest, AddsMeasurementsOneCallAtATime) {
                     &acknowledgement)
                     .ok());
     EXPECT_EQ(acknowledgement.sequence(), batch + 1);
-    EXPECT_EQ(acknowledgement.samples(), 20 * (batch + 1));
+    EXPECT_EQ(acknowledgement.sample_count(), 20 * (batch + 1));
   }
   v1::Estimate estimate;
   ASSERT_TRUE(GetEstimate("sessions/rig", &estimate).ok());
@@ -94,7 +94,7 @@ TEST_F(SessionRpcTest, AddsMeasurementsOneCallAtATime) {
   v1::Session session;
   ASSERT_TRUE(Get("sessions/rig", &session).ok());
   EXPECT_EQ(session.last_sequence(), 3);
-  EXPECT_EQ(session.samples(), 60);
+  EXPECT_EQ(session.sample_count(), 60);
 }
 
 TEST_F(SessionRpcTest, AcknowledgesARepeatAndRefusesGaps) {
@@ -102,7 +102,7 @@ TEST_F(SessionRpcTest, AcknowledgesARepeatAndRefusesGaps) {
   ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 5)).ok());
   v1::Acknowledgement acknowledgement;
   ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 5), &acknowledgement).ok());
-  EXPECT_EQ(acknowledgement.samples(), 5);
+  EXPECT_EQ(acknowledgement.sample_count(), 5);
   grpc::Status status = Add("sessions/rig", 1, OscillatorRows(0, 6));
   EXPECT_EQ(status.error_code(), grpc::StatusCode::ALREADY_EXISTS);
   EXPECT_THAT(status.error_message(), testing::HasSubstr("the next batch must be 2"));
@@ -134,4 +134,4 @@ TEST_F(TwoSessionsTest, AreTheLimitWhenTheLimitIsTwo) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

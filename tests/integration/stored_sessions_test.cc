@@ -5,12 +5,12 @@
 #include <sstream>
 #include <thread>
 
-#include "server/journal/digest.h"
+#include "server/digest/digest.h"
 #include "server/journal/sqlite_journal.h"
 #include "tests/integration/daemon_fixture.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kWriters = 64;  // share their commits
@@ -57,8 +57,8 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
   DaemonProcess daemon({"--listen", "127.0.0.1:0", "--data-dir", data.path()});
   const std::string address = daemon.ReadAddress();
   ASSERT_FALSE(address.empty()) << daemon.Errors();
-  const auto stub = v1::EstimationService::NewStub(
-      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  const auto stub =
+      v1::SessionService::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
 
   int listed = 0, loaded = 0;
   v1::ListSessionsRequest list;
@@ -70,7 +70,7 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
     for (const v1::Session& session : page.sessions()) {
       ++listed;
       loaded += session.activity().loaded() ? 1 : 0;
-      EXPECT_EQ(session.samples(), 20);
+      EXPECT_EQ(session.sample_count(), 20);
     }
     list.set_page_token(page.next_page_token());
   } while (!list.page_token().empty());
@@ -84,10 +84,10 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
   grpc::ClientContext context;
   v1::GetEstimateRequest get;
   get.set_session(Name(kSessions / 2));
-  v1::EstimateResponse estimate;
+  v1::Estimate estimate;
   const grpc::Status status = stub->GetEstimate(&context, get, &estimate);
   ASSERT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(estimate.estimate().samples(), 20);
+  EXPECT_EQ(estimate.samples(), 20);
 }
 
 // The contract's own bound; it takes about a tenth of that.
@@ -98,8 +98,8 @@ TEST(StoredSessions, AThousandAreServedWithinTwoSecondsOfTheStart) {
   DaemonProcess daemon({"--listen", "127.0.0.1:0", "--data-dir", data.path()});
   const std::string address = daemon.ReadAddress();
   ASSERT_FALSE(address.empty()) << daemon.Errors();
-  const auto stub = v1::EstimationService::NewStub(
-      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  const auto stub =
+      v1::SessionService::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;
   v1::GetSessionRequest get;
   get.set_name(Name(999));
@@ -107,10 +107,10 @@ TEST(StoredSessions, AThousandAreServedWithinTwoSecondsOfTheStart) {
   const grpc::Status status = stub->GetSession(&context, get, &session);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   ASSERT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(session.samples(), 20);
+  EXPECT_EQ(session.sample_count(), 20);
   RecordProperty("milliseconds", static_cast<int>(1'000 * taken.count()));
   EXPECT_LT(taken.count(), 2);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,7 +2,7 @@
 
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class StreamTest : public DaemonTest {
@@ -14,7 +14,7 @@ class StreamTest : public DaemonTest {
 };
 
 TEST_F(StreamTest, AcknowledgesEachBatchAndEndsWithTheEstimateOfTheWholeRecord) {
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   v1::Estimate estimate;
   for (int batch = 0; batch < 6; ++batch) {
     // The session is named once.
@@ -33,7 +33,7 @@ TEST_F(StreamTest, AcknowledgesEachBatchAndEndsWithTheEstimateOfTheWholeRecord) 
 }
 
 TEST_F(StreamTest, CutOtherwiseGivesTheSameBits) {
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   int row = 0, batch = 0;
   for (const int rows : {1, 2, 30, 7, 20}) {
     ASSERT_TRUE(
@@ -50,10 +50,10 @@ TEST_F(StreamTest, CutOtherwiseGivesTheSameBits) {
 }
 
 TEST_F(StreamTest, EstimatesAsOftenAsAsked) {
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   v1::StreamMeasurementsRequest policy;
   policy.set_session("sessions/rig");
-  policy.mutable_estimates()->set_every_batches(3);
+  policy.mutable_estimates()->set_batch_count(3);
   ASSERT_TRUE(stream.SendRequest(policy));
   for (int batch = 0; batch < 7; ++batch) {
     ASSERT_TRUE(stream.Send("", batch + 1, OscillatorRows(2 * batch, 2 * (batch + 1))));
@@ -70,7 +70,7 @@ TEST_F(StreamTest, EstimatesAsOftenAsAsked) {
 
 TEST_F(StreamTest, TakesManyMoreBatchesThanItsQueuesHold) {
   constexpr int kBatches = 500;
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   std::jthread writer([&] {
     for (int batch = 0; batch < kBatches; ++batch) {
       ASSERT_TRUE(
@@ -88,7 +88,7 @@ TEST_F(StreamTest, TakesManyMoreBatchesThanItsQueuesHold) {
 
 TEST_F(StreamTest, GoesOnWhereAnEarlierStreamEnded) {
   {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 30)));
     stream.HalfClose();
     v1::StreamMeasurementsResponse response;
@@ -96,7 +96,7 @@ TEST_F(StreamTest, GoesOnWhereAnEarlierStreamEnded) {
     }
     ASSERT_TRUE(stream.Finish().ok());
   }
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   // As if its acknowledgement had been lost.
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 30)));
   stream.ExpectAcknowledgement(1);
@@ -129,7 +129,7 @@ TEST_F(StreamTest, EndsOnABadBatchWithItsFieldAndLeavesTheSessionUsable) {
              grpc::StatusCode::ALREADY_EXISTS},
         Case{2, unnamed, "\"q\""}, Case{2, past, "times must increase"},
         Case{2, infinite, "measurements.channels[0].values[0]: inf of x must be finite"}}) {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     ASSERT_TRUE(stream.Send("sessions/rig", bad.sequence, bad.rows));
     v1::StreamMeasurementsResponse response;
     EXPECT_FALSE(stream.Read(response));
@@ -148,18 +148,18 @@ TEST_F(StreamTest, RefusesAStreamWithoutItsSession) {
   for (const Case& bad : {Case{"", grpc::StatusCode::INVALID_ARGUMENT},
                           Case{"rig", grpc::StatusCode::INVALID_ARGUMENT},
                           Case{"sessions/none", grpc::StatusCode::NOT_FOUND}}) {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     stream.Send(bad.session, 1, OscillatorRows(0, 1));
     EXPECT_EQ(stream.Finish().error_code(), bad.code) << bad.session;
   }
-  ClientStream silent(*stub_);
+  ClientStream silent(*sessions_);
   silent.HalfClose();
   EXPECT_EQ(silent.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 TEST_F(StreamTest, RefusesAChangeOfSessionAndABatchWithoutMeasurements) {
   ASSERT_TRUE(Create("other").ok());
-  ClientStream change(*stub_);
+  ClientStream change(*sessions_);
   ASSERT_TRUE(change.Send("sessions/rig", 1, OscillatorRows(0, 1)));
   change.ExpectAcknowledgement(1);
   change.Send("sessions/other", 2, OscillatorRows(1, 2));
@@ -168,7 +168,7 @@ TEST_F(StreamTest, RefusesAChangeOfSessionAndABatchWithoutMeasurements) {
   }
   EXPECT_EQ(change.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 
-  ClientStream empty(*stub_);
+  ClientStream empty(*sessions_);
   v1::StreamMeasurementsRequest request;
   request.set_session("sessions/rig");
   request.set_sequence(2);
@@ -179,10 +179,10 @@ TEST_F(StreamTest, RefusesAChangeOfSessionAndABatchWithoutMeasurements) {
 }
 
 TEST_F(StreamTest, IsTheOnlyWriterOfItsSession) {
-  ClientStream first(*stub_);
+  ClientStream first(*sessions_);
   ASSERT_TRUE(first.Send("sessions/rig", 1, OscillatorRows(0, 1)));
   first.ExpectAcknowledgement(1);
-  ClientStream second(*stub_);
+  ClientStream second(*sessions_);
   second.Send("sessions/rig", 2, OscillatorRows(1, 2));
   EXPECT_EQ(second.Finish().error_code(), grpc::StatusCode::ABORTED);
   first.HalfClose();
@@ -191,14 +191,14 @@ TEST_F(StreamTest, IsTheOnlyWriterOfItsSession) {
   }
   ASSERT_TRUE(first.Finish().ok());
   // Free at once for the next.
-  ClientStream third(*stub_);
+  ClientStream third(*sessions_);
   ASSERT_TRUE(third.Send("sessions/rig", 2, OscillatorRows(1, 2)));
   third.ExpectAcknowledgement(2);
 }
 
 TEST_F(StreamTest, FreesItsSessionWhenCancelled) {
   {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 1)));
     stream.ExpectAcknowledgement(1);
     stream.Cancel();
@@ -206,7 +206,7 @@ TEST_F(StreamTest, FreesItsSessionWhenCancelled) {
   }
   // The daemon hears of it a moment later; until then the answer is ABORTED.
   while (true) {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     stream.Send("sessions/rig", 2, OscillatorRows(1, 2));
     v1::StreamMeasurementsResponse response;
     if (stream.Read(response)) {
@@ -218,7 +218,7 @@ TEST_F(StreamTest, FreesItsSessionWhenCancelled) {
 }
 
 TEST_F(StreamTest, EndsNotFoundWhenItsSessionIsDeleted) {
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 1)));
   stream.ExpectAcknowledgement(1);
   v1::Estimate estimate;
@@ -230,4 +230,4 @@ TEST_F(StreamTest, EndsNotFoundWhenItsSessionIsDeleted) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,12 +6,13 @@
 
 #include <thread>
 
+#include "core/common/sanitizer.h"
 #include "server/daemon/daemon.h"
 #include "server/telemetry/process_info.h"
 #include "tests/integration/daemon_fixture.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kAtATime = 100;
@@ -31,13 +32,15 @@ v1::Problem Tiny() {
 class ThousandSessionsTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto daemon = Daemon::Start({.listen = {"127.0.0.1", 0},
+    auto daemon = Daemon::Start({.listen = {{"127.0.0.1", 0}},
                                  .data_dir = data_.path(),
                                  .unload_after = std::chrono::milliseconds(20)});
     ASSERT_TRUE(daemon.ok()) << daemon.status();
     daemon_ = *std::move(daemon);
-    stub_ = v1::EstimationService::NewStub(
-        grpc::CreateChannel(daemon_->address().ToString(), grpc::InsecureChannelCredentials()));
+    const auto channel = grpc::CreateChannel(daemon_->addresses().front().ToString(),
+                                             grpc::InsecureChannelCredentials());
+    sessions_ = v1::SessionService::NewStub(channel);
+    status_ = v1::StatusService::NewStub(channel);
   }
 
   // The life of some sessions, from the first to the last call.
@@ -47,25 +50,25 @@ class ThousandSessionsTest : public testing::Test {
     for (int i = 0; i < kAtATime; ++i)
       Stream(names[static_cast<size_t>(i)], /*to_the_end=*/i % kEstimated == 0);
     // The housekeeper unloads them meanwhile.
-    while (Status().sessions_loaded() > 0) std::this_thread::yield();
+    while (Status().loaded_session_count() > 0) std::this_thread::yield();
     for (const std::string& name : names) Add(name);
     for (int i = 0; i < kAtATime; i += kEstimated) Estimate(names[static_cast<size_t>(i)]);
     for (const std::string& name : names) Delete(name);
-    ASSERT_EQ(Status().sessions(), 0);
+    ASSERT_EQ(Status().session_count(), 0);
   }
 
   std::string Create() {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
-    *request.mutable_problem() = Tiny();
+    *request.mutable_session()->mutable_problem() = Tiny();
     v1::Session session;
-    EXPECT_TRUE(stub_->CreateSession(&context, request, &session).ok());
+    EXPECT_TRUE(sessions_->CreateSession(&context, request, &session).ok());
     return session.name();
   }
 
   // One batch; without the end the client goes away.
   void Stream(const std::string& session, bool to_the_end) {
-    ClientStream stream(*stub_);
+    ClientStream stream(*sessions_);
     stream.Send(session, 1, OscillatorRows(0, kRowsABatch),
                 [](auto& request) { request.mutable_estimates()->set_only_last(true); });
     stream.ExpectAcknowledgement(1);
@@ -88,17 +91,17 @@ class ThousandSessionsTest : public testing::Test {
     request.set_sequence(2);
     *request.mutable_measurements() = OscillatorRows(kRowsABatch, 2 * kRowsABatch);
     v1::AddMeasurementsResponse response;
-    EXPECT_TRUE(stub_->AddMeasurements(&context, request, &response).ok());
-    EXPECT_EQ(response.acknowledgement().samples(), 2 * kRowsABatch);
+    EXPECT_TRUE(sessions_->AddMeasurements(&context, request, &response).ok());
+    EXPECT_EQ(response.acknowledgement().sample_count(), 2 * kRowsABatch);
   }
 
   void Estimate(const std::string& session) {
     grpc::ClientContext context;
     v1::GetEstimateRequest request;
     request.set_session(session);
-    v1::EstimateResponse response;
-    EXPECT_TRUE(stub_->GetEstimate(&context, request, &response).ok());
-    EXPECT_EQ(response.estimate().samples(), 2 * kRowsABatch);
+    v1::Estimate response;
+    EXPECT_TRUE(sessions_->GetEstimate(&context, request, &response).ok());
+    EXPECT_EQ(response.samples(), 2 * kRowsABatch);
   }
 
   void Delete(const std::string& session) {
@@ -106,19 +109,20 @@ class ThousandSessionsTest : public testing::Test {
     v1::DeleteSessionRequest request;
     request.set_name(session);
     google::protobuf::Empty response;
-    EXPECT_TRUE(stub_->DeleteSession(&context, request, &response).ok());
+    EXPECT_TRUE(sessions_->DeleteSession(&context, request, &response).ok());
   }
 
   v1::DaemonStatus Status() {
     grpc::ClientContext context;
     v1::DaemonStatus status;
-    EXPECT_TRUE(stub_->GetStatus(&context, {}, &status).ok());
+    EXPECT_TRUE(status_->GetStatus(&context, {}, &status).ok());
     return status;
   }
 
   const TestFolder data_;
   std::unique_ptr<Daemon> daemon_;
-  std::unique_ptr<v1::EstimationService::Stub> stub_;
+  std::unique_ptr<v1::SessionService::Stub> sessions_;
+  std::unique_ptr<v1::StatusService::Stub> status_;
 };
 
 struct Memory {
@@ -133,7 +137,7 @@ TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
   const Memory full;
   RecordProperty("allocated_growth_bytes", std::to_string(full.allocated - half.allocated));
   RecordProperty("resident_growth_bytes", std::to_string(full.resident - half.resident));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER
   // A sanitizer's own memory grows with what was freed.
   EXPECT_LT(full.allocated - half.allocated, 500 * 1'000);
   EXPECT_LT(full.resident - half.resident, 500 * 16'384);
@@ -142,4 +146,4 @@ TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

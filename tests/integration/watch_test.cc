@@ -1,18 +1,18 @@
 #include "tests/integration/daemon_fixture.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class Watch {
  public:
-  Watch(v1::EstimationService::Stub& stub, const std::string& session) {
+  Watch(v1::SessionService::Stub& stub, const std::string& session) {
     v1::WatchSessionRequest request;
     request.set_session(session);
     reader_ = stub.WatchSession(&context_, request);
   }
   // The sequence of the next estimate, or −1 at the end.
   int64_t Next() {
-    v1::EstimateResponse response;
+    v1::WatchSessionResponse response;
     return reader_->Read(&response) ? response.estimate().sequence() : -1;
   }
   void Cancel() { context_.TryCancel(); }
@@ -20,7 +20,7 @@ class Watch {
 
  private:
   grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReader<v1::EstimateResponse>> reader_;
+  std::unique_ptr<grpc::ClientReader<v1::WatchSessionResponse>> reader_;
 };
 
 class WatchTest : public DaemonTest {
@@ -33,10 +33,10 @@ class WatchTest : public DaemonTest {
 };
 
 TEST_F(WatchTest, ShowsThePresentEstimateAndNewOnesToEveryObserver) {
-  Watch first(*stub_, "sessions/rig"), second(*stub_, "sessions/rig");
+  Watch first(*sessions_, "sessions/rig"), second(*sessions_, "sessions/rig");
   EXPECT_EQ(first.Next(), 1);
   EXPECT_EQ(second.Next(), 1);
-  ClientStream stream(*stub_);
+  ClientStream stream(*sessions_);
   ASSERT_TRUE(stream.Send("sessions/rig", 2, OscillatorRows(5, 10)));
   EXPECT_EQ(first.Next(), 2);
   EXPECT_EQ(second.Next(), 2);
@@ -48,14 +48,14 @@ TEST_F(WatchTest, ShowsThePresentEstimateAndNewOnesToEveryObserver) {
 }
 
 TEST_F(WatchTest, ShowsEstimatesOfBatchesAddedByUnaryCalls) {
-  Watch watch(*stub_, "sessions/rig");
+  Watch watch(*sessions_, "sessions/rig");
   EXPECT_EQ(watch.Next(), 1);
   ASSERT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 10)).ok());
   EXPECT_EQ(watch.Next(), 2);
 }
 
 TEST_F(WatchTest, MissesNeverTheLastEstimateWhenItIsSlow) {
-  Watch watch(*stub_, "sessions/rig");
+  Watch watch(*sessions_, "sessions/rig");
   constexpr int64_t kLast = 40;
   for (int64_t sequence = 2; sequence <= kLast; ++sequence) {
     const int row = static_cast<int>(sequence) + 3;
@@ -70,18 +70,18 @@ TEST_F(WatchTest, MissesNeverTheLastEstimateWhenItIsSlow) {
 }
 
 TEST_F(WatchTest, EndsNotFoundWithItsSession) {
-  Watch watch(*stub_, "sessions/rig");
+  Watch watch(*sessions_, "sessions/rig");
   EXPECT_EQ(watch.Next(), 1);
   ASSERT_TRUE(Delete("sessions/rig").ok());
   EXPECT_EQ(watch.Next(), -1);
   EXPECT_EQ(watch.Finish().error_code(), grpc::StatusCode::NOT_FOUND);
-  Watch none(*stub_, "sessions/rig");
+  Watch none(*sessions_, "sessions/rig");
   EXPECT_EQ(none.Next(), -1);
   EXPECT_EQ(none.Finish().error_code(), grpc::StatusCode::NOT_FOUND);
-  Watch bad(*stub_, "rig");
+  Watch bad(*sessions_, "rig");
   EXPECT_EQ(bad.Next(), -1);
   EXPECT_EQ(bad.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

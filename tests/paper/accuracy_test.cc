@@ -8,12 +8,12 @@
 
 #include <cmath>
 
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 #include "tests/testing/oscillator.h"
 #include "tests/testing/records.h"
 #include "tests/testing/two_gliders.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::EstimateInBatches;
@@ -29,12 +29,12 @@ struct Exact {
   double std_dev = 0;
 };
 
-void ExpectNear(const ParameterEstimate& parameter, const Exact& exact, double most_map_error,
-                double most_mean_error, double most_std_dev_error) {
+void ExpectNear(const ParameterEstimate& parameter, const Exact& exact, double max_map_error,
+                double max_mean_error, double max_std_dev_error) {
   SCOPED_TRACE(parameter.name);
-  EXPECT_NEAR((parameter.map - exact.value) / exact.std_dev, 0, most_map_error);
-  EXPECT_NEAR((parameter.mean - exact.value) / exact.std_dev, 0, most_mean_error);
-  EXPECT_NEAR(parameter.std_dev / exact.std_dev, 1, most_std_dev_error);
+  EXPECT_NEAR((parameter.map - exact.value) / exact.std_dev, 0, max_map_error);
+  EXPECT_NEAR((parameter.mean - exact.value) / exact.std_dev, 0, max_mean_error);
+  EXPECT_NEAR(parameter.std_dev / exact.std_dev, 1, max_std_dev_error);
 }
 
 bool Has(const Estimate& estimate, DiagnosticCode code) {
@@ -211,4 +211,4 @@ TEST(Estimates, AreTheSameBitsForAnyThreadsOfALargeEnsemble) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,12 +1,13 @@
 // Figures 13 and 14 and sections 3.5 and 3.6: what cannot be identified, and what helps.
 
+#include <absl/strings/match.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "tests/paper/paper_experiments.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Values computed from (55)–(56) with ω_obs = 6.098601, to four digits: half a unit of the last
@@ -29,6 +30,22 @@ const VariantResult& WithRegularization(double alpha_squared) {
     }
   }
   throw std::runtime_error("no such variant");
+}
+
+TEST(Figure14, DrawsTheContoursOfTheRegularizationThatEachRuleChooses) {
+  int changed = 0;
+  for (const VariantResult& variant : Rerun("14").variants) {
+    const double chosen = variant.estimate.regularization;
+    EXPECT_EQ(variant.cost.regularization, chosen) << variant.name;
+    for (Eigen::Index i = 0; i < variant.cost.total.size(); ++i) {
+      const double prior = variant.cost.prior.reshaped()[i];
+      EXPECT_DOUBLE_EQ(variant.cost.total.reshaped()[i],
+                       variant.cost.mismatch.reshaped()[i] + chosen * prior)
+          << variant.name;
+    }
+    if (absl::StrContains(variant.name, "α² by") && chosen != 1) ++changed;
+  }
+  EXPECT_GE(changed, 2);  // of three rules
 }
 
 TEST(Figure13, MeasuresTheFrequencyOfTheReference) {
@@ -165,4 +182,4 @@ TEST(Section36, ABumpOnOneSideIdentifiesBoth) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include "core/model/equations/equation_model.h"
 #include "tests/testing/records.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::EstimateInBatches;
@@ -113,4 +113,4 @@ TEST_P(MagnetorheologicalDamper, FollowsDahlsHysteresis) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "client/paper/experiments.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // The experiment of a figure, run once a program.
 inline const ExperimentResult& Rerun(const std::string& figure) {
@@ -29,4 +29,4 @@ inline bool HasDiagnostic(const Estimate& estimate, DiagnosticCode code) {
   return false;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

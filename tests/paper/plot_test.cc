@@ -16,7 +16,7 @@
 #include "client/paper/svg_writer.h"
 #include "tests/paper/paper_experiments.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::HasSubstr;
@@ -185,4 +185,4 @@ TEST(PaperCommand, PrintsAFigureAndWritesItsPlot) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

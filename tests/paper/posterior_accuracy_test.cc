@@ -11,12 +11,12 @@
 #include <ostream>
 #include <vector>
 
-#include "core/estimator/estimator.h"
-#include "core/model/catalogue.h"
 #include "core/model/equations/equation_model.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
 #include "tests/testing/oscillator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::OscillatorDisplacement;
@@ -224,24 +224,24 @@ Case Bimodal() {
 
 class PosteriorAccuracy : public ::testing::TestWithParam<Case> {};
 
-void ExpectNear(const Summary& summary, const Summary& exact, double most_limit_error) {
-  constexpr double kMostError = 0.03;
-  EXPECT_NEAR((summary.mean - exact.mean) / exact.std_dev, 0, kMostError);
-  EXPECT_NEAR((summary.std_dev - exact.std_dev) / exact.std_dev, 0, kMostError);
-  EXPECT_NEAR((summary.lower95 - exact.lower95) / exact.std_dev, 0, most_limit_error);
-  EXPECT_NEAR((summary.upper95 - exact.upper95) / exact.std_dev, 0, most_limit_error);
+void ExpectNear(const Summary& summary, const Summary& exact, double max_limit_error) {
+  constexpr double kMaxError = 0.03;
+  EXPECT_NEAR((summary.mean - exact.mean) / exact.std_dev, 0, kMaxError);
+  EXPECT_NEAR((summary.std_dev - exact.std_dev) / exact.std_dev, 0, kMaxError);
+  EXPECT_NEAR((summary.lower95 - exact.lower95) / exact.std_dev, 0, max_limit_error);
+  EXPECT_NEAR((summary.upper95 - exact.upper95) / exact.std_dev, 0, max_limit_error);
 }
 
 // An estimate is made of fewer draws. A limit at the probability p of a density f has the error
 // √(p(1 − p)/N)/f from N of them: in the long tails here f is about 0.02/s, so that 4,000, what
 // chains of 30,000 effective draws have in tails where they mix worst, leave 0.12 s.
-double MostLimitErrorOfEstimates(PosteriorMethod method) {
+double MaxLimitErrorOfEstimates(PosteriorMethod method) {
   return method == PosteriorMethod::kImportanceSampling ? 0.03 : 0.12;
 }
 
 TEST_P(PosteriorAccuracy, IsThreePercentOfAStandardDeviation) {
   const Case& one = GetParam();
-  const auto estimator = Estimator::Make(ResolvedProblem::Make(one.problem).value()).value();
+  const auto estimator = Estimator::Make(one.problem).value();
   Samples samples = one.samples;
   samples.end_of_run = true;
   ASSERT_TRUE(estimator->Append(samples).ok());
@@ -258,7 +258,7 @@ TEST_P(PosteriorAccuracy, IsThreePercentOfAStandardDeviation) {
     EXPECT_LT(marginal.r_hat, 1.01);
     const ParameterEstimate& parameter = estimate.parameters[i];
     ExpectNear({parameter.mean, parameter.posterior_std_dev, parameter.lower95, parameter.upper95},
-               exact[i], MostLimitErrorOfEstimates(one.method));
+               exact[i], MaxLimitErrorOfEstimates(one.method));
   }
   bool said = false;
   for (const Diagnostic& diagnostic : estimate.diagnostics) {
@@ -271,4 +271,4 @@ INSTANTIATE_TEST_SUITE_P(FiveShapes, PosteriorAccuracy,
                          ::testing::Values(Gaussian(), Skewed(), AtABound(), Banana(), Bimodal()));
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

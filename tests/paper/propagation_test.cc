@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
-#include "core/estimator/studies.h"
-#include "core/model/catalogue.h"
+#include "core/estimator/studies/prior_propagation.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kRuns = 20'000;
@@ -23,7 +23,7 @@ Matrix DrawParameters(const Prior& prior) {
   for (int r = 0; r < kRuns; ++r) {
     for (int i = 0; i < prior.dimension(); ++i) {
       const double u = (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53;
-      xi(i) = prior.parameters()[i].germ.Quantile(u);
+      xi(i) = Germ(prior.parameters()[i].germ).Quantile(u);
     }
     thetas.row(r) = prior.ToParameters(xi).transpose();
   }
@@ -121,4 +121,4 @@ TEST(PropagatePrior, IsMonteCarloForADuffingOscillator) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include "core/estimator/estimator.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
 #include "tests/testing/records.h"
 #include "tests/testing/two_gliders.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::EstimateInBatches;
@@ -26,7 +26,7 @@ bool Has(const Estimate& estimate, DiagnosticCode code) {
 }
 
 // From a cold start with broad priors.
-TEST(TwoGlidersRecord, HasTheResidualsThatOthersFound) {
+TEST(TwoGlidersRecordNoise, HasTheResidualsThatOthersFound) {
   const auto record = SharedRecord("air_track_2mass.csv", {"x1", "x2"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_2mass.csv is not there";
   Problem problem = testing::TwoGlidersProblem(2);
@@ -38,7 +38,7 @@ TEST(TwoGlidersRecord, HasTheResidualsThatOthersFound) {
   EXPECT_TRUE(Has(estimate, DiagnosticCode::kCorrelatedResiduals));
 }
 
-TEST(TwoGlidersRecord, GivesTheSameWithCorrelatedNoiseInAWiderInterval) {
+TEST(TwoGlidersRecordNoise, GivesTheSameWithCorrelatedNoiseInAWiderInterval) {
   const auto record = SharedRecord("air_track_2mass.csv", {"x1", "x2"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_2mass.csv is not there";
   Problem problem = testing::TwoGlidersProblem(2);
@@ -70,14 +70,14 @@ Problem PendulumProblem(const NoiseModel& noise) {
   return problem;
 }
 
-TEST(PendulumRecord, HasTheResidualThatOthersFound) {
+TEST(PendulumRecordNoise, HasTheResidualThatOthersFound) {
   const auto record = SharedRecord("pendulum.csv", {"theta"});
   if (!record) GTEST_SKIP() << "../shared/data/pendulum.csv is not there";
   const Estimate estimate = EstimateInBatches(PendulumProblem(kUnknown), *record, 1000);
   EXPECT_NEAR(estimate.channels[0].noise_std_dev, 0.0106, 0.0002);
 }
 
-TEST(PendulumRecord, HasThePublishedValueWithinItsIntervalHoweverItArrives) {
+TEST(PendulumRecordNoise, HasThePublishedValueWithinItsIntervalHoweverItArrives) {
   const auto record = SharedRecord("pendulum.csv", {"theta"});
   if (!record) GTEST_SKIP() << "../shared/data/pendulum.csv is not there";
   const Problem problem = PendulumProblem(kUnknownAndCorrelated);
@@ -91,4 +91,4 @@ TEST(PendulumRecord, HasThePublishedValueWithinItsIntervalHoweverItArrives) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -14,16 +14,17 @@
 
 #include "core/common/check.h"
 #include "core/common/parallel.h"
-#include "core/estimator/estimator.h"
+#include "core/estimator/estimator_access.h"
+#include "polyest/estimator.h"
 #include "tests/paper/paper_experiments.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kSeeds = 100;
 
 Estimate EstimateFrom(const ResolvedProblem& problem, const Samples& samples) {
-  auto estimator = Estimator::Make(problem);
+  auto estimator = EstimatorAccess::Make(problem);
   POLYEST_CHECK(estimator.ok());
   POLYEST_CHECK((*estimator)->Append(samples).ok());
   POLYEST_CHECK((*estimator)->Process().ok());
@@ -88,4 +89,4 @@ TEST(ReferenceScenario, IdentifiesMassAndPlace) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

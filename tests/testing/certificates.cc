@@ -7,7 +7,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr long kDay_s = 24 * 60 * 60;
@@ -79,4 +79,4 @@ IssuedCertificate CertificateAuthority::Issue(const std::string& common_name,
   return {ToPem(certificate.get()), ToPem(key.get())};
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

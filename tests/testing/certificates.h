@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-namespace polyest {
+namespace polyest::internal {
 
 // PEM texts.
 struct IssuedCertificate {
@@ -32,4 +32,4 @@ class CertificateAuthority {
   std::string certificate_pem_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 
 #include "server/journal/memory_journal.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class FaultyJournal final : public SessionJournal {
  public:
@@ -88,4 +88,4 @@ class FaultyJournal final : public SessionJournal {
   absl::Status failure_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -11,7 +11,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr size_t kBuffer = 16'384;
@@ -162,4 +162,4 @@ void HostileProxy::Repeat(const std::string& bytes) {
   close(server);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 class HostileProxy {
  public:
@@ -63,4 +63,4 @@ class HostileProxy {
   std::jthread thread_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 namespace {
 
 constexpr double kStiffness = 4 * std::numbers::pi * std::numbers::pi;  // N/m: 1 Hz
@@ -85,4 +85,4 @@ LeastSquares FitOscillator(const Samples& record, const OscillatorTruth& start) 
   return {theta[0], theta[1], std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1))};
 }
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

@@ -3,9 +3,9 @@
 // The damped 1 Hz oscillator, m = 1 kg, x(0) = 1 m at rest, k and c unknown, x measured: a problem
 // whose exact answer is at hand.
 
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 
 inline constexpr double kOscillatorNoise = 0.01;  // m
 inline constexpr double kOscillatorRate = 20;     // samples a second
@@ -34,4 +34,4 @@ struct LeastSquares {
 };
 LeastSquares FitOscillator(const Samples& record, const OscillatorTruth& start);
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

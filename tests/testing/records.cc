@@ -5,8 +5,9 @@
 #include <sstream>
 
 #include "core/common/check.h"
+#include "core/estimator/estimator_access.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 namespace {
 
 template <class T>
@@ -58,7 +59,7 @@ Estimate EstimateInBatches(const Problem& problem, const Samples& record, size_t
   POLYEST_CHECK(resolved.ok());
   EstimatorOptions options;
   options.threads = threads;
-  auto estimator = Estimator::Make(*std::move(resolved), options);
+  auto estimator = EstimatorAccess::Make(*std::move(resolved), options);
   POLYEST_CHECK(estimator.ok());
   for (size_t first = 0; first < record.rows(); first += batch_rows) {
     POLYEST_CHECK((*estimator)->Append(Rows(record, first, batch_rows)).ok());
@@ -69,4 +70,4 @@ Estimate EstimateInBatches(const Problem& problem, const Samples& record, size_t
   return *std::move(estimate);
 }
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 
 // The named columns after the first, which is the time; nothing when the file is not there.
 std::optional<Samples> SharedRecord(const std::string& file,
@@ -23,4 +23,4 @@ Samples Rows(const Samples& record, size_t first, size_t count);
 Estimate EstimateInBatches(const Problem& problem, const Samples& record, size_t batch_rows,
                            int threads = 1);
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

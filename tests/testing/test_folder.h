@@ -10,7 +10,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 class TestFolder {
  public:
@@ -38,4 +38,4 @@ class TestFolder {
   std::string path_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

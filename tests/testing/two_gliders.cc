@@ -1,6 +1,6 @@
 #include "tests/testing/two_gliders.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 
 ModelDescription TwoGliders::Describe() {
   ModelDescription description;
@@ -41,4 +41,4 @@ Problem TwoGlidersProblem(int order) {
   return problem;
 }
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

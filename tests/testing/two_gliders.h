@@ -7,10 +7,10 @@
 
 #include <array>
 
-#include "core/estimator/problem.h"
 #include "core/model/lane_model.h"
+#include "polyest/problem.h"
 
-namespace polyest::testing {
+namespace polyest::internal::testing {
 
 struct TwoGliders {
   static constexpr int kStates = 4;
@@ -50,4 +50,4 @@ struct TwoGliders {
 // Broad uniform priors, both displacements measured with 0.62 pixel noise.
 Problem TwoGlidersProblem(int order);
 
-}  // namespace polyest::testing
+}  // namespace polyest::internal::testing

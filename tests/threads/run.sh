@@ -22,10 +22,8 @@ options="log_path=$reports/race second_deadlock_stack=1"
 options+=" suppressions=$PWD/tests/threads/suppressions.txt print_suppressions=0"
 options+=" handle_segv=0"  # an FMU of the tests crashes its worker on purpose
 status=0
-# Everything is tens of times slower: so the daemon is killed less often, and what takes longest to
-# compute is left out, whose threads are those of other tests.
+# Everything is tens of times slower: so the daemon is killed less often.
 TSAN_OPTIONS="$options" POLYEST_TEST_CRASHES="${POLYEST_TEST_CRASHES:-5}" \
-  GTEST_FILTER="-StreamTest.TakesTheLastRowsOfASmoothInputToo" \
   ctest --preset tsan --label-regex '^threads$' "$@" || status=$?
 found="$(find "$reports" -type f | wc -l)"
 if [[ $found -gt 0 ]]; then

@@ -6,10 +6,10 @@
 #include <map>
 #include <string>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/study_service.pb.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -228,7 +228,7 @@ TEST_F(CommandTest, RanksTheParametersThatMatter) {
   const Finished run =
       Run({"sensitivity", Example("oscillator.json"), "--until", "4", "--format", "json"});
   ASSERT_EQ(run.exit_status, 0) << run.err;
-  v1::AnalyzeSensitivityResponse response;
+  v1::ComputeSensitivityResponse response;
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(run.out, &response).ok()) << run.out;
   ASSERT_EQ(response.activity_size(), 2);
   // What the README says of it.
@@ -236,7 +236,7 @@ TEST_F(CommandTest, RanksTheParametersThatMatter) {
   EXPECT_NEAR(response.activity(0).share(), 0.99, 0.01);
   EXPECT_EQ(response.activity(1).parameter(), "c");
   EXPECT_NEAR(response.activity(1).peak_to_noise(), 7, 0.5);
-  EXPECT_EQ(response.time_size(), 101);
+  EXPECT_EQ(response.time_s_size(), 101);
   EXPECT_EQ(response.diagnostics_size(), 0);
 }
 
@@ -252,9 +252,9 @@ TEST_F(CommandTest, PrintsOneCsvRowATimeOfTheSensitivities) {
   EXPECT_THAT(lines[5], StartsWith("1,"));
 }
 
-v1::DesignExperimentResponse DesignOf(const Finished& run) {
+v1::ComputeExperimentDesignResponse DesignOf(const Finished& run) {
   EXPECT_EQ(run.exit_status, 0) << run.err;
-  v1::DesignExperimentResponse response;
+  v1::ComputeExperimentDesignResponse response;
   EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(run.out, &response).ok()) << run.out;
   return response;
 }
@@ -267,7 +267,7 @@ TEST_F(CommandTest, RanksTheInputsOfANextExperiment) {
   })");
   const Finished run = Run({"design", Example("forced.json"), "--until", "10", "--candidate", slow,
                             "--samples", "4", "--format", "json"});
-  const v1::DesignExperimentResponse response = DesignOf(run);
+  const v1::ComputeExperimentDesignResponse response = DesignOf(run);
   ASSERT_EQ(response.candidates_size(), 2);
   EXPECT_EQ(response.candidates(0).name(), Example("forced.json"));
   EXPECT_EQ(response.candidates(1).name(), slow);
@@ -417,4 +417,4 @@ TEST_F(CommandTest, ExplainsItself) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,7 +6,7 @@
 
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::AllOf;
@@ -160,4 +160,4 @@ TEST_F(CheckTest, PrintsTheSchema) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

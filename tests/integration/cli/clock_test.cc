@@ -5,11 +5,11 @@
 
 #include <ctime>
 
-#include "client/cpp/client.h"
-#include "client/cpp/problem_file.h"
+#include "polyest/client.h"
+#include "polyest/problem_file.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -36,7 +36,7 @@ class ClockTest : public CommandTest {
   // A new session of the daemon, as it says itself.
   static v1::Session Created(Client& client) {
     v1::CreateSessionRequest create;
-    *create.mutable_problem() = *ReadProblemFile(Example("oscillator.json"));
+    *create.mutable_session()->mutable_problem() = *ReadProblemFile(Example("oscillator.json"));
     const auto session = client.CreateSession(create);
     EXPECT_TRUE(session.ok()) << session.status();
     return session.ok() ? *session : v1::Session();
@@ -56,7 +56,7 @@ TEST_F(ClockTest, MayBeSetForwardsAndBackUnderAStream) {
   EXPECT_THAT(process.ReadLine(), HasSubstr("\"sequence\":\"2\""));
   const v1::Session late = Created(client);
   EXPECT_NEAR(static_cast<double>(late.create_time().seconds() - std::time(nullptr)), kJumpS, 3600);
-  EXPECT_LT(late.activity().idle_time(), 60);
+  EXPECT_LT(late.activity().idle_time_s(), 60);
 
   SetClock("-400d");
   const v1::Session early = Created(client);
@@ -76,4 +76,4 @@ TEST_F(ClockTest, MayBeSetForwardsAndBackUnderAStream) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

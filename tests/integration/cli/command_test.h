@@ -20,7 +20,7 @@
 #include "tests/integration/cli/process.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // A daemon on a port of its own choice, with a data folder of its own unless it is given one.
 class DaemonProcess {
@@ -103,4 +103,4 @@ class CommandTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::AllOf;
@@ -213,9 +213,9 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
   const std::string problem = File("p.json", kProblem);
   for (const char* const command : {"sensitivity", "design"}) {
     EXPECT_THAT(OneLine(Run({command, problem}), 2), HasSubstr("--until"));
-    EXPECT_THAT(OneLine(Run({command, problem, "--until", "0"}), 2), HasSubstr("until: 0"));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "0"}), 2), HasSubstr("untilS: 0"));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--step", "-1"}), 2),
-                HasSubstr("step: -1"));
+                HasSubstr("stepS: -1"));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,q"}), 2),
                 AllOf(HasSubstr("\"q\""), HasSubstr("x, v, a")));
   }
@@ -225,7 +225,7 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
   EXPECT_THAT(OneLine(Run({"design", streamed, "--until", "1"}), 2), HasSubstr("road is streamed"));
   const std::string other = File("other.json", R"({"inputs": [{"name": "wind"}]})");
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", other}), 2),
-              HasSubstr("candidates[1]: inputs[0]"));
+              HasSubstr("candidates[1].inputs[0]"));
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", "absent.json"}), 2),
               HasSubstr("absent.json"));
 }
@@ -259,4 +259,4 @@ TEST_F(ErrorsTest, BadUsage) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

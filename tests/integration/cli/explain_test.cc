@@ -5,10 +5,10 @@
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/study_service.pb.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::AllOf;
@@ -25,13 +25,13 @@ class ExplainTest : public CommandTest {
     const Finished predicted =
         Run({"propagate", file, "--until", "2", "--step", "0.02", "--format", "json"});
     EXPECT_EQ(predicted.exit_status, 0) << predicted.err;
-    v1::PropagateResponse response;
+    v1::ComputePropagationResponse response;
     EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(predicted.out, &response).ok());
     std::string record = "t";
     for (const std::string& output : outputs) absl::StrAppend(&record, ",", output);
     if (!ones.empty()) absl::StrAppend(&record, ",", ones);
-    for (int k = 1; k < response.time_size(); ++k) {
-      absl::StrAppend(&record, "\n", response.time(k));
+    for (int k = 1; k < response.time_s_size(); ++k) {
+      absl::StrAppend(&record, "\n", response.time_s(k));
       for (const auto& output : response.outputs()) {
         absl::StrAppend(&record, ",", output.mean(k));
       }
@@ -118,4 +118,4 @@ TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -86,4 +86,4 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -109,4 +109,4 @@ TEST_F(FmuCommandTest, SaysWhichFmusThereAreAndHowToNameTheirFolder) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,7 +12,7 @@
 
 #include "core/common/check.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // In the child, between fork and exec.
@@ -128,4 +128,4 @@ Finished RunProgram(const std::vector<std::string>& arguments, const std::string
   return finished;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

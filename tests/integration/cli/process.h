@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 // A program of ours as a process, with pipes to its standard input and output. Its standard error
 // goes into a file without a name, which never makes it wait.
@@ -48,4 +48,4 @@ struct Finished {
 // Runs a program to its end.
 Finished RunProgram(const std::vector<std::string>& arguments, const std::string& input = "");
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,12 +1,12 @@
 #include <gmock/gmock.h>
 #include <stdlib.h>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 #include "server/security/token_table.h"
 #include "tests/integration/cli/command_test.h"
 #include "tests/testing/certificates.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::AllOf;
@@ -160,66 +160,5 @@ TEST_F(SecurityTest, ShowsAClientsCertificateToADaemonThatAsksForOne) {
   OneLine(Run({"models", "--server", daemon.address(), "--tls-ca", ca_}), 3);
 }
 
-// The commands of a section of README.md, continued lines as one.
-std::vector<std::string> CommandsOf(const std::string& section) {
-  std::ifstream in(std::string(POLYEST_SOURCE_DIR) + "/README.md");
-  std::vector<std::string> commands;
-  bool inside = false, code = false, continued = false;
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("## ")) inside = line == "## " + section;
-    if (!inside) continue;
-    if (line.starts_with("```")) {
-      code = line == "```sh";
-    } else if (code) {
-      const bool continues = line.ends_with("\\");
-      if (continues) line.pop_back();
-      if (continued) {
-        commands.back() += line;
-      } else {
-        commands.push_back(line);
-      }
-      continued = continues;
-    }
-  }
-  return commands;
-}
-
-std::string Replaced(std::string text, const std::string& old_text, const std::string& new_text) {
-  const size_t place = text.find(old_text);
-  EXPECT_NE(place, std::string::npos) << text;
-  return text.replace(place, old_text.size(), new_text);
-}
-
-TEST_F(SecurityTest, WorksAsTheReadmeSays) {
-  const std::string prepare =
-      "set -eu; cd " + folder_.string() + "; export XDG_STATE_HOME=$PWD/state; PATH=" +
-      std::filesystem::path(POLYEST_PROGRAM).parent_path().string() + ":" +
-      std::filesystem::path(POLYESTD_PROGRAM).parent_path().string() + ":$PATH; ";
-  std::filesystem::remove(tokens_);
-  for (const char* file : {"oscillator.json", "oscillator.csv"}) {
-    std::filesystem::copy(Example(file), folder_ / file);
-  }
-  const auto shell = [&](const std::string& command) {
-    return std::vector<std::string>{"/bin/bash", "-c", prepare + command};
-  };
-  std::unique_ptr<Process> daemon;
-  std::string address;
-  bool streamed = false;
-  for (const std::string& command : CommandsOf("Security")) {
-    if (command.starts_with("polyestd --listen")) {
-      daemon = std::make_unique<Process>(shell("exec " + Replaced(command, ":50051", ":0")));
-      address = daemon->ReadLine();
-      ASSERT_THAT(address, StartsWith("listening on 0.0.0.0:")) << daemon->Errors();
-      continue;
-    }
-    const bool client = command.starts_with("polyest stream");
-    const Finished finished = RunProgram(
-        shell(client ? Replaced(command, ":50051", address.substr(address.rfind(':'))) : command));
-    EXPECT_EQ(finished.exit_status, 0) << command << "\n" << finished.err;
-    if (client) streamed = finished.out.find("identified") != std::string::npos;
-  }
-  EXPECT_TRUE(streamed);
-}
-
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

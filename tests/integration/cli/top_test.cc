@@ -2,10 +2,10 @@
 
 #include <gmock/gmock.h>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -46,8 +46,9 @@ TEST_F(TopTest, FollowsThePages) {
   std::ifstream in(Example("oscillator.json"));
   std::ostringstream problem;
   problem << in.rdbuf();
-  ASSERT_TRUE(
-      google::protobuf::util::JsonStringToMessage(problem.str(), request.mutable_problem()).ok());
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(
+                  problem.str(), request.mutable_session()->mutable_problem())
+                  .ok());
   for (int i = 0; i < 51; ++i) ASSERT_TRUE(client.CreateSession(request).ok());
   const Finished top = Run({"top", "--server", daemon_.address(), "--once"});
   EXPECT_EQ(Lines(top.out).size(), 4u + 51u);
@@ -74,4 +75,4 @@ TEST_F(TopTest, SaysThatTheDaemonIsNotThere) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,6 +5,9 @@ endfunction()
 
 file(REMOVE_RECURSE ${SCRATCH})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/prefix)
+if(PYTHON)
+  run(${PYTHON} ${CHECK} ${SCRATCH}/prefix/include)
+endif()
 run(${CMAKE_COMMAND} -S ${SOURCE} -B ${SCRATCH}/build -G ${GENERATOR}
   -D CMAKE_PREFIX_PATH=${SCRATCH}/prefix
   -D CMAKE_BUILD_TYPE=Release
@@ -13,4 +16,5 @@ run(${CMAKE_COMMAND} -S ${SOURCE} -B ${SCRATCH}/build -G ${GENERATOR}
   -D CMAKE_CXX_FLAGS=${FLAGS})
 run(${CMAKE_COMMAND} --build ${SCRATCH}/build)
 run(${SCRATCH}/build/consumer)
+run(${SCRATCH}/build/client_consumer)
 file(REMOVE_RECURSE ${SCRATCH})

@@ -45,11 +45,12 @@ case "$1" in
   start)
     address=localhost:0
     [[ ! -e $root/address ]] || address=$(<"$root/address")
-    command=$(sed -n '/^ExecStart=/,/[^\\]$/p' "$source_folder/deploy/systemd/polyestd.service" |
-      sed "s|^ExecStart=[^ ]*|$polyestd|; s|0.0.0.0:50051|$address|; s|/var/lib|$root/var/lib|g
-           s|/etc/polyest|$root/etc/polyest|g; s|\\\\\$||; s|\$POLYESTD_OPTIONS||" | tr -d '\n')
+    sed "s|/etc/polyest|$root/etc/polyest|g; s|^listen .*|listen = \"$address\"|; s|^metrics .*||" "$root/etc/polyest/polyestd.toml" >"$root/polyestd.toml"
+    command=$(sed -n 's/^ExecStart=//p' "$source_folder/deploy/systemd/polyestd.service")
+    command="$polyestd${command#/usr/bin/polyestd}"
+    command=${command/"/etc/polyest/polyestd.toml"/"$root/polyestd.toml"}
     rm -f "$root/ready" && mkfifo "$root/ready"
-    nohup $command >"$root/ready" 2>>"$root/log" </dev/null &
+    STATE_DIRECTORY=$root/var/lib/polyest nohup $command >"$root/ready" 2>>"$root/log" </dev/null &
     echo $! >"$root/pid"
     read -r line <"$root/ready" || exit 1
     echo "${line#listening on }" >"$root/address"
@@ -71,6 +72,10 @@ clean() {
 }
 trap clean EXIT
 cd "$root/work"
+
+# The unit's configuration file, as it is installed, with what the runbook adds.
+cp "$source_folder/deploy/polyestd.toml" "$root/etc/polyest/polyestd.toml"
+sed -n '/^```toml$/,/^```$/{/^```/!p}' "$runbook" >>"$root/etc/polyest/polyestd.toml"
 
 # The commands of a section, all of them or the one block of that number.
 commands() { # SECTION [BLOCK]
@@ -129,7 +134,7 @@ say "looking into a damaged file"
 mkdir "$root/damaged"
 sqlite3 "$root/var/lib/polyest/journal.db" ".backup '$root/damaged/journal.db'"
 cd "$root/damaged"
-run "A file that is refused"
+run "Damaged journal"
 cd "$root/work"
 expect "$(<"$root/output")" ok
 systemctl stop polyestd
@@ -143,7 +148,7 @@ rm -r "$root/var/lib/polyest" && mv "$root/kept" "$root/var/lib/polyest"
 systemctl start polyestd
 
 say "making room"
-run "A full disk"
+run "Disk full"
 expect "$(stream 60)" "60 rows were there already"
 
 say "rotating and revoking"

@@ -9,9 +9,9 @@
 #include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
-#include "polyest/v1/estimation_service.pb.h"
+#include "polyest/v1/model_service.pb.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -167,4 +167,4 @@ TEST(ToJson, PrintsWhatHasItsDefault) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,12 +1,12 @@
-#include "client/cpp/connection.h"
+#include "polyest/connection.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cpp/client.h"
+#include "polyest/client.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -48,12 +48,42 @@ TEST(DaemonConnection, NeedsACertificateWithItsKey) {
               HasSubstr("must be given together"));
 }
 
+// As gRPC 1.51 words them.
+absl::Status NoConnection(const std::string& reason) {
+  return absl::UnavailableError(
+      "failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:1: " + reason);
+}
+
+std::string Hinted(const std::string& reason, const std::optional<ClientTls>& tls) {
+  return std::string(WithConnectionHint(NoConnection(reason), tls).message());
+}
+
+TEST(ConnectionHint, SaysWhatToLookAtWhereTheTwoEndsDifferInTls) {
+  const ClientTls tls{.ca_file = "ca.pem"};
+  const ClientTls own{.ca_file = "ca.pem", .certificate_file = "a.pem", .key_file = "a.key"};
+  const std::string ssl = "Ssl handshake failed: SSL_ERROR_SSL: error:0A000086:SSL routines::";
+  EXPECT_THAT(Hinted("Socket closed", std::nullopt), HasSubstr("name its CA with --tls-ca"));
+  EXPECT_THAT(Hinted(ssl + "wrong version number", tls), HasSubstr("does not speak TLS"));
+  EXPECT_THAT(Hinted(ssl + "certificate verify failed", tls), HasSubstr("not of the CA in"));
+  EXPECT_THAT(Hinted("Socket closed", tls), HasSubstr("give yours with --tls-certificate"));
+  EXPECT_THAT(Hinted("Socket closed", own), HasSubstr("its --tls-client-ca"));
+}
+
+TEST(ConnectionHint, IsNotGivenWhereTlsIsNotTheReason) {
+  const absl::Status refused = NoConnection("Failed to connect to remote host: Connection refused");
+  EXPECT_EQ(WithConnectionHint(refused, std::nullopt), refused);
+  EXPECT_EQ(WithConnectionHint(refused, ClientTls{}), refused);
+  // Of a connection that there was.
+  EXPECT_EQ(WithConnectionHint(absl::UnavailableError("Socket closed"), std::nullopt),
+            absl::UnavailableError("Socket closed"));
+}
+
 TEST(Client, FailsEveryCallWithWhatIsWrongWithItsOptions) {
   Client client("rig.example.org:1", {.token = "secret"});
   EXPECT_EQ(client.ListModels({}).status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(client.WatchSession({}, [](const v1::EstimateResponse&) { return true; }).code(),
+  EXPECT_EQ(client.WatchSession({}, [](const v1::WatchSessionResponse&) { return true; }).code(),
             absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

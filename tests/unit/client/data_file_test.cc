@@ -1,4 +1,4 @@
-#include "client/cpp/data_file.h"
+#include "polyest/data_file.h"
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <sstream>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -37,7 +37,7 @@ std::string ErrorOf(const std::string& text, const DataColumns& columns = kMeasu
 TEST(DataReader, ReadsColumnsByName) {
   const auto data = ReadAll("t,v,x,force\n0,1,2,3\n0.5,-1e-3,2.5,+4\n", kColumns);
   ASSERT_TRUE(data.ok()) << data.status();
-  EXPECT_THAT(data->time(), ElementsAre(0, 0.5));
+  EXPECT_THAT(data->time_s(), ElementsAre(0, 0.5));
   EXPECT_THAT(data->run(), IsEmpty());
   ASSERT_THAT(data->channels(), SizeIs(3));
   EXPECT_EQ(data->channels(0).name(), "v");
@@ -51,7 +51,7 @@ TEST(DataReader, ReadsColumnsByName) {
 TEST(DataReader, ReadsEveryDigit) {
   const auto data = ReadAll("t,x\n0.1,6.0221407599999999e23\n");
   ASSERT_TRUE(data.ok()) << data.status();
-  EXPECT_EQ(data->time(0), 0.1);
+  EXPECT_EQ(data->time_s(0), 0.1);
   EXPECT_EQ(data->channels(0).values(0), 6.0221407599999999e23);
 }
 
@@ -66,7 +66,7 @@ TEST(DataReader, TakesAnEmptyCellForAMissingSample) {
 TEST(DataReader, AcceptsCarriageReturnsSpacesBlankLinesAMarkAndNoLastLineEnd) {
   const auto data = ReadAll("\xEF\xBB\xBFt, x\r\n\r\n0 ,1\r\n 1,\t2\r\n\r\n2,3");
   ASSERT_TRUE(data.ok()) << data.status();
-  EXPECT_THAT(data->time(), ElementsAre(0, 1, 2));
+  EXPECT_THAT(data->time_s(), ElementsAre(0, 1, 2));
   EXPECT_THAT(data->channels(0).values(), ElementsAre(1, 2, 3));
 }
 
@@ -74,7 +74,7 @@ TEST(DataReader, RestartsTheClockAtANewRun) {
   const auto data = ReadAll("t,run,x\n0,0,1\n1,0,2\n0.5,1,3\n0,2,4\n");
   ASSERT_TRUE(data.ok()) << data.status();
   EXPECT_THAT(data->run(), ElementsAre(0, 0, 1, 2));
-  EXPECT_THAT(data->time(), ElementsAre(0, 1, 0.5, 0));
+  EXPECT_THAT(data->time_s(), ElementsAre(0, 1, 0.5, 0));
 }
 
 TEST(DataReader, CutsTheSameRowsIntoBatches) {
@@ -87,13 +87,13 @@ TEST(DataReader, CutsTheSameRowsIntoBatches) {
     ASSERT_TRUE(batch.ok()) << batch.status();
     batches.push_back(*batch);
   }
-  EXPECT_THAT(batches[0].time(), ElementsAre(0, 1));
+  EXPECT_THAT(batches[0].time_s(), ElementsAre(0, 1));
   EXPECT_THAT(batches[0].channels(0).missing(), ElementsAre(0));
-  EXPECT_THAT(batches[1].time(), ElementsAre(2, 3));
+  EXPECT_THAT(batches[1].time_s(), ElementsAre(2, 3));
   EXPECT_THAT(batches[1].run(), ElementsAre(0, 0));
   EXPECT_THAT(batches[1].channels(0).missing(), ElementsAre(1));
-  EXPECT_THAT(batches[2].time(), ElementsAre(4));
-  EXPECT_THAT(batches[3].time(), IsEmpty());
+  EXPECT_THAT(batches[2].time_s(), ElementsAre(4));
+  EXPECT_THAT(batches[3].time_s(), IsEmpty());
 }
 
 TEST(DataReader, ChecksTimesFromOneBatchToTheNext) {
@@ -238,7 +238,7 @@ TEST(DataReader, GoesOnAfterABadLineIfAsked) {
                           HasSubstr("data.csv:8: the row has 2 cells")));
   ASSERT_TRUE(sieved.data.ok()) << sieved.data.status();
   // Of a row that is refused nothing is left.
-  EXPECT_THAT(sieved.data->time(), ElementsAre(0, 3, 6));
+  EXPECT_THAT(sieved.data->time_s(), ElementsAre(0, 3, 6));
   EXPECT_THAT(sieved.data->run(), ElementsAre(0, 0, 1));
   EXPECT_THAT(sieved.data->channels(0).values(), ElementsAre(1, 4, 8));
   EXPECT_THAT(sieved.data->channels(0).missing(), IsEmpty());
@@ -264,4 +264,4 @@ TEST(DataReader, SaysOnlyOnceThatThereIsNoGoodRow) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,17 +1,14 @@
 // The examples that are shipped can be read.
 
-#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
-#include "client/cpp/data_file.h"
-#include "client/cpp/problem_file.h"
-#include "server/convert/problem.h"
+#include "polyest/data_file.h"
+#include "polyest/problem_file.h"
+#include "proto/wire/convert/problem.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 const std::filesystem::path kExamples =
@@ -29,25 +26,6 @@ TEST(Examples, EveryProblemIsValid) {
   EXPECT_GE(problems, 7);
 }
 
-// The text between the first ```json and the next ``` of a page.
-std::string FirstJsonOf(const std::filesystem::path& page) {
-  std::ifstream in(page);
-  std::stringstream all;
-  all << in.rdbuf();
-  const std::string text = all.str();
-  const std::string opening = "```json\n";
-  const size_t begin = text.find(opening) + opening.size();
-  return text.substr(begin, text.find("```", begin) - begin);
-}
-
-TEST(Examples, TheProblemInTheLanguagesPageIsValid) {
-  const std::string json =
-      FirstJsonOf(std::filesystem::path(POLYEST_SOURCE_DIR) / "core/model/equations/README.md");
-  v1::Problem problem;
-  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(json, &problem).ok()) << json;
-  EXPECT_TRUE(ToProblem(problem).ok()) << ToProblem(problem).status();
-}
-
 TEST(Examples, EveryRecordSuitsItsProblem) {
   int records = 0;
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
@@ -63,4 +41,4 @@ TEST(Examples, EveryRecordSuitsItsProblem) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

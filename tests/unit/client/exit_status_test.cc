@@ -4,7 +4,9 @@
 
 #include <sstream>
 
-namespace polyest {
+#include "core/common/field_error.h"
+
+namespace polyest::internal {
 namespace {
 
 constexpr char kServer[] = "rig:50051";
@@ -39,12 +41,12 @@ TEST(Report, NamesTheServerThatRefused) {
 }
 
 TEST(InFile, PutsTheFileInFrontOfTheField) {
-  EXPECT_EQ(InFile(absl::InvalidArgumentError("fixed.q: unknown"), "p.json", "d.csv").message(),
+  EXPECT_EQ(InFile(InvalidField("fixed.q", "unknown"), "p.json", "d.csv").message(),
             "p.json: fixed.q: unknown");
-  EXPECT_EQ(InFile(absl::InvalidArgumentError("measurements.time[0]: x"), "p.json", "d.csv"),
+  EXPECT_EQ(InFile(InvalidField("measurements.time[0]", "x"), "p.json", "d.csv"),
             absl::InvalidArgumentError("d.csv: measurements.time[0]: x"));
   EXPECT_EQ(InFile(absl::UnavailableError("gone"), "p.json", "d.csv").message(), "gone");
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,4 +1,4 @@
-#include "client/cpp/measurement_stream.h"
+#include "polyest/measurement_stream.h"
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -12,10 +12,10 @@
 #include <numeric>
 
 #include "polyest/rpc/error_details.pb.h"
-#include "server/refusal/refusal.h"
+#include "proto/wire/refusal/refusal.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 // A daemon with one session, which takes batches by the contract's rules and breaks on demand.
-class FakeDaemon : public v1::EstimationService::Service {
+class FakeDaemon : public v1::SessionService::Service {
  public:
   using Stream =
       grpc::ServerReaderWriter<v1::StreamMeasurementsResponse, v1::StreamMeasurementsRequest>;
@@ -62,7 +62,7 @@ class FakeDaemon : public v1::EstimationService::Service {
         return {grpc::StatusCode::INVALID_ARGUMENT, "not the next batch"};
       }
       last_sequence = request.sequence();
-      times.push_back(request.measurements().time(0));
+      times.push_back(request.measurements().time_s(0));
       ++taken;
       // The batch is taken, but its acknowledgement gets lost with the connection.
       if (connections <= breaks && taken == 3) {
@@ -113,14 +113,14 @@ class MeasurementStreamTest : public ::testing::Test {
  protected:
   MeasurementStreamTest() : client_(daemon_.address()) {
     options_.first_delay = std::chrono::milliseconds(1);
-    options_.longest_delay = std::chrono::milliseconds(20);
+    options_.max_delay = std::chrono::milliseconds(20);
     callbacks_.connection = [this](const std::string& sentence) { told_.push_back(sentence); };
     callbacks_.estimate = [this](const v1::Estimate&) { ++estimates_; };
   }
 
   static v1::Measurements Batch(double time) {
     v1::Measurements batch;
-    batch.add_time(time);
+    batch.add_time_s(time);
     return batch;
   }
 
@@ -183,7 +183,7 @@ TEST_F(MeasurementStreamTest, NumbersOnFromTheSessionsLastBatch) {
 }
 
 TEST_F(MeasurementStreamTest, BoundsWhatIsNotAcknowledged) {
-  options_.most_unacknowledged = 3;
+  options_.max_unacknowledged = 3;
   daemon_.acknowledge_every = 3;
   MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
   ASSERT_TRUE(stream.Open().ok());
@@ -225,7 +225,7 @@ TEST_F(MeasurementStreamTest, DoesNotFightAnotherWriter) {
 }
 
 TEST_F(MeasurementStreamTest, GivesUpWhenTheDaemonStaysAway) {
-  options_.most_attempts = 3;
+  options_.max_attempts = 3;
   MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
   ASSERT_TRUE(stream.Open().ok());
   daemon_.Stop();
@@ -277,7 +277,7 @@ TEST_F(MeasurementStreamTest, HoldsOutWhileTheDaemonHasNoRoomAndSaysSo) {
   EXPECT_EQ(told_.back(), "the daemon takes batches again");
   // Never before the daemon has asked for it, ever longer, up to the longest.
   EXPECT_EQ(delays.front(), std::chrono::milliseconds(2));
-  EXPECT_EQ(delays.back(), options_.longest_delay);
+  EXPECT_EQ(delays.back(), options_.max_delay);
 }
 
 TEST_F(MeasurementStreamTest, DoesNotWaitForALimitThatWaitingDoesNotCure) {
@@ -306,7 +306,7 @@ class RotatedTokenTest : public MeasurementStreamTest {
   absl::Status Stream() {
     daemon_.authorization = "Bearer one";
     daemon_.breaks = 1;
-    options_.most_unacknowledged = 1;
+    options_.max_unacknowledged = 1;
     Client client(daemon_.address(), {.token_file = file_});
     options_.wait = [this](std::chrono::milliseconds) {
       daemon_.authorization = "Bearer two";
@@ -367,7 +367,7 @@ TEST_F(MeasurementStreamTest, OpensOnceTheDaemonIsThere) {
 }
 
 TEST_F(MeasurementStreamTest, DoesNotOpenWhenTheDaemonStaysAway) {
-  options_.most_attempts = 3;
+  options_.max_attempts = 3;
   daemon_.absences = 100;
   MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
   EXPECT_EQ(stream.Open(), absl::UnavailableError("it is just starting"));
@@ -380,7 +380,7 @@ TEST_F(MeasurementStreamTest, CannotOpenASessionThatThereIsNot) {
   EXPECT_EQ(stream.Open().code(), absl::StatusCode::kNotFound);
 }
 
-TEST(Client, TellsThatADaemonIsUnreachable) {
+TEST(StreamingClient, TellsThatADaemonIsUnreachable) {
   std::string address;
   {
     FakeDaemon gone;
@@ -391,4 +391,4 @@ TEST(Client, TellsThatADaemonIsUnreachable) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -17,9 +17,9 @@
 #include <sstream>
 
 #include "client/cli/starting_problem.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using google::protobuf::Struct;
@@ -63,6 +63,7 @@ class Validator {
     if (keyword == "const") {
       return value.has_string_value() && rule.string_value() == value.string_value() ? "" : path;
     }
+    if (keyword == "minimum") return value.number_value() >= rule.number_value() ? "" : path;
     if (keyword == "required") return CheckRequired(rule, value, path);
     if (keyword == "properties") return "";  // with additionalProperties
     if (keyword == "additionalProperties") return CheckMembers(rule, schema, value, path);
@@ -179,13 +180,18 @@ TEST(ProblemSchema, TakesEveryProblemToStartFrom) {
 }
 
 TEST(ProblemSchema, TakesNumbersThatJsonCannotSay) {
-  EXPECT_EQ(WrongWith(R"({"model": {"builtin": "bicycle"}, "fixed": {"mu": "Infinity"}})"), "");
+  EXPECT_EQ(
+      WrongWith(
+          R"({"model": {"builtin": "bicycle"}, "uncertain": [], "fixed": {"mu": "Infinity"}})"),
+      "");
   EXPECT_NE(WrongWith(R"({"model": {"builtin": "bicycle"}, "fixed": {"mu": "much"}})"), "");
 }
 
 TEST(ProblemSchema, SeesMistakes) {
   const auto with = [](const std::string& members) {
-    return WrongWith(R"({"model": {"builtin": "duffing"}, )" + members + "}");
+    const bool has_uncertain = members.find("uncertain") != std::string::npos;
+    return WrongWith(R"({"model": {"builtin": "duffing"}, )" +
+                     (has_uncertain ? "" : std::string(R"("uncertain": [], )")) + members + "}");
   };
   EXPECT_EQ(WrongWith("{}"), "problem: model is missing");
   EXPECT_NE(WrongWith(R"({"model": {}})"), "");
@@ -195,6 +201,7 @@ TEST(ProblemSchema, SeesMistakes) {
   EXPECT_EQ(with(R"("regularizationMode": "L_CURV")"),
             "problem.regularizationMode: not one of the names");
   EXPECT_EQ(with(R"("expansion": {"order": 2.5})"), "problem.expansion.order");
+  EXPECT_EQ(with(R"("expansion": {"order": 0})"), "problem.expansion.order");
   EXPECT_EQ(with(R"("expansion": {"order": "auto"})"), "problem.expansion.order");
   EXPECT_EQ(with(R"("expansion": {"order": "AUTO"})"), "");
   EXPECT_EQ(with(R"("expansion": {"order": 7})"), "");
@@ -206,8 +213,8 @@ TEST(ProblemSchema, SeesMistakes) {
 
 TEST(ProblemSchema, ExplainsEveryField) {
   EXPECT_THAT(kProblemSchema, HasSubstr("\"description\": \"What is uncertain, with its prior."));
-  EXPECT_THAT(kProblemSchema, HasSubstr("Natural cubic spline instead of linear"));
+  EXPECT_THAT(kProblemSchema, HasSubstr("Whether a natural cubic spline runs"));
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

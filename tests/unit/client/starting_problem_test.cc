@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cpp/problem_file.h"
-#include "core/model/catalogue.h"
-#include "server/convert/problem.h"
+#include "polyest/catalogue.h"
+#include "polyest/problem_file.h"
+#include "proto/wire/convert/problem.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::IsEmpty;
@@ -47,4 +47,4 @@ TEST(StartingProblem, AsEquationsIsValid) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -11,7 +11,7 @@ using ::testing::IsEmpty;
 
 v1::Measurements Rows() {
   v1::Measurements batch;
-  for (const double time : {1, 2, 3, 4}) batch.add_time(time);
+  for (const double time : {1, 2, 3, 4}) batch.add_time_s(time);
   auto& channel = *batch.add_channels();
   channel.set_name("x");
   for (const double value : {10, 20, 0, 40}) channel.add_values(value);
@@ -23,7 +23,7 @@ v1::Measurements Rows() {
 TEST(RemoveRowsUpTo, KeepsWhatIsLater) {
   v1::Measurements batch = Rows();
   EXPECT_EQ(RemoveRowsUpTo({0, 2}, batch), 2);
-  EXPECT_THAT(batch.time(), ElementsAre(3, 4));
+  EXPECT_THAT(batch.time_s(), ElementsAre(3, 4));
   EXPECT_THAT(batch.channels(0).values(), ElementsAre(0, 40));
   EXPECT_THAT(batch.channels(0).missing(), ElementsAre(0));
 }
@@ -31,9 +31,9 @@ TEST(RemoveRowsUpTo, KeepsWhatIsLater) {
 TEST(RemoveRowsUpTo, MayTakeAllOrNone) {
   v1::Measurements batch = Rows();
   EXPECT_EQ(RemoveRowsUpTo({0, 0.5}, batch), 0);
-  EXPECT_EQ(batch.time_size(), 4);
+  EXPECT_EQ(batch.time_s_size(), 4);
   EXPECT_EQ(RemoveRowsUpTo({0, 10}, batch), 4);
-  EXPECT_THAT(batch.time(), IsEmpty());
+  EXPECT_THAT(batch.time_s(), IsEmpty());
 }
 
 TEST(RemoveRowsUpTo, LeavesLaterRunsAlone) {
@@ -47,8 +47,8 @@ TEST(RemoveRowsUpTo, TakesEarlierRunsWhole) {
   v1::Measurements batch = Rows();
   for (const int run : {0, 0, 1, 1}) batch.add_run(run);
   EXPECT_EQ(RemoveRowsUpTo({1, 3}, batch), 3);
-  EXPECT_THAT(batch.time(), ElementsAre(4));
+  EXPECT_THAT(batch.time_s(), ElementsAre(4));
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,15 +8,28 @@
 #include <string>
 #include <vector>
 
-namespace polyest {
+#include "client/cli/screen.h"
+
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string Print(const DaemonView& now, const DaemonView* before = nullptr) {
   std::ostringstream out;
-  PrintTop(now, before, out);
+  PrintTop(now, before, /*fit_rows=*/false, out);
   return out.str();
+}
+
+// The lines that a screen of that size shows.
+std::vector<std::string> PrintOn(int columns, int rows, const DaemonView& now) {
+  std::stringstream out;
+  SetScreen(out, {.columns = columns, .rows = rows, .color = false});
+  PrintTop(now, nullptr, /*fit_rows=*/true, out);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(out, line);) lines.push_back(line);
+  return lines;
 }
 
 DaemonView ViewOf(int64_t samples, double time_s) {
@@ -24,8 +37,8 @@ DaemonView ViewOf(int64_t samples, double time_s) {
   view.time_s = time_s;
   v1::Session session;
   session.set_name("sessions/rig");
-  session.set_samples(samples);
-  session.mutable_activity()->set_batches(7);
+  session.set_sample_count(samples);
+  session.mutable_activity()->set_batch_count(7);
   view.sessions.push_back(session);
   return view;
 }
@@ -43,19 +56,19 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   DaemonView view = ViewOf(1200, 0);
   view.status.set_version("1.2.3");
   view.status.set_durable(true);
-  view.status.set_uptime(7200);
+  view.status.set_uptime_s(7200);
   view.status.set_memory_bytes(3 << 20);
-  view.status.set_sessions(5);
-  view.status.set_sessions_loaded(1);
+  view.status.set_session_count(5);
+  view.status.set_loaded_session_count(1);
   auto& activity = *view.sessions[0].mutable_activity();
-  activity.set_estimates(6);
-  activity.set_reexpansions(2);
+  activity.set_estimate_count(6);
+  activity.set_reexpansion_count(2);
   activity.set_real_time_factor(12.5);
-  activity.set_unprocessed_batches(4);
+  activity.set_unprocessed_batch_count(4);
   activity.set_has_writer(true);
-  activity.set_watchers(3);
+  activity.set_watcher_count(3);
   activity.set_loaded(true);
-  activity.set_idle_time(90);
+  activity.set_idle_time_s(90);
   const std::string text = Print(view);
   EXPECT_THAT(text, HasSubstr("polyestd 1.2.3, up 2.0 h, 3.0 MiB, sessions on disk\n"));
   EXPECT_THAT(text, HasSubstr("5 sessions, 1 of them loaded; 0 writers"));
@@ -80,6 +93,33 @@ TEST(TopTableTest, TakesASessionWithFewerSamplesForAnotherOne) {
   EXPECT_EQ(LastRow(Print(ViewOf(10, 12), &before))[3], "-");
 }
 
+TEST(TopTableTest, LeavesOutColumnsThatDoNotFitTheScreen) {
+  DaemonView view = ViewOf(123'456'789, 0);
+  view.sessions[0].set_name("sessions/" + std::string(60, 'r'));
+  view.sessions[0].mutable_activity()->set_idle_time_s(90);
+  for (const int columns : {40, 80, 100}) {
+    const std::vector<std::string> lines = PrintOn(columns, 24, view);
+    for (const std::string& line : lines) {
+      if (&line - lines.data() < 2) continue;  // the daemon's own
+      EXPECT_LE(DisplayWidth(line), columns) << line;
+    }
+    EXPECT_THAT(lines[3], HasSubstr("session"));
+    EXPECT_THAT(lines[4], HasSubstr("rrr…"));
+  }
+  EXPECT_THAT(PrintOn(80, 24, view)[3], HasSubstr("real-time"));
+  EXPECT_THAT(PrintOn(80, 24, view)[3], Not(HasSubstr("re-expansions")));
+  EXPECT_THAT(PrintOn(200, 24, view)[3], HasSubstr("re-expansions"));
+}
+
+TEST(TopTableTest, CountsTheSessionsThatTheScreenHasNoRoomFor) {
+  DaemonView view = ViewOf(1, 0);
+  for (int i = 0; i < 29; ++i) view.sessions.push_back(view.sessions[0]);
+  const std::vector<std::string> lines = PrintOn(80, 24, view);
+  EXPECT_EQ(lines.size(), 24u);
+  EXPECT_EQ(lines[22], "… and 12 more");
+  EXPECT_EQ(lines[23], "q ends");
+}
+
 TEST(TopTableTest, HasUnitsThatFitTheSize) {
   EXPECT_EQ(FormatDuration(0.4), "0 s");
   EXPECT_EQ(FormatDuration(59.4), "59 s");
@@ -92,4 +132,4 @@ TEST(TopTableTest, HasUnitsThatFitTheSize) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Chains of x_t = ρ x_{t−1} + √(1 − ρ²) ε, started from the stationary N(0, 1).
@@ -85,4 +85,4 @@ TEST(EffectiveSize, OfChainsThatDoNotMoveIsTheirNumber) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

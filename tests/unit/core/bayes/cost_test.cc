@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <random>
 
 #include "core/bayes/curvature.h"
@@ -12,10 +11,8 @@
 #include "core/bayes/minimizer.h"
 #include "tests/unit/core/bayes/frequency_example.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Sums of `count` samples with random coefficients about φ_0, and the same mismatch term by term.
 struct RandomRecord {
@@ -254,4 +251,4 @@ TEST(Cost, OfTheFrequencyExampleTendsToTheMinimumNormPointOfTheValley) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 
 #include "core/bayes/identifiability.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Prior TwoNormals() {
@@ -115,4 +115,4 @@ TEST(Verdicts, ChangeAtTheirThresholds) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,15 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "core/chaos/collocation_points.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Quasi-random standard normal points.
 Matrix NormalPoints(int dimension, int count) {
@@ -63,4 +60,4 @@ TEST(LogEvidence, OfDrawsThatDoNotSpreadIsNone) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/collocation_points.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline constexpr double kMeanMass = 200;
 inline constexpr double kMassDeviation = 6.667;
@@ -59,4 +59,4 @@ inline Minimum FrequencyMinimum(const Cost& cost) {
   return FindMinima(problem, starts, {}, {}).front();
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include "core/bayes/weighted_samples.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Prior Normals(int n) {
@@ -85,4 +85,4 @@ TEST(ImportanceSample, LosesItsEffectiveSizeWhereThePosteriorIsNotGaussian) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

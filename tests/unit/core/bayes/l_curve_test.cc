@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/bayes/frequency_example.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Linear data z_i = s_i ξ_i with unit noise, unit normal priors and a residual χ² that no ξ
@@ -97,4 +97,4 @@ TEST(LCurve, SurvivesDegenerateCosts) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

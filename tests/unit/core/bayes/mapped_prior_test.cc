@@ -17,12 +17,11 @@
 #include "core/bayes/prior.h"
 #include "core/chaos/collocation_points.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 UncertainParameter Normal(const char* name, double mean, double std_dev) {
@@ -238,11 +237,11 @@ std::string Refusal(const absl::Status& status) {
   return std::string(status.message());
 }
 
-TEST(UncertainParameter, RefusesWhatIsNoLognormal) {
+TEST(MappedParameter, RefusesWhatIsNoLognormal) {
   const auto refusal = [](double mean, double std_dev) {
     return Refusal(UncertainParameter::Lognormal("k", mean, std_dev).status());
   };
-  EXPECT_THAT(refusal(0, 1), HasSubstr("k: lognormal: mean 0 must be > 0"));
+  EXPECT_THAT(refusal(0, 1), HasSubstr("lognormal: mean 0 must be > 0"));
   EXPECT_THAT(refusal(-3, 1), HasSubstr("mean -3 must be > 0"));
   EXPECT_THAT(refusal(kNan, 1), HasSubstr("mean nan"));
   EXPECT_THAT(refusal(1, kInfinity), HasSubstr("standard deviation inf must lie between"));
@@ -250,11 +249,11 @@ TEST(UncertainParameter, RefusesWhatIsNoLognormal) {
               HasSubstr("standard deviation 201 must be at most 100 times the mean 2"));
 }
 
-TEST(UncertainParameter, RefusesWhatIsNoTruncatedNormal) {
+TEST(MappedParameter, RefusesWhatIsNoTruncatedNormal) {
   const auto refusal = [](double mean, double std_dev, double lower, double upper) {
     return Refusal(UncertainParameter::TruncatedNormal("k", mean, std_dev, lower, upper).status());
   };
-  EXPECT_THAT(refusal(0, 1, 2, 2), HasSubstr("k: truncatedNormal: lower 2 must be below upper 2"));
+  EXPECT_THAT(refusal(0, 1, 2, 2), HasSubstr("truncated_normal: lower 2 must be below upper 2"));
   EXPECT_THAT(refusal(0, 1, kNan, 2), HasSubstr("lower nan must be below"));
   EXPECT_THAT(refusal(0, 0, -1, 2), HasSubstr("standard deviation 0 must be > 0"));
   EXPECT_THAT(refusal(kInfinity, 1, -1, 2), HasSubstr("mean inf"));
@@ -285,4 +284,4 @@ TEST(Correlations, RefusalNamesPairAndRule) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include "core/bayes/posterior.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Prior OneUniform() { return Prior({UncertainParameter::Uniform("a", -1, 1).value()}); }
@@ -85,7 +85,7 @@ TEST(RunChains, KeepCostsWithTheirDraws) {
   const Cost cost = CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0]; }, 0.4, 0.2}});
   ChainOptions options;
   options.effective_size = 1e9;  // never reached: as many sweeps as allowed, and draws thinned
-  options.most_sweeps = 300;
+  options.max_sweeps = 300;
   const Chains chains = RunOn(cost, 1.15, options);
   ASSERT_EQ(chains.etas.rows(), chains.costs.size());
   EXPECT_EQ(chains.etas.rows() % 1000, 0);
@@ -110,4 +110,4 @@ TEST(RunChains, AreCancelledByAStopRequest) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,10 +7,8 @@
 #include <limits>
 #include <random>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 MinimizationProblem InBox(Vector lower, Vector upper,
                           std::function<double(const Vector&, Vector*)> function) {
@@ -236,7 +234,7 @@ TEST(Minimizer, AcceptsAFlatFunction) {
 
 TEST(Minimizer, GivesUpAfterTheMostEvaluations) {
   MinimizerOptions options;
-  options.most_evaluations = 3;
+  options.max_evaluations = 3;
   const auto minima =
       FindMinima(InCube(5, 1, Quadratic(IllConditioned(5, 1e8), Vector::Constant(5, 0.3))),
                  Matrix::Constant(1, 5, 0.9), options, {});
@@ -269,4 +267,4 @@ TEST(Minimizer, IsDeterministic) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // log ∫ e^{f(x)} dx by the trapezoidal rule, which for a smooth f that vanishes at both ends is
@@ -167,4 +167,4 @@ TEST(ChannelSums, HasTheLag1CorrelationOfItsResiduals) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

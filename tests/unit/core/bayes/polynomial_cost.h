@@ -10,7 +10,7 @@
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/collocation_points.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 struct Measurement {
   std::function<double(const Vector& xi)> output;  // a polynomial of degree ≤ 2
@@ -41,4 +41,4 @@ inline Cost CostOf(const Prior& prior, const std::vector<Measurement>& measureme
   return Cost(basis, Region::WholePrior(prior.dimension()), reference, sums, prior, 1);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

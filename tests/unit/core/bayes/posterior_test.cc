@@ -9,7 +9,7 @@
 
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 Prior OneUniform() { return Prior({UncertainParameter::Uniform("a", -1, 1).value()}); }
@@ -203,4 +203,4 @@ TEST(SamplePosterior, NeedsSomewhereToStart) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

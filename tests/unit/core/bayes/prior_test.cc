@@ -8,12 +8,11 @@
 
 #include "core/bayes/region.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Prior OneOfEach() {
@@ -78,17 +77,17 @@ std::string Refusal(const absl::StatusOr<UncertainParameter>& parameter) {
 
 TEST(UncertainParameter, RefusalNamesParameterValueAndRule) {
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 5, 3)),
-              HasSubstr("k: uniform: lower 5 must be below upper 3"));
+              HasSubstr("uniform: lower 5 must be below upper 3"));
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 3, 3)), HasSubstr("must be below"));
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", -kInfinity, 3)), HasSubstr("lower -inf"));
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 0, kNan)), HasSubstr("upper nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", kNan, 1)), HasSubstr("mean nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, -1)),
-              HasSubstr("c: normal: standard deviation -1 must be > 0"));
+              HasSubstr("normal: standard deviation -1 must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, kNan)), HasSubstr("must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, 1e200)), HasSubstr("must lie between"));
   EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 0.5, 2, 0, 1)),
-              HasSubstr("v: beta: alpha 0.5 must lie between 1 and"));
+              HasSubstr("beta: alpha 0.5 must lie between 1 and"));
   EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 2, kNan, 0, 1)), HasSubstr("beta nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 0.9, 1, 0)), HasSubstr("shape 0.9"));
   EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 0, 0)), HasSubstr("scale 0 must be > 0"));
@@ -122,4 +121,4 @@ TEST(Region, MapsThereAndBackOneOrMany) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 #include "core/bayes/regularization_prior.h"
 #include "core/chaos/germ.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -177,8 +177,8 @@ TEST(RegularizedMinimum, HasNoEvidenceFromAParameterThatTheDataLeaveToThePrior) 
         UncertainParameter::TruncatedNormal("b", 0, 1, -1, 3).value()}) {
     const auto log_evidence = [&](double r) {
       // Off the bounds, as a minimizer keeps.
-      const double mode =
-          std::clamp(second.germ.Mode(), second.germ.Lower() + 1e-9, second.germ.Upper() - 1e-9);
+      const double mode = std::clamp(Germ(second.germ).Mode(), Germ(second.germ).Lower() + 1e-9,
+                                     Germ(second.germ).Upper() - 1e-9);
       const Vector at = Eigen::Vector2d(s * s * z / (s * s + r), mode);
       return DescribeMinimum(FirstOfTwo(second, s, z, r), at)->log_evidence;
     };
@@ -188,7 +188,7 @@ TEST(RegularizedMinimum, HasNoEvidenceFromAParameterThatTheDataLeaveToThePrior) 
     };
     for (const double r : {0.01, 0.3, 20.0}) {
       EXPECT_NEAR(log_evidence(r) - log_evidence(1), of_first(r) - of_first(1), 1e-5)
-          << static_cast<int>(second.germ.family()) << ", α² " << r;
+          << static_cast<int>(second.germ.family) << ", α² " << r;
     }
   }
 }
@@ -290,7 +290,7 @@ Cost OneParameter(const UncertainParameter& parameter, double z, double regulari
 // × the prior term's third and fourth derivatives): here 0.01 α².
 TEST(Evidence, OfASkewedPriorIsThatOfQuadrature) {
   const auto log_evidence = [](const UncertainParameter& parameter, double z, double r) {
-    const Germ& germ = parameter.germ;
+    const Germ germ(parameter.germ);
     const double top = std::min(germ.Upper(), 200.0);
     double sum = 0, weight = 0, best = 1e300, at = 0;
     constexpr int kSteps = 200'000;
@@ -306,7 +306,7 @@ TEST(Evidence, OfASkewedPriorIsThatOfQuadrature) {
   };
   for (const UncertainParameter& parameter : {UncertainParameter::Beta("a", 2, 2, 0, 1).value(),
                                               UncertainParameter::Gamma("a", 4, 1, 0).value()}) {
-    const double z = parameter.germ.Upper() == 1 ? 0.4 : 2;
+    const double z = Germ(parameter.germ).Upper() == 1 ? 0.4 : 2;
     for (const double r : {0.1, 1.0, 3.0}) {
       const auto [laplace, exact] = log_evidence(parameter, z, r);
       EXPECT_NEAR(laplace, exact, 0.01 * std::max(r, 1.0) + 0.02);
@@ -340,4 +340,4 @@ TEST(RegularizationBias, TakesASkewedPriorAsItIs) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -72,4 +72,4 @@ TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

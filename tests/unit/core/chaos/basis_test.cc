@@ -8,7 +8,7 @@
 #include "core/chaos/collocation_points.h"
 #include "core/chaos/gauss_rule.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 std::vector<Germ> FourFamilies() {
@@ -167,4 +167,4 @@ TEST(Basis, LegendreTermsOfOrderSixtyFourReachTheirValuesAtTheEnd) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,7 +10,7 @@
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/collocation_points.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -185,4 +185,4 @@ TEST(CollocationMatrix, AConditionNumberPastTheLimitIsRefused) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 TEST(Expansion, MomentsAreThoseOfTheCoefficients) {
@@ -71,4 +71,4 @@ TEST(QuantileOfSamples, InterpolatesTheOrderStatistics) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

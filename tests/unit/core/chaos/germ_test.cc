@@ -11,10 +11,8 @@
 
 #include "core/chaos/gauss_rule.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 const std::vector<Germ>& AllGerms() {
   static const std::vector<Germ> germs = {
@@ -239,7 +237,7 @@ TEST(Germ, QuantileFollowsTheNormalLimitForLargeShapes) {
 }
 
 TEST(Germ, KeepsItsAccuracyUpToTheLargestShape) {
-  for (const double shape : {1e3, 1e4, Germ::kMostShape}) {
+  for (const double shape : {1e3, 1e4, Germ::kMaxShape}) {
     // P(a, a) = ½ + 1/(3 √(2πa)) + O(a^(−3/2)); by symmetry I_½(a, a) = ½.
     const double expected = 0.5 + 1 / (3 * std::sqrt(2 * std::numbers::pi * shape));
     const double allowed = 1e-9 + std::pow(shape, -1.5);
@@ -283,7 +281,7 @@ TEST(TruncatedNormal, WithoutBoundsIsNormalAndWithNarrowOnesUniform) {
 // By panels of 1/50, in each of which eight Gauss–Legendre nodes are exact to rounding for
 // polynomials whose zeros lie no closer.
 TEST(TruncatedNormal, HasAsManyOrthonormalPolynomialsAsItSays) {
-  const int order = Germ::kMostTruncatedNormalOrder;
+  const int order = Germ::kMaxTruncatedNormalOrder;
   const GaussRule rule = MakeGaussRule(Germ::Uniform(), 8);
   const double width = 0.02;
   const Germ germ = Germ::TruncatedNormal(-1, kInfinity);
@@ -371,4 +369,4 @@ TEST(GermDeathTest, ShapesBelowOneAndCertainProbabilitiesAreProgrammersErrors) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 TEST(MultiIndex, TermCountIsTheBinomialCoefficient) {
@@ -76,4 +76,4 @@ TEST(MultiIndex, CountingStopsPastTheMost) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,8 +9,9 @@
 #include "core/chaos/basis.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/collocation_points.h"
+#include "core/common/sanitizer.h"
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(__GLIBC__)
+#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER && defined(__GLIBC__)
 
 namespace {
 thread_local int allocations = 0;
@@ -22,7 +23,7 @@ extern "C" void* malloc(std::size_t size) {
   return __libc_malloc(size);
 }
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class NoAllocation : public ::testing::Test {
@@ -62,6 +63,6 @@ TEST_F(NoAllocation, WhenCoefficientsAreSolvedFor) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal
 
 #endif

@@ -14,7 +14,7 @@
 #include "core/estimator/snapshot.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -162,4 +162,4 @@ TEST_F(BadSnapshot, IsOneForWhichTheRowsAreNotThereOrTaken) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

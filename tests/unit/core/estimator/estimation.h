@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "core/estimator/estimator.h"
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 // x(t) of v0 = 1 m/s: x = v0 sin(2πt)/2π.
 inline double UnitResponse(double time_s) {
@@ -47,7 +47,7 @@ inline Samples InitialVelocityRecord(const std::vector<double>& time_s, double v
 
 inline std::unique_ptr<Estimator> MakeEstimator(const Problem& problem,
                                                 EstimatorOptions options = {}) {
-  return Estimator::Make(ResolvedProblem::Make(problem).value(), std::move(options)).value();
+  return Estimator::Make(problem, std::move(options)).value();
 }
 
 inline Estimate EstimateOf(const Problem& problem, const Samples& samples) {
@@ -107,4 +107,4 @@ inline void ExpectSame(const Estimate& a, const Estimate& b) {
   }
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

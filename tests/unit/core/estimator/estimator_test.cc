@@ -1,6 +1,6 @@
 // The estimator as a stream: what must not change its answers, and what it refuses.
 
-#include "core/estimator/estimator.h"
+#include "polyest/estimator.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,12 +8,14 @@
 #include <chrono>
 #include <stop_token>
 
-#include "core/estimator/memory_store.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/model/interpolation.h"
 #include "tests/testing/oscillator.h"
 #include "tests/testing/records.h"
 #include "tests/unit/core/estimator/estimation.h"
+#include "tests/unit/core/estimator/stopping_store.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::EstimateInBatches;
@@ -34,7 +36,7 @@ const Estimate& Undisturbed() {
 TEST(Estimator, NeedsAMeasuredOutput) {
   Problem problem = testing::OscillatorProblem(3);
   problem.measured.clear();
-  const auto estimator = Estimator::Make(ResolvedProblem::Make(problem).value());
+  const auto estimator = Estimator::Make(problem);
   EXPECT_EQ(estimator.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(estimator.status().message(), "measured: at least one output must be measured");
 }
@@ -92,28 +94,6 @@ TEST(Estimator, TakesNothingWhenAlreadyStoppedAndGoesOnLater) {
   ASSERT_TRUE(estimator->Process().ok());
   ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
 }
-
-// Requests a stop when it has been read a number of times: work stops wherever the estimator looks
-// next, in the middle of a block, a replay or a settlement.
-class StoppingStore final : public SampleStore {
- public:
-  int64_t rows() const override { return samples_.rows(); }
-  absl::Status Append(const RowBlock& block) override { return samples_.Append(block); }
-  absl::Status Read(int64_t first, int64_t count, RowBlock& block) const override {
-    if (--reads_left_ == 0) source_.request_stop();
-    return samples_.Read(first, count, block);
-  }
-  Stop StopAfter(int reads) {
-    source_ = std::stop_source();
-    reads_left_ = reads;
-    return Stop(source_.get_token());
-  }
-
- private:
-  MemoryStore samples_;
-  mutable std::stop_source source_;
-  mutable int reads_left_ = 0;
-};
 
 TEST(Estimator, ReachesTheSameBitsThroughAnyStops) {
   const auto store = std::make_shared<StoppingStore>();
@@ -266,4 +246,4 @@ TEST(Estimator, TakesRowsOfANewRunOnlyAfterTheEndOfARun) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,10 +2,11 @@
 
 #include <gmock/gmock.h>
 
-#include "core/estimator/memory_store.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -34,7 +35,7 @@ TEST(Verdicts, DoNotTakeTheWeightOfThePriorForKnowledge) {
   EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kNotIdentified);
 }
 
-TEST(Estimator, RefusesASampleThatWouldDrownTheOthersInRounding) {
+TEST(EstimatorGuards, RefusesASampleThatWouldDrownTheOthersInRounding) {
   const Problem problem =
       InitialVelocityProblem(*UncertainParameter::Uniform("v0", 0.5, 1.5), 0.01);
   const Samples good = InitialVelocityRecord({0.1, 0.2, 0.3}, 1.0, 0.01);
@@ -65,7 +66,7 @@ class FailingOnceStore final : public SampleStore {
   int appends_ = 0;
 };
 
-TEST(Estimator, TakesABatchAgainThatTheStoreCouldNotTake) {
+TEST(EstimatorGuards, TakesABatchAgainThatTheStoreCouldNotTake) {
   const Problem problem =
       InitialVelocityProblem(*UncertainParameter::Uniform("v0", 0.5, 1.5), 0.01);
   EstimatorOptions options;
@@ -79,7 +80,7 @@ TEST(Estimator, TakesABatchAgainThatTheStoreCouldNotTake) {
   EXPECT_EQ(estimator->rows_appended(), 4);
 }
 
-TEST(Estimator, BeginsWithAnEmptyStoreOnly) {
+TEST(EstimatorGuards, BeginsWithAnEmptyStoreOnly) {
   const Problem problem =
       InitialVelocityProblem(*UncertainParameter::Uniform("v0", 0.5, 1.5), 0.01);
   EstimatorOptions options;
@@ -89,11 +90,11 @@ TEST(Estimator, BeginsWithAnEmptyStoreOnly) {
   row.values.push_back(1);
   row.noise.push_back(0.01);
   ASSERT_TRUE(options.store->Append(row).ok());
-  EXPECT_EQ(Estimator::Make(ResolvedProblem::Make(problem).value(), options).status().code(),
+  EXPECT_EQ(Estimator::Make(problem, options).status().code(),
             absl::StatusCode::kFailedPrecondition);
   EstimatorOptions no_threads;
   no_threads.threads = 0;
-  EXPECT_EQ(Estimator::Make(ResolvedProblem::Make(problem).value(), no_threads).status().code(),
+  EXPECT_EQ(Estimator::Make(problem, no_threads).status().code(),
             absl::StatusCode::kInvalidArgument);
 }
 
@@ -106,4 +107,4 @@ TEST(Problem, RefusesAFixedAmplitudeOfAnInputWithoutASignal) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

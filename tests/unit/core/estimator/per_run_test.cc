@@ -7,11 +7,12 @@
 
 #include <Eigen/Cholesky>
 
-#include "core/estimator/experiment_design.h"
-#include "core/estimator/studies.h"
+#include "core/estimator/estimator_access.h"
+#include "core/estimator/studies/cost_grid.h"
+#include "core/estimator/studies/experiment_design.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -114,7 +115,8 @@ TEST(PerRun, HowARecordIsCutIntoBatchesDoesNotMatter) {
 
 TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   const auto estimator = MakeEstimator(LineProblem());
-  EXPECT_EQ(estimator->problem().most_runs(), 11);  // a and 11 of b are 12
+  EXPECT_EQ(EstimatorAccess::ProblemOf(*estimator).max_runs(),
+            11);  // a and 11 of b are 12
   Samples samples;
   samples.time_s = {0, 0};
   samples.run = {0, 11};
@@ -125,13 +127,13 @@ TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   EXPECT_EQ(estimator->rows_appended(), 0);
   samples.run = {0, 10};
   EXPECT_TRUE(estimator->Append(samples).ok());
-  EXPECT_EQ(estimator->problem().dimension(), 12);
+  EXPECT_EQ(EstimatorAccess::ProblemOf(*estimator).dimension(), 12);
 }
 
 TEST(PerRun, WithoutThemRunsAreUnlimited) {
   Problem problem = LineProblem();
   problem.uncertain[0].per_run = false;
-  EXPECT_GT(ResolvedProblem::Make(problem)->most_runs(), 1'000'000);
+  EXPECT_GT(ResolvedProblem::Make(problem)->max_runs(), 1'000'000);
 }
 
 TEST(PerRun, ACorrelationIsOfParametersOfOneKind) {
@@ -220,4 +222,4 @@ TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

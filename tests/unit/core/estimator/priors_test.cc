@@ -7,19 +7,17 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 
-#include "core/estimator/studies.h"
+#include "core/estimator/studies/cost_grid.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kIndependent = 1000;  // particles that 2000 are worth at least, posterior_test.cc
 const double kMeanError = 4 / std::sqrt(kIndependent);  // in deviations
 const double kQuantileError = 4 * std::sqrt(0.025 * 0.975 / kIndependent) / 0.0584;  // of a normal
@@ -301,4 +299,4 @@ TEST(TruncatedNormalPriors, RefuseAnOrderTheyHaveNoPolynomialsFor) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -15,7 +15,7 @@
 #include "core/estimator/snapshot.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline constexpr double kStep = 0.05;
 inline constexpr int kInterval = 32;
@@ -97,4 +97,4 @@ inline Samples OscillatorRecord(int rows = 240, int runs = 1) {
   return Record("x", Displacement, 0.02, rows, runs);
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

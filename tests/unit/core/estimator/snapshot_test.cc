@@ -8,11 +8,11 @@
 
 #include <cmath>
 
-#include "core/estimator/checkpoints.h"
+#include "core/estimator/record/checkpoints.h"
 #include "core/model/equations/equation_model.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -58,8 +58,9 @@ Outcome ExpectSameBitsThroughRestarts(Problem problem, const Samples& samples, s
       ++outcome.restored;
     }
     EXPECT_TRUE(session.estimator->Process().ok());
-    EXPECT_EQ(AllNumbersOf(session.Current()), AllNumbersOf(outcome.estimates.back())) << end;
-    ExpectSame(session.Current(), outcome.estimates.back());
+    const Estimate estimate = session.Current();
+    EXPECT_EQ(AllNumbersOf(estimate), AllNumbersOf(outcome.estimates.back())) << end;
+    ExpectSame(estimate, outcome.estimates.back());
     if (!session.rows.empty()) {
       EXPECT_GT(session.rows.front(), latest.rows);
       latest = session.last;
@@ -312,4 +313,4 @@ TEST(Checkpoints, AreAFunctionOfTheRecord) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -10,7 +10,7 @@
 #include "core/model/equations/equation_model.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline Problem TextProblem(const std::string& output, std::vector<UncertainParameter> uncertain,
                            double noise) {
@@ -35,4 +35,4 @@ inline std::unique_ptr<Estimator> Processed(const Problem& problem,
   return estimator;
 }
 
-}  // namespace polyest
+}  // namespace polyest::internal

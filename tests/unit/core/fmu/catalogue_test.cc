@@ -13,7 +13,7 @@
 #include "core/fmu/archive.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::AllOf;
@@ -155,11 +155,11 @@ TEST_F(FmuFolder, RefusesArchivesThatWouldWriteElsewhere) {
 TEST_F(FmuFolder, RefusesArchivesThatAreTooLarge) {
   const std::filesystem::path file =
       Zip("large", {{"a", std::string(6000, 'a')}, {"b", std::string(6000, 'b')}});
-  const absl::StatusOr<Archive> archive = Archive::Open(file, {.most_bytes = 10'000});
+  const absl::StatusOr<Archive> archive = Archive::Open(file, {.max_bytes = 10'000});
   ASSERT_TRUE(archive.ok());
   EXPECT_THAT(archive->Unpack(folder_).message(), HasSubstr("more than the limit of 10000 bytes"));
   EXPECT_THAT(archive->Read("a", 5999).status().message(), HasSubstr("more than 5999 bytes"));
-  EXPECT_FALSE(Archive::Open(file, {.most_entries = 1}).ok());
+  EXPECT_FALSE(Archive::Open(file, {.max_entries = 1}).ok());
 }
 
 std::string Xml(const std::string& root, const std::string& body) {
@@ -222,4 +222,4 @@ TEST_F(FmuFolder, TakesFloat32AndStartValuesOfStates) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kG = 9.81;
@@ -107,4 +107,4 @@ TEST_P(Switch, TurnsAtTheTimesThatTheFmuNames) {
 INSTANTIATE_TEST_SUITE_P(Versions, Switch, testing::Values("switch_me2", "switch_me3"));
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -12,9 +12,10 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "core/common/sanitizer.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using testing::AllOf;
@@ -22,7 +23,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZER
 constexpr bool kSanitized = true;
 #else
 constexpr bool kSanitized = false;
@@ -90,7 +91,7 @@ TEST_F(FaultyFmu, ThatHangsHeedsAStop) {
 
 TEST_F(FaultyFmu, ThatLeaksMeetsItsLimitOfMemory) {
   if (kSanitized) GTEST_SKIP() << "a sanitized worker has no limit of memory";
-  EXPECT_THAT(Error("leak_at", 0.31, {.most_memory_bytes = int64_t{512} << 20}),
+  EXPECT_THAT(Error("leak_at", 0.31, {.max_memory_bytes = int64_t{512} << 20}),
               AllOf(HasSubstr("was killed by signal 11"), HasSubstr("the limit is 512 MiB")));
 }
 
@@ -228,4 +229,4 @@ TEST_F(FaultyFmu, NeedsTheProgramThatRunsIt) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

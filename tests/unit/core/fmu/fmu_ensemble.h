@@ -9,10 +9,10 @@
 
 #include "core/common/check.h"
 #include "core/fmu/catalogue.h"
-#include "core/model/catalogue.h"
 #include "core/propagation/ensemble_propagator.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline FmuCatalogue TestFmus(const WorkerLimits& limits = {}) {
   return *FmuCatalogue::Open(POLYEST_TEST_FMUS, limits);
@@ -81,4 +81,4 @@ struct FmuEnsemble {
   std::vector<PointFailure> failures;  // of the last propagation
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 FmuEnsemble Oscillator(std::shared_ptr<const Model> model) {
@@ -102,4 +102,4 @@ INSTANTIATE_TEST_SUITE_P(Versions, CoSimulationInputs,
                          testing::Values("oscillator_cs2", "oscillator_cs3"));
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

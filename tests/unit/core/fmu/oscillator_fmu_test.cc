@@ -8,7 +8,7 @@
 
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // 70 points: two blocks, the second not full.
@@ -105,4 +105,4 @@ TEST(FmuEnsemble, DoesNotDependOnHowTheTimesAreCut) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

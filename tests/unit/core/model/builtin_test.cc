@@ -13,7 +13,7 @@
 #include "core/model/builtin/pendulum.h"
 #include "core/model/builtin/roll_plane_2dof.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 namespace {
 
 template <class Equations>
@@ -214,4 +214,4 @@ TEST(Pendulum, IsSlowedByBothDampingsInEitherDirection) {
 }
 
 }  // namespace
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

@@ -1,4 +1,4 @@
-#include "core/model/catalogue.h"
+#include "polyest/catalogue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
-namespace polyest {
+#include "core/model/list_names.h"
+
+namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -208,4 +210,4 @@ TEST(ModelDescription, ListsNamesForMessages) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,12 +9,11 @@
 #include <string>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = std::numbers::pi;
 // A few roundings of sin's argument, which stays below 100 here.
@@ -202,40 +201,41 @@ TEST(StreamedInputDeathTest, TakesOnlyFiniteKnotsInIncreasingTime) {
 
 TEST(InputSignal, NamesTheFieldTheValueAndTheRule) {
   EXPECT_EQ(Refusal(SinusoidInput{.frequency_hz = 0}),
-            "sinusoid: frequencyHz 0 must be finite and above 0");
+            "sinusoid.frequency_hz: 0 must be finite and above 0");
   EXPECT_EQ(Refusal(TableInput{.time_s = {0, 1}, .value = {2}}),
-            "table: timeS has 2 entries and value 1; they must be equally many");
-  EXPECT_EQ(Refusal(TableInput{}), "table: timeS has 0 entries; there must be at least 1");
+            "table.time_s: 2 times for 1 values; they must be equally many");
+  EXPECT_EQ(Refusal(TableInput{}), "table.time_s: there must be at least one");
   EXPECT_EQ(Refusal(TableInput{.time_s = {0, 3, 3}, .value = {0, 0, 0}}),
-            "table: timeS[2] 3 must be above timeS[1] 3");
+            "table.time_s[2]: 3 must be above the time before, 3");
 }
 
 TEST(InputSignal, RefusesNumbersThatAreNotFinite) {
-  EXPECT_THAT(Refusal(ConstantInput{.amplitude = kNan}), HasSubstr("constant: amplitude"));
-  EXPECT_THAT(Refusal(StepInput{.amplitude = kInfinity}), HasSubstr("step: amplitude"));
-  EXPECT_THAT(Refusal(StepInput{.time_s = kNan}), HasSubstr("step: timeS"));
-  EXPECT_THAT(Refusal(SinusoidInput{.amplitude = kNan}), HasSubstr("sinusoid: amplitude"));
-  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = kInfinity}), HasSubstr("frequencyHz"));
-  EXPECT_THAT(Refusal(SinusoidInput{.phase_rad = kNan}), HasSubstr("phaseRad"));
-  EXPECT_THAT(Refusal(ChirpInput{.amplitude = kNan}), HasSubstr("chirp: amplitude"));
-  EXPECT_THAT(Refusal(ChirpInput{.start_s = kNan}), HasSubstr("startS"));
-  EXPECT_THAT(Refusal(ChirpInput{.phase_rad = kNan}), HasSubstr("phaseRad"));
-  EXPECT_THAT(Refusal(HalfSineBumpInput{.amplitude = kNan}), HasSubstr("halfSineBump: amplitude"));
-  EXPECT_THAT(Refusal(HalfSineBumpInput{.start_s = kNan}), HasSubstr("startS"));
-  EXPECT_THAT(Refusal(TableInput{.time_s = {kNan}, .value = {0}}), HasSubstr("timeS[0]"));
+  EXPECT_THAT(Refusal(ConstantInput{.amplitude = kNan}), HasSubstr("constant.amplitude: "));
+  EXPECT_THAT(Refusal(StepInput{.amplitude = kInfinity}), HasSubstr("step.amplitude: "));
+  EXPECT_THAT(Refusal(StepInput{.time_s = kNan}), HasSubstr("step.time_s: "));
+  EXPECT_THAT(Refusal(SinusoidInput{.amplitude = kNan}), HasSubstr("sinusoid.amplitude: "));
+  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = kInfinity}), HasSubstr("frequency_hz"));
+  EXPECT_THAT(Refusal(SinusoidInput{.phase_rad = kNan}), HasSubstr("phase_rad"));
+  EXPECT_THAT(Refusal(ChirpInput{.amplitude = kNan}), HasSubstr("chirp.amplitude: "));
+  EXPECT_THAT(Refusal(ChirpInput{.start_s = kNan}), HasSubstr("start_s"));
+  EXPECT_THAT(Refusal(ChirpInput{.phase_rad = kNan}), HasSubstr("phase_rad"));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.amplitude = kNan}),
+              HasSubstr("half_sine_bump.amplitude: "));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.start_s = kNan}), HasSubstr("start_s"));
+  EXPECT_THAT(Refusal(TableInput{.time_s = {kNan}, .value = {0}}), HasSubstr("table.time_s[0]: "));
   EXPECT_THAT(Refusal(TableInput{.time_s = {0}, .value = {kNan}}), HasSubstr("value[0]"));
   EXPECT_THAT(Refusal(TableInput{.time_s = {0}, .value = {0}, .amplitude = kNan}),
-              HasSubstr("table: amplitude"));
-  EXPECT_THAT(Refusal(StreamedInput{.amplitude = kNan}), HasSubstr("streamed: amplitude"));
+              HasSubstr("table.amplitude: "));
+  EXPECT_THAT(Refusal(StreamedInput{.amplitude = kNan}), HasSubstr("streamed.amplitude: "));
 }
 
 TEST(InputSignal, RefusesFrequenciesAndDurationsWithoutMeaning) {
-  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = -1}), HasSubstr("frequencyHz -1"));
-  EXPECT_THAT(Refusal(ChirpInput{.start_frequency_hz = -1}), HasSubstr("startFrequencyHz -1"));
-  EXPECT_THAT(Refusal(ChirpInput{.end_frequency_hz = -2}), HasSubstr("endFrequencyHz -2"));
-  EXPECT_THAT(Refusal(ChirpInput{.duration_s = 0}), HasSubstr("durationS 0"));
-  EXPECT_THAT(Refusal(HalfSineBumpInput{.duration_s = -0.5}), HasSubstr("durationS -0.5"));
+  EXPECT_THAT(Refusal(SinusoidInput{.frequency_hz = -1}), HasSubstr("frequency_hz: -1"));
+  EXPECT_THAT(Refusal(ChirpInput{.start_frequency_hz = -1}), HasSubstr("start_frequency_hz: -1"));
+  EXPECT_THAT(Refusal(ChirpInput{.end_frequency_hz = -2}), HasSubstr("end_frequency_hz: -2"));
+  EXPECT_THAT(Refusal(ChirpInput{.duration_s = 0}), HasSubstr("duration_s: 0"));
+  EXPECT_THAT(Refusal(HalfSineBumpInput{.duration_s = -0.5}), HasSubstr("duration_s: -0.5"));
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

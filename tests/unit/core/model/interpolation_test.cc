@@ -10,7 +10,7 @@
 
 #include "core/model/input_signal.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 double Cubic(double t) { return 1 + t * (-2 + t * (0.5 + 0.25 * t)); }
@@ -162,4 +162,4 @@ TEST(SmoothCurveDeathTest, IsNotReadBeforeItIsSettled) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -16,7 +16,7 @@
 #include "core/model/builtin/roll_plane_2dof.h"
 #include "core/model/builtin/roll_plane_4dof.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Positive numbers that differ in every row and column, in (0.5, 2.5).
@@ -157,4 +157,4 @@ TEST(LaneModelDeathTest, RefusesBlocksOfTheWrongShape) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -18,7 +18,7 @@
 #include "core/model/builtin/roll_plane_4dof.h"
 #include "core/model/lane_model.h"
 
-namespace polyest::builtin {
+namespace polyest::internal::builtin {
 namespace {
 
 template <class Equations>
@@ -408,4 +408,4 @@ TEST(Lanes, HaveAHyperbolicTangent) {
 }
 
 }  // namespace
-}  // namespace polyest::builtin
+}  // namespace polyest::internal::builtin

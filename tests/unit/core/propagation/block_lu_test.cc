@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 TEST(BlockLu, SolvesEachPointsOwnSystemWhateverItsPivots) {
@@ -41,4 +41,4 @@ TEST(BlockLu, SolvesEachPointsOwnSystemWhateverItsPivots) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

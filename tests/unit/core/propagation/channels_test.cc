@@ -8,7 +8,7 @@
 
 #include "tests/unit/core/propagation/ensemble.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr double kOmega = 3;
@@ -132,4 +132,4 @@ TEST(DelayedInput, SurvivesTheFailureOfAPoint) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -9,7 +9,7 @@
 #include "tests/unit/core/propagation/ensemble.h"
 #include "tests/unit/core/propagation/oscillator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 constexpr int kInterval = 10;
@@ -183,4 +183,4 @@ TEST(Checkpoint, RefusesWhatCannotBeOfTheEnsemble) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

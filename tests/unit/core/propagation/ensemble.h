@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "core/model/catalogue.h"
 #include "core/propagation/ensemble_propagator.h"
+#include "polyest/catalogue.h"
 
-namespace polyest {
+namespace polyest::internal {
 
 inline InputSignal Signal(InputSpecification specification) {
   return *InputSignal::Make(std::move(specification));
@@ -70,4 +70,4 @@ struct Ensemble {
   std::vector<PointFailure> failures;  // of the last propagation
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

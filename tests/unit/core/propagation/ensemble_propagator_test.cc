@@ -12,13 +12,13 @@
 #include "tests/unit/core/propagation/ensemble.h"
 #include "tests/unit/core/propagation/oscillator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // A step adds at most the tolerance, relative to each state's own amplitude, to displacement and
 // velocity; the free motion does not magnify it. No test here takes more than 500 steps, so that
 // the global error, relative to the amplitude, stays below
-constexpr double kMostErrorsInTolerances = 1000;
+constexpr double kMaxErrorsInTolerances = 1000;
 
 // Oscillators of 0.8 to 1 Hz, lightly damped; every third one starts at x = 0.
 Oscillator Slow(int point) {
@@ -62,7 +62,7 @@ TEST(EnsemblePropagator, FollowsTheClosedFormOfDampedOscillatorsWithinItsToleran
   for (const double tolerance : {1e-4, 1e-7, 1e-10}) {
     Ensemble ensemble = SlowOscillators(20, tolerance);
     const double error = WorstErrorOfSlow(ensemble.Propagate(times_s), times_s);
-    EXPECT_LT(error, kMostErrorsInTolerances * tolerance);
+    EXPECT_LT(error, kMaxErrorsInTolerances * tolerance);
     EXPECT_GT(error, 0);
   }
 }
@@ -82,8 +82,7 @@ TEST(EnsemblePropagator, TreatsEachPointOfAnyNumberAlike) {
   const std::vector<double> times_s = TimesUntil(2, 0.1);
   for (const int points : {1, 7, 8, 9, 64, 65}) {
     Ensemble ensemble = SlowOscillators(points, 1e-8);
-    EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s),
-              kMostErrorsInTolerances * 1e-8)
+    EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s), kMaxErrorsInTolerances * 1e-8)
         << points;
   }
 }
@@ -231,7 +230,7 @@ TEST(EnsemblePropagator, KeepsTheAccuracyOfOneFastPointAmongManySlowOnes) {
     Set(ensemble, 40, fast);
     const Matrix x = ensemble.Propagate(times_s);
     for (size_t i = 0; i < times_s.size(); ++i) {
-      EXPECT_NEAR(x(40, i), fast.Free(times_s[i]), kMostErrorsInTolerances * tolerance);
+      EXPECT_NEAR(x(40, i), fast.Free(times_s[i]), kMaxErrorsInTolerances * tolerance);
     }
   }
 }
@@ -245,7 +244,7 @@ TEST(EnsemblePropagator, KeepsThePointsOfSmallAmplitudeAsAccurateAsTheOthers) {
   const std::vector<double> times_s = TimesUntil(5, 0.05);
   const Matrix x = ensemble.Propagate(times_s);
   for (size_t i = 0; i < times_s.size(); ++i) {
-    EXPECT_NEAR(x(5, i), small.Free(times_s[i]), 0.01 * kMostErrorsInTolerances * 1e-6);
+    EXPECT_NEAR(x(5, i), small.Free(times_s[i]), 0.01 * kMaxErrorsInTolerances * 1e-6);
   }
 }
 
@@ -261,13 +260,13 @@ TEST_P(StiffOscillators, AreFollowedInFewSteps) {
   }
   ensemble.specification.integration.method = GetParam();
   // An explicit method needs t c/(3.3 m) ≈ 18 million steps.
-  ensemble.specification.integration.most_steps = 5000;
+  ensemble.specification.integration.max_steps = 5000;
   const std::vector<double> times_s = TimesUntil(5, 0.5);
   const Matrix x = ensemble.Propagate(times_s);
   EXPECT_TRUE(ensemble.failures.empty());
   for (int point = 0; point < 12; ++point) {
     for (size_t i = 0; i < times_s.size(); ++i) {
-      EXPECT_NEAR(x(point, i), oscillators[point].Free(times_s[i]), kMostErrorsInTolerances * 1e-7);
+      EXPECT_NEAR(x(point, i), oscillators[point].Free(times_s[i]), kMaxErrorsInTolerances * 1e-7);
     }
   }
 }
@@ -279,7 +278,7 @@ TEST(EnsemblePropagator, FollowsTheClosedFormWithTheStiffMethodToo) {
   const std::vector<double> times_s = TimesUntil(5, 0.05);
   Ensemble ensemble = SlowOscillators(20, 1e-8);
   ensemble.specification.integration.method = IntegrationMethod::kStiff;
-  EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s), kMostErrorsInTolerances * 1e-8);
+  EXPECT_LT(WorstErrorOfSlow(ensemble.Propagate(times_s), times_s), kMaxErrorsInTolerances * 1e-8);
 }
 
 TEST(EnsemblePropagator, EvaluatesAnAlgebraicModel) {
@@ -307,11 +306,11 @@ TEST(IntegrationOptions, NameTheValueThatIsWrong) {
   IntegrationOptions options;
   EXPECT_TRUE(options.Validate().ok());
   options.relative_tolerance = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("relativeTolerance: nan"));
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("relative_tolerance: nan"));
   options = {};
-  options.most_steps = 0;
-  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("maxSteps: 0"));
+  options.max_steps = 0;
+  EXPECT_THAT(options.Validate().message(), ::testing::HasSubstr("max_steps: 0"));
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

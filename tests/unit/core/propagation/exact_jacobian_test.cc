@@ -8,7 +8,7 @@
 #include "core/model/equations/equation_model.h"
 #include "core/propagation/ensemble_propagator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 // Another model that counts how often it is asked, with or without its derivatives.
@@ -108,4 +108,4 @@ TEST(ExactJacobian, FallsBackToDifferencesWhereADerivativeIsInfinite) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 
 struct Oscillator {
   double m = 1;
@@ -58,4 +58,4 @@ struct Oscillator {
   }
 };
 
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 TEST(ParallelFor, DoesEachItemOnceForAnyNumberOfThreads) {
@@ -28,4 +28,4 @@ TEST(ParallelFor, ThrowsAgainWhatAnItemThrew) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -8,7 +8,7 @@
 #include "tests/unit/core/propagation/ensemble.h"
 #include "tests/unit/core/propagation/oscillator.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 const std::vector<double> kTimes = TimesUntil(4, 0.1);
@@ -178,7 +178,7 @@ TEST(PointFailures, NameTheStepsThatRanOut) {
   ensemble.Set("v0", 1.0);
   ensemble.Set("k", 3, 1e8);  // 5 kHz
   ensemble.specification.integration.method = IntegrationMethod::kExplicit;
-  ensemble.specification.integration.most_steps = 1000;
+  ensemble.specification.integration.max_steps = 1000;
   ensemble.Propagate({0, 1});
   ASSERT_EQ(ensemble.failures.size(), 1u);
   EXPECT_EQ(ensemble.failures[0].point, 3);
@@ -187,4 +187,4 @@ TEST(PointFailures, NameTheStepsThatRanOut) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

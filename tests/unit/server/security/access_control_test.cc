@@ -5,7 +5,7 @@
 
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 class AccessControlTest : public testing::Test {
@@ -107,4 +107,4 @@ TEST(AccessControl, KnowsHoldersOfCertificatesByTheirNames) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
-namespace polyest {
+#include "proto/wire/transport/loopback.h"
+
+namespace polyest::internal {
 namespace {
 
 TEST(Exposure, KnowsLoopback) {
@@ -36,4 +38,4 @@ TEST(Exposure, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -7,7 +7,7 @@
 
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 TEST(FileChanges, TellsAChangeOnceWhenItHasSettled) {
@@ -63,4 +63,4 @@ TEST(FileWatch, EndsWithoutWaitingForItsNextLook) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

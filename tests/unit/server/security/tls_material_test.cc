@@ -7,7 +7,7 @@
 #include "tests/testing/certificates.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::StartsWith;
@@ -79,4 +79,4 @@ TEST_F(TlsMaterialTest, KeepsServingWhenNewFilesAreNoGood) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -5,7 +5,7 @@
 
 #include <set>
 
-namespace polyest {
+namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -46,9 +46,13 @@ TEST(TokenTable, FindsNobodyForOtherTokens) {
   EXPECT_FALSE(table->Find(ToHex(DigestOf(rig.secret))));
 }
 
-TEST(TokenTable, TakesAnEmptyFileAsOneOfNobody) {
-  EXPECT_EQ(TokenTable::Parse("", "tokens")->size(), 0);
-  EXPECT_EQ(TokenTable::Parse("# nobody", "tokens")->size(), 0);
+TEST(TokenTable, RefusesAFileWithoutAToken) {
+  for (const char* empty : {"", "\n \n", "# nobody"}) {
+    const absl::Status refused = TokenTable::Parse(empty, "tokens").status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(std::string(refused.message()),
+                testing::StartsWith("tokens: there is no token in it"));
+  }
 }
 
 TEST(TokenTable, TakesTwoTokensOfOneName) {
@@ -111,4 +115,4 @@ TEST(Token, IsMadeForANameATenantAndARoleOnly) {
 }
 
 }  // namespace
-}  // namespace polyest
+}  // namespace polyest::internal

@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# Runs what a release must pass beside .ci/run, and what takes too long for it, and says how long each
+# step took. Needs a Debian 12 machine, and root to install packages and boot one.
+#
+#   tests/release.sh [STEP]...    all steps, in this order, unless some are named
+#
+#   crashes      kills the daemon 200 times while rigs stream to it (17 minutes on two cores)
+#   sanitized    all unit tests under the address and undefined-behaviour sanitizers
+#   fuzz         fuzzes equations and calls for half an hour
+#   threads      looks for races in the tests in which threads meet (90 minutes)
+#   calibration  asks of 1,008 campaigns whether the uncertainty is true (10 minutes)
+#   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
+#                them, and compares their speed with a native build
+#
+# Stops at the first step that fails; its exit status is that step's.
+set -euo pipefail
+
+root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+cd "$root"
+all_steps=(crashes sanitized fuzz threads calibration package)
+
+crashes() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target durability_test
+  POLYEST_TEST_CRASHES=200 ctest --preset release --tests-regex 'integration/durability_test'
+}
+
+sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label unit; }
+
+fuzz() { tests/fuzz/run.sh 1800; }
+
+threads() { tests/threads/run.sh; }
+
+calibration() {
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target calibration
+  build/release/bin/calibration 1008
+}
+
+package() {
+  deploy/package.sh
+  tests/package/run.sh
+  tests/package/boot.sh
+  tests/bench/packaged.sh
+}
+
+for step in "$@"; do
+  if [[ "$step" == --help ]]; then
+    sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+    exit 0
+  fi
+  if [[ " ${all_steps[*]} " != *" $step "* ]]; then
+    echo "tests/release.sh: unknown step '$step'; there are ${all_steps[*]}" >&2
+    exit 2
+  fi
+done
+[[ $# -gt 0 ]] || set -- "${all_steps[@]}"
+
+summary=()
+for step in "$@"; do
+  printf '\n==> %s\n' "$step"
+  began=$SECONDS
+  "$step"
+  summary+=("$(printf '%-12s %5d s' "$step" $((SECONDS - began)))")
+done
+printf '\n==> all passed\n'
+printf '%s\n' "${summary[@]}" "$(printf '%-12s %5d s' total "$SECONDS")"

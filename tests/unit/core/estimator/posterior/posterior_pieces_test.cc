@@ -1,0 +1,112 @@
+#include "core/estimator/posterior/posterior_pieces.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/equations/equation_model.h"
+#include "polyest/problem.h"
+#include "tests/unit/core/bayes/polynomial_cost.h"
+
+namespace polyest::internal {
+namespace {
+
+Prior Normals(int dimension) {
+  std::vector<UncertainParameter> parameters;
+  for (int i = 0; i < dimension; ++i) {
+    parameters.push_back(UncertainParameter::Normal(std::string(1, 'a' + i), 0, 1).value());
+  }
+  return Prior(parameters);
+}
+
+// The whole prior, as far as pieces are concerned: a box of ±4 standard deviations.
+ExpansionDesign WideDesign(int dimension) {
+  ExpansionDesign design;
+  design.region = Region::WholePrior(dimension);
+  design.lower = Vector::Constant(dimension, -4);
+  design.upper = -design.lower;
+  return design;
+}
+
+std::vector<Matrix> PiecesOf(const Cost& cost, int particles = 1000) {
+  const ExpansionDesign design = WideDesign(cost.dimension());
+  SamplerOptions options;
+  options.particles = particles;
+  const Particles drawn =
+      SamplePosterior(cost, design.lower, design.upper, Matrix(0, cost.dimension()), options, {})
+          .value();
+  return FindPieces(cost, design, drawn.etas);
+}
+
+// What a² = 1 with a noise of 0.1 leaves: a = ±1, each with a standard deviation of 0.05.
+std::vector<Measurement> SquareOfTheFirst() {
+  return {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.1}};
+}
+
+TEST(PosteriorPieces, AreTwoWhereASignIsNotObserved) {
+  for (const int n : {1, 2, 6}) {
+    const std::vector<Matrix> pieces = PiecesOf(CostOf(Normals(n), SquareOfTheFirst()));
+    ASSERT_EQ(pieces.size(), 2U) << n;
+    EXPECT_EQ(pieces[0].rows() + pieces[1].rows(), 1000);
+    const double first = pieces[0].col(0).maxCoeff(), second = pieces[1].col(0).minCoeff();
+    EXPECT_LT(std::min(first, second), 0) << n;
+    EXPECT_NEAR(std::abs(pieces[0].col(0).mean()), 1, 0.05);
+    EXPECT_LT(pieces[0].col(0).mean() * pieces[1].col(0).mean(), 0);
+  }
+}
+
+TEST(PosteriorPieces, AreFourWhereTwoSignsAreNotObserved) {
+  std::vector<Measurement> measurements = SquareOfTheFirst();
+  measurements.push_back({[](const Vector& xi) { return xi[1] * xi[1]; }, 1.5, 0.1});
+  const std::vector<Matrix> pieces = PiecesOf(CostOf(Normals(2), measurements));
+  ASSERT_EQ(pieces.size(), 4U);
+  for (const Matrix& piece : pieces) {
+    // All of a piece's particles have the signs of its mean.
+    for (int j = 0; j < 2; ++j) {
+      const double sign = piece.col(j).mean() > 0 ? 1 : -1;
+      EXPECT_GT((sign * piece.col(j)).minCoeff(), 0);
+    }
+  }
+}
+
+TEST(PosteriorPieces, AreOneOfAGaussian) {
+  for (const int n : {1, 2, 6}) {
+    const Cost cost = CostOf(Normals(n), {{[](const Vector& xi) { return xi.sum(); }, 0.3, 0.05}});
+    EXPECT_EQ(PiecesOf(cost).size(), 1U) << n;
+  }
+}
+
+// b = a² along ±2: a banana whose straight chord has a density of nothing.
+TEST(PosteriorPieces, AreOneOfABanana) {
+  const Cost cost =
+      CostOf(Normals(2), {{[](const Vector& xi) { return xi[1] - xi[0] * xi[0]; }, -1, 0.05}});
+  EXPECT_EQ(PiecesOf(cost).size(), 1U);
+}
+
+// a b = 1, of which the prior leaves two branches; each is a piece, though a curved valley.
+TEST(PosteriorPieces, AreTheBranchesOfAHyperbola) {
+  const Cost cost = CostOf(Normals(2), {{[](const Vector& xi) { return xi[0] * xi[1]; }, 1, 0.02}});
+  const std::vector<Matrix> pieces = PiecesOf(cost);
+  ASSERT_EQ(pieces.size(), 2U);
+  EXPECT_LT(pieces[0].col(0).mean() * pieces[1].col(0).mean(), 0);
+}
+
+// a = b to 10⁻⁴: a thousandth as wide as long.
+TEST(PosteriorPieces, AreOneOfAValley) {
+  const Cost cost = CostOf(Normals(2), {{[](const Vector& xi) { return xi[0] - xi[1]; }, 0, 1e-4}});
+  EXPECT_EQ(PiecesOf(cost).size(), 1U);
+}
+
+// Two minima with a saddle of 3 between them: far less than what separates.
+TEST(PosteriorPieces, AreOneWhereALowSaddleJoinsTwoMinima) {
+  const Cost cost = CostOf(Normals(1), {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.4}});
+  EXPECT_EQ(PiecesOf(cost).size(), 1U);
+}
+
+TEST(PosteriorPieces, AreNotToldApartByFewParticles) {
+  EXPECT_EQ(PiecesOf(CostOf(Normals(1), SquareOfTheFirst()), 199).size(), 1U);
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,229 @@
+#include "core/estimator/record/sample_checks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "polyest/catalogue.h"
+
+namespace polyest::internal {
+namespace {
+
+std::vector<double> Row(const CheckedSamples& checked, const std::vector<double>& all, size_t row) {
+  const auto width = static_cast<std::ptrdiff_t>(all.size() / checked.rows.size());
+  const auto begin = all.begin() + static_cast<std::ptrdiff_t>(row) * width;
+  return {begin, begin + width};
+}
+
+std::vector<double> RowValues(const CheckedSamples& checked, size_t row) {
+  return Row(checked, checked.values, row);
+}
+
+std::vector<double> RowNoise(const CheckedSamples& checked, size_t row) {
+  return Row(checked, checked.noise, row);
+}
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// x and v measured, the force streamed.
+ResolvedProblem StreamedProblem() {
+  Problem problem;
+  problem.model = *FindBuiltinModel("mass_spring_damper");
+  problem.uncertain = {UncertainParameter::Uniform("c", 0, 1).value()};
+  problem.inputs = {{"force", StreamedInput{}}};
+  problem.measured = {{"x", {.absolute = 0.1, .relative = 0.01, .relative_to_max = 0.001}},
+                      {"v", {.relative = 0.5}}};
+  return ResolvedProblem::Make(problem).value();
+}
+
+Samples ThreeRows() {
+  Samples samples;
+  samples.time_s = {0, 1, 2};
+  samples.columns = {{"x", {1, -3, 2}, {}}, {"force", {5, 6, 7}, {}}};
+  return samples;
+}
+
+class SampleChecksTest : public ::testing::Test {
+ protected:
+  std::string Refusal(const Samples& samples) const {
+    const auto checked = checks_.Check(samples);
+    EXPECT_EQ(checked.status().code(), absl::StatusCode::kInvalidArgument) << checked.status();
+    return std::string(checked.status().message());
+  }
+  void Take(const Samples& samples) { checks_.Accept(checks_.Check(samples).value()); }
+
+  const ResolvedProblem problem_ = StreamedProblem();
+  SampleChecks checks_{problem_};
+};
+
+TEST_F(SampleChecksTest, PlaceValuesByTheProblemsOrderWithNanWhereMissing) {
+  const CheckedSamples checked = checks_.Check(ThreeRows()).value();
+  ASSERT_EQ(checked.rows.size(), 3u);
+  EXPECT_EQ(checked.rows[2].time_s, 2);
+  EXPECT_EQ(checked.rows[2].run, 0);
+  EXPECT_THAT(RowValues(checked, 1), ElementsAre(-3, ::testing::IsNan(), 6));
+  EXPECT_EQ(RowNoise(checked, 1)[1], 0);
+}
+
+// σ = absolute + relative |z| + relative_to_max max |z| up to the sample itself.
+TEST_F(SampleChecksTest, GiveNoiseWithTheMaximumSoFar) {
+  const CheckedSamples checked = checks_.Check(ThreeRows()).value();
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 0)[0], 0.1 + 0.01 * 1 + 0.001 * 1);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 1)[0], 0.1 + 0.01 * 3 + 0.001 * 3);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 3);
+}
+
+TEST_F(SampleChecksTest, GiveTheSameNoiseHoweverTheRecordIsCut) {
+  const CheckedSamples whole = checks_.Check(ThreeRows()).value();
+  for (size_t k = 0; k < 3; ++k) {
+    Samples row;
+    row.time_s = {ThreeRows().time_s[k]};
+    row.columns = {{"x", {ThreeRows().columns[0].value[k]}, {}},
+                   {"force", {ThreeRows().columns[1].value[k]}, {}}};
+    const CheckedSamples checked = checks_.Check(row).value();
+    EXPECT_EQ(RowNoise(checked, 0), RowNoise(whole, k));
+    checks_.Accept(checked);
+  }
+}
+
+TEST_F(SampleChecksTest, IgnoreTheValueOfAMissingSample) {
+  Samples samples = ThreeRows();
+  samples.columns[0].value[1] = kNan;
+  samples.columns[0].missing = {false, true, false};
+  const CheckedSamples checked = checks_.Check(samples).value();
+  EXPECT_TRUE(std::isnan(RowValues(checked, 1)[0]));
+  EXPECT_EQ(RowNoise(checked, 1)[0], 0);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);  // 3 was not measured
+}
+
+TEST_F(SampleChecksTest, KeepTheNoiseAboveZero) {
+  Samples samples = ThreeRows();
+  samples.columns.push_back({"v", {0, 0, 4}, {}});
+  const CheckedSamples checked = checks_.Check(samples).value();
+  EXPECT_EQ(RowNoise(checked, 0)[1], NoiseModel::kMinStandardDeviation);
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2);
+}
+
+TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {
+  EXPECT_TRUE(checks_.Check(ThreeRows()).ok());
+  Samples earlier = ThreeRows();
+  earlier.time_s = {0, 0.5, 0.75};
+  earlier.columns[0].value = {1, 1, 1};
+  const CheckedSamples checked = checks_.Check(earlier).value();
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 + 0.001);  // not the 3 of the batch before
+}
+
+TEST_F(SampleChecksTest, TakeRunsThatBeginAgainAtZero) {
+  Samples samples = ThreeRows();
+  samples.run = {0, 0, 1};
+  samples.time_s = {0, 5, 0};
+  Take(samples);
+  Samples next = ThreeRows();
+  next.run = {1, 3, 3};  // a run without samples may be left out
+  next.time_s = {1, 0, 1};
+  EXPECT_TRUE(checks_.Check(next).ok());
+}
+
+TEST_F(SampleChecksTest, RefuseNoRows) {
+  EXPECT_EQ(Refusal(Samples()), "the measurements have no rows");
+}
+
+TEST_F(SampleChecksTest, AnswerAnUnknownColumnWithTheColumnsThereAre) {
+  Samples samples = ThreeRows();
+  samples.columns.push_back({"a", {1, 2, 3}, {}});
+  EXPECT_EQ(Refusal(samples),
+            "column \"a\" is neither a measured output nor a streamed input of the problem; it has "
+            "x, v, force");
+}
+
+TEST_F(SampleChecksTest, RefuseAColumnGivenTwice) {
+  Samples samples = ThreeRows();
+  samples.columns.push_back(samples.columns[0]);
+  EXPECT_EQ(Refusal(samples), "column x is given twice");
+}
+
+TEST_F(SampleChecksTest, RefuseColumnsOfAnotherLength) {
+  Samples samples = ThreeRows();
+  samples.columns[0].value.pop_back();
+  EXPECT_EQ(Refusal(samples), "column x: 2 values for 3 rows");
+  samples = ThreeRows();
+  samples.run = {0, 0, 0, 0};
+  EXPECT_EQ(Refusal(samples), "run: 4 values for 3 rows");
+  samples = ThreeRows();
+  samples.columns[0].missing = {true};
+  EXPECT_EQ(Refusal(samples), "column x: 1 missing flags for 3 rows");
+}
+
+TEST_F(SampleChecksTest, RefuseTimesThatAreNone) {
+  for (const double time_s : {-0.5, kNan, std::numeric_limits<double>::infinity()}) {
+    Samples samples = ThreeRows();
+    samples.time_s[1] = time_s;
+    EXPECT_THAT(Refusal(samples), ::testing::StartsWith("row 1, column t: "));
+    EXPECT_THAT(Refusal(samples), HasSubstr("must be a finite time ≥ 0"));
+  }
+}
+
+TEST_F(SampleChecksTest, RefuseTimesThatDoNotIncrease) {
+  for (const double time_s : {1.0, 0.5}) {
+    Samples samples = ThreeRows();
+    samples.time_s[2] = time_s;
+    EXPECT_THAT(Refusal(samples), HasSubstr("row 2, column t: "));
+    EXPECT_THAT(Refusal(samples), HasSubstr("after 1; times must increase within a run"));
+  }
+}
+
+TEST_F(SampleChecksTest, RefuseTimesThatGoBackFromBatchToBatch) {
+  Take(ThreeRows());
+  Samples next = ThreeRows();
+  next.time_s = {2, 3, 4};
+  EXPECT_EQ(Refusal(next), "row 0, column t: 2 after 2; times must increase within a run");
+  next.time_s = {2.5, 3, 4};
+  EXPECT_TRUE(checks_.Check(next).ok());
+}
+
+TEST_F(SampleChecksTest, RefuseARecordThatDoesNotBeginWithRunZero) {
+  for (const int run : {1, -1}) {
+    Samples samples = ThreeRows();
+    samples.run = {run, run, run};
+    EXPECT_THAT(Refusal(samples), HasSubstr("row 0, column run: "));
+    EXPECT_THAT(Refusal(samples), HasSubstr("runs start at 0 and never decrease"));
+  }
+}
+
+TEST_F(SampleChecksTest, RefuseRunsThatDecrease) {
+  Samples samples = ThreeRows();
+  samples.run = {0, 1, 0};
+  EXPECT_EQ(Refusal(samples), "row 2, column run: 0 after 1; runs start at 0 and never decrease");
+  samples.run = {0, 1, 1};
+  samples.time_s = {0, 1, 2};
+  Take(samples);
+  Samples next = ThreeRows();
+  next.time_s = {3, 4, 5};  // run 0 where none is given
+  EXPECT_EQ(Refusal(next), "row 0, column run: 0 after 1; runs start at 0 and never decrease");
+}
+
+TEST_F(SampleChecksTest, RefuseAStreamedInputThatIsNotThere) {
+  Samples samples = ThreeRows();
+  samples.columns.pop_back();
+  EXPECT_EQ(Refusal(samples), "column force is missing: the input is streamed");
+  samples = ThreeRows();
+  samples.columns[1].missing = {false, false, true};
+  EXPECT_EQ(Refusal(samples), "row 2, column force: a streamed input needs a value in every row");
+}
+
+TEST_F(SampleChecksTest, RefuseValuesThatAreNoNumbers) {
+  Samples samples = ThreeRows();
+  samples.columns[0].value[1] = kNan;
+  EXPECT_EQ(Refusal(samples), "row 1, column x: nan must be a finite number");
+  samples = ThreeRows();
+  samples.columns[1].value[0] = -std::numeric_limits<double>::infinity();
+  EXPECT_EQ(Refusal(samples), "row 0, column force: -inf must be a finite number");
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,319 @@
+#include "core/estimator/studies/experiment_design.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/estimator/estimator_access.h"
+#include "core/estimator/studies/sample_times.h"
+#include "core/model/equations/equation_model.h"
+#include "polyest/catalogue.h"
+#include "polyest/estimator.h"
+
+namespace polyest::internal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+UncertainParameter Normal(const char* name, double mean, double std_dev) {
+  return UncertainParameter::Normal(name, mean, std_dev).value();
+}
+
+Problem ProblemOf(EquationSpecification equations, std::vector<UncertainParameter> uncertain) {
+  Problem problem;
+  problem.model = MakeEquationModel(equations).value();
+  problem.uncertain = std::move(uncertain);
+  return problem;
+}
+
+// x = x_0 + a t, x_0 ~ N(0, 2²), a ~ N(1, 3²), x measured with σ = 0.5; its rate v = a is not.
+Problem Line() {
+  Problem problem = ProblemOf({.states = {{"x", "a"}}, .outputs = {{"v", "a"}, {"x", "x"}}},
+                              {Normal("x_0", 0, 2), Normal("a", 1, 3)});
+  problem.measured = {{"x", {.absolute = 0.5}}};
+  return problem;
+}
+
+// Posterior covariance of (x_0, a) of the line after samples of x at the times with σ = 0.5.
+Eigen::Matrix2d LineCovariance(const std::vector<double>& time_s) {
+  Eigen::Matrix2d precision = Eigen::Vector2d(1.0 / 4, 1.0 / 9).asDiagonal();
+  for (const double t : time_s) {
+    const Eigen::Vector2d slope(1, t);
+    precision += slope * slope.transpose() / 0.25;
+  }
+  return precision.inverse();
+}
+
+// ½ log₂ of prior over posterior determinant.
+double LineBits(const Eigen::Matrix2d& covariance) {
+  return 0.5 * std::log2(4 * 9 / covariance.determinant());
+}
+
+ResolvedProblem Resolve(Problem problem) {
+  return ResolvedProblem::Make(std::move(problem)).value();
+}
+
+ExperimentDesign Design(const Problem& problem, double until_s, double step_s, int samples = 3,
+                        std::vector<MeasuredOutput> possible = {}) {
+  ExperimentOptions options;
+  options.until_s = until_s;
+  options.step_s = step_s;
+  options.samples = samples;
+  options.possible = std::move(possible);
+  const auto design = DesignExperiment(Resolve(problem), options, {});
+  EXPECT_TRUE(design.ok()) << design.status();
+  return *design;
+}
+
+TEST(ExperimentDesign, OfALinearModelIsKalmansUpdate) {
+  // The slopes are the same everywhere, so that the mean over draws is exact.
+  const ExperimentDesign design = Design(Line(), 2, 0.5);
+  const Eigen::Matrix2d after = LineCovariance({0, 0.5, 1, 1.5, 2});
+  EXPECT_NEAR(design.gain.bits, LineBits(after), 1e-7);
+  EXPECT_NEAR(design.gain.standard_deviation[0], std::sqrt(after(0, 0)), 1e-7);
+  EXPECT_NEAR(design.gain.standard_deviation[1], std::sqrt(after(1, 1)), 1e-7);
+  EXPECT_THAT(design.diagnostics, IsEmpty());
+}
+
+TEST(ExperimentDesign, TakesTheBestTimesOneAfterTheOther) {
+  // The last time tells most of x_0 + a t; beside it the first tells most of x_0; then the last
+  // but one, by the determinants of all choices below.
+  const ExperimentDesign design = Design(Line(), 2, 0.5, 3);
+  ASSERT_EQ(design.samples.size(), 3u);
+  std::vector<double> chosen;
+  for (int step = 0; step < 3; ++step) {
+    double best = 0;
+    double best_bits = 0;
+    for (const double t : {0.0, 0.5, 1.0, 1.5, 2.0}) {
+      if (std::count(chosen.begin(), chosen.end(), t) > 0) continue;
+      std::vector<double> times = chosen;
+      times.push_back(t);
+      const double bits = LineBits(LineCovariance(times));
+      if (bits > best_bits) {
+        best_bits = bits;
+        best = t;
+      }
+    }
+    chosen.push_back(best);
+    const SampleTime& sample = design.samples[static_cast<size_t>(step)];
+    EXPECT_EQ(sample.time_s, best);
+    EXPECT_NEAR(sample.gain.bits, best_bits, 1e-7);
+    EXPECT_NEAR(sample.gain.standard_deviation[1], std::sqrt(LineCovariance(chosen)(1, 1)), 1e-7);
+  }
+  EXPECT_THAT(chosen, ElementsAre(2, 0, 1.5));
+}
+
+TEST(ExperimentDesign, ComparesOutputsAloneAndTogether) {
+  // v = a with σ = 0.1 at five times tells a alone: precision 1/9 + 5/0.01.
+  const ExperimentDesign design = Design(Line(), 2, 0.5, 3, {{"v", {.absolute = 0.1}}});
+  ASSERT_EQ(design.outputs.size(), 2u);
+  const OutputGain& x = design.outputs[0];
+  EXPECT_EQ(x.output, "x");
+  EXPECT_TRUE(x.measured);
+  EXPECT_NEAR(x.noise, 0.5, 1e-12);
+  EXPECT_EQ(x.alone.bits, design.gain.bits);
+  EXPECT_EQ(x.together.bits, design.gain.bits);
+  const OutputGain& v = design.outputs[1];
+  EXPECT_EQ(v.output, "v");
+  EXPECT_FALSE(v.measured);
+  EXPECT_NEAR(v.noise, 0.1, 1e-12);
+  EXPECT_NEAR(v.alone.bits, 0.5 * std::log2(9 * (1.0 / 9 + 500)), 1e-7);
+  EXPECT_NEAR(v.alone.standard_deviation[0], 2, 1e-7);
+  EXPECT_NEAR(v.alone.standard_deviation[1], 1 / std::sqrt(1.0 / 9 + 500), 1e-9);
+  Eigen::Matrix2d precision = LineCovariance({0, 0.5, 1, 1.5, 2}).inverse();
+  precision(1, 1) += 500;
+  EXPECT_NEAR(v.together.bits, LineBits(precision.inverse()), 1e-7);
+}
+
+TEST(ExperimentDesign, AssumesOnePercentOfTheRangeForNoiseThatIsNotKnown) {
+  // v = a, between −5 and 7.
+  const ExperimentDesign design = Design(Line(), 2, 0.5);
+  ASSERT_EQ(design.outputs.size(), 2u);
+  EXPECT_NEAR(design.outputs[1].noise, 0.12, 1e-9);
+}
+
+TEST(ExperimentDesign, TakesAnOutputThatIsMeasuredAnywayOnce) {
+  EXPECT_EQ(Design(Line(), 2, 0.5, 1, {{"x", {}}, {"v", {}}, {"v", {}}}).outputs.size(), 2u);
+  EXPECT_EQ(Design(Line(), 2, 0.5, 1, {{"x", {}}}).outputs.size(), 1u);
+}
+
+TEST(ExperimentDesign, PlansAllOutputsWhenNoneIsMeasured) {
+  Problem problem = Line();
+  problem.measured.clear();
+  const ExperimentDesign design = Design(problem, 2, 0.5, 1);
+  ASSERT_EQ(design.outputs.size(), 2u);
+  EXPECT_FALSE(design.outputs[0].measured);
+  EXPECT_GT(design.gain.bits, design.outputs[0].alone.bits);
+  EXPECT_GT(design.gain.bits, design.outputs[1].alone.bits);
+  EXPECT_EQ(design.outputs[0].together.bits, design.gain.bits);
+}
+
+TEST(ExperimentDesign, AveragesOverThePriorWhereTheModelIsNotLinear) {
+  // y = a², a ~ N(1, 0.2²), σ = 0.1: the mean of ½ log₂(1 + (2 a · 0.2/0.1)²). The oracle is
+  // midpoint quadrature; 64 draws of Halton's sequence err by about a hundredth.
+  Problem problem = ProblemOf({.outputs = {{"y", "a^2"}}}, {Normal("a", 1, 0.2)});
+  problem.measured = {{"y", {.absolute = 0.1}}};
+  const ExperimentDesign design = Design(problem, 1, 1, 1);
+  double mean = 0;
+  for (double u = -6; u < 6; u += 1e-3) {
+    const double density = std::exp(-0.5 * u * u) / std::sqrt(2 * std::numbers::pi);
+    const double slope = 2 * (1 + 0.2 * u) * 0.2 / 0.1;
+    mean += 1e-3 * density * 0.5 * std::log2(1 + slope * slope);
+  }
+  ASSERT_EQ(design.samples.size(), 1u);
+  EXPECT_NEAR(design.samples[0].gain.bits, mean, 0.03);
+}
+
+TEST(ExperimentDesign, KeepsThePriorOfWhatIsNotSeen) {
+  Problem problem =
+      ProblemOf({.outputs = {{"y", "a"}}, .parameters = {{"b", 1}}},
+                {Normal("a", 0, 1), UncertainParameter::Lognormal("b", 3, 2).value()});
+  problem.measured = {{"y", {.absolute = 0.1}}};
+  const ExperimentDesign design = Design(problem, 1, 1, 5);
+  EXPECT_NEAR(design.gain.standard_deviation[1], 2, 1e-6);
+  EXPECT_EQ(design.samples.size(), 2u);
+}
+
+TEST(ExperimentDesign, ChoosesNoTimesThatAddNothing) {
+  Problem problem =
+      ProblemOf({.states = {{"x", "a"}}, .outputs = {{"x", "x"}}}, {Normal("a", 1, 1)});
+  problem.measured = {{"x", {.absolute = 0.1}}};
+  const ExperimentDesign design = Design(problem, 1, 0.5, 10);
+  ASSERT_EQ(design.samples.size(), 2u);  // not t = 0
+  EXPECT_EQ(design.samples[0].time_s, 1);
+  EXPECT_EQ(design.samples[1].time_s, 0.5);
+}
+
+TEST(ExperimentDesign, PrefersAnInputThatExcites) {
+  const auto bits = [](InputSpecification signal) {
+    Problem problem;
+    problem.model = *FindBuiltinModel("mass_spring_damper");
+    problem.fixed = {{"m", 1}, {"c", 1}};
+    problem.uncertain = {UncertainParameter::Uniform("k", 36, 42).value()};
+    problem.inputs = {{"force", std::move(signal)}};
+    problem.measured = {{"x", {.absolute = 0.001}}};
+    return Design(problem, 5, 0.05).gain.bits;
+  };
+  const double resonant = bits(SinusoidInput{.amplitude = 1, .frequency_hz = 1});
+  const double slow = bits(SinusoidInput{.amplitude = 1, .frequency_hz = 0.1});
+  const double none = bits(ConstantInput{0});
+  EXPECT_GT(resonant, slow + 1);
+  EXPECT_GT(slow, 1);
+  EXPECT_NEAR(none, 0, 1e-9);
+}
+
+TEST(ExperimentDesign, SaysWhenTheExpansionIsNoLongerExact) {
+  Problem problem;
+  problem.model = *FindBuiltinModel("mass_spring_damper");
+  problem.fixed = {{"m", 1}, {"x0", 1}};
+  problem.uncertain = {UncertainParameter::Uniform("k", 31.584, 47.376).value()};
+  problem.measured = {{"x", {.absolute = 0.01}}};
+  EXPECT_THAT(Design(problem, 1, 0.05, 3, {{"v", {.absolute = 0.06}}}).diagnostics, IsEmpty());
+  const ExperimentDesign late = Design(problem, 20, 0.1, 3, {{"v", {.absolute = 0.06}}});
+  ASSERT_EQ(late.diagnostics.size(), 1u);
+  EXPECT_EQ(late.diagnostics[0].code, DiagnosticCode::kExpansionInaccurate);
+  EXPECT_THAT(late.diagnostics[0].message, AllOf(HasSubstr("x by "), HasSubstr("v by ")));
+}
+
+TEST(ExperimentDesign, RefusalNamesFieldValueAndRule) {
+  const auto refusal = [](auto change) {
+    ExperimentOptions options;
+    options.until_s = 2;
+    options.step_s = 0.5;
+    change(options);
+    return std::string(DesignExperiment(Resolve(Line()), options, {}).status().message());
+  };
+  EXPECT_THAT(refusal([](auto& o) { o.until_s = 0; }), HasSubstr("until_s: 0 must"));
+  EXPECT_THAT(refusal([](auto& o) { o.samples = 0; }), HasSubstr("samples: 0 must"));
+  EXPECT_THAT(refusal([](auto& o) { o.samples = 1001; }), HasSubstr("1 and 1000"));
+  EXPECT_THAT(refusal([](auto& o) {
+                o.possible = {{"w", {}}};
+              }),
+              AllOf(HasSubstr("possible[0]"), HasSubstr("\"w\""), HasSubstr("v, x")));
+  EXPECT_THAT(refusal([](auto& o) {
+                o.possible = {{"x", {.absolute = 1}}};
+              }),
+              HasSubstr("possible[0].noise: output x has a noise already"));
+  EXPECT_THAT(refusal([](auto& o) {
+                o.possible = {{"v", {.absolute = -1}}};
+              }),
+              HasSubstr("possible[0].noise: -1"));
+  EXPECT_THAT(refusal([](auto& o) { o.step_s = 1e-6; }), HasSubstr("limit"));
+}
+
+TEST(ExperimentDesign, EndsOnAStopRequest) {
+  std::stop_source source;
+  source.request_stop();
+  const Stop stop(source.get_token());
+  ExperimentOptions options;
+  options.until_s = 2;
+  options.step_s = 0.5;
+  EXPECT_EQ(DesignExperiment(Resolve(Line()), options, stop).status().code(),
+            absl::StatusCode::kCancelled);
+  EXPECT_EQ(ChooseSampleTimes({Matrix::Ones(2, 1)}, 1, 1, stop).status().code(),
+            absl::StatusCode::kCancelled);
+}
+
+// Samples of the line with x_0 = 1, a = 2.
+Estimate LineEstimate(const ResolvedProblem& problem, const std::vector<double>& time_s) {
+  const auto estimator = EstimatorAccess::Make(problem).value();
+  Samples samples;
+  samples.time_s = time_s;
+  samples.columns = {{"x", {}, {}}};
+  for (const double t : time_s) samples.columns[0].value.push_back(1 + 2 * t);
+  EXPECT_TRUE(estimator->Append(samples).ok());
+  EXPECT_TRUE(estimator->Process().ok());
+  return estimator->CurrentEstimate().value();
+}
+
+TEST(EstimateAsPrior, HasItsMeansAndCovariance) {
+  const ResolvedProblem problem = Resolve(Line());
+  const Estimate estimate = LineEstimate(problem, {0, 1, 2});
+  const ResolvedProblem next = WithEstimateAsPrior(problem, estimate).value();
+  const Prior& prior = next.prior();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(prior.Mean()[i], estimate.parameters[static_cast<size_t>(i)].mean, 1e-12);
+  }
+  const Matrix jacobian = prior.Jacobian(Vector::Zero(2));
+  EXPECT_TRUE((jacobian * jacobian.transpose()).isApprox(estimate.covariance, 1e-6));
+}
+
+TEST(EstimateAsPrior, MakesGainsOfOneExperimentAndTheNextAddUp) {
+  const ResolvedProblem problem = Resolve(Line());
+  const ResolvedProblem next =
+      WithEstimateAsPrior(problem, LineEstimate(problem, {0, 1, 2})).value();
+  ExperimentOptions options;
+  options.until_s = 2;
+  options.step_s = 1;
+  const double first = DesignExperiment(problem, options, {})->gain.bits;
+  const double second = DesignExperiment(next, options, {})->gain.bits;
+  // Both times all of t = 0, 1, 2 is sampled. The curvature is exact to rounding here.
+  EXPECT_NEAR(first + second, LineBits(LineCovariance({0, 1, 2, 0, 1, 2})), 1e-4);
+}
+
+TEST(EstimateAsPrior, StaysWithinTheBounds) {
+  Problem problem = Line();
+  problem.uncertain = {Normal("x_0", 0, 2), UncertainParameter::Uniform("a", 0, 4).value()};
+  const ResolvedProblem before = Resolve(problem);
+  const ResolvedProblem wide = WithEstimateAsPrior(before, LineEstimate(before, {0.1})).value();
+  EXPECT_EQ(wide.prior().parameters()[1].germ.family, GermFamily::kTruncatedNormal);
+  // At a bound mean + scale · germ rounds, to half a unit in the last place of its terms, below 4.
+  constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+  for (const double score : {-30.0, 30.0}) {
+    EXPECT_GE(wide.prior().OfScore(1, score), -kRounding);
+    EXPECT_LE(wide.prior().OfScore(1, score), 4 + kRounding);
+  }
+  std::vector<double> many;
+  for (int k = 0; k < 400; ++k) many.push_back(0.01 * k);
+  const ResolvedProblem sharp = WithEstimateAsPrior(before, LineEstimate(before, many)).value();
+  EXPECT_EQ(sharp.prior().parameters()[1].germ.family, GermFamily::kNormal);
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,129 @@
+// The graph shares what is common, and the program computes it once.
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "core/model/equations/definitions.h"
+#include "core/model/equations/differentiate.h"
+#include "core/model/equations/expressions.h"
+#include "core/model/equations/program.h"
+
+namespace polyest::internal::equations {
+namespace {
+
+// Expressions of the variables a, b, c, d.
+class Shared {
+ public:
+  explicit Shared(const std::vector<std::string>& texts) {
+    for (const char* name : {"a", "b", "c", "d"}) {
+      names_[name] = graph_.Variable(static_cast<int>(places_.size()));
+      places_.push_back({0, std::ssize(places_)});
+    }
+    for (const std::string& text : texts) {
+      const auto syntax = Parse("text", text, {});
+      EXPECT_TRUE(syntax.ok()) << syntax.status();
+      roots_.push_back(*Lower(*syntax, names_, {}, graph_));
+    }
+  }
+
+  NodeId root(size_t i) const { return roots_[i]; }
+  Program Compile() const { return Program(graph_, roots_, places_, {}); }
+  int Instructions() const { return Compile().instructions(); }
+
+ private:
+  Graph graph_{1000};
+  std::map<std::string, NodeId> names_;
+  std::vector<VariablePlace> places_;
+  std::vector<NodeId> roots_;
+};
+
+TEST(EquationGraph, MakesOneNodeOfWhatMeansTheSame) {
+  const char* const same[][2] = {{"a*b + c", "c + b*a"}, {"a - b", "a + -b"},
+                                 {"-(a - b)", "b - a"},  {"a + 0", "a"},
+                                 {"1*a", "a"},           {"a^2", "a*a"},
+                                 {"a^3", "a*a*a"},       {"a/2", "0.5*a"},
+                                 {"2*3*a", "6*a"},       {"2*(3*a)", "6*a"},
+                                 {"-a*b", "-(a*b)"},     {"a/-b", "-(a/b)"},
+                                 {"--a", "a"},           {"min(a, b)", "min(b, a)"},
+                                 {"a > b", "b < a"},     {"a^0.5", "sqrt(a)"},
+                                 {"1/a^2", "a^-2"},      {"a^0", "1"},
+                                 {"0*a", "0"},           {"a - a", "0"},
+                                 {"if(1, a, b)", "a"},   {"if(a, b, b)", "b"},
+                                 {"2 + 3", "5"},         {"sin(0)", "0"},
+                                 {"a/1", "a"},           {"0/a", "0"},
+                                 {"-a - b", "-(a + b)"}};
+  for (const auto& [left, right] : same) {
+    const Shared both({left, right});
+    EXPECT_EQ(both.root(0), both.root(1)) << left << " and " << right;
+  }
+}
+
+TEST(EquationProgram, ComputesCommonSubexpressionsOnce) {
+  // k x + c v, its quotient, sine and the sum: the second expression adds one instruction.
+  EXPECT_EQ(Shared({"sin(a*b + c*d)/d"}).Instructions(), 4);
+  EXPECT_EQ(Shared({"sin(a*b + c*d)/d", "sin(d*c + b*a)/d + a"}).Instructions(), 5);
+  EXPECT_EQ(Shared({"exp(a) + exp(a)*b + exp(a)*c"}).Instructions(), 3);
+  // An expression asked for twice is copied.
+  EXPECT_EQ(Shared({"exp(a)", "exp(a)"}).Instructions(), 2);
+}
+
+TEST(EquationProgram, DrawsAProductIntoTheSum) {
+  EXPECT_EQ(Shared({"a*b + c"}).Instructions(), 1);
+  EXPECT_EQ(Shared({"a*b - c"}).Instructions(), 1);
+  EXPECT_EQ(Shared({"c - a*b"}).Instructions(), 1);
+  EXPECT_EQ(Shared({"a*b + c", "a*b"}).Instructions(), 2);
+}
+
+TEST(EquationProgram, ReusesRegistersThatAreNoLongerNeeded) {
+  std::string sum = "a";
+  for (int i = 0; i < 100; ++i) sum += " + sin(" + std::to_string(i + 1) + "*b)";
+  const Program program = Shared({sum}).Compile();
+  // A hundred sines and sums, and all products but that with 1.
+  EXPECT_EQ(program.instructions(), 299);
+  EXPECT_LE(program.registers(), 3);
+}
+
+TEST(EquationProgram, ComputesConstantsVariablesAndZeros) {
+  const Shared shared({"0", "2", "b", "b", "a + b"});
+  const Program program = shared.Compile();
+  Eigen::ArrayXXd variables(kLanes, 4), results(kLanes, 5);
+  for (int i = 0; i < 4; ++i) variables.col(i).setConstant(i + 1);
+  const ConstBlock block(variables);
+  const std::array<const ConstBlock*, 1> blocks = {&block};
+  program.Run(0, blocks, results);
+  const Eigen::Array<double, 1, 5> expected(0, 2, 2, 2, 3);
+  EXPECT_TRUE((results == expected.replicate(kLanes, 1)).all());
+}
+
+TEST(Expressions, TieParametersToOthers) {
+  const auto expressions = Expressions::Make(
+      "derived", {{"I", "m*r^2"}, {"I2", "2*I + k"}, {"k2", "k"}}, {"k", "m", "unused", "r"});
+  ASSERT_TRUE(expressions.ok()) << expressions.status();
+  EXPECT_EQ(expressions->names(), (std::vector<std::string>{"I", "I2", "k2"}));
+  EXPECT_EQ(expressions->variables_used(), (std::set<std::string>{"k", "m", "r"}));
+  for (const Eigen::Index rows : {0, 1, 7, 8, 9, 64, 100}) {
+    const Matrix variables = Matrix::NullaryExpr(rows, 4, [](Eigen::Index i, Eigen::Index j) {
+      return 1 + 0.5 * static_cast<double>(i) + static_cast<double>(j);
+    });
+    Matrix results(rows, 3);
+    expressions->Evaluate(variables, results);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double inertia = variables(i, 1) * variables(i, 3) * variables(i, 3);
+      EXPECT_NEAR(results(i, 0), inertia, 1e-15 * inertia);
+      EXPECT_NEAR(results(i, 1), 2 * inertia + variables(i, 0), 1e-15 * inertia * 4);
+      EXPECT_EQ(results(i, 2), variables(i, 0));
+    }
+  }
+}
+
+TEST(Expressions, MayBeNone) {
+  const auto expressions = Expressions::Make("derived", {}, {"k"});
+  ASSERT_TRUE(expressions.ok()) << expressions.status();
+  Matrix results(3, 0);
+  expressions->Evaluate(Matrix::Ones(3, 1), results);
+  EXPECT_TRUE(expressions->variables_used().empty());
+}
+
+}  // namespace
+}  // namespace polyest::internal::equations

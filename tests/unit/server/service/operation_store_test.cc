@@ -1,0 +1,113 @@
+#include "server/service/operation_store.h"
+
+#include <gtest/gtest.h>
+
+namespace polyest::internal {
+namespace {
+
+class OperationStoreTest : public testing::Test {
+ protected:
+  // Jobs wait in `queue_` until they are run.
+  absl::StatusOr<v1::Operation> Start(const std::string& tenant = "a",
+                                      const absl::Status& outcome = absl::OkStatus()) {
+    return store_.Start(tenant, "ComputeEstimate", [&](v1::ComputationResult* result) {
+      return Job{[this](Task task) {
+                   if (full_) return absl::ResourceExhaustedError("the queue is full");
+                   queue_.push_back(std::move(task));
+                   return absl::OkStatus();
+                 },
+                 [result, outcome](const Stop& stop, const UnaryCall::Finisher& finish) {
+                   result->mutable_estimate()->mutable_estimate()->set_samples(7);
+                   const absl::Status stopped = stop.Check();
+                   finish(stopped.ok() ? outcome : stopped);
+                   return absl::OkStatus();
+                 }};
+    });
+  }
+
+  void RunAll() {
+    for (Task& task : queue_) task();
+    queue_.clear();
+  }
+
+  v1::Operation::State StateOf(const std::string& name) { return store_.Get("a", name)->state(); }
+
+  std::vector<Task> queue_;
+  bool full_ = false;
+  OperationStore::Clock::time_point now_{};
+  OperationStore store_{{.per_tenant = 2, .max_computing = std::chrono::seconds(60)},
+                        [] { return google::protobuf::Timestamp(); },
+                        [this] { return now_; }};
+};
+
+TEST_F(OperationStoreTest, KeepsAResultUntilItIsFetched) {
+  const auto started = Start();
+  ASSERT_TRUE(started.ok()) << started.status();
+  EXPECT_EQ(started->state(), v1::Operation::QUEUED);
+  EXPECT_EQ(StateOf(started->name()), v1::Operation::QUEUED);
+  RunAll();
+  const auto done = store_.Get("a", started->name());
+  EXPECT_EQ(done->state(), v1::Operation::SUCCEEDED);
+  EXPECT_EQ(done->response().estimate().estimate().samples(), 7);
+}
+
+TEST_F(OperationStoreTest, HidesOperationsFromOtherTenants) {
+  const auto started = Start();
+  EXPECT_TRUE(absl::IsNotFound(store_.Get("b", started->name()).status()));
+  EXPECT_TRUE(absl::IsNotFound(store_.Cancel("b", started->name()).status()));
+  EXPECT_TRUE(absl::IsNotFound(store_.Delete("b", started->name())));
+  EXPECT_TRUE(store_.List("b", "", 10)->empty());
+  RunAll();
+  EXPECT_EQ(StateOf(started->name()), v1::Operation::SUCCEEDED);
+}
+
+TEST_F(OperationStoreTest, CancelsWhatWaits) {
+  const auto started = Start();
+  ASSERT_TRUE(store_.Cancel("a", started->name()).ok());
+  RunAll();
+  EXPECT_EQ(StateOf(started->name()), v1::Operation::CANCELLED);
+}
+
+TEST_F(OperationStoreTest, LeavesWhatIsDoneAsItIs) {
+  const auto failed = Start("a", absl::InvalidArgumentError("uncertain: none"));
+  RunAll();
+  ASSERT_TRUE(store_.Cancel("a", failed->name()).ok());
+  const auto found = store_.Get("a", failed->name());
+  EXPECT_EQ(found->state(), v1::Operation::FAILED);
+  EXPECT_EQ(found->error().message(), "uncertain: none");
+  EXPECT_FALSE(found->has_response());
+}
+
+TEST_F(OperationStoreTest, MakesRoomByForgettingWhatEndedFirst) {
+  const auto first = Start(), second = Start();
+  RunAll();
+  const auto third = Start();
+  ASSERT_TRUE(third.ok()) << third.status();
+  EXPECT_TRUE(absl::IsNotFound(store_.Get("a", first->name()).status()));
+  EXPECT_TRUE(store_.Get("a", second->name()).ok());
+  ASSERT_TRUE(Start().ok());
+  // Both are under way now; another tenant has room of its own.
+  EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
+  EXPECT_TRUE(Start("b").ok());
+  RunAll();
+}
+
+TEST_F(OperationStoreTest, ForgetsAnHourAfterTheEnd) {
+  const auto started = Start();
+  now_ += std::chrono::hours(2);
+  EXPECT_TRUE(store_.Get("a", started->name()).ok());
+  RunAll();
+  now_ += std::chrono::minutes(59);
+  EXPECT_TRUE(store_.Get("a", started->name()).ok());
+  now_ += std::chrono::minutes(2);
+  EXPECT_TRUE(absl::IsNotFound(store_.Get("a", started->name()).status()));
+}
+
+TEST_F(OperationStoreTest, KeepsNothingOfWhatFindsNoRoom) {
+  full_ = true;
+  EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
+  EXPECT_TRUE(store_.List("a", "", 10)->empty());
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,92 @@
+// All that is wrong with a problem is said at once.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert/problem.h"
+#include "tests/testing/problem_json.h"
+
+namespace polyest::internal {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+std::vector<std::string> Messages(const v1::Problem& problem) {
+  std::vector<std::string> messages;
+  for (const absl::Status& refusal : CheckProblem(problem)) {
+    messages.emplace_back(refusal.message());
+  }
+  return messages;
+}
+
+TEST(CheckProblem, HasNothingToSayAgainstAGoodOne) {
+  EXPECT_THAT(Messages(SmallProblem()), IsEmpty());
+}
+
+TEST(CheckProblem, SaysEverythingAndToProblemTheFirstOfIt) {
+  const v1::Problem problem = ProblemFromJson(R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "fixed": {"mass": 1},
+    "uncertain": [{"name": "k", "uniform": {"lower": 5, "upper": 3}},
+                  {"name": "c"},
+                  {"name": "stiffness", "normal": {"mean": 1, "stdDev": 1}}],
+    "inputs": [{"name": "force"}, {"name": "wind", "sinusoid": {"frequencyHz": -1}}],
+    "measured": [{"output": "x"}, {"output": "y", "noise": {"absolute": -1}}],
+    "expansion": {"order": -1},
+    "regularization": -2,
+    "integration": {"maxSteps": -1}
+  })");
+  const std::vector<std::string> messages = Messages(problem);
+  EXPECT_THAT(
+      messages,
+      ElementsAre(StartsWith("uncertain[0].uniform: lower 5 must be below upper 3"),
+                  StartsWith("uncertain[1]: c needs a prior"),
+                  StartsWith("inputs[0]: force needs a signal"), StartsWith("regularization: -2"),
+                  StartsWith("expansion.order: -1"), StartsWith("integration.maxSteps: -1"),
+                  StartsWith("inputs[1].sinusoid.frequencyHz: -1"),
+                  StartsWith("measured[0].noise: output x needs a noise"),
+                  StartsWith("measured[1].noise.absolute: -1"),
+                  StartsWith("inputs[1]: model mass_spring_damper has no input \"wind\""),
+                  StartsWith("measured[1]: model mass_spring_damper has no output \"y\""),
+                  StartsWith("fixed.mass: model mass_spring_damper has no parameter"),
+                  StartsWith("uncertain[2]: model mass_spring_damper has no parameter")));
+  EXPECT_EQ(ToProblem(problem).status().message(), messages.front());
+}
+
+TEST(CheckProblem, SaysWhatItCanWithoutAModel) {
+  EXPECT_THAT(Messages(ProblemFromJson(R"({
+        "model": {"builtin": "rocket"},
+        "uncertain": [{"name": "k", "uniform": {"lower": 5, "upper": 3}}],
+        "inputs": [{"name": "u", "halfSineBump": {"amplitude": 1, "durationS": 0}}],
+        "measured": [{"output": "x", "noise": {"relative": -1}}],
+        "expansion": {"pointsPerTerm": 0.5}})")),
+              ElementsAre(StartsWith("model.builtin: "), StartsWith("uncertain[0].uniform: "),
+                          StartsWith("expansion.pointsPerTerm: 0.5"),
+                          StartsWith("inputs[0].halfSineBump.durationS: 0"),
+                          StartsWith("measured[0].noise.relative: -1")));
+  EXPECT_THAT(Messages(v1::Problem()),
+              ElementsAre(StartsWith("model: a model must be named"), StartsWith("uncertain: ")));
+}
+
+TEST(CheckProblem, LooksIntoTheModelThoughNothingIsUncertain) {
+  v1::Problem problem = SmallProblem();
+  problem.clear_uncertain();
+  problem.mutable_measured(0)->set_output("y");
+  EXPECT_THAT(Messages(problem), ElementsAre(StartsWith("uncertain: "), StartsWith("measured[0]")));
+}
+
+TEST(CheckProblem, NamesEveryEquationThatIsWrong) {
+  const v1::Problem problem = ProblemFromJson(R"json({
+    "model": {"equations": {"states": {"x": "v", "v": "-k*x +"},
+                            "outputs": {"x": "x", "a": "sine(x)"}}},
+    "uncertain": [{"name": "k", "uniform": {"lower": 5, "upper": 3}}]
+  })json");
+  EXPECT_THAT(Messages(problem),
+              ElementsAre(StartsWith("model.equations."), StartsWith("model.equations."),
+                          StartsWith("uncertain[0].uniform: ")));
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,99 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "proto/wire/convert/measurements.h"
+
+namespace polyest::internal {
+namespace {
+
+// Three rows of x and v; v misses the second.
+v1::Measurements ThreeRows() {
+  v1::Measurements measurements;
+  for (const double time : {0.1, 0.2, 0.1}) measurements.add_time_s(time);
+  for (const int run : {0, 0, 1}) measurements.add_run(run);
+  auto& x = *measurements.add_channels();
+  x.set_name("x");
+  for (const double value : {1.0, 2.0, 3.0}) x.add_values(value);
+  auto& v = *measurements.add_channels();
+  v.set_name("v");
+  for (const double value : {4.0, std::nan(""), 6.0}) v.add_values(value);
+  v.add_missing(1);
+  return measurements;
+}
+
+std::string MessageOf(const v1::Measurements& measurements) {
+  const auto samples = ToSamples(measurements);
+  EXPECT_EQ(samples.status().code(), absl::StatusCode::kInvalidArgument);
+  return std::string(samples.status().message());
+}
+
+TEST(ToSamples, KeepsRowsRunsColumnsAndGaps) {
+  const auto samples = ToSamples(ThreeRows());
+  ASSERT_TRUE(samples.ok()) << samples.status();
+  EXPECT_EQ(samples->time_s, (std::vector<double>{0.1, 0.2, 0.1}));
+  EXPECT_EQ(samples->run, (std::vector<int>{0, 0, 1}));
+  ASSERT_EQ(samples->columns.size(), 2u);
+  EXPECT_EQ(samples->columns[0].name, "x");
+  EXPECT_EQ(samples->columns[0].value, (std::vector<double>{1, 2, 3}));
+  EXPECT_TRUE(samples->columns[0].missing.empty());
+  EXPECT_EQ(samples->columns[1].name, "v");
+  EXPECT_EQ(samples->columns[1].missing, (std::vector<bool>{false, true, false}));
+  EXPECT_EQ(samples->columns[1].value[2], 6);
+}
+
+TEST(ToSamples, RefusesTimesThatAreNotFinite) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.set_time_s(1, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(MessageOf(measurements), "measurements.timeS[1]: inf must be finite");
+}
+
+TEST(ToSamples, RefusesRunsOfAnotherLength) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.add_run(1);
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.run: 4 entries for 3 rows; must be one a row, or none");
+}
+
+TEST(ToSamples, RefusesColumnsOfAnotherLength) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.mutable_channels(0)->add_values(9);
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[0].values: 4 values of x for 3 rows; must be one a row");
+}
+
+TEST(ToSamples, RefusesAValueThatIsNotFiniteAndNotMissing) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.mutable_channels(1)->clear_missing();
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[1].values[1]: nan of v must be finite, or its row listed in "
+            "missing");
+}
+
+TEST(ToSamples, RefusesMissingRowsThatDoNotExistOrIncrease) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.mutable_channels(1)->add_missing(3);
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[1].missing[1]: row 3 of v must be above 1 and below the number "
+            "of rows, 3");
+  measurements = ThreeRows();
+  measurements.mutable_channels(1)->add_missing(1);
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[1].missing[1]: row 1 of v must be above 1 and below the number "
+            "of rows, 3");
+  measurements = ThreeRows();
+  measurements.mutable_channels(0)->add_missing(-1);
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[0].missing[0]: row -1 of x must be above -1 and below the "
+            "number of rows, 3");
+}
+
+TEST(ToSamples, RefusesAChannelWithoutAName) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.mutable_channels(0)->clear_name();
+  EXPECT_EQ(MessageOf(measurements), "measurements.channels[0].name: must not be empty");
+}
+
+}  // namespace
+}  // namespace polyest::internal

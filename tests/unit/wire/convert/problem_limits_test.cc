@@ -1,0 +1,89 @@
+#include "proto/wire/convert/problem_limits.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert/problem.h"
+#include "proto/wire/refusal/refusal.h"
+#include "tests/testing/problem_json.h"
+
+namespace polyest::internal {
+namespace {
+
+// The limit that a problem exceeds; empty: none.
+std::string Exceeded(const v1::Problem& problem, const ProblemLimits& limits) {
+  const auto resolved = ToProblem(problem, {}, limits);
+  if (resolved.ok()) return "";
+  EXPECT_EQ(resolved.status().code(), absl::StatusCode::kResourceExhausted) << resolved.status();
+  const auto refusal = RefusalOf(resolved.status());
+  return refusal ? refusal->limit : "none";
+}
+
+v1::Problem TwoUnknowns() {
+  v1::Problem problem = SmallProblem();
+  auto& x0 = *problem.add_uncertain();
+  x0.set_name("x0");
+  x0.mutable_uniform()->set_lower(-1);
+  x0.mutable_uniform()->set_upper(1);
+  return problem;
+}
+
+TEST(ProblemLimits, AreThoseOfTheCoreByDefault) { EXPECT_EQ(Exceeded(TwoUnknowns(), {}), ""); }
+
+TEST(ProblemLimits, BoundParameters) {
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.parameters = 2}), "");
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.parameters = 1}), "--max-parameters");
+}
+
+TEST(ProblemLimits, BoundStates) {
+  // Of mass_spring_damper: displacement and velocity.
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.states = 2}), "");
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.states = 1}), "--max-states");
+}
+
+TEST(ProblemLimits, BoundThePointsOfAGivenOrder) {
+  v1::Problem problem = TwoUnknowns();
+  problem.mutable_expansion()->set_order(3);
+  problem.mutable_expansion()->set_points_per_term(3);
+  // Ten terms in two parameters.
+  EXPECT_EQ(Exceeded(problem, {.points = 30}), "");
+  EXPECT_EQ(Exceeded(problem, {.points = 29}), "--max-points");
+  problem.mutable_expansion()->set_points(v1::ExpansionOptions::GAUSS_TENSOR);
+  problem.mutable_expansion()->set_points_per_term(1.2);
+  // (3 + 1)².
+  EXPECT_EQ(Exceeded(problem, {.points = 16}), "");
+  EXPECT_EQ(Exceeded(problem, {.points = 15}), "--max-points");
+}
+
+TEST(ProblemLimits, BoundThePointsOfTheHighestOrderThatIsTakenByItself) {
+  // Order 9 in two parameters: 55 terms.
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.points = 110}), "");
+  EXPECT_EQ(Exceeded(TwoUnknowns(), {.points = 109}), "--max-points");
+  v1::Problem fixed = TwoUnknowns();
+  fixed.mutable_expansion()->set_adaptive(false);
+  // Order 3.
+  EXPECT_EQ(Exceeded(fixed, {.points = 20}), "");
+  EXPECT_EQ(Exceeded(fixed, {.points = 19}), "--max-points");
+}
+
+TEST(ProblemLimits, BoundTheParametersThatComeWithRuns) {
+  v1::Problem problem = TwoUnknowns();
+  problem.mutable_uncertain(1)->set_per_run(true);
+  const ProblemLimits limits{.parameters = 3};
+  const auto resolved = ToProblem(problem, {}, limits);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  v1::Measurements batch;
+  EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
+  for (const int run : {0, 1}) batch.add_run(run);
+  EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
+  batch.add_run(2);
+  EXPECT_EQ(RefusalOf(CheckRuns(limits, *resolved, batch))->limit, "--max-parameters");
+  // Past what the core bears, and past what a number holds, the core says so.
+  for (const int run : {1'000, std::numeric_limits<int>::max()}) {
+    batch.set_run(2, run);
+    EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
+  }
+}
+
+}  // namespace
+}  // namespace polyest::internal
