@@ -6,6 +6,7 @@
 // say so.
 
 #include <Eigen/LU>
+#include <optional>
 
 #include "core/common/types.h"
 
@@ -22,6 +23,8 @@ struct SymmetricEigen {
 SymmetricEigen DecomposeSymmetric(const Matrix& matrix);
 // Decomposes the symmetric tridiagonal matrix with `diagonal` (n ≥ 1) and `off_diagonal` (n − 1).
 SymmetricEigen DecomposeTridiagonal(const Vector& diagonal, const Vector& off_diagonal);
+// Returns its eigenvalues alone, ascending; nothing when the iteration does not converge.
+std::optional<Vector> TridiagonalEigenvalues(const Vector& diagonal, const Vector& off_diagonal);
 // Returns the eigenvalues alone, ascending; reads the lower triangle of `matrix` only.
 Vector SymmetricEigenvalues(const Matrix& matrix);
 
@@ -83,11 +86,11 @@ struct PivotedQr {
 };
 PivotedQr SolveByPivotedQr(const Matrix& matrix, const Vector& right);
 
-// Rank and condition number of a matrix by its singular values; rank 0 and +∞ when it has entries
-// that are not finite.
+// Rank and condition number of an m × n matrix, m ≥ n ≥ 1, by its singular values; rank 0 and +∞ when
+// it has entries that are not finite.
 struct Conditioning {
-  Eigen::Index rank = 0;
-  double number;  // largest singular value ÷ smallest; +∞ when the smallest is 0
+  Eigen::Index rank = 0;  // singular values above n ε times the largest, ε the machine's
+  double number;          // largest singular value ÷ smallest; +∞ when the rank is below n
 };
 Conditioning ConditioningOf(const Matrix& matrix);
 

@@ -125,6 +125,20 @@ TEST(Conditioning, IsTheRatioOfSingularValues) {
   EXPECT_EQ(singular.number, std::numeric_limits<double>::infinity());
 }
 
+// Oracle: A = U diag(σ) Vᵀ with orthonormal U and V has the singular values σ.
+TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
+  const Vector values = Vector::LinSpaced(kSize, 1, 1e6);
+  const Matrix left = OrthonormalBasisFrom(SomeMatrix(kSize, 1).col(0));
+  const Matrix right = OrthonormalBasisFrom(SomeMatrix(kSize, 2).col(1));
+  const Matrix matrix = left * values.asDiagonal() * right.transpose();
+  const Conditioning conditioning = ConditioningOf(matrix);
+  EXPECT_EQ(conditioning.rank, kSize);
+  // The smallest value is rounded by some ε of the largest.
+  EXPECT_NEAR(conditioning.number, 1e6, 1e6 * 1e6 * kRounding);
+  EXPECT_EQ(ConditioningOf(Matrix::Constant(1, 1, -3)).number, 1);
+  EXPECT_EQ(ConditioningOf(Matrix::Zero(3, 3)).rank, 0);
+}
+
 TEST(Conditioning, IsTheWorstForEntriesThatAreNotFinite) {
   Matrix matrix = Matrix::Identity(20, 20);
   matrix(3, 4) = std::numeric_limits<double>::quiet_NaN();

@@ -57,7 +57,7 @@ TEST(ToGrpc, TellsTheFieldAlsoWhereTheMessageNamesItInWords) {
   const grpc::Status status = ToGrpc(NamedInWords(
       "measurements.time_s[3]", absl::InvalidArgumentError("row 3, column t: -1 must be ≥ 0")));
   EXPECT_EQ(status.error_message(), "row 3, column t: -1 must be ≥ 0");
-  EXPECT_EQ(Find<rpc::BadRequest>(status).field_violations(0).field(), "measurements.time[3]");
+  EXPECT_EQ(Find<rpc::BadRequest>(status).field_violations(0).field(), "measurements.timeS[3]");
 }
 
 TEST(ToGrpc, ReadsNoFieldOutOfASentence) {
