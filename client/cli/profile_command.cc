@@ -18,7 +18,6 @@
 namespace polyest::internal {
 namespace {
 
-
 absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& arguments) {
   v1::ComputeCostProfilesRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));

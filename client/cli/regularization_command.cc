@@ -21,7 +21,6 @@ namespace {
 
 using Sweep = v1::ComputeRegularizationSweepResponse;
 
-
 absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
   v1::ComputeRegularizationSweepRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));

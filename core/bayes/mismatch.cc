@@ -83,7 +83,8 @@ double NegativeLogLikelihood(double degrees, double chi_squared, double differen
 }
 
 double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
-  return samples.count() == 0 ? 0 : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
+  return samples.count() == 0 ? 0
+                              : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
 Mismatch::Mismatch(MismatchSums sums) : known_(std::move(sums)), count_(known_.count()) {}

@@ -86,8 +86,8 @@ struct PivotedQr {
 };
 PivotedQr SolveByPivotedQr(const Matrix& matrix, const Vector& right);
 
-// Rank and condition number of an m × n matrix, m ≥ n ≥ 1, by its singular values; rank 0 and +∞ when
-// it has entries that are not finite.
+// Rank and condition number of an m × n matrix, m ≥ n ≥ 1, by its singular values; rank 0 and +∞
+// when it has entries that are not finite.
 struct Conditioning {
   Eigen::Index rank = 0;  // singular values above n ε times the largest, ε the machine's
   double number;          // largest singular value ÷ smallest; +∞ when the rank is below n

@@ -32,6 +32,8 @@ class BatchIntake {
  public:
   explicit BatchIntake(ResolvedProblem problem);
 
+  // Without parameters for runs other than the first.
+  const ResolvedProblem& problem() const { return problem_; }
   // After the last batch taken.
   SessionPlace place() const;
   double measured_s() const;

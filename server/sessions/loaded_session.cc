@@ -16,6 +16,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models, limits));
   std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem), resolved));
   EstimatorOptions options;
+  options.store = loaded->store_;
   options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {
     if (session->save_) session->save_(std::move(snapshot));
   };
@@ -24,7 +25,8 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
   return loaded;
 }
 
-void LoadedSession::SaveSnapshots(SessionJournal& journal, int64_t session) {
+void LoadedSession::Attach(SessionJournal& journal, int64_t session) {
+  store_->ReadFrom(journal, session);
   save_ = [this, &journal, session](EstimatorSnapshot snapshot) {
     journal.SaveSnapshot(session, {sequence_, snapshot.rows, std::move(snapshot.state)});
   };
@@ -44,10 +46,13 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
                                                                    const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(session));
   POLYEST_ASSIGN_OR_RETURN(auto loaded, Make(std::move(problem), models));
+  loaded->store_->ReadFrom(journal, session);
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(loaded->intake_.Take(batch.measurements));
-    return loaded->GiveUpTo(batch.sequence);
+    POLYEST_RETURN_IF_ERROR(loaded->GiveUpTo(batch.sequence));
+    loaded->Release(batch.sequence);
+    return absl::OkStatus();
   };
   POLYEST_RETURN_IF_ERROR(journal.ReadBatches(session, 0, append));
   const SessionPlace reached = loaded->intake_.place();
@@ -59,7 +64,9 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
 }
 
 LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved)
-    : problem_(std::move(problem)), intake_(resolved) {}
+    : problem_(std::move(problem)),
+      intake_(resolved),
+      store_(std::make_shared<JournalStore>(intake_.problem())) {}
 
 absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));

@@ -17,6 +17,7 @@
 #include "proto/wire/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
 #include "server/sessions/batch_intake.h"
+#include "server/sessions/journal_store.h"
 #include "server/sessions/session_observer.h"
 
 namespace polyest::internal {
@@ -36,8 +37,11 @@ class LoadedSession {
                                                              const ModelLibrary& models,
                                                              const Stop& stop);
 
-  // From here on the journal is given the estimator's snapshots of this session.
-  void SaveSnapshots(SessionJournal& journal, int64_t session);
+  // From here on the journal is given the estimator's snapshots of this session, and rows that are
+  // no longer in memory are read from it. The journal must outlive this.
+  void Attach(SessionJournal& journal, int64_t session);
+  // Rows of batches up to `sequence`, which the journal keeps, need not stay in memory.
+  void Release(int64_t sequence) { store_->Release(sequence); }
 
   const v1::Problem& problem() const { return problem_; }
   // Where batches are taken: not yet by the estimator.
@@ -66,6 +70,7 @@ class LoadedSession {
 
   const v1::Problem problem_;
   BatchIntake intake_;
+  const std::shared_ptr<JournalStore> store_;  // the estimator's; refers to the intake's problem
   std::unique_ptr<Estimator> estimator_;
   std::function<void(EstimatorSnapshot)> save_;
   int64_t sequence_ = 0;

@@ -43,7 +43,7 @@ Session::Session(const SessionServices& services, SessionHead head,
       writer_(head_.name),
       observers_(head_.name) {
   if (loaded == nullptr) return;
-  loaded->SaveSnapshots(services.journal, number());
+  loaded->Attach(services.journal, number());
   Replace({std::move(loaded), 0});
 }
 
@@ -113,14 +113,17 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   POLYEST_RETURN_IF_ERROR(CheckOpen());
   const uint64_t losses = ledger_.losses();
   const InMemory present = Present();
-  if (present.loaded != nullptr && present.losses == losses) return present.loaded;
+  if (present.loaded != nullptr && present.losses == losses) {
+    present.loaded->Release(ledger_.kept().sequence);
+    return present.loaded;
+  }
   POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   Replace({nullptr, present.losses});
   // Until it is replaced below, no batch is taken.
   POLYEST_ASSIGN_OR_RETURN(
       std::shared_ptr<LoadedSession> loaded,
       LoadedSession::Load(services_.journal, number(), ledger_.kept(), services_.models, stop));
-  loaded->SaveSnapshots(services_.journal, number());
+  loaded->Attach(services_.journal, number());
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;
   Replace({loaded, losses});

@@ -119,7 +119,7 @@ TEST_F(PosteriorRpcTest, RefusesBadRequestsByTheirFields) {
   request.set_sample_count(-1);
   grpc::Status status = Get(request, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.error_message(), "samples: -1 must be from 0 to 100000");
+  EXPECT_EQ(status.error_message(), "sampleCount: -1 must be from 0 to 100000");
   v1::ComputePosteriorRequest missing;
   missing.mutable_subject()->set_session("sessions/rig");
   EXPECT_EQ(Get(missing, &response).error_code(), grpc::StatusCode::NOT_FOUND);

@@ -37,6 +37,33 @@ bool Missing(const SampleColumn& column, size_t row) {
 
 }  // namespace
 
+RecordPosition After(const RecordPosition& position, const RowBlock& block) {
+  RecordPosition after = position;
+  const auto channels = static_cast<size_t>(position.largest.size());
+  const size_t width = block.rows.empty() ? 0 : block.values.size() / block.rows.size();
+  for (size_t k = 0; k < block.rows.size(); ++k) {
+    const SampleRow& row = block.rows[k];
+    const bool same_run = after.rows > 0 && row.run == after.run;
+    after.rows_in_run = same_run ? after.rows_in_run + 1 : 1;
+    after.run = row.run;
+    after.time_s = row.time_s;
+    ++after.rows;
+    for (size_t i = 0; i < channels; ++i) {
+      const double z = block.values[k * width + i];
+      if (std::isnan(z)) continue;
+      double& largest = after.largest[static_cast<Eigen::Index>(i)];
+      largest = std::max(largest, std::abs(z));
+    }
+  }
+  after.run_ended = block.run_ended;
+  return after;
+}
+
+SampleChecks::SampleChecks(const ResolvedProblem& problem, const RecordPosition& position)
+    : SampleChecks(problem) {
+  position_ = position;
+}
+
 SampleChecks::SampleChecks(const ResolvedProblem& problem)
     : problem_(problem), max_runs_(problem.max_runs()) {
   for (const MeasuredOutput& measured : problem.problem().measured) {
@@ -54,7 +81,7 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   POLYEST_RETURN_IF_ERROR(CheckTimes(samples));
   POLYEST_RETURN_IF_ERROR(CheckValues(samples));
   CheckedSamples checked;
-  checked.after = position_;
+  Vector largest_so_far = position_.largest;
   const auto channels = static_cast<size_t>(problem_.channels());
   const size_t width = names_.size();
   checked.values.assign(samples.rows() * width, std::numeric_limits<double>::quiet_NaN());
@@ -67,7 +94,7 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
       const double z = column.value[k];
       checked.values[k * width + place] = z;
       if (place >= channels) continue;
-      double& largest = checked.after.largest[static_cast<Eigen::Index>(place)];
+      double& largest = largest_so_far[static_cast<Eigen::Index>(place)];
       largest = std::max(largest, std::abs(z));
       const NoiseModel& noise = problem_.problem().measured[place].noise;
       const double sigma = noise.StandardDeviation(z, largest);
@@ -83,15 +110,8 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   for (size_t k = 0; k < samples.rows(); ++k) {
     checked.rows.push_back({samples.run.empty() ? 0 : samples.run[k], samples.time_s[k]});
   }
-  for (const SampleRow& row : checked.rows) {
-    const bool same_run = checked.after.rows > 0 && row.run == checked.after.run;
-    checked.after.rows_in_run = same_run ? checked.after.rows_in_run + 1 : 1;
-    checked.after.run = row.run;
-    checked.after.time_s = row.time_s;
-    ++checked.after.rows;
-  }
   checked.run_ended = samples.end_of_run;
-  checked.after.run_ended = samples.end_of_run;
+  checked.after = After(position_, checked);
   return checked;
 }
 

@@ -27,10 +27,15 @@ struct CheckedSamples : RowBlock {
   RecordPosition after;
 };
 
+// Returns where the record stands after `block`, which follows `position`.
+RecordPosition After(const RecordPosition& position, const RowBlock& block);
+
 class SampleChecks {
  public:
-  // `problem` must outlive the checks.
+  // Checks a record from its beginning. `problem` must outlive the checks.
   explicit SampleChecks(const ResolvedProblem& problem);
+  // Checks what follows `position`.
+  SampleChecks(const ResolvedProblem& problem, const RecordPosition& position);
 
   // The whole of `samples`, or INVALID_ARGUMENT that names row (counted from 0 in the samples
   // given), column, value and rule. Changes nothing.

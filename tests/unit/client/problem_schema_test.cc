@@ -207,7 +207,8 @@ TEST(ProblemSchema, SeesMistakes) {
   EXPECT_EQ(with(R"("expansion": {"order": 7})"), "");
   EXPECT_EQ(with(R"("measured": [{"output": "x"}])"), "problem.measured[]: noise is missing");
   EXPECT_EQ(with(R"("uncertain": [{"name": "k"}])"), "problem.uncertain[]: 0 of oneOf");
-  EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {}, "normal": {}}])"),
+  EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {"lower": 0, "upper": 1},
+                                     "normal": {"mean": 0, "stdDev": 1}}])"),
             "problem.uncertain[]: 2 of oneOf");
 }
 

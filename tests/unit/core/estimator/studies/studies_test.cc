@@ -13,7 +13,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-
 // dx/dt = a + u, x(0) = x0, outputs x and 2x: everything about it is a closed form. Where a passes
 // `limit` the derivative gains 1000 x² at t = 1, so that x is infinite within a millisecond.
 class Ramp : public StateSpaceModel {
