@@ -30,7 +30,7 @@ std::vector<std::shared_ptr<const StateSpaceModel>> MakeAll() {
 }  // namespace
 
 const std::vector<std::shared_ptr<const StateSpaceModel>>& BuiltinModels() {
-  // Never destroyed, so that it may be used at any time of the program's end.
+  // The list is never destroyed, so it stays valid during the program's shutdown.
   static const auto& models = *new std::vector<std::shared_ptr<const StateSpaceModel>>(
       MakeAll<builtin::MassSpringDamper, builtin::MassSpringFrequency, builtin::LinearTwoState,
               builtin::RollPlane2Dof, builtin::RollPlane4Dof, builtin::QuarterCar, builtin::Bicycle,

@@ -95,7 +95,7 @@ absl::Status Validate(const StreamedInput& input) {
   return RequireFinite("streamed", "amplitude", input.amplitude);
 }
 
-// The closed-form shapes. Each is 0 from its end on: there the value from the right is wanted.
+// The closed-form shapes. Each is 0 from its end on, since Shape returns the value from the right.
 
 double ClosedForm(const ConstantInput&, double) { return 1; }
 
@@ -246,7 +246,7 @@ double InputSignal::NextBreak(double time_s) const {
       specification_);
 }
 
-// A smooth curve has corners where it begins and ends.
+// Returns the next end of a smooth curve, where its derivative jumps.
 double InputSignal::EndAfter(double time_s) const {
   if (knot_time_s_.empty()) return kInfinity;
   if (time_s < knot_time_s_.front()) return knot_time_s_.front();
@@ -259,7 +259,7 @@ bool InputSignal::Jumps() const {
         if constexpr (kHasKnots<Input>) {
           return input.interpolation == Interpolation::kHold;
         } else {
-          // A chirp ends, and with a phase also begins, in the middle of a swing.
+          // A chirp ends, and with a phase also begins, at a value other than 0.
           return std::is_same_v<Input, StepInput> || std::is_same_v<Input, ChirpInput>;
         }
       },

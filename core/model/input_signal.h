@@ -1,7 +1,6 @@
 #pragma once
 
-// The signal that an InputSpecification describes (polyest/input_signal.h): u(t) = amplitude ·
-// shape(t).
+// The signal of an InputSpecification (polyest/input_signal.h): u(t) = amplitude · shape(t).
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -16,50 +15,53 @@ namespace polyest::internal {
 
 class InputSignal {
  public:
-  // INVALID_ARGUMENT names the field as in a problem file, the value and the rule:
-  // "sinusoid: frequencyHz 0 must be finite and above 0".
+  // Makes the signal. Returns InvalidArgument that names the field as in a problem file, the value
+  // and the rule: "sinusoid: frequencyHz 0 must be finite and above 0".
   static absl::StatusOr<InputSignal> Make(InputSpecification specification);
 
   double default_amplitude() const;
   bool streamed() const;
-  // What it was made of, but for a table's knots: those are below, with a streamed signal's.
+  // Returns the specification that the signal was made from, without a table's knots: those are in
+  // knot_times_s() and knot_values(), as are the knots of a streamed signal.
   const InputSpecification& specification() const { return specification_; }
   std::span<const double> knot_times_s() const { return knot_time_s_; }
   std::span<const double> knot_values() const { return knot_value_; }
-  // A streamed signal's next knot: finite, times strictly increasing within a run; amortized O(1).
+  // Adds the next knot of a streamed signal, in amortized O(1). Time and value must be finite, and
+  // times must strictly increase within a run.
   void Append(double time_s, double value);
-  // No more knots of a streamed signal will come.
+  // Declares that no more knots of a streamed signal will follow.
   void Finish();
   bool finished() const { return finished_; }
-  // Forgets the knots of a streamed signal: a new run begins.
+  // Removes the knots of a streamed signal, for a new run.
   void Clear();
 
-  // Knots that must follow a knot before the signal up to it is settled, unless it is finished.
+  // Returns how many later knots must be known before the signal is settled up to a knot. A
+  // finished signal is settled everywhere.
   int knots_ahead() const;
 
-  // shape(t), for a streamed signal no later than it is settled. It is its first value before its
-  // first knot and its last value after its last, and 0 while it has none. At a jump (step, held
-  // knot, end of a chirp) it is the value from the right; the one from the left is
+  // Returns shape(t). A streamed signal must be settled up to time_s. Before the first knot the
+  // shape is the first value, after the last knot the last value, and without knots 0. At a jump
+  // (step, held knot, end of a chirp) it is the value from the right; the value from the left is
   // Shape(std::nextafter(break, −∞)).
   double Shape(double time_s) const;
-  // The first time strictly after time_s at which shape or its derivative jumps; +∞ if none. A
-  // smooth curve has none but its ends.
+  // Returns the first time strictly after time_s at which shape or its derivative jumps, or +∞ if
+  // there is none. A smooth curve through knots has breaks only at its two ends.
   double NextBreak(double time_s) const;
-  // Whether shape itself jumps at its breaks (step, chirp, hold), so that an
-  // integrator must also forget the derivative it kept from before.
+  // Whether shape itself jumps at its breaks (step, chirp, hold). An integrator must then also
+  // discard the derivative that it has stored.
   bool Jumps() const;
 
  private:
   explicit InputSignal(InputSpecification specification);
-  std::optional<Interpolation> interpolation() const;  // of a signal with knots
+  std::optional<Interpolation> interpolation() const;  // only for a signal with knots
   void SettleSlopes();
   double EndAfter(double time_s) const;
   double BetweenKnots(double time_s, Interpolation interpolation) const;
 
-  InputSpecification specification_;  // a table's knots are moved out of it
+  InputSpecification specification_;  // without a table's knots, which are moved out of it
   std::vector<double> knot_time_s_;
   std::vector<double> knot_value_;
-  std::vector<double> knot_slope_;  // of a smooth curve, as far as it is settled
+  std::vector<double> knot_slope_;  // for a smooth curve, as far as it is settled
   bool finished_ = false;
 };
 

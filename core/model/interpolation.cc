@@ -11,8 +11,8 @@ namespace {
 
 constexpr size_t kMaxKnots = 2 * kSplineReach + 1;
 
-// Knots of a stretch with the widths h_i = t_{i+1} − t_i of its intervals and the slopes
-// δ_i = (u_{i+1} − u_i)/h_i of its chords.
+// A stretch of knots with the widths h_i = t_{i+1} − t_i of its intervals and the slopes δ_i =
+// (u_{i+1} − u_i)/h_i of its chords.
 struct Stretch {
   size_t knots;
   std::array<double, kMaxKnots> width;
@@ -28,7 +28,7 @@ Stretch StretchOf(std::span<const double> time_s, std::span<const double> value)
   return stretch;
 }
 
-// The slope at knot k of the parabola through three knots.
+// Returns the slope at knot k of the parabola through three knots.
 double ParabolaSlope(const Stretch& stretch, size_t k) {
   const auto& h = stretch.width;
   const auto& chord = stretch.chord;
@@ -37,8 +37,8 @@ double ParabolaSlope(const Stretch& stretch, size_t k) {
   return k == 1 ? chord[0] + curvature * h[0] : chord[1] + curvature * h[1];
 }
 
-// A tridiagonal system for the slopes, row by row: below · s_{i−1} + diagonal · s_i +
-// above · s_{i+1} = right.
+// One row of the tridiagonal system for the slopes: below · s_{i−1} + diagonal · s_i + above ·
+// s_{i+1} = right.
 struct Row {
   double below = 0, diagonal = 0, above = 0, right = 0;
 };
@@ -78,7 +78,8 @@ double SlopeOfSpline(const Stretch& stretch, size_t k) {
   return slope;
 }
 
-// Three-point formula at an end, 0 where it turns against the chord, at most three times it.
+// Returns the slope at an end by the three-point formula: 0 if its sign differs from the chord's,
+// and at most three times the chord's slope if the chords differ in sign.
 double LimitedEndSlope(double h0, double h1, double chord0, double chord1) {
   const double slope = ((2 * h0 + h1) * chord0 - h0 * chord1) / (h0 + h1);
   if (slope * chord0 <= 0) return 0;

@@ -1,12 +1,12 @@
 #pragma once
 
-// Smooth curves through the knots (t_k, u_k) of a sampled signal: a cubic on each interval,
+// Smooth curves through the knots (t_k, u_k) of a sampled signal, cubic on each interval:
 //
 //   u(t) = (1 + 2q)(1 − q)² u_k + q² (3 − 2q) u_{k+1} + h q (1 − q)² s_k − h q² (1 − q) s_{k+1},
 //   q = (t − t_k)/h,  h = t_{k+1} − t_k,
 //
-// with a slope s_k for each knot, so that u and its derivative are continuous. Slopes depend on a
-// few neighbours only: a knot far away, or yet to come, changes nothing.
+// Each knot has a slope s_k, which makes u and its derivative continuous. A slope depends on a few
+// neighbouring knots only, so a distant knot, or one yet to come, does not change it.
 
 #include <cstddef>
 #include <span>
@@ -15,25 +15,25 @@
 
 namespace polyest::internal {
 
-// Slopes are SplineSlope for kCubic and MonotoneSlope for kShapePreserving.
+// The slopes are SplineSlope for kCubic and MonotoneSlope for kShapePreserving.
 
-// Returns the number of knots after a knot that its slope may depend on: 3 for kCubic; 2 for
-// kShapePreserving, at its first knot; else 0.
+// Returns the largest number of later knots that the slope at a knot may depend on: 3 for kCubic, 2
+// for kShapePreserving (reached at the first knot), else 0.
 int KnotsAhead(Interpolation interpolation);
 
-// The slope at knot k of the cubic spline through it and the kSplineReach knots on either side, as
-// far as there are any; at the ends of this stretch the third derivative is continuous
-// (not-a-knot). Exact on cubics from four knots on. What knots farther away would change, a spline
-// forgets by (2 − √3) ≈ 0.27 a knot.
+// Returns the slope at knot k of the cubic spline through it and up to kSplineReach knots on either
+// side. At the ends of this stretch the third derivative is continuous (not-a-knot). The slope is
+// exact for cubics from four knots on. The influence of a knot on a spline decays by the factor 2 −
+// √3 ≈ 0.27 per knot, so knots farther away matter little.
 inline constexpr int kSplineReach = 3;
 double SplineSlope(std::span<const double> time_s, std::span<const double> value, size_t k);
 
-// The slope of Fritsch and Butland: 0 where the chords on either side differ in sign, else their
-// harmonic mean, weighted; at the ends the three-point formula, limited. Never overshoots the
-// knots. (Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300.)
+// Returns the slope of Fritsch and Butland: 0 where the chords on either side differ in sign, else
+// their weighted harmonic mean; at the ends the three-point formula, limited. The curve never
+// overshoots the knots. Source: Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300.
 double MonotoneSlope(std::span<const double> time_s, std::span<const double> value, size_t k);
 
-// u(t) on the interval from knot k to knot k + 1 with these slopes at its ends.
+// Returns u(at_s) for at_s between the knots k and k + 1, with the given slopes at these knots.
 double Hermite(std::span<const double> time_s, std::span<const double> value, size_t k,
                double left_slope, double right_slope, double at_s);
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The scalar type that a model's equations are evaluated with, and the functions of it that
-// Eigen's own do not serve for.
+// The scalar type in which a model's equations are evaluated, and replacements for those of Eigen's
+// functions that do not suit it.
 
 #include <cmath>
 #include <limits>
@@ -10,13 +10,13 @@
 
 namespace polyest::internal {
 
-// kLanes points of one quantity.
+// The values of one quantity at kLanes points.
 using Lane = Eigen::Array<double, kLanes, 1>;
 
 inline double Sqrt(double x) { return std::sqrt(x); }
 
-// Correctly rounded and thus the same as for a single point; Eigen's own is an approximation
-// refined by Newton steps where there is an instruction for it (AVX-512).
+// Returns the correctly rounded root, identical to that of a single point. Eigen's own square root
+// is an approximation refined by Newton steps on processors with AVX-512.
 inline Lane Sqrt(const Lane& x) {
   Lane root;
   for (int i = 0; i < kLanes; ++i) root[i] = std::sqrt(x[i]);
@@ -25,9 +25,10 @@ inline Lane Sqrt(const Lane& x) {
 
 inline double Tanh(double x) { return std::tanh(x); }
 
-// Exact to a rounding of 1, which is all that a force that saturates needs; Eigen's exponential
-// saturates at both ends and is vectorized: tanh x = 1 − 2/(e^{2x} + 1). (GCC 12 takes the
-// undefined operand of AVX-512's intrinsics for an uninitialized variable: GCC bug 105593.)
+// Returns tanh x = 1 − 2/(e^{2x} + 1), which is vectorized. Its absolute error is a rounding of 1,
+// enough for a saturating force, and Eigen's exponential saturates at both ends. The warning is
+// disabled because GCC 12 mistakes the undefined operand of AVX-512's intrinsics for an
+// uninitialized variable (GCC bug 105593).
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wuninitialized"
 inline Lane Tanh(const Lane& x) { return 1 - 2 / ((2 * x).exp() + 1); }
@@ -41,8 +42,9 @@ inline Lane Atan2(const Lane& y, const Lane& x) {
   return angle;
 }
 
-// x where it is above 0, else NaN: for a quantity whose equations say nothing there, so that the
-// trajectory is reported as failed instead of going on with numbers that mean nothing.
+// Returns x if it is above 0, else NaN. It guards a quantity for which the equations are undefined
+// otherwise: the trajectory is then reported as failed instead of continuing with meaningless
+// numbers.
 inline double PositiveOrNan(double x) {
   return x > 0 ? x : std::numeric_limits<double>::quiet_NaN();
 }

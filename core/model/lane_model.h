@@ -1,9 +1,9 @@
 #pragma once
 
-// A model whose equations are written once, over a scalar type Real, and evaluated kLanes points
-// at a time with every quantity of the chunk in registers.
+// A model whose equations are written once for a scalar type Real and evaluated for kLanes points
+// at a time, with all quantities of the chunk in registers.
 //
-// `Equations` has
+// `Equations` provides
 //
 //   static constexpr int kStates, kParameters, kInputs, kOutputs;
 //   static ModelDescription Describe();          // sizes as above, same order
@@ -16,9 +16,9 @@
 //   template <class Real> static void
 //     Outputs(double time_s, …the same…, std::array<Real, kOutputs>& outputs);
 //
-// Real is Lane here; double gives the value at a single point. An algebraic model (kStates = 0)
-// leaves out Initial and Derivatives. Locals are declared `const Real`, never `auto`: that would
-// keep an unevaluated Eigen expression. Each column of a block is contiguous.
+// Real is Lane here; with double the equations give the value at a single point. An algebraic model
+// (kStates = 0) omits Initial and Derivatives. Declare locals `const Real`, never `auto`, which
+// would keep an unevaluated Eigen expression. Each column of a block is contiguous in memory.
 
 #include <array>
 
@@ -91,7 +91,7 @@ class LaneModel final : public StateSpaceModel {
     POLYEST_CHECK(parameters.rows() % kLanes == 0);
   }
 
-  // A block without columns may have any number of rows: nothing of it is read.
+  // A block without columns may have any number of rows, since none of it is read.
   template <class AnyBlock>
   static void CheckShape(const AnyBlock& block, Eigen::Index rows, int columns) {
     POLYEST_CHECK(block.cols() == columns && (columns == 0 || block.rows() == rows));

@@ -7,8 +7,8 @@
 
 namespace polyest::internal {
 
-// Returns the names in order, comma-separated, for messages that list what there is: "m, c, k, x0,
-// v0", or "none".
+// Returns the names in order, comma-separated, to list in a message the names that exist: "m, c, k,
+// x0, v0", or "none".
 std::string ListNames(const std::vector<Quantity>& quantities);
 
 }  // namespace polyest::internal

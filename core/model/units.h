@@ -1,11 +1,12 @@
 #pragma once
 
-// Units of measurement as products of powers of the SI's base units, with a scale.
+// Units of measurement: products of powers of the SI base units with a scale factor.
 //
-// A unit is written as its factors, separated by spaces, * or ·, each with an optional power; a /
-// holds for the one factor after it, or for a group in parentheses: "kg m^2", "N s/m",
-// "m/s/s", "J/(kg K)", "1/s", "mm". "1" is that of a plain number, and so are rad and sr; deg is
-// π/180. Symbols are case-sensitive and take the SI's prefixes (µ may be written u).
+// A unit is written as factors separated by spaces, * or ·, each with an optional power. A /
+// applies only to the factor after it, or to a group in parentheses: "kg m^2", "N s/m", "m/s/s",
+// "J/(kg K)", "1/s", "mm". A positive number is a factor of the scale. "1" is the unit of a plain
+// number, as are rad and sr; deg is π/180. Symbols are case-sensitive and take the SI prefixes (µ
+// may be written u).
 
 #include <absl/status/statusor.h>
 
@@ -18,24 +19,25 @@ namespace polyest::internal {
 struct Unit {
   // Powers of m, kg, s, A, K, mol, cd.
   std::array<double, 7> powers = {};
-  // One of this unit in base units: 0.001 for mm.
+  // Size of this unit in SI base units: 0.001 for mm.
   double scale = 1;
 
-  bool IsPlain() const;  // "1"
+  bool IsPlain() const;  // whether it is "1", the unit of a plain number
 };
 
-// INVALID_ARGUMENT with what is wrong, and the known symbols where one is not.
+// Parses a unit. Returns InvalidArgument that states the error and, for an unknown symbol, lists
+// the known ones.
 absl::StatusOr<Unit> ParseUnit(std::string_view text);
 
 Unit operator*(const Unit& a, const Unit& b);
 Unit operator/(const Unit& a, const Unit& b);
 Unit Power(const Unit& unit, double exponent);
 
-// Up to rounding.
+// Whether the units agree up to rounding; SameDimension ignores the scale.
 bool SameUnit(const Unit& a, const Unit& b);
 bool SameDimension(const Unit& a, const Unit& b);
 
-// "N/m", "kg m^2/s": what ParseUnit reads as this unit again.
+// Returns text that ParseUnit reads back as this unit: "N", "kg m^2/s".
 std::string FormatUnit(const Unit& unit);
 
 }  // namespace polyest::internal

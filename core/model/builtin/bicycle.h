@@ -1,20 +1,22 @@
 #pragma once
 
-// The lateral dynamics of a vehicle with each axle's wheels drawn together into one on its centre
-// line (single track): mass m, yaw inertia Iz about the centre of mass, which is lf behind the
-// front and lr ahead of the rear axle. The speed vx along the vehicle and the front wheel's
-// steering angle delta are inputs; the lateral velocity vy of the centre of mass and the yaw rate
-// r, positive to the left, are the states. Newton's and Euler's laws in axes fixed to the vehicle:
+// Lateral dynamics of a vehicle as a single-track model: the wheels of each axle are merged into
+// one on the centre line. The vehicle has the mass m and the yaw inertia Iz about the centre of
+// mass, which is lf behind the front axle and lr ahead of the rear axle. The inputs are the speed
+// vx along the vehicle and the steering angle delta of the front wheel. The states are the lateral
+// velocity vy of the centre of mass and the yaw rate r, both positive to the left. Newton's and
+// Euler's laws in axes fixed to the vehicle are
 //
 //   m (v̇y + vx r) = Ff cos δ + Fr,   Iz ṙ = lf Ff cos δ − lr Fr.
 //
-// The axles move sideways with vy + lf r and vy − lr r, so that their slip angles are
+// The axles move sideways with vy + lf r and vy − lr r. Their slip angles are therefore
 //
 //   αf = δ − atan2(vy + lf r, vx),   αr = −atan2(vy − lr r, vx).
 //
-// No small-angle form is taken: atan2 and cos δ cost little, keep the equations right at a parking
-// lot's steering angles, and keep the slip angles bounded in a spin. Linearized they are the usual
-// ones. The tyre force of an axle is C α, bounded by friction when mu is given:
+// The slip angles and cos δ are not approximated for small angles: atan2 and cos δ cost little,
+// keep the equations right at large steering angles (parking), and keep the slip angles bounded in
+// a spin. Linearized, they are the usual small-angle equations. The tyre force of an axle is C α,
+// bounded by friction when mu is given:
 //
 //   F = C α/√(1 + (C α/(mu Fz))²),   |F| < mu Fz,   Fz = m g lr/L in front, m g lf/L at the rear,
 //
@@ -23,10 +25,11 @@
 //
 //   r/δ = vx/(L + K vx²),   K = m/L (lr/Cf − lf/Cr).
 //
-// Valid for vx > 0: at vx ≤ 0 no slip angle exists, the derivatives and outputs are NaN, and the
-// trajectory is a failed point. (Down to 0 they exist but grow stiff like 1/vx.) No load transfer,
-// no relaxation length, no roll; drive and brake forces do not act on the tyres' grip. m, Iz, lf,
-// lr, Cf, Cr, mu > 0.
+// The model is valid for vx > 0. At vx ≤ 0 no slip angle exists: the derivatives and outputs are
+// NaN, and the trajectory is a failed point. (As vx approaches 0 from above, the equations grow
+// stiff like 1/vx.) The model has no load transfer, no relaxation length and no roll, and drive and
+// brake forces do not reduce the tyres' grip. The parameters m, Iz, lf, lr, Cf, Cr and mu must be
+// above 0.
 
 #include <array>
 #include <cmath>
@@ -110,7 +113,7 @@ struct Bicycle {
   }
 
  private:
-  // Ff cos δ and Fr.
+  // Returns Ff cos δ and Fr.
   template <class Real>
   static std::array<Real, 2> LateralForces(const std::array<Real, kStates>& states,
                                            const std::array<Real, kParameters>& parameters,
@@ -131,7 +134,7 @@ struct Bicycle {
             TyreForce<Real>(Cr * slip_rear, grip_rear)};
   }
 
-  // F/√(1 + (F/grip)²)
+  // Returns F/√(1 + (F/grip)²) for the linear tyre force F.
   template <class Real>
   static Real TyreForce(const Real& linear, const Real& grip) {
     const Real share = linear / grip;

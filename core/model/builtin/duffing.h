@@ -6,8 +6,8 @@
 
 namespace polyest::internal::builtin {
 
-// m ẍ + c ẋ + k x + k2 x² + k3 x³ = force + offset. A rest position x_e of a linear spring is
-// offset = k x_e.
+// An oscillator with a polynomial spring: m ẍ + c ẋ + k x + k2 x² + k3 x³ = force + offset. For a
+// linear spring, offset = k x_e gives the rest position x_e.
 struct Duffing {
   static constexpr int kStates = 2;
   static constexpr int kParameters = 8;

@@ -6,7 +6,8 @@
 
 namespace polyest::internal::builtin {
 
-// (57): θ drives both states alike, so that x₁ − x₂ says nothing about it.
+// Equation (57) of the paper. θ drives both states equally, so x₁ − x₂ carries no information about
+// it.
 struct LinearTwoState {
   static constexpr int kStates = 2;
   static constexpr int kParameters = 3;

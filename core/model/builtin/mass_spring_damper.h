@@ -7,7 +7,8 @@
 
 namespace polyest::internal::builtin {
 
-// m ẍ + c ẋ + k x = force; the paper's (26) is the case without damping and force.
+// The oscillator m ẍ + c ẋ + k x = force. Without damping and force it is equation (26) of the
+// paper.
 struct MassSpringDamper {
   static constexpr int kStates = 2;
   static constexpr int kParameters = 5;
@@ -15,7 +16,7 @@ struct MassSpringDamper {
   static constexpr int kOutputs = 3;
 
   static ModelDescription Describe() {
-    const double omega = 2 * std::numbers::pi;  // of the defaults: 1 Hz
+    const double omega = 2 * std::numbers::pi;  // gives k the default for 1 Hz
     return {
         .name = "mass_spring_damper",
         .summary = "A mass on a linear spring and damper, driven by a force",

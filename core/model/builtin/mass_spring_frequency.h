@@ -8,7 +8,8 @@
 
 namespace polyest::internal::builtin {
 
-// ω = √(k/m), an algebraic model: one measurement of ω leaves a valley in the plane of m and k.
+// The algebraic model ω = √(k/m). A single measurement of ω determines only the ratio k/m, so the
+// posterior is a valley in the plane of m and k.
 struct MassSpringFrequency {
   static constexpr int kStates = 0;
   static constexpr int kParameters = 2;

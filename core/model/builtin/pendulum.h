@@ -7,7 +7,7 @@
 
 namespace polyest::internal::builtin {
 
-// θ̈ = −(g/ℓ) sin θ − c θ̇ − c2 θ̇ |θ̇|
+// The damped pendulum θ̈ = −(g/ℓ) sin θ − c θ̇ − c2 θ̇ |θ̇|.
 struct Pendulum {
   static constexpr int kStates = 2;
   static constexpr int kParameters = 5;

@@ -1,17 +1,19 @@
 #pragma once
 
-// One corner of a vehicle: the sprung mass ms on a suspension, the unsprung mass mu below it on a
-// tyre of stiffness kt whose foot follows the road. With displacements from static equilibrium,
-// positive upwards, and the suspension's travel zs − zu, Newton's law of the two masses is
+// One corner of a vehicle: the sprung mass ms stands on a suspension, and the unsprung mass mu
+// below it on a tyre of stiffness kt whose contact point follows the road. Displacements are
+// measured from static equilibrium, positive upwards, and the suspension's travel is zs − zu.
+// Newton's law for the two masses is
 //
 //   ms z̈s = −F,   mu z̈u = F + kt (road − zu),   F = ks travel + ks3 travel³ + cs travel'.
 //
-// Linear (ks3 = 0), the transfer functions from the road are, with c = cs s + ks,
+// In the linear case (ks3 = 0), the transfer functions from the road are, with c = cs s + ks,
 //
 //   zs/road = kt c/D,   zu/road = kt (ms s² + c)/D,   D = (ms s² + c)(mu s² + c + kt) − c².
 //
-// Valid while the tyre keeps the ground, kt (zu − road) < (ms + mu) g, and the suspension is off
-// its stops. The tyre has no damping; ks and ks3 are those at the static load. ms, mu > 0.
+// The model is valid while the tyre keeps contact, kt (zu − road) < (ms + mu) g, and the suspension
+// is off its stops. The tyre has no damping. ks and ks3 are the stiffnesses at the static load. ms
+// and mu must be above 0.
 
 #include <array>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// A bar of mass M, roll inertia I about its centre and length L on two springs whose feet move by
-// u₁ and u₂; x₁ and x₂ are the displacements of its ends. From
+// A bar of mass M, roll inertia I about its centre and length L on two springs whose lower ends are
+// displaced by u₁ and u₂; x₁ and x₂ are the displacements of the bar's ends. From
 //
 //   T = ½ M ((ẋ₁ + ẋ₂)/2)² + ½ I ((ẋ₂ − ẋ₁)/L)²,   V = ½ k₁ (x₁ − u₁)² + ½ k₂ (x₂ − u₂)²,
 //
@@ -10,13 +10,15 @@
 //   (M/4 + I/L²) ẍ₁ + (M/4 − I/L²) ẍ₂ = −F₁,
 //   (M/4 − I/L²) ẍ₁ + (M/4 + I/L²) ẍ₂ = −F₂;
 //
-// their sum is the balance of forces and their difference that of moments about the centre:
+// The sum of the two is the balance of forces, and their difference the balance of moments about
+// the centre:
 //
 //   M (ẍ₁ + ẍ₂)/2 + F₁ + F₂ = 0,   I (ẍ₂ − ẍ₁)/L − (L/2) (F₁ − F₂) = 0.
 //
-// The first is the paper's (58). The second is not as printed there, I (ẍ₂ − ẍ₁)/L + F₁ − F₂ = 0:
-// without the arm L/2 that adds a moment to a force, and with that sign the springs would push the
-// bar further over (with k₁ = k₂ = k, roll would grow like exp(t √(k L/I))). It cannot be meant.
+// The first is equation (58) of the paper. The second differs from the paper, which prints I (ẍ₂ −
+// ẍ₁)/L + F₁ − F₂ = 0. The printed form adds a moment to a force because the arm L/2 is missing,
+// and with its sign the springs would push the bar further over (with k₁ = k₂ = k, roll would grow
+// like exp(t √(k L/I))), so it must be a misprint.
 
 #include <array>
 

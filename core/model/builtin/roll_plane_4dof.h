@@ -1,10 +1,11 @@
 #pragma once
 
-// A half car seen from behind: a bar of mass M, roll inertia I about its centre and length L stands
-// at each end on a suspension, that on a wheel of mass m_t, and that on a tyre of stiffness k_t
-// whose foot follows the road. A point mass m_a sits on the bar at the distance d from its left
-// end. With x₁, x₂ the displacements of the bar's ends, xt₁, xt₂ those of the wheels, y₁, y₂ the
-// road's height, δ = d/L, travel dᵢ = xᵢ − xtᵢ, and displacements counted from static equilibrium,
+// A half car seen from behind. A bar of mass M, roll inertia I about its centre and length L stands
+// at each end on a suspension, each suspension on a wheel of mass m_t, and each wheel on a tyre of
+// stiffness k_t whose contact point follows the road. A point mass m_a sits on the bar at the
+// distance d from its left end. Let x₁, x₂ be the displacements of the bar's ends, xt₁, xt₂ those
+// of the wheels, y₁, y₂ the road's height, δ = d/L and dᵢ = xᵢ − xtᵢ the travel of a suspension,
+// with displacements measured from static equilibrium. From
 //
 //   T = ½ M ((ẋ₁ + ẋ₂)/2)² + ½ I ((ẋ₂ − ẋ₁)/L)² + ½ m_a ((1 − δ) ẋ₁ + δ ẋ₂)² + ½ m_t (ẋt₁² + ẋt₂²),
 //   V = Σᵢ ½ k dᵢ² + ¼ k3 dᵢ⁴ + ½ k_t (yᵢ − xtᵢ)²,
@@ -16,14 +17,14 @@
 //   [ M/4 − J + m_a δ(1−δ)   M/4 + J + m_a δ²     ] [ẍ₂] = [ −F₂ ],
 //   m_t ẍtᵢ = Fᵢ + k_t (yᵢ − xtᵢ).
 //
-// The mass matrix is solved with its determinant multiplied out, M J + m_a (J + M (1 − 2δ)²/4), in
-// which nothing cancels. It is above 0 for M, I, L > 0 and m_a ≥ 0, wherever the point mass sits;
-// 0 ≤ d ≤ L puts it on the bar.
+// The mass matrix is inverted with its determinant in expanded form, M J + m_a (J + M (1 − 2δ)²/4),
+// in which nothing cancels. The determinant is above 0 for M, I, L > 0 and m_a ≥ 0, wherever the
+// point mass sits; 0 ≤ d ≤ L places it on the bar.
 //
-// Valid for small roll (x₂ − x₁ ≪ L) and while the tyres keep the ground: the force of their static
-// load (M + m_a) g/2 + m_t g, for a symmetric load, must stay above k_t (xtᵢ − yᵢ). The 10 in the
-// friction is in s/m: it is Coulomb's c_f sign ḋᵢ smoothed over ḋᵢ of about 0.1 m/s, and so lets a
-// suspension creep that dry friction would hold. The springs' forces are counted from static
+// The model is valid for small roll (x₂ − x₁ ≪ L) and while the tyres keep contact: the static load
+// of a tyre, (M + m_a) g/2 + m_t g for a symmetric load, must stay above k_t (xtᵢ − yᵢ). The 10 in
+// the friction has the unit s/m. It smooths Coulomb's c_f sign ḋᵢ over |ḋᵢ| of about 0.1 m/s, so a
+// suspension creeps where dry friction would hold it. The springs' forces are measured from static
 // equilibrium too: k and k3 belong to the loaded vehicle.
 
 #include <array>
@@ -147,7 +148,7 @@ struct RollPlane4Dof {
             (k + k3 * d2 * d2) * d2 + c_f * smooth_sign2};
   }
 
-  // ẍ₁, ẍ₂ from the mass matrix [A B; B C].
+  // Returns ẍ₁ and ẍ₂, solved with the mass matrix [A B; B C].
   template <class Real>
   static std::array<Real, 2> BarAccelerations(const std::array<Real, 2>& F,
                                               const std::array<Real, kParameters>& parameters) {

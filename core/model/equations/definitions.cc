@@ -15,7 +15,8 @@
 namespace polyest::internal::equations {
 namespace {
 
-// Depth first from each definition in turn, with the way there at hand, without recursion.
+// Sorts definitions by a depth-first search without recursion, which keeps the path from the
+// starting definition for the report of a cycle.
 class DependencyOrder {
  public:
   explicit DependencyOrder(const std::vector<Definition>& definitions) {
@@ -32,7 +33,7 @@ class DependencyOrder {
     }
   }
 
-  // False, and cycle() says which, if there is no order.
+  // Returns false if there is no order; cycle() then returns the cycle.
   bool Find() {
     std::vector<size_t> next(needs_.size(), 0);
     std::vector<bool> done(needs_.size(), false), on_path(needs_.size(), false);
@@ -68,7 +69,8 @@ class DependencyOrder {
   std::vector<size_t> path_, order_;
 };
 
-// A constant part of the text whose value is not finite stays unfolded.
+// Whether the node is a constant subexpression whose value is not finite: the graph leaves such a
+// node unfolded.
 bool IsNotFinite(const Graph& graph, NodeId id, const NodeId (&operands)[3]) {
   if (graph.IsConstant(id)) return false;
   return std::all_of(std::begin(operands), std::end(operands),

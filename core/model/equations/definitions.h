@@ -1,6 +1,6 @@
 #pragma once
 
-// Named expressions that refer to one another, made into nodes of a graph.
+// Named expressions that refer to one another, and their translation into nodes of a graph.
 
 #include <absl/status/statusor.h>
 
@@ -18,13 +18,14 @@ struct Definition {
   Syntax syntax;
 };
 
-// Puts each definition after those that it refers to. One that depends on itself is an
-// INVALID_ARGUMENT that shows the way round.
+// Sorts the definitions so that each follows those it refers to. Returns InvalidArgument, with the
+// cycle in the message, if one depends on itself.
 absl::Status SortByDependency(std::vector<Definition>& definitions);
 
-// The node of the expression. `names` has every name in it and `tables` the index of every table.
-// A constant part without a finite value is INVALID_ARGUMENT with its column, more nodes than the
-// graph may have RESOURCE_EXHAUSTED.
+// Adds the expression to `graph` and returns its node. `names` must hold the node of every name in
+// it, and `tables` the index of every table. Returns InvalidArgument with the column for a constant
+// subexpression whose value is not finite, and ResourceExhausted if the graph would exceed its
+// maximum number of nodes.
 absl::StatusOr<NodeId> Lower(const Syntax& syntax, const std::map<std::string, NodeId>& names,
                              const std::map<std::string, int>& tables, Graph& graph);
 

@@ -5,12 +5,12 @@
 namespace polyest::internal::equations {
 namespace {
 
-// The derivative with respect to one variable of nodes whose operands' derivatives are known.
+// Differentiates nodes with respect to one variable, given the derivatives of their operands.
 class ChainRule {
  public:
   explicit ChainRule(Graph& graph) : graph_(graph) {}
 
-  // dy for the node y, from da, db, dc of its operands.
+  // Returns the derivative dy of node y from the derivatives da, db, dc of its operands.
   NodeId Of(NodeId y, NodeId da, NodeId db, NodeId dc) {
     const Node node = graph_.node(y);
     const auto [a, b, c] = node.operands;
@@ -102,7 +102,7 @@ NodeId ChainRule::OfBinary(Operation operation, NodeId y, NodeId a, NodeId b, No
       return Make(Operation::kSelect, Make(Operation::kLessOrEqual, b, a), da, db);
     case Operation::kArcTangent2:  // y = atan2(a, b): (b da − a db)/(a² + b²)
       return Divide(Subtract(Multiply(b, da), Multiply(a, db)), Add(Square(a), Square(b)));
-    case Operation::kHypotenuse:  // (a da + b db)/y, and 0 at the origin, as of abs
+    case Operation::kHypotenuse:  // (a da + b db)/y, and 0 at the origin, as for abs
       return Make(Operation::kSelect, y, Divide(Add(Multiply(a, da), Multiply(b, db)), y),
                   Graph::kZero);
     case Operation::kModulo:  // y = a − b floor(a/b)
@@ -112,7 +112,7 @@ NodeId ChainRule::OfBinary(Operation operation, NodeId y, NodeId a, NodeId b, No
   }
 }
 
-// d aᵇ = b a^{b−1} da + aᵇ ln a db, where 0ᵇ ln 0 = 0.
+// Implements d aᵇ = b a^{b−1} da + aᵇ ln a db, where 0ᵇ ln 0 = 0.
 NodeId ChainRule::OfPower(NodeId y, NodeId a, NodeId b, NodeId da, NodeId db) {
   NodeId sum = Graph::kZero;
   if (da != Graph::kZero) {
@@ -125,7 +125,7 @@ NodeId ChainRule::OfPower(NodeId y, NodeId a, NodeId b, NodeId da, NodeId db) {
 }
 
 NodeId ChainRule::OfLookup(const Node& node, NodeId da, NodeId db) {
-  // The slope of a slope is never asked for: only values are differentiated.
+  // A slope is never differentiated: only values are.
   if (node.operation != Operation::kLookup) return Graph::kZero;
   const auto [x, y, none] = node.operands;
   NodeId sum = Graph::kZero;
@@ -136,7 +136,7 @@ NodeId ChainRule::OfLookup(const Node& node, NodeId da, NodeId db) {
   return Add(sum, Multiply(graph_.Look(Operation::kLookupSlopeY, node.index, x, y), db));
 }
 
-// The nodes that the roots need, operands first.
+// Returns the nodes that the roots depend on, operands first.
 std::vector<NodeId> Reachable(const Graph& graph, const std::vector<NodeId>& roots) {
   std::vector<bool> needed(static_cast<size_t>(graph.size()), false);
   for (const NodeId root : roots) needed[static_cast<size_t>(root)] = true;

@@ -1,10 +1,10 @@
 #pragma once
 
-// Derivatives of expressions as expressions, by the chain rule on the graph.
+// Symbolic derivatives: the chain rule applied to a graph of expressions.
 //
-// A piecewise function has the derivative of the piece taken: abs x has sign x, floor and ceil have
-// 0, min(a, b) has that of a where a ≤ b, comparisons and logic have 0. Where a function has no
-// derivative (√x at 0) the result is not finite.
+// A piecewise function has the derivative of the piece that is taken: sign x for abs x, 0 for floor
+// and ceil, the derivative of a for min(a, b) where a ≤ b, 0 for comparisons and logic. Where a
+// function has no derivative (√x at 0) the result is not finite.
 
 #include <vector>
 
@@ -12,9 +12,9 @@
 
 namespace polyest::internal::equations {
 
-// ∂root/∂variable for each root, in the order of the roots for the first variable, then for the
-// next: element v·roots + r. kZero where a root does not depend on a variable. If the graph runs
-// out of room on the way, graph.exhausted() and the result means nothing. `variables` are nodes.
+// Returns ∂root/∂variable for nodes `variables`: element v·roots + r is the derivative of root r
+// with respect to variable v, kZero if the root does not depend on it. If the graph runs out of
+// room, graph.exhausted() becomes true and the result is meaningless.
 std::vector<NodeId> Differentiate(Graph& graph, const std::vector<NodeId>& roots,
                                   const std::vector<NodeId>& variables);
 

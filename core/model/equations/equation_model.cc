@@ -63,7 +63,7 @@ class EquationModel final : public StateSpaceModel {
   }
 
  private:
-  // A block without columns may have any number of rows: nothing of it is read.
+  // A block without columns may have any number of rows, since none of it is read.
   void CheckShapes(const ConstBlock& states, const ConstBlock& parameters,
                    const ConstBlock& inputs) const {
     const auto fits = [&parameters](const ConstBlock& block, size_t columns) {
@@ -88,7 +88,7 @@ class EquationModel final : public StateSpaceModel {
   Programs programs_;
 };
 
-// The graph of all expressions.
+// Builds the graph of all expressions of a model and compiles the programs.
 class Assembly {
  public:
   explicit Assembly(const ReadEquations& read) : read_(read) {}

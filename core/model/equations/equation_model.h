@@ -1,11 +1,11 @@
 #pragma once
 
-// Models whose equations are given as text by somebody who need not be trusted.
+// Models whose equations are given as text, possibly by an untrusted user.
 //
-// The text is read by a parser with limits (limits.h), its expressions are drawn into one graph in
-// which common subexpressions are shared, and the graph is evaluated by a register machine for a
-// block of points at once. Nothing but arithmetic can be expressed: no loops, no memory, no files.
-// The derivatives ∂f/∂x are exact.
+// A parser with limits (limits.h) reads the text. All expressions become one graph, in which common
+// subexpressions are shared. A register machine evaluates the graph for a block of points at once.
+// Only arithmetic can be expressed: no loops, no memory, no files. The state Jacobian ∂f/∂x is
+// exact (symbolic).
 
 #include <string>
 #include <vector>
@@ -14,8 +14,9 @@
 
 namespace polyest::internal {
 
-// Returns all that is wrong with it, each with its field's path from the problem on:
-// "model.equations.states.v: column 7: unknown function \"sine\"; …". Empty: nothing.
+// Returns every error in the specification, each with its field's path starting at the problem:
+// "model.equations.states.v: column 7: unknown function \"sine\"; …". An empty list means that the
+// specification is valid.
 std::vector<absl::Status> CheckEquations(const EquationSpecification& specification);
 
 }  // namespace polyest::internal

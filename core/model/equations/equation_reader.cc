@@ -65,12 +65,13 @@ class Reader {
   const EquationSpecification& specification_;
   std::vector<absl::Status>& problems_;
   ReadEquations read_;
-  std::map<std::string, std::string> declared_;  // name -> what it is, "a state"
+  std::map<std::string, std::string> declared_;  // what each name is: "a state"
   std::map<std::string, int> table_arguments_;
-  std::set<std::string> free_;  // names that nothing declares
+  std::set<std::string> free_;  // undeclared names that become parameters
 };
 
-// `what` follows their number in the message.
+// Refuses more than `most` items with ResourceExhausted. In the message `what` follows the number
+// of items.
 void Reader::CheckSize(const FieldPath& path, size_t size, size_t most, const char* what) {
   if (size <= most) return;
   problems_.push_back(
@@ -161,8 +162,8 @@ void Reader::Declare() {
   for (const auto& [name, text] : s.outputs) DeclareOutput(name);
 }
 
-// An output may be named as the state or the intermediate that it is mostly; it means that in
-// expressions.
+// An output may share its name with a state or an intermediate, since it usually equals that one.
+// In expressions the name means the state or the intermediate.
 void Reader::DeclareOutput(const std::string& name) {
   const auto found = declared_.find(name);
   const bool shared = found != declared_.end() &&

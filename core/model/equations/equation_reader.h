@@ -1,6 +1,6 @@
 #pragma once
 
-// Reads a specification: every check of it that needs no evaluation.
+// Reads an equation specification and makes every check that needs no evaluation.
 
 #include <absl/status/status.h>
 
@@ -16,17 +16,18 @@
 namespace polyest::internal::equations {
 
 struct ReadEquations {
-  std::vector<Definition> states, outputs, intermediates;  // intermediates by dependency
-  std::vector<Quantity> parameters;                        // initial states last
+  std::vector<Definition> states, outputs, intermediates;  // intermediates sorted by dependency
+  std::vector<Quantity> parameters;                        // with the initial states last
   std::vector<std::string> inputs;
   std::vector<Lookup> tables;
   std::map<std::string, int> table_index;
 };
 
-// What is wrong is appended to `problems`; the result is of use only if nothing was.
+// Reads the specification and appends its errors to `problems`. The result is usable only if
+// nothing was appended.
 ReadEquations Read(const EquationSpecification& specification, std::vector<absl::Status>& problems);
 
-// The name of the parameter that is the state's initial value.
+// Returns the name of the parameter that holds the state's initial value.
 std::string InitialName(const std::string& state);
 
 }  // namespace polyest::internal::equations

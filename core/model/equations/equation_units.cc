@@ -19,7 +19,7 @@ class ModelUnits {
       : specification_(specification), read_(read), problems_(problems) {}
 
   std::map<std::string, std::string> Run() {
-    // Who gives no units may write sin(t).
+    // A specification without units is not checked: it may contain sin(t), although t is in s.
     if (specification_.units.empty()) return {};
     ReadGiven();
     if (!problems_.empty()) return {};
@@ -72,7 +72,8 @@ class ModelUnits {
     return found == units_.end() ? std::nullopt : std::optional(found->second);
   }
 
-  // The unit of the expression, or the one that it should have.
+  // Returns the expected unit if it is known, else the unit of the expression. Reports a difference
+  // between the two.
   std::optional<Unit> Check(const Definition& definition, const std::optional<Unit>& expected,
                             const char* reason) {
     const absl::StatusOr<std::optional<Unit>> unit = InferUnit(definition.syntax, units_);
@@ -88,7 +89,7 @@ class ModelUnits {
     return expected ? expected : *unit;
   }
 
-  // As its user writes it, here or elsewhere.
+  // Returns the unit as the user wrote it, for this name or for another of the same unit.
   std::string InWords(const std::string& name, const Unit& unit) const {
     if (const auto given = specification_.units.find(name); given != specification_.units.end()) {
       return given->second;

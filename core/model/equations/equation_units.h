@@ -1,6 +1,6 @@
 #pragma once
 
-// Whether the units of a model's equations go together.
+// Checks that the units of a model's equations are consistent.
 
 #include <absl/status/status.h>
 
@@ -12,8 +12,8 @@
 
 namespace polyest::internal::equations {
 
-// Appends what does not to `problems`. Returns the unit of each output that has one, as given or
-// as its expression has it.
+// Appends every inconsistency of units to `problems`. Returns the unit of each output whose unit is
+// known, as given or as inferred from its expression.
 std::map<std::string, std::string> CheckUnits(const EquationSpecification& specification,
                                               const ReadEquations& read,
                                               std::vector<absl::Status>& problems);

@@ -48,7 +48,8 @@ absl::Status CheckName(const FieldPath& field, const std::string& name,
   return absl::OkStatus();
 }
 
-// Every name in the expression is known; the variables among them go to `used`.
+// Refuses an unknown name in the expression with InvalidArgument, and adds the variables in it to
+// `used`.
 absl::Status CheckNames(const Syntax& syntax, const std::set<std::string>& variables,
                         const std::map<std::string, std::string>& definitions,
                         std::set<std::string>& used) {
@@ -112,7 +113,7 @@ void Expressions::Evaluate(const ConstMatrixRef& variables, MatrixRef results) c
   const Eigen::Index rows = variables.rows();
   POLYEST_CHECK(variables.cols() == variables_ && results.rows() == rows);
   POLYEST_CHECK(results.cols() == std::ssize(names_));
-  // Copies of the last row fill up the lanes.
+  // Copies of the last row pad the block to a multiple of kLanes.
   const Eigen::Index padded = (rows + kLanes - 1) / kLanes * kLanes;
   Eigen::ArrayXXd values(padded, variables.cols());
   values.topRows(rows) = variables.array();

@@ -1,7 +1,7 @@
 #pragma once
 
-// Named expressions over named variables in the language of equation models (README.md), for
-// parameters that are tied to others: {"k2": "k1", "I": "m*r^2"}.
+// Named expressions over named variables in the language of equation models (README.md). They
+// define parameters that depend on others: {"k2": "k1", "I": "m*r^2"}.
 
 #include <absl/status/statusor.h>
 
@@ -18,19 +18,21 @@ namespace polyest::internal {
 
 class Expressions {
  public:
-  // definitions: name -> text, which may use the variables and other definitions, without a cycle;
-  // no time and no tables. `field` begins each message: "derived" gives "derived.k2: column 3: …".
-  // INVALID_ARGUMENT, or RESOURCE_EXHAUSTED past a limit.
+  // Reads `definitions`, a map from name to text. A text may use the variables and other
+  // definitions without a cycle, but neither time nor tables. Every error message starts with
+  // `field`: "derived" gives "derived.k2: column 3: …". Returns InvalidArgument for an invalid
+  // definition, or ResourceExhausted beyond a limit of limits.h.
   static absl::StatusOr<Expressions> Make(const FieldPath& field,
                                           const std::map<std::string, std::string>& definitions,
                                           const std::vector<std::string>& variables);
 
-  const std::vector<std::string>& names() const { return names_; }  // in the map's order
-  // Those of the variables that some definition refers to.
+  // Returns the names in the map's order, which is the order of the columns that Evaluate fills.
+  const std::vector<std::string>& names() const { return names_; }
+  // Returns the variables that at least one definition refers to.
   const std::set<std::string>& variables_used() const { return variables_used_; }
 
-  // variables: rows × variables, results: rows × names; any number of rows. A result need not be
-  // finite.
+  // Evaluates the expressions for each row. `variables` has the shape rows × variables and
+  // `results` rows × names, with any number of rows. A result may be infinite or NaN.
   void Evaluate(const ConstMatrixRef& variables, MatrixRef results) const;
 
  private:

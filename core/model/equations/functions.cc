@@ -40,7 +40,8 @@ constexpr Function kFunctions[] = {
 
 bool IsLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-// The number of letters to insert, leave out or exchange to make one of the other (Levenshtein).
+// Returns the Levenshtein distance: the number of letters to insert, delete or replace to turn one
+// word into the other.
 size_t Distance(std::string_view from, std::string_view to) {
   std::vector<size_t> row(to.size() + 1);
   std::iota(row.begin(), row.end(), size_t{0});

@@ -1,6 +1,6 @@
 #pragma once
 
-// The functions that can be called in an expression, and the words that mean something there.
+// The functions and the reserved words of an expression.
 
 #include <optional>
 #include <string>
@@ -15,20 +15,21 @@ struct Function {
   std::string_view name;
   Operation operation;
   int min_arguments;
-  int max_arguments;  // more than three only where the operation is associative
+  int max_arguments;  // above three only for an associative operation
 };
 
-// Nullptr if there is none of that name.
+// Returns nullptr if no function has that name.
 const Function* FindFunction(std::string_view name);
 
-// t, pi and the names of the functions.
+// Whether the name is t, pi or that of a function.
 bool IsReserved(std::string_view name);
 
-// A letter or _, then letters, digits and _, of ASCII; of at most kMaxNameLength.
+// Whether the text is an ASCII letter or _, followed by ASCII letters, digits and _, with at most
+// kMaxNameLength characters.
 bool IsName(std::string_view text);
 
-// "; do you mean sin?" if a function or one of the names is near, otherwise "; the functions are
-// abs, …".
+// Returns "; do you mean sin?" if a function's or a table's name is similar to `unknown`, otherwise
+// "; the functions are abs, …".
 std::string SuggestFunction(std::string_view unknown, const std::vector<std::string>& tables);
 
 }  // namespace polyest::internal::equations

@@ -12,7 +12,7 @@
 namespace polyest::internal::equations {
 namespace {
 
-constexpr int kMaxFactors = 16;  // of a power that is written as a product
+constexpr int kMaxFactors = 16;  // largest power that is written as a product
 
 }  // namespace
 
@@ -47,7 +47,7 @@ NodeId Graph::Intern(const Node& node) {
 
 NodeId Graph::Constant(double value) {
   POLYEST_CHECK(std::isfinite(value));
-  // 0 and −0 are equal, so they must be one.
+  // 0 and −0 compare equal and must be the same node.
   return Intern({.operation = Operation::kConstant, .value = value == 0 ? 0.0 : value});
 }
 
@@ -62,7 +62,7 @@ NodeId Graph::Look(Operation operation, int table, NodeId x, NodeId y) {
 
 NodeId Graph::Raw(Operation operation, NodeId a, NodeId b, NodeId c) {
   if (IsCommutative(operation)) {
-    // Constants first, then in the order of appearance.
+    // Constants come first, then nodes by their index.
     const auto rank = [this](NodeId id) { return std::make_pair(!IsConstant(id), id); };
     if (rank(b) < rank(a)) std::swap(a, b);
   }

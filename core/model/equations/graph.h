@@ -1,11 +1,12 @@
 #pragma once
 
-// Expressions as a graph in which equal subexpressions are one node.
+// A graph of expressions in which equal subexpressions are one node.
 //
-// Whatever is added is first brought to a canonical form: constants are folded, negations drawn
-// outwards, operands of commutative operations put in order, small integer powers written as
-// products. All of this is exact in floating point, but for a product of constants taken first
-// (c·(d·x) = (c·d)·x) and a division by a constant (x/c = (1/c)·x), a rounding each.
+// Every added expression is first brought to a canonical form: constants are folded, negations
+// moved outwards, operands of commutative operations sorted, and small integer powers written as
+// products. Two of the rewritings may change the result by one rounding each: a product of
+// constants is multiplied first (c·(d·x) = (c·d)·x), and a division by a constant becomes a product
+// (x/c = (1/c)·x). A power written as a product rounds once for each multiplication.
 
 #include <cstddef>
 #include <unordered_map>
@@ -15,14 +16,14 @@
 
 namespace polyest::internal::equations {
 
-// Of a node in its graph. The operands of a node come before it.
+// The index of a node in its graph. The operands of a node have lower indices.
 using NodeId = int;
 
 struct Node {
   Operation operation = Operation::kConstant;
   NodeId operands[3] = {-1, -1, -1};
-  int index = 0;     // of a variable, or of a lookup's table
-  double value = 0;  // of a constant
+  int index = 0;     // of a variable, or of the table of a lookup
+  double value = 0;  // value of a constant
 
   bool operator==(const Node&) const = default;
 };
@@ -34,12 +35,13 @@ class Graph {
 
   explicit Graph(int max_nodes);
 
-  NodeId Constant(double value);  // finite
+  NodeId Constant(double value);  // `value` must be finite
   NodeId Variable(int index);
   NodeId Apply(Operation operation, NodeId a, NodeId b = -1, NodeId c = -1);
   NodeId Look(Operation operation, int table, NodeId x, NodeId y = -1);
 
-  // There was no room for a node: what was asked for since is kZero.
+  // Whether a node was refused because the graph is full. From then on every added expression is
+  // kZero.
   bool exhausted() const { return exhausted_; }
   void set_most_nodes(int max_nodes) { max_nodes_ = max_nodes; }
 

@@ -6,7 +6,7 @@
 namespace polyest::internal::equations {
 namespace {
 
-// An operand: kLanes rows from `row` on, or the same for all rows.
+// Reads an operand: kLanes rows starting at `row`, or one value for all rows.
 template <bool uniform>
 class Operand {
  public:
@@ -27,7 +27,7 @@ class Operand<true> {
   const Lane value_;
 };
 
-// The results of `function` for each kLanes rows; blocks of the usual size without a counter.
+// Stores the values of `function` for all rows, kLanes rows at a time.
 template <class Function>
 void ForRows(double* result, Eigen::Index rows, const Function& function) {
   for (Eigen::Index row = 0; row < rows; row += kLanes) {
@@ -72,8 +72,8 @@ void Look(const Instruction& instruction, double* const* slots, Eigen::Index row
   const double* y = slots[instruction.operands[1]];
   double* result = slots[instruction.result];
   for (Eigen::Index row = 0; row < rows; ++row) {
-    // The result may take the place of an operand that has one value for each row, never of one
-    // that has one value for all.
+    // The result may overwrite an operand with one value per row, but never one with a single value
+    // for all rows.
     result[row] = (instruction.lookup->*kFunction)(x[kUniformA ? 0 : row], y[kUniformB ? 0 : row]);
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
-// The instructions of the register machine: one operation on every row of a chunk of a block.
+// The instructions of the register machine: each applies one operation to every row of a chunk of a
+// block.
 
 #include <cstdint>
 
@@ -11,24 +12,25 @@ namespace polyest::internal::equations {
 
 struct Instruction;
 
-// Carries out the instruction on `rows` rows, a multiple of kLanes. slots[i] is where the values of
-// the i-th slot begin.
+// Carries out the instruction on `rows` rows, a multiple of kLanes. slots[i] points to the values
+// of slot i.
 using Kernel = void (*)(const Instruction& instruction, double* const* slots, Eigen::Index rows);
 
 struct Instruction {
   Kernel kernel;
   std::uint32_t result;
-  std::uint32_t operands[3];  // slots; the result's may be among them
-  const Lookup* lookup;       // of a lookup
+  std::uint32_t operands[3];  // slots; one of them may be the result's
+  const Lookup* lookup;       // the table, for a lookup
 };
 
-// `uniform`, of each operand: its slot has one value, for all rows.
+// Returns the kernel for the operation. `uniform_x` says whether the slot of operand x holds a
+// single value for all rows.
 Kernel SelectKernel(Operation operation, bool uniform_a, bool uniform_b, bool uniform_c);
 
-// The kernel that copies its operand.
+// Returns the kernel that copies its operand.
 Kernel CopyKernel(bool uniform);
 
-// The operation at one point, to the bit what the kernels give.
+// Returns the operation's value at one point, bit for bit the value that the kernels give.
 double EvaluateAtPoint(Operation operation, double a, double b, double c);
 
 }  // namespace polyest::internal::equations

@@ -1,7 +1,7 @@
 #pragma once
 
-// Each operation on kLanes points. What Eigen has no vector instructions for is the standard
-// library's function point by point, so that a point gives the same bits in any lane.
+// Each operation applied to kLanes points. Where Eigen has no vector instruction, the standard
+// library's function is applied point by point. A point therefore gets the same bits in any lane.
 
 #include <cmath>
 #include <functional>
@@ -44,8 +44,8 @@ Lane PointByPoint(const Lane& a, const Lane& b) {
   return result;
 }
 
-// 1 where the relation holds and 0 where it does not. Plain loops: the compiler makes masks of
-// them, Eigen's select() does not.
+// Returns 1 where the relation holds and 0 elsewhere. Plain loops are used because the compiler
+// vectorizes them with masks, unlike Eigen's select().
 template <class Relation>
 Lane Truth(const Lane& a, const Lane& b, Relation relation) {
   Lane result;
@@ -53,14 +53,15 @@ Lane Truth(const Lane& a, const Lane& b, Relation relation) {
   return result;
 }
 
-// Nothing of the side that is not taken gets into the result, not even a NaN.
+// Returns a where the condition is not 0, else b. Nothing of the other side enters the result, not
+// even a NaN.
 inline Lane Select(const Lane& condition, const Lane& a, const Lane& b) {
   Lane result;
   for (int i = 0; i < kLanes; ++i) result[i] = condition[i] != 0 ? a[i] : b[i];
   return result;
 }
 
-// NaN if either is.
+// Returns NaN if either operand is NaN.
 inline Lane Minimum(const Lane& a, const Lane& b) {
   Lane result;
   for (int i = 0; i < kLanes; ++i) result[i] = a[i] < b[i] || a[i] != a[i] ? a[i] : b[i];
@@ -73,9 +74,9 @@ inline Lane Maximum(const Lane& a, const Lane& b) {
   return result;
 }
 
-// For |x| < 0.625 Lambert's continued fraction x/(1 + x²/(3 + x²/(5 + …))) cut off after 17, which
-// leaves an error of |x|¹⁷/(17·15!!²) < 1e-17 |x|; otherwise (e^{2|x|} − 1)/(e^{2|x|} + 1), which
-// is 1 to rounding past 20.
+// For |x| < 0.625 evaluates Lambert's continued fraction x/(1 + x²/(3 + x²/(5 + …))) truncated
+// after 17, with an error of |x|¹⁷/(17·15!!²) < 1e-17 |x|. Otherwise evaluates (e^{2|x|} −
+// 1)/(e^{2|x|} + 1) with the sign of x, which rounds to 1 beyond 20.
 inline Lane HyperbolicTangent(const Lane& x) {
   const Lane s = x * x;
   const Lane near_numerator = x * ((((s + 990) * s + 135135) * s + 4729725) * s + 34459425);
@@ -91,14 +92,14 @@ inline Lane HyperbolicTangent(const Lane& x) {
   return numerator / denominator;
 }
 
-// −1, 0 or 1, and NaN of NaN.
+// Returns −1, 0 or 1, and NaN for NaN.
 inline Lane Sign(const Lane& x) {
   Lane result;
   for (int i = 0; i < kLanes; ++i) result[i] = x[i] > 0 ? 1.0 : x[i] < 0 ? -1.0 : x[i];
   return result;
 }
 
-// The remainder of the division that rounds down: it has the sign of the divisor.
+// Returns the remainder of the division that rounds down; it has the sign of the divisor.
 inline double Modulo(double a, double b) {
   const double remainder = std::fmod(a, b);
   return remainder != 0 && (remainder < 0) != (b < 0) ? remainder + b : remainder;

@@ -18,7 +18,7 @@ bool BelongsToName(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || IsDigit(c);
 }
 
-// Two characters before one, so that "<=" is not "<".
+// Symbols of two characters come before those of one, so "<=" is not read as "<".
 constexpr std::string_view kSymbols[] = {"<=", ">=", "==", "!=", "&&", "||", "**", "+", "-",
                                          "*",  "/",  "^",  "(",  ")",  ",",  "<",  ">", "!"};
 
@@ -59,7 +59,7 @@ absl::StatusOr<Token> Lexer::Next() {
   if (IsDigit(first) || point) return Number();
   if (!BelongsToName(first)) return Symbol();
   size_t end = Skip(offset_, BelongsToName);
-  // A name may have parts, as in u.delay.
+  // A name may have parts separated by points, as in u.delay.
   while (end + 1 < text_.size() && text_[end] == '.' && BelongsToName(text_[end + 1]) &&
          !IsDigit(text_[end + 1])) {
     end = Skip(end + 1, BelongsToName);
@@ -73,7 +73,7 @@ absl::StatusOr<Token> Lexer::Next() {
   return token;
 }
 
-// digits [. digits] [e [sign] digits], or without the digits before the point
+// Reads digits [. digits] [e [sign] digits]; the digits before the point may be missing.
 absl::StatusOr<Token> Lexer::Number() {
   size_t end = Skip(offset_, IsDigit);
   if (end < text_.size() && text_[end] == '.') end = Skip(end + 1, IsDigit);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The words of an expression.
+// Splits the text of an expression into tokens.
 
 #include <absl/status/statusor.h>
 
@@ -15,13 +15,13 @@ struct Token {
   enum class Kind { kNumber, kName, kSymbol, kEnd };
   Kind kind = Kind::kEnd;
   size_t offset = 0;           // bytes from the beginning of the text
-  std::string_view text = {};  // of it: the name, the symbol ("<=", "(" …) or the number
-  double value = 0;            // of a number, finite
+  std::string_view text = {};  // the name, the symbol ("<=", "(" …) or the number as written
+  double value = 0;            // value of a number, finite
 };
 
 class Lexer {
  public:
-  // Both must outlive the lexer and its tokens.
+  // Reads `text`; errors name `field`. Both must outlive the lexer and its tokens.
   Lexer(const FieldPath& field, std::string_view text) : field_(field), text_(text) {}
 
   absl::StatusOr<Token> Next();

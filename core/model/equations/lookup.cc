@@ -32,8 +32,8 @@ absl::Status CheckGrid(const char* name, const std::vector<double>& grid) {
   return absl::OkStatus();
 }
 
-// The second derivatives M at the knots of the natural cubic spline through `count` values that are
-// `stride` apart, by elimination of the tridiagonal system
+// Computes the second derivatives M at the knots of the natural cubic spline through values that
+// are `stride` apart, by elimination of the tridiagonal system
 //
 //   h_{i−1} M_{i−1} + 2 (h_{i−1} + h_i) M_i + h_i M_{i+1} = 6 ((f_{i+1} − f_i)/h_i − (f_i −
 //   f_{i−1})/h_{i−1}),
@@ -58,8 +58,8 @@ void NaturalCurvature(const std::vector<double>& grid, const double* values, siz
   }
 }
 
-// Where an argument lies, and the weights there of the values (0, 1) and the curvatures (2, 3) at
-// the knots `cell` and cell + 1.
+// The grid cell of an argument, and the weights of the values (0, 1) and of the curvatures (2, 3)
+// at the knots `cell` and cell + 1.
 struct Place {
   size_t cell;
   std::array<double, 4> weight;
@@ -76,7 +76,7 @@ Place Find(const std::vector<double>& grid, double x, bool spline, int order) {
   if (order == 1) {
     if (outside) return {cell, {0, 0, 0, 0}};
     if (!spline) return {cell, {-1 / h, 1 / h, 0, 0}};
-    // d/dx of the below, da/dx = −1/h, db/dx = 1/h
+    // Derivative of the spline's weights below, with da/dx = −1/h and db/dx = 1/h.
     return {cell, {-1 / h, 1 / h, (1 - 3 * a * a) * h / 6, (3 * b * b - 1) * h / 6}};
   }
   if (!spline) return {cell, {a, b, 0, 0}};

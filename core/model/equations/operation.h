@@ -1,6 +1,6 @@
 #pragma once
 
-// What an expression is made of once it has been read.
+// The operations that an expression consists of once it is parsed.
 
 #include <cstdint>
 
@@ -58,7 +58,7 @@ enum class Operation : std::uint8_t {
   kLookupSlopeY,  // ∂/∂y
 };
 
-// The number of operands; −1 for a lookup, whose table says how many.
+// Returns the number of operands, or −1 for a lookup, whose table determines it.
 constexpr int Operands(Operation operation) {
   if (operation <= Operation::kVariable) return 0;
   if (operation <= Operation::kCeiling) return 1;
@@ -69,7 +69,7 @@ constexpr int Operands(Operation operation) {
 
 constexpr bool IsLookup(Operation operation) { return operation >= Operation::kLookup; }
 
-// a ∘ b = b ∘ a, to the bit.
+// Whether a ∘ b = b ∘ a holds bit for bit.
 constexpr bool IsCommutative(Operation operation) {
   switch (operation) {
     case Operation::kAdd:

@@ -21,7 +21,7 @@ struct BinaryOperator {
   std::string_view symbol;
   int precedence;
   Operation operation;
-  bool swapped = false;  // a > b is b < a
+  bool swapped = false;  // whether a > b is stored as b < a
 };
 
 constexpr int kOr = 1, kAnd = 2, kComparison = 3, kSum = 4, kProduct = 5, kSign = 6, kPower = 7;
@@ -50,7 +50,7 @@ class Parser {
   absl::Status Run();
 
  private:
-  // The index of a node, or a message.
+  // The index of a node, or an error.
   using Result = absl::StatusOr<int>;
 
   absl::Status Advance();
@@ -118,7 +118,7 @@ Parser::Result Parser::Expression(int min_precedence) {
     if (!found || found->precedence < min_precedence) break;
     const size_t offset = token_.offset;
     POLYEST_RETURN_IF_ERROR(Advance());
-    // Powers bind to the right and may have a sign in the exponent.
+    // Powers bind to the right, and their exponent may have a sign.
     POLYEST_ASSIGN_OR_RETURN(
         const int right, Expression(found->precedence == kPower ? kSign : found->precedence + 1));
     SyntaxNode node{.operation = found->operation, .offset = offset, .swapped = found->swapped};

@@ -1,6 +1,6 @@
 #pragma once
 
-// Reads an expression. Grammar, from the loosest to the tightest binding:
+// Parser of expressions. The grammar, from the loosest to the tightest binding:
 //
 //   or          = and { "||" and }
 //   and         = comparison { "&&" comparison }
@@ -23,23 +23,23 @@
 namespace polyest::internal::equations {
 
 struct SyntaxNode {
-  Operation operation = Operation::kConstant;  // kVariable: a name; kLookup: a table's
-  int operands[3] = {-1, -1, -1};              // nodes before this one
-  double value = 0;                            // of a number
-  std::string name = {};                       // of a name or a table
-  size_t offset = 0;                           // into the text, for messages
-  bool swapped = false;                        // a > b, kept as b < a
+  Operation operation = Operation::kConstant;  // kVariable for a name, kLookup for a table
+  int operands[3] = {-1, -1, -1};              // indices of earlier nodes
+  double value = 0;                            // value of a number
+  std::string name = {};                       // of a variable or a table
+  size_t offset = 0;                           // position in the text in bytes, for messages
+  bool swapped = false;                        // whether a > b is stored as b < a
 };
 
-// An expression as it was written; the last node is the whole.
+// An expression as it was written. The last node is the whole expression.
 struct Syntax {
-  FieldPath field;  // where it stands, as in "model.equations.states.v"
+  FieldPath field;  // path of the field that holds it: "model.equations.states.v"
   std::string text;
   std::vector<SyntaxNode> nodes;
 };
 
-// `tables`: how many arguments each takes. Errors are INVALID_ARGUMENT with the column, or
-// RESOURCE_EXHAUSTED for a text longer than kMaxTextLength.
+// Parses the text. `tables` maps each table to its number of arguments. Returns InvalidArgument
+// with the column for an invalid text, or ResourceExhausted for one longer than kMaxTextLength.
 absl::StatusOr<Syntax> Parse(FieldPath field, std::string text,
                              const std::map<std::string, int>& tables);
 

@@ -7,7 +7,7 @@
 namespace polyest::internal::equations {
 namespace {
 
-// What the thread's programs work in.
+// Memory that all programs of a thread share.
 struct Scratch {
   Eigen::ArrayXd registers;
   std::vector<double*> slots;
@@ -29,7 +29,7 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
       ThreadScratch(first_register_ + static_cast<size_t>(registers_), registers_ * kRows);
   double** const slots = scratch.slots.data();
   slots[0] = &time_s;
-  // The slots of operands are only read: see Kernel.
+  // Kernels only read the slots of operands, so the cast is safe: see Kernel.
   double* const constants = const_cast<double*>(constants_.data());
   for (size_t i = 0; i < constants_.size(); ++i) slots[1 + i] = constants + i;
   for (int i = 0; i < registers_; ++i) {

@@ -1,11 +1,12 @@
 #pragma once
 
-// Expressions as a straight sequence of instructions, each carried out on up to kRows rows at once,
-// so that finding out what to do costs little beside doing it.
+// Expressions compiled into a sequence of instructions without branches. Each instruction processes
+// up to kRows rows at once, which makes the cost of its dispatch small.
 //
-// What several expressions share is computed once. An intermediate value lives in a register of
-// kRows rows for as long as it is needed; a product that is only added to something is one
-// instruction with the sum. The first run in a thread may allocate; the ones after it do not.
+// Subexpressions that several expressions share are computed once. An intermediate value occupies a
+// register of kRows rows for as long as it is needed. A product that is only added or subtracted
+// once is fused with that sum into one instruction. The first run in a thread may allocate memory;
+// later runs do not.
 
 #include <span>
 #include <vector>
@@ -16,10 +17,11 @@
 
 namespace polyest::internal::equations {
 
-// Where the values of a variable are: a column of one of the blocks, or the time, the same for all.
+// Where the values of a variable are stored: in a column of one of the blocks, or in the time,
+// which is one value for all rows.
 struct VariablePlace {
   static constexpr int kTime = -1;
-  int block = 0;  // or kTime
+  int block = 0;  // index of the block, or kTime
   Eigen::Index column = 0;
 };
 
@@ -28,13 +30,13 @@ class Program {
   static constexpr Eigen::Index kRows = 64;
 
   Program() = default;
-  // Computes roots[i] into column i of the results. places[i] is where variable i is. The tables
-  // must outlive the program.
+  // Compiles a program that writes the value of roots[i] into column i of the results. places[i]
+  // says where variable i is stored. The tables must outlive the program.
   Program(const Graph& graph, const std::vector<NodeId>& roots,
           const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables);
 
-  // Every block has as many rows as the results, a multiple of kLanes; blocks that the program
-  // takes nothing from may be of any size. No block may overlap the results.
+  // Evaluates the program. Every block must have as many rows as `results`, a multiple of kLanes; a
+  // block that the program does not read may have any size. No block may overlap the results.
   void Run(double time_s, std::span<const ConstBlock* const> blocks, Block results) const;
 
   Eigen::Index results() const { return first_register_ - first_result_; }
@@ -52,8 +54,9 @@ class Program {
   std::vector<Instruction> instructions_;
   std::vector<Load> loads_;
   std::vector<double> constants_;
-  std::vector<Eigen::Index> zero_;  // columns that are 0 for ever
-  // Slots: the time, the constants, the loads, the columns of the results, the registers.
+  std::vector<Eigen::Index> zero_;  // columns of the results that are always 0
+  // Order of the slots: the time, the constants, the loads, the columns of the results, the
+  // registers.
   std::uint32_t first_result_ = 0;
   std::uint32_t first_register_ = 0;
   int registers_ = 0;

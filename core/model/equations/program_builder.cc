@@ -1,4 +1,4 @@
-// Makes programs of graphs.
+// Compiles graphs into programs.
 
 #include <algorithm>
 #include <limits>
@@ -11,11 +11,11 @@ namespace {
 
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
-// A node as it is computed: with a product drawn into a sum where that saves an instruction.
+// A node as it is computed: a product may be fused with a sum where that saves an instruction.
 struct Step {
   Operation operation;
   NodeId operands[3];
-  int uses = 0;       // by steps and roots
+  int uses = 0;       // number of steps and roots that read it
   int last_use = -1;  // position of the last instruction that reads it
   bool needed = false;
   std::uint32_t slot = kNowhere;
@@ -59,7 +59,7 @@ class ProgramBuilder {
   const std::vector<VariablePlace>& places_;
   const std::vector<Lookup>& tables_;
   std::vector<Step> steps_;
-  std::vector<NodeId> order_;  // of what is computed, operands first
+  std::vector<NodeId> order_;  // the nodes to compute, operands first
   std::vector<std::uint32_t> free_registers_;
   Program program_;
 };
@@ -96,8 +96,8 @@ void ProgramBuilder::Fuse() {
   }
 }
 
-// Makes `sum` the operation on the factors of `product` and the other term, if nobody else needs
-// the product.
+// Fuses `product` into `sum`: makes `sum` the operation on the factors of `product` and the other
+// term. Returns false if `product` is not a product or has other uses.
 bool ProgramBuilder::Draw(NodeId sum, Operation operation, NodeId product, NodeId other) {
   if (step(product).operation != Operation::kMultiply || step(product).uses != 1) return false;
   const auto [a, b, none] = step(product).operands;
@@ -108,7 +108,8 @@ bool ProgramBuilder::Draw(NodeId sum, Operation operation, NodeId product, NodeI
   return true;
 }
 
-// Appends what `root` needs and is not there yet, operands first, without recursion.
+// Appends the nodes that `root` depends on and that are not yet in the order, operands first,
+// without recursion.
 void ProgramBuilder::Order(NodeId root) {
   std::vector<std::pair<NodeId, int>> path = {{root, 0}};
   while (!path.empty()) {
@@ -122,7 +123,8 @@ void ProgramBuilder::Order(NodeId root) {
       path.emplace_back(step(id).operands[next++], 0);
       continue;
     }
-    // A value that nothing reads, a root's, lives to its own computation.
+    // Initial value for a node that no other reads, such as a root; PlaceResults raises it for the
+    // others.
     step(id).last_use = static_cast<int>(order_.size());
     order_.push_back(id);
     path.pop_back();
@@ -146,7 +148,8 @@ void ProgramBuilder::PlaceLeaf(NodeId id) {
   step(id).slot = static_cast<std::uint32_t>(program_.loads_.size() - 1);
 }
 
-// Constants first, since where they end the slots of the loads begin.
+// Places the constants first, because the slots of the loads begin where those of the constants
+// end.
 void ProgramBuilder::PlaceOperands() {
   std::vector<NodeId> leaves;
   for (const NodeId id : order_) {
@@ -165,7 +168,7 @@ void ProgramBuilder::PlaceOperands() {
     if (graph_.IsConstant(id) || step(id).slot != kNowhere) continue;
     const size_t loads = program_.loads_.size();
     PlaceLeaf(id);
-    if (program_.loads_.size() == loads) continue;  // the time
+    if (program_.loads_.size() == loads) continue;  // the time has a slot of its own
     step(id).slot += first_load;
     program_.loads_.back().slot = step(id).slot;
   }
@@ -173,7 +176,7 @@ void ProgramBuilder::PlaceOperands() {
   program_.first_register_ = program_.first_result_ + static_cast<std::uint32_t>(roots_.size());
 }
 
-// A root is computed into its column at once.
+// Computes each root directly into its column of the results.
 void ProgramBuilder::PlaceResults() {
   for (size_t i = 0; i < roots_.size(); ++i) {
     Step& root = step(roots_[i]);
@@ -192,14 +195,14 @@ void ProgramBuilder::EmitStep(NodeId id, int position) {
   Instruction instruction{};
   bool uniform[3] = {true, true, true};
   for (int i = 0; i < 3; ++i) {
-    // An operand that is not there is the first one once more.
+    // A missing operand is replaced by the first one.
     const NodeId operand = current.operands[current.operands[i] < 0 ? 0 : i];
     Step& source = step(operand);
     instruction.operands[i] = source.slot;
     uniform[i] = IsUniform(source.slot);
     if (source.last_use == position && source.slot >= program_.first_register_) {
       free_registers_.push_back(source.slot);
-      source.last_use = -1;  // once
+      source.last_use = -1;  // frees the register only once
     }
   }
   if (current.slot == kNowhere) {

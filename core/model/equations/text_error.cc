@@ -14,8 +14,8 @@ constexpr size_t kMaxQuoted = 24;  // bytes
 
 bool Continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
 
-// The bytes of the character that the text begins with, 0 if it is not valid UTF-8: neither cut
-// off, nor longer than needed, nor a surrogate, nor past U+10FFFF.
+// Returns the length in bytes of the character at the beginning of the text, or 0 if it is not
+// valid UTF-8: truncated, longer than needed, a surrogate, or beyond U+10FFFF.
 size_t CharacterLength(std::string_view text) {
   const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
   if (byte(0) < 0x80) return 1;

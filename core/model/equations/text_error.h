@@ -1,6 +1,6 @@
 #pragma once
 
-// Messages about a place in a text.
+// Error messages that point to a place in a text.
 
 #include <absl/status/status.h>
 
@@ -12,13 +12,13 @@
 
 namespace polyest::internal::equations {
 
-// "FIELD: column 7: MESSAGE (at "sine(x)")": `offset` bytes into `text`, counted in characters from
-// 1. What is quoted is valid UTF-8 on one line whatever the text.
+// Returns InvalidArgument with "FIELD: column 7: MESSAGE (at "sine(x)")". `offset` is in bytes; the
+// column counts characters from 1. The quotation is valid UTF-8 on one line, whatever the text.
 absl::Status ErrorAt(const FieldPath& field, std::string_view text, size_t offset,
                      std::string_view message);
 
-// The text in quotation marks, fit for a message: cut where it is long, escaped where it is not
-// plain.
+// Returns the text in quotation marks for a message. Cuts it after 24 bytes and escapes it if it
+// contains control characters or is not valid UTF-8.
 std::string Quoted(std::string_view text);
 
 }  // namespace polyest::internal::equations

@@ -12,10 +12,10 @@
 namespace polyest::internal::equations {
 namespace {
 
-// What is known of a part of an expression.
+// The unit and the value of a part of an expression, as far as they are known.
 struct Known {
-  std::optional<Unit> unit;     // nullopt: unknown, or any
-  std::optional<double> value;  // of a part that is a constant
+  std::optional<Unit> unit;     // nullopt if unknown or arbitrary
+  std::optional<double> value;  // only for a constant part
 };
 
 class UnitCheck {

@@ -1,11 +1,11 @@
 #pragma once
 
-// Units of expressions from the units of their names.
+// Infers the unit of an expression from the units of its names and checks it for consistency.
 //
 // The two sides of a sum, a comparison, min, max, mod, atan2, hypot and if must have the same unit,
-// scale included; exp, sin and their like take plain numbers and give them; xⁿ needs a constant n
-// unless x is plain. A number written out is plain, but 0 has any unit. Where the unit of a name is
-// not known nothing that depends on it is checked.
+// scale included. exp, sin and similar functions take plain numbers and return plain numbers. xⁿ
+// needs a constant n unless x is plain. A literal number is plain, except that 0 has any unit.
+// Anything that depends on a name of unknown unit is not checked.
 
 #include <absl/status/statusor.h>
 
@@ -18,8 +18,8 @@
 
 namespace polyest::internal::equations {
 
-// The unit of the expression, nullopt if it is not known or is any. `units`: of the names that have
-// one. INVALID_ARGUMENT with the column where units do not go together.
+// Returns the unit of the expression, or nullopt if it is unknown or arbitrary. `units` holds the
+// names whose unit is known. Returns InvalidArgument with the column where units are inconsistent.
 absl::StatusOr<std::optional<Unit>> InferUnit(const Syntax& syntax,
                                               const std::map<std::string, Unit>& units);
 
