@@ -23,7 +23,7 @@ struct CloseEntry {
 };
 using OpenEntry = std::unique_ptr<zip_file_t, CloseEntry>;
 
-// Calls write(data, size) for each piece of the entry, until it returns false.
+// Calls write(data, size) for each piece of the entry until it returns an error.
 template <class Write>
 absl::Status ForEachPiece(zip_t* archive, uint64_t index, const std::string& name, Write write) {
   const OpenEntry entry(zip_fopen_index(archive, index, 0));

@@ -1,7 +1,7 @@
 #pragma once
 
-// An FMU is a zip archive. What is in it is not trusted: names that leave the folder, symbolic
-// links, and archives that unpack to more than the limits are refused.
+// Reads an FMU's zip archive. Its content is not trusted: names that leave the folder, symbolic
+// links and archives that unpack to more than the limits are refused.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -17,19 +17,22 @@ namespace polyest::internal {
 
 struct ArchiveLimits {
   int64_t max_entries = 20'000;
-  int64_t max_bytes = int64_t{2} << 30;  // unpacked, all files together
+  int64_t max_bytes = int64_t{2} << 30;  // unpacked size of all files together
 };
 
 class Archive {
  public:
-  // FAILED_PRECONDITION for a file that is no zip archive or has an entry that is refused.
+  // Opens a file. Returns FailedPrecondition for one that is not a zip archive or contains a
+  // refused entry.
   static absl::StatusOr<Archive> Open(const std::filesystem::path& file,
                                       const ArchiveLimits& limits = {});
 
   bool Contains(const std::string& entry) const;
-  // The text of one entry of at most this many bytes.
+  // Returns the text of an entry. Returns FailedPrecondition if there is no such entry, if it has
+  // more than `max_bytes` bytes, or if it is damaged.
   absl::StatusOr<std::string> Read(const std::string& entry, int64_t max_bytes) const;
-  // Writes all entries below an existing folder.
+  // Writes all entries below an existing folder. Returns FailedPrecondition for a damaged archive
+  // or one beyond the limits, and ResourceExhausted if a file cannot be written.
   absl::Status Unpack(const std::filesystem::path& folder) const;
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
 
-// The FMUs that may be used: the *.fmu files of one folder, which is the operator's; nothing
-// outside of it can be named. What is in an FMU is found out when it is asked for, so that files
-// that come, go or change are seen.
+// The usable FMUs: the *.fmu files of one folder, which the operator owns. A name cannot refer to a
+// file outside the folder. The folder is read again on every call, so added, removed and changed
+// files are noticed.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -19,25 +19,26 @@
 
 namespace polyest::internal {
 
-// A file that cannot be used, and why.
+// An FMU file that cannot be used, and the reason.
 struct BrokenFmu {
   std::string name;
   absl::Status status;
 };
 
-// May be used by several threads at once; a copy is the same catalogue.
+// Thread-safe. Copies share their state.
 class FmuCatalogue {
  public:
-  // NOT_FOUND when there is no such folder.
+  // Opens a folder. Returns NotFound when there is no such folder.
   static absl::StatusOr<FmuCatalogue> Open(const std::filesystem::path& folder,
                                            const WorkerLimits& limits = {});
 
-  // Those that can be used, by name.
+  // Returns the usable FMUs, sorted by name.
   std::vector<std::shared_ptr<const Model>> Models() const;
   std::vector<BrokenFmu> Broken() const;
 
-  // `name` is the file's without ".fmu". NOT_FOUND lists the names there are; INVALID_ARGUMENT for
-  // a name that is none; FAILED_PRECONDITION says what is wrong with an FMU that cannot be used.
+  // Returns the FMU named `name`, the file's name without ".fmu". Returns InvalidArgument if `name`
+  // cannot be such a name, NotFound with the available names if there is no such file, and
+  // FailedPrecondition with the reason if the FMU cannot be used.
   absl::StatusOr<std::shared_ptr<const Model>> Find(std::string_view name) const;
 
  private:
@@ -50,11 +51,11 @@ class FmuCatalogue {
     std::filesystem::path folder;
     WorkerLimits limits;
     std::mutex mutex;
-    std::map<std::string, Entry> entries;  // as they were when last looked at
+    std::map<std::string, Entry> entries;  // as of the last Refresh
   };
 
   explicit FmuCatalogue(std::shared_ptr<State> state) : state_(std::move(state)) {}
-  // Sees what has changed. With the mutex held.
+  // Reads the folder again and updates `entries`. The mutex must be held.
   void Refresh() const;
 
   std::shared_ptr<State> state_;

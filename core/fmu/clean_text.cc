@@ -5,7 +5,8 @@
 namespace polyest::internal {
 
 std::string CleanText(const std::string& text, size_t max_bytes) {
-  // The way to wide characters drops what is not UTF-8, and so a character that was cut in two.
+  // The conversion to wide characters drops invalid UTF-8, including a character that was cut in
+  // two.
   std::string clean = pugi::as_utf8(pugi::as_wide(text.substr(0, max_bytes)));
   for (char& c : clean) {
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';

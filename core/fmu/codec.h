@@ -1,11 +1,12 @@
 #pragma once
 
-// Values as bytes between a daemon and its workers: one machine, one build, so that numbers go as
-// they lie in memory. The decoder reads what a worker wrote, whose FMU may have written anything:
-// it never reads past the end nor makes room for more than is there.
+// Encodes values as bytes for the messages between a daemon and its workers. Both are the same
+// build on the same machine, so numbers keep their representation in memory. The decoder does not
+// trust its input, since an FMU may have overwritten the worker's memory: it never reads past the
+// end and never allocates more than the input can fill.
 //
-// A type takes part by a function Fields(archive, value) that names its members once, for both
-// directions.
+// A type is supported if it has a function Fields(archive, value) that lists its members once, for
+// both directions.
 
 #include <cstdint>
 #include <cstring>
@@ -58,7 +59,8 @@ class Encoder {
   template <class T>
   requires std::is_class_v<T>
   void Put(const T& value) {
-    // Fields serves both directions and so takes what it may change; this one does not.
+    // Fields serves both directions and so takes a mutable reference; the encoder does not modify
+    // the value.
     Fields(*this, const_cast<T&>(value));
   }
 
@@ -73,21 +75,22 @@ class Decoder {
   void operator()(Values&... values) {
     (Get(values), ...);
   }
-  // Whether all was there that was asked for; what was not is left as it was.
+  // Whether all values could be read so far. Values that could not be read are left unchanged.
   bool ok() const { return ok_; }
+  // Whether all values could be read and no bytes are left.
   bool complete() const { return ok_ && position_ == bytes_.size(); }
 
  private:
   size_t left() const { return bytes_.size() - position_; }
 
-  // The next bytes, or null.
+  // Returns the next `size` bytes, or nullptr if fewer are left.
   const char* Next(size_t size) {
     ok_ = ok_ && size <= left();
     if (!ok_) return nullptr;
     position_ += size;
     return bytes_.data() + position_ - size;
   }
-  // How many there are of something that has at least this many bytes each.
+  // Reads a number of elements, each of which takes at least `bytes_each` bytes.
   size_t Count(size_t bytes_each) {
     uint64_t count = 0;
     Get(count);

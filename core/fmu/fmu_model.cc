@@ -32,7 +32,7 @@ absl::Status Annotate(const std::string& name, const absl::Status& status) {
 
 absl::Status UnpackInto(const std::filesystem::path& file, UnpackedFmu& fmu) {
   POLYEST_ASSIGN_OR_RETURN(const Archive archive, Archive::Open(file));
-  // The file may have been replaced since it was read.
+  // The file may have been replaced since its description was read.
   const std::string& name = fmu.description.interface.name;
   POLYEST_ASSIGN_OR_RETURN(const FmuDescription now, ReadDescription(archive, name));
   if (now.interface.token != fmu.description.interface.token) {
@@ -60,7 +60,7 @@ std::shared_ptr<const UnpackedFmu> FmuModel::Unpack() const {
   auto fmu = std::make_shared<UnpackedFmu>();
   fmu->description = description_;
   fmu->status = Annotate(description_.interface.name, UnpackInto(file_, *fmu));
-  // A failure (no room left, say) is not kept.
+  // A failure, such as a full disk, is not kept, so the next use tries again.
   if (fmu->status.ok()) unpacked_ = fmu;
   return fmu;
 }

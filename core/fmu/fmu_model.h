@@ -1,6 +1,6 @@
 #pragma once
 
-// An FMU as a model that simulates itself, in processes of its own.
+// An FMU as a model that propagates its own trajectories, in separate worker processes.
 
 #include <absl/status/status.h>
 
@@ -18,14 +18,14 @@ namespace polyest::internal {
 
 struct UnpackedFmu {
   FmuDescription description;
-  absl::Status status;  // why it could not be unpacked
+  absl::Status status;  // the reason if it could not be unpacked
   std::unique_ptr<TemporaryFolder> folder;
 };
 
 class FmuModel final : public SelfPropagatingModel {
  public:
-  // Reads what the archive says of itself; nothing of the FMU is run. FAILED_PRECONDITION says
-  // what is wrong with it.
+  // Reads the FMU's description without running any of its code. Returns FailedPrecondition with
+  // the reason if the FMU cannot be used.
   static absl::StatusOr<std::shared_ptr<const FmuModel>> Read(const std::filesystem::path& file,
                                                               const std::string& name,
                                                               const WorkerLimits& limits);
@@ -33,14 +33,16 @@ class FmuModel final : public SelfPropagatingModel {
   const ModelDescription& description() const override { return description_.model; }
   const FmuInterface& interface() const { return description_.interface; }
 
-  // An FMU that cannot be run fails the first Advance of the ensemble: FAILED_PRECONDITION.
+  // Starts an ensemble. If the FMU cannot be run, the ensemble's first Advance fails with
+  // FailedPrecondition.
   std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
                                                     const InputSignals* inputs) const override;
 
  private:
   FmuModel(std::filesystem::path file, FmuDescription description, const WorkerLimits& limits)
       : file_(std::move(file)), description_(std::move(description)), limits_(limits) {}
-  // Unpacked at its first use, and kept until nobody uses it any more.
+  // Unpacks the archive at first use. The folder exists as long as this model or an ensemble refers
+  // to it. A failed attempt is repeated at the next use.
   std::shared_ptr<const UnpackedFmu> Unpack() const;
 
   std::filesystem::path file_;

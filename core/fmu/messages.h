@@ -1,7 +1,8 @@
 #pragma once
 
-// What a daemon and its workers tell each other over a socket: a length of 8 bytes, then a Start
-// once, then Advances, each answered by a Result.
+// The messages between a daemon and its workers over a socket. Each is preceded by its length in 8
+// bytes. The daemon sends one StartMessage, then AdvanceMessages; the worker answers each of the
+// latter with a ResultMessage.
 
 #include <cstdint>
 #include <string>
@@ -14,7 +15,7 @@
 
 namespace polyest::internal {
 
-// Beyond it a message is refused by both sides.
+// Maximum length of a message in bytes; both sides refuse longer ones.
 inline constexpr uint64_t kLongestMessage = uint64_t{1} << 30;
 
 // One or more blocks of points, and the FMU that simulates them.
@@ -24,21 +25,21 @@ struct StartMessage {
   FmuInterface interface;
   std::vector<FmuVariable> parameters;
   std::vector<FmuVariable> inputs;
-  std::vector<FmuVariable> outputs;  // those to read
-  std::vector<int> block_points;     // the sizes of the blocks
-  // As in EnsembleSpecification, the blocks' rows one below the other.
+  std::vector<FmuVariable> outputs;  // the outputs to read
+  std::vector<int> block_points;     // number of points in each block
+  // As in EnsembleSpecification, with the rows of the blocks stacked.
   Matrix parameter_values;
   Matrix amplitudes, input_delays_s, input_offsets;
   std::vector<InputSpecification> signals;
   IntegrationOptions integration;
 };
 
-// The new knots of one streamed input.
+// New knots of one streamed input.
 struct KnotsMessage {
   int input = 0;
   std::vector<double> time_s;
   std::vector<double> value;
-  bool finished = false;  // no more will come
+  bool finished = false;  // whether these are the last knots
 };
 
 struct AdvanceMessage {
@@ -47,9 +48,9 @@ struct AdvanceMessage {
 };
 
 struct ResultMessage {
-  std::string error;  // what ended the simulation as a whole; empty: nothing did
-  Matrix outputs;     // rows as in Start, columns as TrajectoryEnsemble::Advance has them
-  std::vector<PointFailure> failures;  // all up to now; points are rows of Start
+  std::string error;  // an error that ended the whole simulation, or empty
+  Matrix outputs;     // rows as in StartMessage, columns as in TrajectoryEnsemble::Advance
+  std::vector<PointFailure> failures;  // all so far; `point` is a row of StartMessage
 };
 
 template <class Archive>

@@ -1,6 +1,7 @@
 #pragma once
 
-// The models that have a name here: the built-in ones, and the FMUs of a folder if there is one.
+// The models that can be referred to by name: the built-in models and the FMUs of an optional
+// folder.
 
 #include <absl/status/statusor.h>
 
@@ -14,20 +15,22 @@
 
 namespace polyest::internal {
 
-// May be used by several threads at once.
+// Thread-safe.
 class ModelLibrary {
  public:
-  // The built-in models alone.
+  // Makes a library of the built-in models alone.
   ModelLibrary() = default;
   explicit ModelLibrary(FmuCatalogue fmus) : fmus_(std::move(fmus)) {}
 
-  // The built-in models, then the FMUs that can be used; no two of the same name: an FMU with that
-  // of a built-in model is left out.
+  // Returns the built-in models, then the usable FMUs. An FMU with the name of a built-in model is
+  // left out.
   std::vector<std::shared_ptr<const Model>> Models() const;
-  // By name, a built-in model before an FMU. NOT_FOUND lists the names of the built-in models, or
-  // of the FMUs when there are some; FAILED_PRECONDITION for an FMU that cannot be used.
+  // Returns the model of that name; a built-in model takes precedence over an FMU. Returns NotFound
+  // with the names of the built-in models, and of the FMUs if there is a folder of them. Returns
+  // FailedPrecondition for an FMU that cannot be used.
   absl::StatusOr<std::shared_ptr<const Model>> Find(std::string_view name) const;
-  // As FmuCatalogue::Find; FAILED_PRECONDITION without a folder of FMUs.
+  // Returns the FMU as FmuCatalogue::Find does, or FailedPrecondition if there is no folder of
+  // FMUs.
   absl::StatusOr<std::shared_ptr<const Model>> FindFmu(std::string_view name) const;
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
 
-// Memory that a worker shares with the process that started it: which function of the FMU is being
-// called, at which time, and what the FMU said last. It outlives a worker that crashes, and its
-// counter tells one that is slow from one that hangs.
+// Memory that a worker shares with the process that started it. It holds the FMU function that is
+// being called, the simulation time of the call, and the FMU's last message. It survives a crash of
+// the worker, and its counter of calls distinguishes a slow worker from one that hangs.
 
 #include <array>
 #include <atomic>
@@ -25,14 +25,15 @@ enum class FmuCall : int32_t {
 };
 
 struct StatusPage {
-  std::atomic<uint64_t> calls;  // counts up with every call
+  std::atomic<uint64_t> calls;  // number of calls so far
   std::atomic<FmuCall> call;
-  std::atomic<int32_t> point;  // the worker's own number of the trajectory
+  std::atomic<int32_t> point;  // index of the trajectory in the worker
   std::atomic<double> time_s;
-  std::array<char, 512> message;  // ends with a 0
+  std::array<char, 512> message;  // zero-terminated
 };
 
-// "doing a step"; of a number that is none of the calls, "in an unknown call".
+// Returns the call as text, such as "doing a step", or "in an unknown call" for a value that is not
+// in FmuCall.
 const char* InWords(FmuCall call);
 
 }  // namespace polyest::internal

@@ -17,7 +17,8 @@ namespace {
 
 constexpr char kLockName[] = ".lock";
 
-// A descriptor of the file, locked; −1 if it cannot be opened or is locked by another.
+// Returns a locked descriptor of the file, or −1 if it cannot be opened or another descriptor holds
+// the lock.
 int Lock(const std::filesystem::path& file, int flags) {
   const int descriptor = open(file.c_str(), flags | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (descriptor < 0) return -1;
@@ -31,7 +32,7 @@ bool IsOwnFolder(const std::filesystem::path& path) {
   return lstat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid();
 }
 
-// Those of processes that are gone.
+// Removes the folders of processes that have ended.
 void RemoveAbandoned(const std::filesystem::path& below) {
   std::error_code error;
   for (std::filesystem::directory_iterator entry(below, error), end; !error && entry != end;

@@ -7,11 +7,13 @@
 
 namespace polyest::internal {
 
-// A folder of this process alone below the system's folder for temporary files (TMPDIR), removed
-// with the object. A process that dies leaves its folders behind; the next one to make a folder
-// knows them by their lock, which went with the process, and removes them.
+// A private folder below the system's folder for temporary files (TMPDIR). It is removed with the
+// object. A process that crashes leaves its folders behind; the lock in them is released with the
+// process. The next Make, in any process, recognizes such folders by the missing lock and removes
+// them.
 class TemporaryFolder {
  public:
+  // Makes the folder, and removes abandoned ones. Returns ResourceExhausted if it cannot be made.
   static absl::StatusOr<std::unique_ptr<TemporaryFolder>> Make();
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
@@ -19,14 +21,14 @@ class TemporaryFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
-  // The folders' names begin like this.
+  // Prefix of the folders' names.
   static constexpr char kPrefix[] = "polyest-fmu-";
 
  private:
   TemporaryFolder(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
 
   std::filesystem::path path_;
-  int lock_;  // descriptor of the locked file in it
+  int lock_;  // descriptor of the locked file in the folder
 };
 
 }  // namespace polyest::internal

@@ -21,7 +21,7 @@ absl::Status Wrong(const std::string& what) {
   return absl::FailedPreconditionError(absl::StrCat("modelDescription.xml: ", what));
 }
 
-// The units that named types declare.
+// Returns the units of the declared types by the type's name.
 absl::flat_hash_map<std::string, std::string> TypeUnits(const pugi::xml_node& root, int version) {
   absl::flat_hash_map<std::string, std::string> units;
   for (const pugi::xml_node type : root.child("TypeDefinitions").children()) {
@@ -170,14 +170,15 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
     }
     const bool is_parameter = variable.causality == "parameter";
     const bool is_input = variable.causality == "input";
-    // Model Exchange takes discrete inputs only at events, of which a signal has none.
+    // Model Exchange accepts discrete inputs only at events, and a signal has none.
     const bool is_discrete = kind == FmuKind::kModelExchange && variable.variability == "discrete";
     if ((is_parameter || is_input) && (!variable.is_real || (is_input && is_discrete))) {
       kept.push_back(quantity.name);
       continue;
     }
     if (!variable.is_real || variable.causality == "independent") continue;
-    // The start values of others than parameters: with initial="exact" they are set, not found.
+    // A start value of another variable is a parameter too if initial="exact": it is then set, not
+    // computed.
     const bool is_initial_value = variable.initial == "exact" && variable.has_start &&
                                   variable.variability != "constant" && !is_input;
     if ((is_parameter && variable.has_start) || is_initial_value) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// The variables of a modelDescription.xml, and which of them are states, parameters, inputs and
-// outputs of the model.
+// The variables of a modelDescription.xml, and their classification into states, parameters, inputs
+// and outputs of the model.
 
 #include <absl/container/flat_hash_map.h>
 #include <absl/status/statusor.h>
@@ -16,18 +16,20 @@ namespace polyest::internal {
 
 class VariableList {
  public:
-  // `root` is fmiModelDescription.
+  // Reads the variables below `root`, the fmiModelDescription element. Returns FailedPrecondition
+  // with the reason if the description is invalid.
   static absl::StatusOr<VariableList> Read(const pugi::xml_node& root, int version);
 
-  // Fills the quantities of `description` and answers the names of the parameters and inputs that
-  // keep their start values, because they are no real numbers or no single ones.
+  // Fills the quantities of `description`. Returns the names of the parameters and inputs that keep
+  // their start values: those that are not a scalar real number, and discrete inputs for Model
+  // Exchange.
   absl::StatusOr<std::vector<std::string>> Sort(FmuKind kind, FmuDescription& description) const;
 
  private:
   struct Variable {
     Quantity quantity;
     FmuVariable variable;
-    bool is_real = false;  // and single
+    bool is_real = false;  // real and scalar
     std::string causality, variability, initial;
     bool has_start = false;
     int derivative_of = 0;  // FMI 2: 1-based index; FMI 3: value reference; see is_derivative
@@ -35,7 +37,7 @@ class VariableList {
     bool is_state = false;
   };
 
-  using Units = absl::flat_hash_map<std::string, std::string>;  // by declared type
+  using Units = absl::flat_hash_map<std::string, std::string>;  // by type name
 
   absl::Status Add2(const pugi::xml_node& node, const Units& units);
   absl::Status Add3(const pugi::xml_node& node, const Units& units);
@@ -46,7 +48,7 @@ class VariableList {
   absl::Status AddState(const Variable& derivative, size_t state);
 
   std::vector<Variable> variables_;
-  std::vector<size_t> states_;  // in the order of the FMU's vector of states
+  std::vector<size_t> states_;  // in the order of the FMU's state vector
   int event_indicators_ = 0;
 };
 

@@ -14,7 +14,7 @@
 namespace polyest::internal {
 namespace {
 
-// Between two looks at the stop request and at the workers' progress.
+// Interval between two checks of the stop request and of the workers' progress.
 constexpr int kLookMs = 20;
 
 template <class Message>
@@ -28,7 +28,7 @@ Matrix Rows(const Matrix& matrix, const std::vector<int>& rows) {
   return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
 }
 
-// As it was specified, a table's knots included.
+// Returns the signal's specification with a table's knots restored.
 InputSpecification Specification(const InputSignal& signal) {
   InputSpecification specification = signal.specification();
   if (auto* table = std::get_if<TableInput>(&specification)) {
@@ -138,7 +138,7 @@ absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef 
   return absl::OkStatus();
 }
 
-// Until each worker has answered.
+// Exchanges data until each worker has answered.
 absl::Status WorkerEnsemble::Converse(const Stop& stop) {
   for (;;) {
     std::vector<pollfd> waiting;

@@ -1,8 +1,8 @@
 #pragma once
 
-// An ensemble of an FMU's trajectories in worker processes. The points are dealt into blocks of
-// TrajectoryBlock::kPoints and the blocks to workers; a block's results do not depend on what else
-// its worker does, so that they are the same for any number of workers.
+// An ensemble of an FMU's trajectories in worker processes. The points are split into blocks of
+// TrajectoryBlock::kPoints, and the blocks are distributed over the workers. A block's results do
+// not depend on the worker's other blocks, so they are the same for any number of workers.
 
 #include <absl/status/status.h>
 
@@ -18,7 +18,8 @@ namespace polyest::internal {
 
 class WorkerEnsemble final : public TrajectoryEnsemble {
  public:
-  // Processes start with the first Advance, which also reports why they could not.
+  // Makes the ensemble. The processes start with the first Advance, which also reports an error of
+  // starting them.
   WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu, EnsembleSpecification specification,
                  const InputSignals* inputs, const WorkerLimits& limits);
 
@@ -30,7 +31,7 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
  private:
   struct Worker {
     std::unique_ptr<WorkerProcess> process;
-    std::vector<int> rows;  // of the ensemble
+    std::vector<int> rows;  // rows of the ensemble that it simulates
     std::vector<PointFailure> failures;
   };
 
@@ -46,7 +47,7 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
   const InputSignals* inputs_;
   WorkerLimits limits_;
   std::vector<Worker> workers_;
-  std::vector<size_t> knots_sent_;  // by input
+  std::vector<size_t> knots_sent_;  // number per input
   std::vector<PointFailure> failures_;
 };
 

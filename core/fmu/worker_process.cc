@@ -35,14 +35,15 @@ absl::Status SystemError(const char* what) {
       absl::StrCat("a worker process cannot be started: ", what, ": ", std::strerror(errno)));
 }
 
-// Moved above the numbers that a worker's descriptors get, so that none overwrites another.
+// Moves the descriptor above the numbers that a worker's descriptors get, so that none overwrites
+// another.
 int MoveUp(int descriptor) {
   const int moved = fcntl(descriptor, F_DUPFD_CLOEXEC, kWorkerPage + 1);
   close(descriptor);
   return moved;
 }
 
-// The worker's descriptors: these two, and nothing for what it would read or print.
+// Gives the worker these two descriptors, and /dev/null for its standard streams.
 void DescribeFiles(int socket, int page, posix_spawn_file_actions_t& actions) {
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
@@ -52,7 +53,8 @@ void DescribeFiles(int socket, int page, posix_spawn_file_actions_t& actions) {
   posix_spawn_file_actions_addclosefrom_np(&actions, kWorkerPage + 1);
 }
 
-// A group of its own, so that Ctrl-C is this process's to handle; no signal blocked or ignored.
+// Puts the worker into its own process group, so Ctrl-C reaches only this process, with no signal
+// blocked or ignored.
 void DescribeSignals(posix_spawnattr_t& attributes) {
   sigset_t none, all;
   sigemptyset(&none);
@@ -109,7 +111,8 @@ absl::Status WorkerProcess::MakePage() {
   if (page_descriptor_ < 0 || ftruncate(page_descriptor_, sizeof(StatusPage)) != 0) {
     return SystemError("its status page");
   }
-  // Against a worker that would make the page smaller and so crash whoever looks at it.
+  // The seals prevent a worker from shrinking the page, which would crash every process that reads
+  // it.
   fcntl(page_descriptor_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL);
   void* const memory =
       mmap(nullptr, sizeof(StatusPage), PROT_READ | PROT_WRITE, MAP_SHARED, page_descriptor_, 0);
@@ -236,7 +239,7 @@ std::string WorkerProcess::WhatItDid() const {
 }
 
 absl::Status WorkerProcess::Died() {
-  // It may only have closed the socket; then it is of no more use either.
+  // The worker may only have closed the socket, but it is then useless too.
   int status = 0;
   rusage usage{};
   kill(pid_, SIGKILL);
@@ -250,7 +253,7 @@ absl::Status WorkerProcess::Died() {
   } else if (known) {
     end = absl::StrFormat("ended with status %d", WEXITSTATUS(status));
   }
-  // The kernel counts what this process had when it started the worker as the worker's.
+  // The kernel counts the memory that this process had when it started the worker as the worker's.
   rusage own{};
   getrusage(RUSAGE_SELF, &own);
   const int64_t used_bytes = usage.ru_maxrss > own.ru_maxrss ? int64_t{1024} * usage.ru_maxrss : 0;

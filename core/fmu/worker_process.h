@@ -1,7 +1,7 @@
 #pragma once
 
-// A process that simulates an FMU, as the process that started it sees it. It is killed with this
-// object at the latest, and ends itself when the process that started it is gone.
+// A worker process that simulates an FMU, seen from the process that started it. It is killed with
+// this object at the latest. It also ends itself when the process that started it is gone.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -18,42 +18,45 @@
 namespace polyest::internal {
 
 struct WorkerLimits {
-  // How long a single call of the FMU may take.
+  // Maximum duration of a single call of the FMU.
   std::chrono::milliseconds longest_call{60'000};
   int64_t max_memory_bytes = int64_t{4} << 30;     // address space of a worker
-  int64_t largest_file_bytes = int64_t{16} << 20;  // that a worker writes
+  int64_t largest_file_bytes = int64_t{16} << 20;  // maximum size of a file that a worker writes
 };
 
-// polyest-fmu-worker: what POLYEST_FMU_WORKER names, else beside this program, else in
-// ../libexec/polyest from there. FAILED_PRECONDITION if it is nowhere.
+// Returns the path of polyest-fmu-worker: the value of POLYEST_FMU_WORKER if it is set, else the
+// program beside this one, else the one in ../libexec/polyest relative to it. Returns
+// FailedPrecondition if there is none.
 absl::StatusOr<std::filesystem::path> FindWorkerProgram();
 
 class WorkerProcess {
  public:
-  // `fmu` is the FMU's name, for messages.
+  // Starts a worker. `fmu` is the FMU's name, for messages. Returns FailedPrecondition if the
+  // worker program is missing, or ResourceExhausted if the process cannot be started.
   static absl::StatusOr<std::unique_ptr<WorkerProcess>> Start(std::string fmu,
                                                               const WorkerLimits& limits);
   ~WorkerProcess();
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  // Puts a message to be sent; one for which no answer is awaited may precede one for which it is.
+  // Queues a message. A message that has no answer may be followed by one that has; AwaitAnswer
+  // after the latter.
   void Send(const std::string& message);
   void AwaitAnswer();
   bool awaits_answer() const { return awaits_answer_; }
 
-  // What to poll for, with the socket.
+  // The socket and the direction to poll for.
   int socket() const { return socket_; }
   bool has_to_send() const { return sent_ < outgoing_.size(); }
-  // Sends and receives what can be without waiting. FAILED_PRECONDITION when the worker has died or
-  // one call takes longer than the limit; then it is dead.
+  // Sends and receives as much as possible without waiting. Returns FailedPrecondition when the
+  // worker has died, or when one call takes longer than the limit; the worker is then killed.
   absl::Status Exchange();
-  // The answer, once it is there: awaits_answer() is false.
+  // Returns the answer. It is available once awaits_answer() is false.
   std::string TakeAnswer() { return std::move(answer_); }
 
-  // Ends the worker and waits for its end. The second time nothing happens.
+  // Kills the worker and waits for its end. Has no effect if it is already dead.
   void Kill();
-  pid_t pid() const { return pid_; }  // −1 once it is dead
+  pid_t pid() const { return pid_; }  // −1 once dead
 
  private:
   WorkerProcess(std::string fmu, const WorkerLimits& limits)
@@ -63,7 +66,7 @@ class WorkerProcess {
   absl::Status SendSome();
   absl::Status ReceiveSome();
   absl::Status CheckProgress();
-  // What the worker was doing when it died.
+  // Reaps the dead worker and returns an error that describes its last activity.
   absl::Status Died();
   std::string WhatItDid() const;
 
@@ -82,7 +85,8 @@ class WorkerProcess {
   std::chrono::steady_clock::time_point progress_seen_;
 };
 
-// Where a worker finds these, and its limits as arguments.
+// File descriptors of the socket and the status page in a worker. Its limits are passed as
+// arguments.
 inline constexpr int kWorkerSocket = 3;
 inline constexpr int kWorkerPage = 4;
 

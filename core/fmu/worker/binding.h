@@ -1,7 +1,8 @@
 #pragma once
 
-// One instance of an FMU, whatever the version of FMI: its functions one to one. Each answers a
-// status as the standard numbers them: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal.
+// An instance of an FMU, independent of the FMI version. Each function calls the corresponding FMI
+// function and returns its status as the standard numbers them: 0 OK, 1 warning, 2 discard, 3
+// error, 4 fatal.
 
 #include <absl/status/statusor.h>
 
@@ -16,30 +17,30 @@
 namespace polyest::internal {
 
 struct EventUpdate {
-  bool again = false;      // the discrete states want another iteration
-  bool terminate = false;  // the FMU wants the simulation to end
+  bool again = false;      // whether the discrete states need another iteration
+  bool terminate = false;  // whether the FMU requests the end of the simulation
   bool next_time_defined = false;
   double next_time_s = 0;
 };
 
-// What an FMU says.
+// Receives the messages that an FMU logs.
 using FmuLog = std::function<void(int status, const std::string& message)>;
 
 class Binding {
  public:
   virtual ~Binding() = default;
 
-  // Setup and entry of the initialization mode, at t = 0.
+  // Sets up the experiment and enters the initialization mode, at t = 0.
   virtual int EnterInitialization(double tolerance) = 0;
   virtual int ExitInitialization() = 0;
   virtual int Set(std::span<const FmuVariable> variables, const double* values) = 0;
   virtual int Get(std::span<const FmuVariable> variables, double* values) = 0;
-  // An FMU state; null to begin with, replaced after that.
+  // Saves the FMU state. `*state` is null at first; later calls overwrite the saved state.
   virtual int SaveState(void** state) = 0;
   virtual int RestoreState(void* state) = 0;
   virtual int FreeState(void** state) = 0;
 
-  // Model Exchange.
+  // Functions for Model Exchange.
   virtual int EnterEventMode() = 0;
   virtual int UpdateDiscreteStates(EventUpdate& update) = 0;
   virtual int EnterContinuousTime() = 0;
@@ -51,21 +52,21 @@ class Binding {
   virtual int GetDerivatives(std::span<double> derivatives) = 0;
   virtual int GetEventIndicators(std::span<double> indicators) = 0;
 
-  // Co-Simulation.
+  // Functions for Co-Simulation.
   virtual int SetInputDerivatives(std::span<const FmuVariable> inputs, const double* rates) = 0;
   virtual int DoStep(double time_s, double step_s, bool& terminate) = 0;
 };
 
-// An FMU's library, its functions found.
+// The loaded library of an FMU, with its functions resolved.
 class FmuLibrary {
  public:
   virtual ~FmuLibrary() = default;
-  // A new instance; null when the FMU refuses. `log` must outlive it.
+  // Returns a new instance, or nullptr when the FMU refuses. `log` must outlive the instance.
   virtual std::unique_ptr<Binding> Instantiate(const std::string& name, const FmuLog* log) = 0;
 };
 
-// FAILED_PRECONDITION when the library cannot be loaded or lacks a function. `resources` is the
-// path of the folder of that name.
+// Loads the library of an FMU of FMI 2.0 or 3.0. `resources` is the path of the FMU's resources
+// folder. Returns FailedPrecondition when the library cannot be loaded or lacks a function.
 absl::StatusOr<std::unique_ptr<FmuLibrary>> LoadFmi2(const FmuInterface& interface,
                                                      const std::string& library,
                                                      const std::string& resources);

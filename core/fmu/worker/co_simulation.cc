@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-// Two communication points closer than this part of a step are one.
+// Communication points closer than this fraction of a step are treated as one.
 constexpr double kCloseness = 1e-6;
 
 }  // namespace
@@ -25,7 +25,7 @@ CoSimulationPoint::CoSimulationPoint(const FmuInterface* interface,
   failure_ = instance_->failure();
 }
 
-// The next multiple of the communication step after the present time.
+// Returns the next multiple of the communication step after the present time.
 double CoSimulationPoint::NextMultiple() const {
   const double step_s = interface_.communication_step_s;
   return (std::floor(time_s_ / step_s + kCloseness) + 1) * step_s;
@@ -63,7 +63,7 @@ bool CoSimulationPoint::Step(double to_s) {
   return false;
 }
 
-// u(t), from the right at a jump.
+// Returns u(t); at a jump the value from the right.
 Vector CoSimulationPoint::InputsAt(double time_s) {
   while (inputs_.NextBreak().time_s <= time_s) inputs_.Pass(inputs_.NextBreak().time_s);
   return inputs_.At(time_s).row(0).matrix().transpose();
@@ -73,10 +73,11 @@ bool CoSimulationPoint::SetInputs(double from_s, double to_s) {
   if (input_count_ == 0) return true;
   const double step_s = to_s - from_s;
   if (!interface_.can_interpolate_inputs) {
-    // u = u(t_k + h/2)
+    // The inputs are held at u(t_k + h/2).
     return instance_->SetInputs(InputsAt(from_s + step_s / 2).data());
   }
-  // u(t) = u(t_k) + (t − t_k) (u(t_{k+1}) − u(t_k))/h, the value at the end from the left
+  // The inputs follow u(t) = u(t_k) + (t − t_k) (u(t_{k+1}) − u(t_k))/h. The value at the end is
+  // taken from the left, before a jump there.
   const Vector values = InputsAt(from_s);
   const Vector rates = (InputsAt(std::nextafter(to_s, from_s)) - values) / step_s;
   return instance_->SetInputs(values.data()) && instance_->SetInputRates(rates.data());

@@ -1,15 +1,18 @@
 #pragma once
 
-// One trajectory of an FMU for Co-Simulation, which brings its own solver: from one communication
-// point to the next,
+// One trajectory of an FMU for Co-Simulation, which contains its own solver. It advances from one
+// communication point to the next,
 //
 //   t_0 = 0,  t_{k+1} = the earliest of the next multiple of the communication step, the next
 //                       sample time and the next break of an input.
 //
-// An FMU holds its inputs over a step. They get the value in the middle of the step, with which the
-// error of holding them is of second order in the step; one that interpolates its inputs gets the
-// value and the slope of the straight line between both ends. At the sample times, outputs are
-// those with the inputs of that time.
+// If the FMU cannot vary its communication step, breaks are not communication points, and a sample
+// time that is no multiple of the step fails the trajectory.
+//
+// An FMU holds its inputs during a step. It is given their values at the middle of the step, which
+// makes the error of holding them second order in the step. An FMU that interpolates its inputs is
+// given the value and the slope of the straight line between both ends. The outputs at a sample
+// time are those with the inputs at that time.
 
 #include <memory>
 #include <vector>
@@ -41,7 +44,7 @@ class CoSimulationPoint final : public PointTrajectory {
   const int input_count_;
   const int output_count_;
   double time_s_ = 0;
-  double good_s_ = 0;  // the last time at which nothing was wrong
+  double good_s_ = 0;  // the last time before the failure
   std::string failure_;
 };
 

@@ -21,11 +21,12 @@ namespace {
 
 constexpr double kAbsoluteTolerance = 1e-14;
 constexpr double kNominalShare = 1e-3;
-// More events than this, each so close to the one before, accumulate at a point in time.
+// More consecutive events than this, each within kClose (relative to max(1, t)) of the one before,
+// count as accumulating.
 constexpr int kMaxCloseEvents = 10;
 constexpr double kClose = 1e-8;
 
-// A time that an integrator cannot resolve from the present one.
+// Whether stop_s is too close to time_s for an integrator to resolve the difference.
 bool IsThere(double time_s, double stop_s) {
   constexpr double kResolution = 8 * std::numeric_limits<double>::epsilon();
   return stop_s - time_s <= kResolution * std::max(std::abs(time_s), std::abs(stop_s));
@@ -40,7 +41,7 @@ EventTrajectory::EventTrajectory(const InstanceFactory* factory, std::unique_ptr
       inputs_(std::move(inputs)),
       relative_tolerance_(options.relative_tolerance),
       max_steps_(options.max_steps) {
-  // Without states, one that stays 0 lets the same solver look for events.
+  // Without states, a dummy state that stays 0 lets the same solver search for events.
   const int count = std::max(1, factory_.interface.states);
   states_ = N_VNew_Serial(count, context_);
   N_VConst(0, states_);
@@ -102,7 +103,7 @@ int EventTrajectory::RightHandSide(double time_s, N_Vector states, N_Vector deri
   N_VConst(0, derivatives);
   const std::span<double> rates = trajectory.States(derivatives);
   if (!trajectory.SetPoint(time_s, states) || !trajectory.instance_->GetDerivatives(rates)) {
-    // What the FMU only discards may be defined closer to where the step began.
+    // A value that the FMU discards here may be defined closer to the beginning of the step.
     return trajectory.instance_->broken() ? -1 : 1;
   }
   const auto is_finite = [](double rate) { return std::isfinite(rate); };
@@ -131,11 +132,12 @@ int EventTrajectory::ErrorWeights(N_Vector states, N_Vector weights, void* self)
   return 0;
 }
 
-// From the present time and states on, forgetting what was before.
+// Discards the solver's history.
 void EventTrajectory::Restart(double span_s) {
-  // Small enough to see an input that is 0 now; and, as the solver looks for an event indicator
-  // that is 0 now only from a tenth of the first step on, small beside the time from the event
-  // before, as the next one may follow as soon.
+  // The first step must be small enough to notice an input that is 0 now. It must also be small
+  // compared with the time since the event before: the solver checks an event indicator that is 0
+  // now only from a tenth of the first step on, and the next event may follow as soon as the last
+  // one did.
   constexpr double kOfSpan = 1.0 / 64;
   constexpr double kOfEvents = 1.0 / 16;
   constexpr double kMin = 1e-12;
@@ -245,7 +247,7 @@ bool EventTrajectory::Fail(const std::string& reason) {
   return false;
 }
 
-// When outputs were last good is known, and not when they ceased to be.
+// The time at which outputs were last valid is known; the time at which they became invalid is not.
 bool EventTrajectory::FailSinceRead(const std::string& reason) {
   Fail(reason);
   failure_.time_s = read_s_;

@@ -1,21 +1,24 @@
 #pragma once
 
-// One trajectory of an FMU for Model Exchange with events, integrated on its own by CVODE:
+// One trajectory of an FMU for Model Exchange with events, integrated by its own CVODE solver:
 //
-//   dx/dt = f(t, x, u(t)) between events; an event is where one of the event indicators
-//   z_i(t, x, u) changes its sign, at the next event time that the FMU named, where it asks for one
-//   after a completed step, and where an input jumps.
+//   dx/dt = f(t, x, u(t)) between events.
 //
-// At an event the FMU changes its discrete and perhaps its continuous states until it is settled,
-// and the integration starts anew from there. The local error of state s is held to
+// An event occurs where an event indicator z_i(t, x, u) changes its sign, at the next event time
+// that the FMU announced, where the FMU requests one after a completed step, and where an input
+// jumps.
+//
+// At an event the FMU updates its discrete and possibly its continuous states until they settle.
+// The integration restarts from there. The local error of state s is bounded by
 //
 //   |e_s| ≤ rtol · max(S_s, n_s/1000) + 1e-14,
 //
-// S_s the largest magnitude that the state has had and n_s its nominal value of the FMU.
+// where S_s is the largest magnitude that the state has had and n_s its nominal value according to
+// the FMU.
 //
-// Backward differentiation formulas (method kStiff and kAuto), or Adams' (kExplicit), with a dense
-// Jacobian from differences. Events that accumulate (a bouncing ball that comes to rest without
-// saying so) fail the trajectory.
+// The method is a backward differentiation formula (kStiff and kAuto) or an Adams formula
+// (kExplicit). The former uses a dense Jacobian from finite differences. Events that accumulate (a
+// bouncing ball that comes to rest without the FMU handling it) fail the trajectory.
 
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_linearsolver.h>
@@ -46,17 +49,18 @@ class EventTrajectory final : public PointTrajectory {
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  // Callbacks with this object as user data.
+  // Callbacks of CVODE; the user data is this object.
   static int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self);
   static int EventIndicators(double time_s, N_Vector states, double* indicators, void* self);
   static int ErrorWeights(N_Vector states, N_Vector weights, void* self);
   static void IgnoreMessage(int, const char*, const char*, char*, void*) {}
 
   void MakeSolver(IntegrationMethod method);
-  // A first step that is small for an interval of this length.
+  // Restarts the solver at the present time and states. `span_s` is the time until the next break
+  // or sample; the first step is a small fraction of it.
   void Restart(double span_s);
   bool SetPoint(double time_s, N_Vector states);
-  // Up to stop_s or to an event before it.
+  // Integrates to stop_s or to an event before it, and sets `event` if there was one.
   bool Integrate(double stop_s, bool& event);
   bool CompleteStep(bool& event);
   bool HandleEvent();
@@ -64,7 +68,7 @@ class EventTrajectory final : public PointTrajectory {
   bool Fail(int flag);
   bool Fail(const std::string& reason);
   bool FailSinceRead(const std::string& reason);
-  // The FMU's states; the solver has one more if there are none.
+  // Returns the FMU's states. The vector holds one more element if the FMU has no states.
   std::span<double> States(N_Vector vector) const;
 
   const InstanceFactory& factory_;
@@ -78,13 +82,13 @@ class EventTrajectory final : public PointTrajectory {
   SUNLinearSolver linear_solver_ = nullptr;
   SUNNonlinearSolver fixed_point_ = nullptr;
   void* solver_ = nullptr;
-  Vector largest_;  // S, floored by the nominal values
+  Vector largest_;  // S_s, at least n_s/1000
   double time_s_ = 0;
   double last_event_s_ = 0;
-  double since_event_s_ = kInfinity;  // the time between the last two events
-  double read_s_ = 0;                 // outputs were read
+  double since_event_s_ = kInfinity;  // time between the last two events
+  double read_s_ = 0;                 // when the outputs were last read
   int close_events_ = 0;
-  int steps_ = 0;  // since the last sample
+  int steps_ = 0;  // number since the last sample
   PointFailure failure_;
 };
 

@@ -26,8 +26,8 @@ ExchangeModel::ExchangeModel(const InstanceFactory& factory,
   description_.outputs = Numbered(factory.outputs.size());
 }
 
-// Calls read(instance, result) with each row's instance at its point; a row whose instance fails is
-// NaN.
+// Calls read(instance, result) for each row, with its instance set to the row's point. A row whose
+// instance fails becomes NaN.
 template <class Read>
 void ExchangeModel::ForEachRow(double time_s, const ConstBlock& states,
                                const ConstBlock& parameters, const ConstBlock& inputs,

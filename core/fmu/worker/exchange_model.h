@@ -1,7 +1,7 @@
 #pragma once
 
-// Instances of an FMU for Model Exchange without events as a state-space model, integrated by the
-// very integrators of the built-in models. Its only parameter is the number of the instance.
+// Instances of an FMU for Model Exchange without events as one state-space model, integrated by the
+// same integrators as the built-in models. The only parameter is the index of the instance.
 
 #include <memory>
 #include <vector>
@@ -34,10 +34,10 @@ class ExchangeModel final : public StateSpaceModel {
   std::vector<std::unique_ptr<Instance>> instances_;
 };
 
-// A block of such instances, with what each said of its failure.
+// A block of such instances, with the reason for each failure.
 class ExchangeEnsemble final : public TrajectoryEnsemble {
  public:
-  // `channels` are the block's own rows.
+  // `channels` holds the rows of this block only.
   ExchangeEnsemble(std::shared_ptr<const ExchangeModel> model, EnsembleSpecification channels,
                    const InputSignals* signals);
 

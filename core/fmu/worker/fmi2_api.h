@@ -1,8 +1,8 @@
 #pragma once
 
-// The functions of FMI 2.0 (Functional Mock-up Interface, section 2 to 4 of the standard) that are
-// used, as their binary interface is. A status is 0 OK, 1 warning, 2 discard, 3 error, 4 fatal,
-// 5 pending; a boolean is an int.
+// The binary interface of the FMI 2.0 functions that are used (Functional Mock-up Interface,
+// sections 2 to 4 of the standard). A status is 0 OK, 1 warning, 2 discard, 3 error, 4 fatal, 5
+// pending. A boolean is an int.
 
 #include <cstddef>
 

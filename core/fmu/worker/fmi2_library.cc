@@ -72,7 +72,7 @@ absl::Status BindCoSimulation(const SharedLibrary& library, bool interpolates, F
   return library.Bind("fmi2DoStep", f.do_step);
 }
 
-// A path as file URI: characters that a URI does not take become %XX.
+// Returns the path as a file URI; characters that are not allowed in a URI become %XX.
 std::string FileUri(const std::string& path) {
   std::string uri = "file://";
   for (const char c : path) {
@@ -87,7 +87,7 @@ std::string FileUri(const std::string& path) {
   return uri;
 }
 
-// printf's conventions are those of FMI 2.0.
+// FMI 2.0 formats messages by printf's conventions.
 [[gnu::format(printf, 5, 6)]] void LogMessage(void* environment, const char*, fmi2::Status status,
                                               const char*, const char* message, ...) {
   if (environment == nullptr || message == nullptr) return;

@@ -1,7 +1,7 @@
 #pragma once
 
-// The functions of FMI 3.0 that are used, as their binary interface is. A status is 0 OK,
-// 1 warning, 2 discard, 3 error, 4 fatal.
+// The binary interface of the FMI 3.0 functions that are used. A status is 0 OK, 1 warning, 2
+// discard, 3 error, 4 fatal.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +18,7 @@ using Log = void(void* environment, Status status, const char* category, const c
 using InstantiateModelExchange = Instance(const char* instance, const char* token,
                                           const char* resources_path, bool visible, bool logging,
                                           void* environment, Log* log);
-// The last argument is a callback for intermediate values, which are not asked for.
+// The last argument is a callback for intermediate values; they are not used.
 using InstantiateCoSimulation = Instance(const char* instance, const char* token,
                                          const char* resources_path, bool visible, bool logging,
                                          bool event_mode_used, bool early_return_allowed,

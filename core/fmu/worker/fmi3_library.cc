@@ -130,14 +130,14 @@ class Fmi3Binding final : public Binding {
     return f_.get_event_indicators(instance_, indicators.data(), indicators.size());
   }
 
-  // FMI 3.0 knows none.
+  // FMI 3.0 has no input derivatives.
   int SetInputDerivatives(std::span<const FmuVariable>, const double*) override { return 0; }
   int DoStep(double time_s, double step_s, bool& terminate) override {
     bool event_needed = false, early_return = false;
     double last_time_s = time_s;
     const int status = f_.do_step(instance_, time_s, step_s, true, &event_needed, &terminate,
                                   &early_return, &last_time_s);
-    // A step that ended early, though that was not allowed, has not been done.
+    // A step that ended early without permission counts as not done.
     constexpr int kDiscard = 2;
     return early_return && status < kDiscard ? kDiscard : status;
   }
@@ -196,7 +196,7 @@ int Fmi3Binding::Get(std::span<const FmuVariable> variables, double* values) {
 
 class Fmi3Library final : public FmuLibrary {
  public:
-  // The standard wants the path of the resources to end with a separator.
+  // The standard requires the path of the resources to end with a separator.
   Fmi3Library(SharedLibrary library, const FmuInterface& interface, const std::string& resources)
       : library_(std::move(library)), interface_(interface), resources_(resources + "/") {}
 

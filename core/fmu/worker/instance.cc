@@ -31,7 +31,7 @@ Instance::Instance(InstanceFactory* factory, int point, std::span<const double> 
   if (Instantiate()) Initialize(parameters, inputs);
 }
 
-// The FMU's own end is left to the end of the process: there is nothing in it to be kept.
+// The FMU instance is not freed here: it ends with the process, and nothing in it needs to be kept.
 Instance::~Instance() {
   if (factory_.active == this) factory_.active = nullptr;
 }
@@ -57,7 +57,8 @@ bool Instance::Instantiate() {
   return true;
 }
 
-// Brings this instance's state into the one that all share.
+// Loads this Instance's state into the shared FMU instance, after saving that of the Instance
+// before.
 bool Instance::Activate() {
   if (factory_.shared == nullptr || factory_.active == this) return true;
   factory_.monitor->Enter(FmuCall::kState, point_, time_s_);
@@ -74,7 +75,7 @@ bool Instance::Activate() {
   return true;
 }
 
-// Calls `call`, which answers an FMI status.
+// Calls `call`, which returns an FMI status.
 template <class Call>
 bool Instance::Do(FmuCall kind, Call call) {
   if (broken_ || !Activate()) return false;
@@ -103,7 +104,7 @@ bool Instance::Initialize(std::span<const double> parameters, std::span<const do
          [&] { return binding_->EnterInitialization(factory_.relative_tolerance); }) &&
       Do(FmuCall::kInitialize, [&] { return binding_->ExitInitialization(); });
   if (!initialized) {
-    // At the start there is nothing to be tried again.
+    // Initialization cannot be tried again at another point, so a discard is an error too.
     broken_ = true;
     return false;
   }

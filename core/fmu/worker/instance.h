@@ -1,10 +1,10 @@
 #pragma once
 
-// One instance of an FMU for one point: the calls in the order that the standard demands, what went
-// wrong in words, and the status page kept up to date.
+// One instance of an FMU for one point. It makes the calls in the order that the standard requires,
+// describes failures in words, and updates the status page.
 //
-// Calls answer whether they succeeded. After an error nothing is asked of the instance any more; a
-// value that the FMU discarded may be asked for again elsewhere.
+// Functions return whether they succeeded. After an error the FMU's functions are no longer called.
+// After a status of "discard" they may be called again at another point.
 
 #include <memory>
 #include <span>
@@ -16,7 +16,7 @@
 
 namespace polyest::internal {
 
-// What one worker's instances have in common.
+// The data that all instances of one worker share.
 class Instance;
 
 struct InstanceFactory {
@@ -26,10 +26,10 @@ struct InstanceFactory {
   FmuLibrary* library = nullptr;
   Monitor* monitor = nullptr;
 
-  std::string said;  // by the FMU, during the present call
+  std::string said;  // the FMU's message during the present call
   FmuLog log;
-  // Of an FMU that can be instantiated only once: its one instance, its state before all
-  // initialization, and whose state it has at present.
+  // For an FMU that can be instantiated only once: its single instance, the state of that instance
+  // before any initialization, and the Instance whose state it currently holds.
   std::unique_ptr<Binding> shared;
   void* untouched = nullptr;
   Instance* active = nullptr;
@@ -37,35 +37,38 @@ struct InstanceFactory {
 
 class Instance {
  public:
-  // Instantiated and initialized with these values, at t = 0; of Model Exchange also through its
-  // first event iteration into continuous time. failure() tells of one that failed.
+  // Instantiates and initializes the FMU with these values at t = 0. For Model Exchange it also
+  // performs the first event iteration and enters continuous-time mode. If any of this fails,
+  // failure() is not empty.
   Instance(InstanceFactory* factory, int point, std::span<const double> parameters,
            std::span<const double> inputs);
   ~Instance();
   Instance(const Instance&) = delete;
   Instance& operator=(const Instance&) = delete;
 
-  // Empty, or the last thing that went wrong.
+  // Returns the last failure, or an empty string.
   const std::string& failure() const { return failure_; }
   int failure_status() const { return failure_status_; }
+  // Whether an error has ended the use of the instance.
   bool broken() const { return broken_; }
 
   bool SetInputs(const double* values);
   bool GetOutputs(double* values);
 
-  // Model Exchange. +∞: no next event.
+  // Functions for Model Exchange. The next event time is +∞ if there is none.
   double next_event_s() const { return next_event_s_; }
   bool SetPoint(double time_s, std::span<const double> states);
   bool GetStates(std::span<double> states);
   bool GetNominals(std::span<double> nominals);
   bool GetDerivatives(std::span<double> derivatives);
   bool GetEventIndicators(std::span<double> indicators);
-  // `event`: the FMU wants an event now.
+  // Notifies the FMU of a completed step. Sets `event` if the FMU requests an event now.
   bool CompletedStep(bool& event);
-  // Event mode, event iteration, continuous time again: the states may be others afterwards.
+  // Enters event mode, iterates until the event is settled, and returns to continuous-time mode.
+  // The states may differ afterwards.
   bool HandleEvent();
 
-  // Co-Simulation.
+  // Functions for Co-Simulation.
   bool SetInputRates(const double* rates);
   bool DoStep(double time_s, double step_s);
 
@@ -86,8 +89,8 @@ class Instance {
   int failure_status_ = 0;
   bool broken_ = false;
   std::unique_ptr<Binding> own_;
-  Binding* binding_ = nullptr;  // own_ or the shared one
-  void* state_ = nullptr;       // saved, while another has the shared one
+  Binding* binding_ = nullptr;  // own_ or the shared instance
+  void* state_ = nullptr;       // saved while another Instance uses the shared one
 };
 
 }  // namespace polyest::internal

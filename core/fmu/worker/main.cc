@@ -1,5 +1,5 @@
-// polyest-fmu-worker BYTES_OF_MEMORY BYTES_OF_A_FILE: simulates one FMU for the process that
-// started it, over the socket and the status page that it finds as descriptors 3 and 4. Not for use
+// polyest-fmu-worker MEMORY_BYTES FILE_BYTES: simulates one FMU for the process that started it,
+// over the socket and the status page that it inherits as descriptors 3 and 4. Not meant to be run
 // by hand.
 
 #include <absl/strings/numbers.h>
@@ -22,7 +22,8 @@
 #include "core/fmu/worker_process.h"
 
 #if POLYEST_ADDRESS_SANITIZER
-// A crash of the FMU is to be seen as the signal that it is.
+// The sanitizer must not handle signals: the parent process recognizes a crash of the FMU by its
+// signal.
 extern "C" const char* __asan_default_options() {
   return "handle_segv=0:handle_abort=0:handle_sigfpe=0:handle_sigbus=0:handle_sigill=0:"
          "detect_leaks=0";
@@ -62,7 +63,7 @@ bool Write(const void* data, size_t size) {
   return true;
 }
 
-// false: the other side is gone, or what came is none of its messages.
+// Reads one message. Returns false if the other side is gone or sent no valid message.
 template <class Message>
 bool Receive(Message& message) {
   uint64_t size = 0;
@@ -82,8 +83,9 @@ bool Send(const ResultMessage& result) {
   return Write(&size, sizeof(size)) && Write(bytes.data(), bytes.size());
 }
 
-// Ends this process when the other side of the socket is closed, whatever the FMU is doing. The
-// signal of the parent's death would not do: it comes when the thread ends that started this one.
+// Ends this process when the other side closes the socket, whatever the FMU is doing. The
+// parent-death signal (PR_SET_PDEATHSIG) would not serve: it is sent when the thread ends that
+// started this process.
 void* EndWithParent(void*) {
   pollfd socket{kWorkerSocket, 0, 0};
   while (poll(&socket, 1, -1) < 0 && errno == EINTR) {
@@ -109,12 +111,12 @@ void LimitAll(int64_t memory_bytes, int64_t file_bytes) {
   if (kLimitsMemory) Limit(RLIMIT_AS, memory_bytes);
   Limit(RLIMIT_FSIZE, file_bytes);
   Limit(RLIMIT_CORE, 0);
-  Limit(RLIMIT_NPROC, 0);  // no process or thread but those there are; root is exempt from it
+  Limit(RLIMIT_NPROC, 0);  // forbids new processes and threads; root is exempt
   constexpr int64_t kMaxDescriptors = 256;
   Limit(RLIMIT_NOFILE, kMaxDescriptors);
   prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
-  // A file too large is an error of its write, as on a full disk.
+  // Exceeding the file size becomes a write error, as on a full disk, instead of a signal.
   signal(SIGXFSZ, SIG_IGN);
   signal(SIGPIPE, SIG_IGN);
 }
@@ -165,6 +167,6 @@ int main(int argc, char** argv) {
   if (page == MAP_FAILED || chdir("/") != 0 || !polyest::internal::StartWatch()) return 2;
   close(polyest::internal::kWorkerPage);
   polyest::internal::LimitAll(memory_bytes, file_bytes);
-  // Without the destructors of the FMU's and others' static objects.
+  // Skips the destructors of static objects, including the FMU's.
   _exit(polyest::internal::Serve(static_cast<polyest::internal::StatusPage*>(page)));
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Writes on the status page what is being done.
+// Records the current activity on the status page.
 
 #include <absl/strings/string_view.h>
 
@@ -12,17 +12,17 @@ class Monitor {
  public:
   explicit Monitor(StatusPage* page) : page_(page) {}
 
-  // Before each call of an FMU's function.
+  // Records the start of a call of an FMU function.
   void Enter(FmuCall call, int point, double time_s) {
     page_->call.store(call, std::memory_order_relaxed);
     page_->point.store(point, std::memory_order_relaxed);
     page_->time_s.store(time_s, std::memory_order_relaxed);
-    // The only writer: no need for an atomic addition.
+    // This is the only writer, so no atomic addition is needed.
     page_->calls.store(page_->calls.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
-  // After it.
+  // Records the end of the call.
   void Leave() { page_->call.store(FmuCall::kNothing, std::memory_order_relaxed); }
-  // What the FMU said; cut to the page's size.
+  // Records the FMU's message, truncated to the page's size.
   void Say(absl::string_view message);
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
 
-// Trajectories that each go their own way, one after the other, through the sample times.
+// An ensemble whose trajectories are simulated independently, one after the other, through all
+// sample times.
 
 #include <memory>
 #include <string>
@@ -14,11 +15,12 @@ class PointTrajectory {
  public:
   virtual ~PointTrajectory() = default;
 
-  // To time_s, no earlier than where it is. false: it has failed.
+  // Advances to time_s, which must not be before the present time. Returns false if the trajectory
+  // has failed.
   virtual bool AdvanceTo(double time_s) = 0;
-  // The outputs at the time reached.
+  // Reads the outputs at the present time. Returns false if the trajectory has failed.
   virtual bool ReadOutputs(double* outputs) = 0;
-  // Why it has failed, and the last time at which it was good.
+  // Returns the reason of the failure and the last time at which the trajectory was valid.
   virtual PointFailure failure() const = 0;
 };
 
@@ -35,7 +37,7 @@ class PointwiseEnsemble final : public TrajectoryEnsemble {
  private:
   void AdvancePoint(int point, std::span<const double> times_s, MatrixRef outputs);
 
-  std::vector<std::unique_ptr<PointTrajectory>> points_;  // null once it has failed
+  std::vector<std::unique_ptr<PointTrajectory>> points_;  // null once failed
   const int outputs_;
   std::vector<PointFailure> failures_;
 };

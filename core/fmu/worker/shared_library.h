@@ -8,13 +8,14 @@
 
 namespace polyest::internal {
 
-// A library loaded into this process: only ever a worker's.
+// A library loaded into this process. Only workers load libraries.
 class SharedLibrary {
  public:
-  // FAILED_PRECONDITION with the loader's own words.
+  // Loads the library. Returns FailedPrecondition with the loader's message if that fails.
   static absl::StatusOr<SharedLibrary> Load(const std::string& path);
 
-  // `function` becomes the library's function of that name; FAILED_PRECONDITION if it has none.
+  // Sets `function` to the library's function of that name. Returns FailedPrecondition if there is
+  // none.
   template <class Function>
   absl::Status Bind(const char* name, Function*& function) const {
     void* const symbol = Find(name);

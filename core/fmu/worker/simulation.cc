@@ -91,7 +91,8 @@ std::unique_ptr<Instance> Simulation::MakeInstance(int row, BlockInputs& inputs)
   return std::make_unique<Instance>(&factory_, row, span(parameters), span(values));
 }
 
-// The knots of streamed inputs must be there: the first values of the inputs are needed.
+// Called after the first knots of streamed inputs have arrived: initialization needs the inputs'
+// first values.
 void Simulation::MakeBlocks() {
   int first = 0;
   for (const int points : start_.block_points) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Everything a worker simulates: its blocks of points, each as an ensemble.
+// Everything that a worker simulates: its blocks of points, each as an ensemble.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -16,9 +16,10 @@ namespace polyest::internal {
 
 class Simulation {
  public:
-  // FAILED_PRECONDITION when the FMU cannot be used at all.
+  // Starts the simulation. Returns FailedPrecondition when the FMU cannot be used at all.
   static absl::StatusOr<std::unique_ptr<Simulation>> Start(StartMessage start, Monitor* monitor);
 
+  // Appends the new knots and advances all blocks through the sample times of `message`.
   absl::Status Advance(const AdvanceMessage& message, ResultMessage& result);
 
  private:
