@@ -1,6 +1,6 @@
 #pragma once
 
-// Ways into an estimator for polyest's own programs, which have their problem resolved already.
+// Access to an estimator for polyest's own programs, which have already resolved their problem.
 
 #include <absl/status/statusor.h>
 
@@ -13,10 +13,10 @@ namespace polyest::internal {
 
 class EstimatorAccess {
  public:
-  // Makes an estimator; otherwise as Estimator::Make.
+  // Makes an estimator for a resolved problem; otherwise like Estimator::Make.
   static absl::StatusOr<std::unique_ptr<Estimator>> Make(ResolvedProblem problem,
                                                          EstimatorOptions options = {});
-  // Returns the estimator's problem, resolved for the runs appended.
+  // Returns the estimator's problem, resolved for the runs appended so far.
   static const ResolvedProblem& ProblemOf(const Estimator& estimator);
 };
 

@@ -6,9 +6,10 @@
 
 namespace polyest::internal {
 
-// A checksum of all that a problem says: of its model the names, units, defaults and equations; all
-// priors, inputs with their knots, measured outputs with their noise, and options. Two problems of
-// the same fingerprint give, but for an accident of 1 in 4·10⁹, the same bits.
+// Returns a checksum of the whole problem: the names, units, defaults and equations of its model,
+// all priors, inputs with their knots, measured outputs with their noise, and options. Two problems
+// with the same fingerprint give bit-identical results, except for a coincidence of probability 1
+// in 4·10⁹.
 uint32_t FingerprintOf(const Problem& problem);
 
 }  // namespace polyest::internal

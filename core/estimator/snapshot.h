@@ -1,7 +1,7 @@
 #pragma once
 
-// The state of an estimator as bytes, and back: cereal's portable binary archive, doubles with all
-// their bits, with a version, a fingerprint of the problem and a checksum.
+// Encodes the state of an estimator as bytes and decodes it: cereal's portable binary archive, with
+// doubles bit for bit, a version, a fingerprint of the problem and a checksum.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -15,7 +15,7 @@
 
 namespace polyest::internal {
 
-// Of the components of the posterior's mixture, all at the same row, and of the mixture.
+// The states of the mixture's components, all at the same row, and of the mixture.
 struct EstimatorState {
   std::vector<ComponentState> components;
   int64_t weighing_row = 0;
@@ -24,14 +24,16 @@ struct EstimatorState {
   int64_t propagated_rows = 0;
 };
 
-// To be raised with every change of what the bytes mean, and of what is computed from them.
+// Version of the format. Raise it with every change in the meaning of the bytes or in what is
+// computed from them.
 inline constexpr uint32_t kSnapshotVersion = 1;
 
 std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint);
 
-// DATA_LOSS for bytes that are not of a snapshot of so many rows, cut off or corrupted;
-// FAILED_PRECONDITION for another version or fingerprint. Bounded in memory by a multiple of the
-// bytes, whatever they are. That the state suits the problem, FromState of its components sees to.
+// Decodes a snapshot of `rows` rows. Returns DataLoss for bytes that are truncated, corrupted or
+// not a snapshot of so many rows, and FailedPrecondition for another version or fingerprint. Memory
+// is bounded by a multiple of the number of bytes, whatever they contain. The components' FromState
+// checks that the state suits the problem.
 absl::StatusOr<EstimatorState> DecodeState(std::string_view bytes, int64_t rows,
                                            uint32_t fingerprint);
 

@@ -1,9 +1,9 @@
 #pragma once
 
-// What cereal needs to know of Eigen's and the standard containers. Not cereal's own headers for
-// them, since those allocate whatever size stands in the bytes; here no more memory is taken than
-// there are bytes to fill it with. Doubles keep their bits. Reading past the end, or a size that
-// cannot be, throws cereal::Exception.
+// Serialization of Eigen's and the standard containers for cereal. cereal's own headers are not
+// used because they allocate whatever size the bytes claim; here no more memory is allocated than
+// the bytes can fill. Doubles are kept bit for bit. Reading past the end, or an impossible size,
+// throws cereal::Exception.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace cereal {
 
 namespace polyest_state {
 
-// Elements read at once.
+// Number of elements read at once.
 inline constexpr int64_t kPortion = 8192;
 
 template <class Archive>
@@ -28,7 +28,7 @@ int64_t LoadSize(Archive& archive) {
   return size;
 }
 
-// `size` numbers or characters, which stand without gaps in the container.
+// Reads `size` numbers or characters into a container that stores them contiguously.
 template <class Archive, class Container>
 void LoadPlain(Archive& archive, int64_t size, Container& container) {
   container.clear();
@@ -71,7 +71,7 @@ void load(Archive& archive, std::vector<Element>& elements) {
   for (int64_t i = 0; i < size; ++i) archive(elements.emplace_back());
 }
 
-// A byte each, 0 or not.
+// Each flag is one byte, 0 for false.
 template <class Archive>
 void save(Archive& archive, const std::vector<bool>& flags) {
   polyest_state::SavePlain(archive, std::vector<uint8_t>(flags.begin(), flags.end()));
@@ -98,7 +98,7 @@ void load(Archive& archive, std::optional<Value>& value) {
   if (present != 0) archive(value.emplace());
 }
 
-// Matrices, vectors and arrays of double: rows, columns, elements column by column.
+// Matrices, vectors and arrays of double: rows, columns, then the elements by column.
 template <class Archive, class Derived>
 void save(Archive& archive, const Eigen::PlainObjectBase<Derived>& matrix) {
   archive(static_cast<int64_t>(matrix.rows()), static_cast<int64_t>(matrix.cols()));

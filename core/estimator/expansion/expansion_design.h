@@ -1,7 +1,8 @@
 #pragma once
 
-// Where an expansion interpolates and at which points: the whole prior with the germs' own
-// polynomials (the paper's expansion), or a box moved to the posterior with Legendre polynomials.
+// The region in which an expansion interpolates and its collocation points. The region is either
+// the whole prior, with the polynomials of the germs (the paper's expansion), or a box moved to the
+// posterior, with Legendre polynomials.
 
 #include <absl/status/statusor.h>
 
@@ -19,51 +20,55 @@ namespace polyest::internal {
 struct ExpansionDesign {
   Region region = Region::WholePrior(1);
   std::shared_ptr<const Basis> basis;  // in local coordinates η
-  Matrix points;                       // Q × n, collocation points, local
-  // C × n, local: where the expansion is compared with the model itself, and −log of the density
-  // they were drawn from, up to a constant, so that they can be reweighted as the posterior
-  // narrows.
+  Matrix points;                       // Q × n collocation points, local coordinates
+  // Check points (C × n, local coordinates), where the expansion is compared with the model itself,
+  // and the negative log density from which they were drawn, up to a constant. The latter allows
+  // reweighting them as the posterior narrows.
   Matrix check_points;
   Vector check_costs;
-  Vector reference;     // η_0 of the mismatch sums
-  Vector lower, upper;  // the box (n) in which the expansion is trusted, local
+  Vector reference;     // η_0, the reference of the mismatch sums
+  Vector lower, upper;  // the trusted box (n), local coordinates
   bool whole_prior = true;
 };
 
 // Fraction of the trusted box beyond which a particle counts as lying at its edge, and how far
-// past the edge particles may go, so that a posterior that leans out is seen to do so.
+// beyond the box particles may go, as a factor of its half width. The overshoot makes a posterior
+// that extends beyond the box visible.
 inline constexpr double kEdge = 0.97;
 inline constexpr double kOvershoot = 1.15;
 
-// As many as there are parameters and some more.
+// Returns the number of check points: the dimension plus 3.
 int CheckCount(int dimension);
-// Where an expansion in this germ is trusted: between its bounds; where it has none, between its
-// 0.1 % and 99.9 % quantiles.
+// Returns the range in which an expansion in this germ is trusted: between its bounds, or its 0.1 %
+// and 99.9 % quantiles where it has none.
 std::pair<double, double> TrustedRange(const Germ& germ);
 
-// The paper's expansion: germs' polynomials, points through the germs' quantile functions.
+// Returns the design of the paper's expansion: the germs' polynomials, and points mapped by the
+// germs' quantile functions. Returns FailedPrecondition or ResourceExhausted if the collocation
+// points cannot be made.
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 
-// An expansion over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are drawn towards
-// `inside` (a point of Ω in germ coordinates) until they lie in it.
+// Returns a design over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are moved towards
+// `inside`, a point of Ω in germ coordinates, until they lie in Ω. The design has no check points.
 ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
                                 Region region, const Vector& inside);
 
-// The box that holds the particles (germ coordinates, W × n) along their principal axes, widened
-// by a margin of about a third.
+// Returns the box along the particles' principal axes that contains them, widened by a margin of
+// about a third. The particles are W × n, in germ coordinates.
 Region RegionOfParticles(const Matrix& xis);
 
-// The design's trusted box in germ space as a region, with η ∈ [−1, 1]^n.
+// Returns the design's trusted box as a region in germ space, with η ∈ [−1, 1]^n.
 Region TrustedRegion(const ExpansionDesign& design);
 
-// The box particles are confined to: the trusted box with its overshoot.
+// Sets the box to which particles are confined: the trusted box with its overshoot.
 void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper);
 
-// The axes (of the trusted region) at whose edge more than 1 % of the particles (local, W × n)
-// lie although Ω goes on beyond it.
+// Returns the axes of the trusted region at whose edge more than 1 % of the particles (W × n, local
+// coordinates) lie although Ω extends beyond it.
 std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas);
 
-// The trusted region widened by half along `axes` and shifted towards the particles (local).
+// Returns the trusted region, widened by half along `axes` and shifted along them to the particles'
+// mean (particles in local coordinates).
 Region WidenedRegion(const ExpansionDesign& design, const Matrix& etas,
                      const std::vector<int>& axes);
 

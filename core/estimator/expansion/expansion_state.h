@@ -1,8 +1,9 @@
 #pragma once
 
-// An expansion between two rows as plain data, from which RegionalExpansion::FromState makes one
-// that goes on to the same bits. What follows from the rest to the bit is left out: the basis, the
-// trajectories' parameters, the factors of the collocation matrix.
+// The state of an expansion between two rows as plain data. RegionalExpansion::FromState makes an
+// expansion from it that continues bit for bit. The state omits what can be recomputed bit for bit
+// from the rest: the basis, the parameters of the trajectories, and the factors of the collocation
+// matrix.
 
 #include <optional>
 #include <vector>
@@ -12,7 +13,7 @@
 
 namespace polyest::internal {
 
-// Fields as of ExpansionDesign and its region.
+// The fields are those of ExpansionDesign and its region.
 struct DesignState {
   Truncation truncation;
   bool whole_prior = true;
@@ -24,7 +25,7 @@ struct DesignState {
 };
 
 DesignState StateOf(const ExpansionDesign& design);
-// DATA_LOSS when it cannot be a design for the problem.
+// Returns the design, or DataLoss when it cannot belong to the problem.
 absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignState state);
 
 struct ExpansionState {
@@ -33,10 +34,10 @@ struct ExpansionState {
   AbsorbedRows absorbed{0, 0, 0};
   std::vector<int> kept;
   std::vector<FailedTrajectory> failures;
-  // In the middle of a run; nothing where a new one begins.
+  // These describe the middle of a run; they are empty if a new run begins.
   int run = 0;
   std::optional<EnsembleState> ensemble;
-  std::vector<PreviousSample> previous;  // by channel
+  std::vector<PreviousSample> previous;  // one per channel
 };
 
 }  // namespace polyest::internal

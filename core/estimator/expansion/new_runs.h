@@ -1,7 +1,7 @@
 #pragma once
 
-// What an expansion that has followed the record so far becomes when a run begins that has
-// parameters of its own: the same where it was, the whole prior in the new dimensions.
+// Extends an expansion when a run with its own parameters begins. It stays where it was in the
+// known dimensions and covers the whole prior in the new ones.
 
 #include <absl/status/statusor.h>
 
@@ -11,15 +11,17 @@
 
 namespace polyest::internal {
 
-// `grown` is the problem of the present design, for more runs. FAILED_PRECONDITION and
-// RESOURCE_EXHAUSTED as DesignForPrior.
+// Returns the design for `grown`, the problem of the present design for more runs. Errors are those
+// of DesignForPrior.
 absl::StatusOr<ExpansionDesign> DesignForNewRuns(const ResolvedProblem& grown,
                                                  const ExpansionDesign& present);
 
-// `present` particles (germ coordinates, W × n), with draws of the prior in the new dimensions.
+// Returns the present particles (germ coordinates, W × n), extended by draws of the prior in the
+// new dimensions.
 Matrix ParticlesForNewRuns(const ResolvedProblem& grown, const Matrix& present);
 
-// Where the posterior is known, with the prior's mean and spread in the new dimensions.
+// Returns the present summary, extended by the prior's mean and spread in the new dimensions. A
+// posterior that is not known stays unknown.
 PosteriorSummary SummaryForNewRuns(const ResolvedProblem& grown, const PosteriorSummary& present);
 
 }  // namespace polyest::internal

@@ -1,8 +1,8 @@
 #pragma once
 
-// The outputs of a model at the times of a grid as expansions over the whole prior,
-// y(t_k, ξ) = c_kᵀ φ(ξ) with c_k = A⁺ Y_k (3)–(10): what the studies that need no data read their
-// answers off. The expansion is the paper's, fixed; it does not move.
+// Expansions of a model's outputs over the whole prior at the times of a grid, y(t_k, ξ) = c_kᵀ
+// φ(ξ) with c_k = A⁺ Y_k, equations (3) to (10). The studies that need no data derive their results
+// from them. This is the paper's fixed expansion: its region does not move.
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/statusor.h>
@@ -21,51 +21,58 @@
 
 namespace polyest::internal {
 
-// Times 0, step, 2 step … until, s.
+// The times 0, step, 2 step, …, until, in s.
 struct TimeGrid {
   double until_s = 0;  // > 0
   double step_s = 0;   // > 0, ≤ until_s
 
-  // INVALID_ARGUMENT names the field, the value and the rule.
+  // Returns InvalidArgument that names the field, the value and the rule if the grid is invalid.
   absl::Status Validate() const;
-  // until is one of the times when it is a multiple of the step but for rounding.
+  // Returns the number of times. `until` is one of them when it is a multiple of the step up to
+  // rounding.
   int64_t count() const;
   double time_s(int64_t k) const;
   std::vector<double> times_s() const;
 };
 
-// RESOURCE_EXHAUSTED when `numbers` for each of the outputs at each time are more than `most`.
+// Returns ResourceExhausted when `numbers` values for each output at each time exceed `most` in
+// total.
 absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbers, int64_t most);
 
-// The model's columns of the outputs asked for, or, if none is, of those the problem measures, or,
-// if it measures none, of all. INVALID_ARGUMENT names the field `outputs`, the value and the rule.
+// Returns the model's columns of the requested outputs. Without a request these are the outputs
+// that the problem measures, or all outputs if it measures none. Returns InvalidArgument that names
+// the field `outputs`, the value and the rule.
 absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
                                                const std::vector<std::string>& asked);
 
-// The m outputs at consecutive times: output i at time first_time + k is column k·m + i.
+// The expansions of m outputs at consecutive times. Output i at time first_time + k is column k·m +
+// i.
 struct ExpandedOutputs {
   int64_t first_time;
   int64_t times;
   Expansion expansion;
-  // Of model − expansion at the collocation points, with Q − S degrees of freedom; 0 when Q = S.
+  // Variance of model − expansion at the collocation points, with Q − S degrees of freedom; 0 when
+  // Q = S.
   Vector residual_variance;
 };
 
 class PriorExpansion {
  public:
-  // INVALID_ARGUMENT naming `inputs` when one is streamed, for there are no data to carry it;
-  // otherwise as CollocationPoints and CollocationMatrix::Factor. `problem` must outlive it.
+  // Makes the expansion. Returns InvalidArgument naming `inputs` when an input is streamed, because
+  // there are no data to provide it; other errors are those of CollocationPoints and
+  // CollocationMatrix::Factor. `problem` must outlive the expansion.
   static absl::StatusOr<std::unique_ptr<PriorExpansion>> Make(const ResolvedProblem& problem,
                                                               std::vector<int> outputs,
                                                               int threads);
 
   const Basis& basis() const { return *basis_; }
   int points() const { return static_cast<int>(points_.rows()); }  // Q
-  // Of trajectories that could not be integrated; they are left out of the fit.
+  // Returns the trajectories that could not be integrated. They are left out of the fit.
   const std::vector<PointFailure>& failures() const { return ensemble_.failures(); }
 
-  // Calls `visit` with all times of the grid, in order, some at a time. Once. FAILED_PRECONDITION
-  // when no more than S trajectories are left or an output passes 10¹⁴⁰; a stop request's status.
+  // Calls `visit` for successive stretches of times that cover the grid in order. May be called
+  // only once. Returns FailedPrecondition when at most S trajectories are left or an output exceeds
+  // 10¹⁴⁰, or the status of a stop request.
   absl::Status Run(const TimeGrid& grid, absl::FunctionRef<void(const ExpandedOutputs&)> visit,
                    const Stop& stop);
 
@@ -88,7 +95,7 @@ class PriorExpansion {
   EnsemblePropagator ensemble_;
 };
 
-// POINTS_FAILED, from at least one failure.
+// Returns POINTS_FAILED for at least one failure among `points` points.
 Diagnostic DescribeFailures(const std::vector<PointFailure>& failures, int points);
 
 }  // namespace polyest::internal

@@ -1,15 +1,17 @@
 #pragma once
 
-// Re-expansion: moving the expansion to where the posterior is. The prior density and Ω stay the
-// original ones; only the region in which the polynomial interpolates moves.
+// Re-expansion: moves the expansion to the posterior. The prior density and Ω stay unchanged; only
+// the region in which the polynomial interpolates moves.
 //
-// One settlement: sample the posterior on the present expansion; where the particles lean on an
-// edge of the region that is not Ω's, widen that axis and propagate the record again; where the
-// region of the particles is less than half of the present one, move there and propagate again;
-// repeat until neither is needed. Where nothing is gained by moving, an expansion of automatic
-// order stays and gets as many orders more as follow the model there, if any do; with every move it
-// gives one back. The region comes from particles and never from a minimum and its Hessian: in a
-// direction not yet informed the minimum sits anywhere.
+// A settlement samples the posterior on the present expansion and then moves the region as needed.
+// If particles lean on an edge of the region that is not an edge of Ω, that axis is widened and the
+// record is propagated again. If the region of the particles has less than half the volume of the
+// present one, the expansion moves there and the record is propagated again. This repeats until
+// neither is needed. If moving gains nothing, an expansion of automatic order stays in place and
+// tries higher orders; it takes the first one that follows the model there, if any. Each move
+// lowers the order by one. The region is derived from particles and never from a minimum and its
+// Hessian: in a direction that the data do not inform yet, the position of the minimum is
+// arbitrary.
 
 #include <absl/status/statusor.h>
 
@@ -23,48 +25,52 @@ namespace polyest::internal {
 struct SettleRequest {
   const ResolvedProblem* problem = nullptr;
   const SampleStore* store = nullptr;
-  int64_t rows = 0;  // of the store that the expansion has absorbed
-  Matrix guesses;    // particles of the settlement before, germ coordinates (may be none)
+  int64_t rows = 0;  // rows of the store that the expansion has absorbed
+  Matrix guesses;    // particles of the previous settlement, germ coordinates (may be empty)
   uint64_t seed = 1;
   int threads = 1;
-  bool may_raise_order = true;  // where the order is automatic
+  bool may_raise_order = true;  // has an effect only if the order is automatic
 };
 
 struct Settlement {
-  std::unique_ptr<RegionalExpansion> expansion;  // null: the present one stays
-  Matrix particles;                              // of the posterior, germ coordinates
+  std::unique_ptr<RegionalExpansion> expansion;  // null if the present one stays
+  Matrix particles;                              // particles of the posterior, germ coordinates
   int reexpansions = 0;
-  int64_t propagated_rows = 0;  // by all but the expansion returned
+  int64_t propagated_rows = 0;  // by all expansions but the returned one
 };
 
-// Not OK on a stop request or when the store cannot be read; `present` is then untouched and the
-// same call may be made again.
+// Carries out a settlement. Returns an error on a stop request or when the store cannot be read;
+// `present` is then unchanged and the call may be repeated.
 absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
                                   const Stop& stop);
 
-// An expansion of the design that has absorbed the first `rows` rows of the store.
-// FAILED_PRECONDITION when it cannot be factored or too few trajectories are left.
+// Makes an expansion of the design and lets it absorb the first `rows` rows of the store. Returns
+// FailedPrecondition when its collocation matrix cannot be factored or too few trajectories are
+// left.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
                                                           LearnedNoise noise,
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop);
 
-// How far the posterior on the expansion may be trusted, from the check points. To first order a
-// posterior mean is off, in units of its standard deviation, by no more than either of
+// How accurate the posterior on the expansion is, judged at the check points. To first order the
+// error of a posterior mean, in units of its standard deviation, is bounded by each of
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
 //   (at the expansion's lag-1 correlation, where that enters),
-//   ‖(model − expansion)/σ‖ over the samples,
-// both by the Cauchy–Schwarz inequality, over particles and over samples. The first is the sharper
-// but needs check points where the posterior is; the second holds wherever they are.
+//   ‖(model − expansion)/σ‖ over the samples.
+// Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
+// is sharper but needs check points where the posterior is. The second holds wherever they are.
 struct Agreement {
-  double shift = 0;  // the smaller bound that may be used; ≥ 0
-  // Mean of ΔJ over the posterior, where the check points tell it to 0.25: what the expansion's own
-  // error, the discount included, has made of the cost's height.
+  double shift = 0;  // the smaller of the available bounds, ≥ 0
+  // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the
+  // cost's height that the expansion's own error and its discount cause.
   std::optional<double> mean_difference;
-  double residual_to_noise = 0;  // worst root mean square over the check points that still matter
+  // Largest root mean square of (model − expansion)/σ over the check points of non-negligible
+  // weight.
+  double residual_to_noise = 0;
 };
 
+// Returns the agreement of the expansion with the model. `cost` is the cost on the expansion.
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost);
 
 }  // namespace polyest::internal

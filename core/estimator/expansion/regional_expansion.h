@@ -1,14 +1,14 @@
 #pragma once
 
-// An expansion on its way along the record: the ensemble of trajectories, the coefficients
-// c_k = A⁺ Y_k (10) of every measured output at every sample time, and the mismatch sums they
-// leave behind. Memory does not grow with the number of samples.
+// An expansion that advances along the record. It holds the ensemble of trajectories, the
+// coefficients c_k = A⁺ Y_k (10) of every measured output at every sample time, and the mismatch
+// sums that result. Memory does not grow with the number of samples.
 //
 // The expansion's own error is treated as noise: a sample enters the sums with R = σ² + the
-// residual variance of the fit at its time, so that a region still too wide gives a posterior that
-// is wide and not wrong. The noise is what has been learned of it so far (learned_noise.h):
-// correlated samples are whitened first, outliers lose weight by their residual at the posterior's
-// centre, beside what the posterior leaves open there.
+// residual variance of the fit at its time. A region that is still too wide thus gives a posterior
+// that is wide but not wrong. The noise is the noise learned so far (learned_noise.h). Correlated
+// samples are whitened first. Outliers lose weight according to their residual at the posterior's
+// centre, compared with the noise and the posterior's own spread there.
 
 #include <absl/status/statusor.h>
 
@@ -25,7 +25,7 @@
 
 namespace polyest::internal {
 
-// A trajectory left out, with the parameters that made it fail.
+// A trajectory that was left out, with the parameters for which it failed.
 struct FailedTrajectory {
   Vector theta;
   int run = 0;
@@ -34,89 +34,90 @@ struct FailedTrajectory {
   std::string reason;
 };
 
-// What the rows absorbed by an expansion have left behind.
+// The accumulated contributions of the rows that an expansion has absorbed.
 struct AbsorbedRows {
-  // With S terms, m channels and C check points.
+  // Starts from zero, for S terms, m channels and C check points.
   AbsorbedRows(int terms, int channels, Eigen::Index check_points);
 
   int64_t rows = 0;
   int64_t samples = 0;            // over all channels
   int64_t propagated = 0;         // trajectories × rows
-  std::vector<ChannelSums> sums;  // by channel, over all runs
-  Vector discount;                // by channel: Σ ρ_k/R_k
-  double log_noise = 0;           // Σ ½ log σ² + what outliers' weights lack
-  double log_variance = 0;        // the same with R in place of σ²
-  std::vector<int64_t> outliers;  // by channel
-  // By channel, the sample before in units of its noise; a zero where a run begins.
+  std::vector<ChannelSums> sums;  // per channel, over all runs
+  Vector discount;                // per channel: Σ ρ_k/R_k
+  double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
+  double log_variance = 0;  // as log_noise, with R in place of σ²
+  std::vector<int64_t> outliers;  // per channel
+  // Each channel's previous sample in units of its noise; zero at the beginning of a run.
   int summed_run = -1;
   Matrix previous_coefficients;  // S × m
   Vector previous_error;
-  // At the check points.
+  // Sums at the check points.
   Matrix check_chi_squared;       // C × m
   Vector check_residual;          // Σ ((model − expansion)/σ)²
-  std::vector<bool> check_valid;  // the trajectory could be integrated
+  std::vector<bool> check_valid;  // whether the trajectory could be integrated
 };
 
 struct ExpansionState;
 
 class RegionalExpansion {
  public:
-  // FAILED_PRECONDITION when the design's collocation matrix cannot be factored. `problem` must
-  // outlive the expansion.
+  // Makes an expansion that has absorbed no rows. Returns FailedPrecondition when the design's
+  // collocation matrix cannot be factored. `problem` must outlive the expansion.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
                                                                  ExpansionDesign design,
                                                                  LearnedNoise noise, int threads);
 
-  // One in that state (State), on a store that has its rows at least. DATA_LOSS when the state
-  // cannot be of such a problem, FAILED_PRECONDITION when it is not of those rows.
+  // Restores an expansion from a state that State returned. The store must hold at least its rows.
+  // Returns DataLoss when the state cannot belong to such a problem, FailedPrecondition when the
+  // rows differ from those of the state.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> FromState(
       const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads);
-  // After all rows propagated have been absorbed, at a checkpoint or, for a new run to begin on,
-  // anywhere.
+  // Returns the state. All propagated rows must have been absorbed. The last one must be at a
+  // checkpoint, or anywhere if a new run begins next.
   ExpansionState State() const;
 
   // Propagates over a block of rows that follows the rows propagated before, and fits the outputs
-  // of the first fitted_rows(): all, unless too few trajectories are left at the one after, which
-  // shortage() then explains. Only a stop request makes it not OK; the expansion is then of no
-  // further use.
+  // of the first fitted_rows() rows. These are all rows, unless too few trajectories are left at
+  // the next one; shortage() then explains why. Only a stop request returns an error; the expansion
+  // is then unusable.
   absl::Status Propagate(const RowBlock& block, const Stop& stop);
   int fitted_rows() const { return fitted_rows_; }
   const absl::Status& shortage() const { return shortage_; }
-  // Of row `row` of the block propagated last: the largest, over the channels with a sample, of
-  // the expansion's residual in units of the noise.
+  // Returns, for row `row` of the block propagated last, the expansion's residual in units of the
+  // noise: the largest over the channels with a sample.
   double ResidualToNoise(int row) const;
-  // Takes the row into the sums. Rows are absorbed in order, each once.
+  // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
 
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }
   int points() const { return static_cast<int>(design_.points.rows()); }
   int64_t absorbed_rows() const { return absorbed_.rows; }
-  // Trajectories × rows.
+  // Returns the number of trajectories × rows.
   int64_t propagated_rows() const { return absorbed_.propagated; }
   const std::vector<FailedTrajectory>& failures() const { return failures_; }
 
-  // One a measured channel, over all runs.
+  // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
-  // Of a channel: Σ ρ_k/R_k, how many of its samples the expansion's own error ρ has cost.
+  // Returns Σ ρ_k/R_k of a channel: the number of its samples lost to the expansion's own error ρ.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
-  // Samples of a channel with less than half their weight.
+  // Returns the number of samples of a channel that have less than half their weight.
   int64_t Outliers(int channel) const { return absorbed_.outliers[static_cast<size_t>(channel)]; }
-  // What makes the costs of different expansions of the same record comparable, each with its own
-  // noise and weights of outliers: Σ ½ log R_k, and what reweighting leaves out of the likelihood.
-  // R with the expansion's own error, which belongs to the sums, or without.
+  // Returns the term that makes the costs of different expansions of the same record comparable,
+  // each with its own noise and outlier weights: Σ ½ log R_k, and what the reweighting leaves out
+  // of the likelihood. R is taken with the expansion's own error, as in the sums, or without it.
   double LogNormalization(bool with_own_error) const {
     return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
   }
-  // The cost on this expansion with α² = regularization.
+  // Returns the cost on this expansion with α² = regularization.
   Cost MakeCost(double regularization) const;
 
-  // Agreement with the model itself, at the check points: each one's χ² by channel from its own
-  // trajectory, and root mean square of (model − expansion)/σ over the samples.
+  // Agreement with the model itself at the check points: each one's χ² per channel from its own
+  // trajectory, and the root mean square of (model − expansion)/σ over the samples.
   struct Check {
     Matrix chi_squared;  // check points × m
     Vector residual_to_noise;
-    std::vector<bool> valid;  // the trajectory could be integrated
+    std::vector<bool> valid;  // whether the trajectory could be integrated
     int64_t samples = 0;
   };
   Check Checks() const;
@@ -152,15 +153,15 @@ class RegionalExpansion {
   Matrix check_phi_;  // C × S
 
   Matrix thetas_;          // (Q + C) × n
-  std::vector<int> kept_;  // the collocation points still in the fit
+  std::vector<int> kept_;  // collocation points that are still in the fit
   int run_ = -1;
   std::unique_ptr<InputSignals> inputs_;
-  double knot_time_s_ = 0;        // of the last knot of the streamed inputs
-  bool inputs_finished_ = false;  // no more knots in this run
+  double knot_time_s_ = 0;        // time of the last knot of the streamed inputs
+  bool inputs_finished_ = false;  // whether the run has no more knots
   std::unique_ptr<EnsemblePropagator> propagator_;
   std::vector<FailedTrajectory> failures_;
 
-  // Of the block propagated last.
+  // The block propagated last.
   RowBlock block_;
   Matrix outputs_;            // (Q + C) × (m · rows)
   Matrix coefficients_;       // S × (m · rows)
@@ -169,8 +170,8 @@ class RegionalExpansion {
   absl::Status shortage_;
 
   Whitening whitening_;
-  // Outliers are looked for at φ(η̂), η̂ the posterior's centre, beside the posterior's own spread:
-  // of an output cᵀφ its variance there is ‖spread_ᵀ c‖².
+  // Outliers are judged at φ(η̂), where η̂ is the posterior's centre, relative to the posterior's
+  // own spread: an output cᵀφ has the variance ‖spread_ᵀ c‖² there.
   Vector centre_phi_;
   Matrix spread_;  // S × n
 
@@ -178,7 +179,7 @@ class RegionalExpansion {
   Vector difference_;  // S
 };
 
-// One line that names parameters, time, run and the solver's flag.
+// Returns one line with the parameters, the time, the run and the solver's flag.
 std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior);
 
 }  // namespace polyest::internal

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where minima of the cost are looked for: the box in which the expansion is trusted (with its
-// overshoot), cut by Ω.
+// The search domain for minima of the cost: the box in which the expansion is trusted (with its
+// overshoot), intersected with Ω.
 
 #include "core/bayes/cost.h"
 #include "core/bayes/minimizer.h"
@@ -9,12 +9,12 @@
 
 namespace polyest::internal {
 
-// The minimization of the cost on the design's expansion, in local coordinates; `cost` must outlive
-// it.
+// Returns the minimization problem of the cost on the design's expansion, in local coordinates.
+// `cost` must outlive it.
 MinimizationProblem SearchOf(const Cost& cost, const ExpansionDesign& design);
 
-// `count` rows of points (W × n, W ≥ 1): that of least cost, then each time the one farthest from
-// those chosen, in standard deviations of the points.
+// Returns `count` rows of `points` (W × n, W ≥ 1): first the one of least cost, then each time the
+// one farthest from those already chosen, measured in standard deviations of the points.
 Matrix SpreadStarts(const Matrix& points, const Vector& costs, int count);
 
 }  // namespace polyest::internal

@@ -1,8 +1,8 @@
 #pragma once
 
-// From the sums of an expansion to an estimate: minimum of the cost, curvature, posterior,
-// identifiability and what the engineer should be warned of. Its cost does not depend on the
-// number of samples.
+// Derives an estimate from the sums of an expansion: the minimum of the cost, the curvature, the
+// posterior, identifiability and warnings. The computing time does not depend on the number of
+// samples.
 
 #include <absl/status/statusor.h>
 
@@ -22,12 +22,13 @@ struct AssessmentRequest {
   const ResolvedProblem* problem = nullptr;
   const RegionalExpansion* expansion = nullptr;
   const RecordSummary* record = nullptr;
-  const Matrix* guesses = nullptr;  // particles, germ coordinates (may have no rows)
+  const Matrix* guesses = nullptr;  // particles, germ coordinates (may be empty)
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // trajectories × rows
   PosteriorEffort effort;
-  std::optional<double> regularization;  // α² when it has been chosen already
-  // Of a mixture's component: what is its own, and its weight when that was last looked at.
+  std::optional<double> regularization;  // α² if it has been chosen already
+  // For a component of a mixture: the partition, the component's index, and its weight at the last
+  // weighing.
   const MixturePartition* partition = nullptr;
   size_t component = 0;
   double last_weight = 1;
@@ -35,16 +36,16 @@ struct AssessmentRequest {
 
 struct Assessed {
   Estimate estimate;
-  PosteriorDraws posterior;  // that it sums up
-  Findings findings;         // that its diagnostics are of; refers to what the request does
-  MixtureShare share;        // of a mixture's component
+  PosteriorDraws posterior;  // the draws that the estimate summarizes
+  Findings findings;         // the basis of the diagnostics; refers to the request's objects
+  MixtureShare share;        // for a component of a mixture
 };
 
-// mean, posterior_std_dev and limits of parameter i.
+// Sets mean, posterior_std_dev and limits of parameter i.
 void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
                       ParameterEstimate& parameter);
 
-// Only a stop request makes it not OK.
+// Assesses an expansion. Returns an error only on a stop request.
 absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop);
 
 }  // namespace polyest::internal

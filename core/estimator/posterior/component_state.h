@@ -1,6 +1,7 @@
 #pragma once
 
-// A mixture component between two rows as plain data. Fields as of MixtureComponent.
+// The state of a mixture component between two rows as plain data. The fields are those of
+// MixtureComponent.
 
 #include <cstdint>
 
@@ -10,8 +11,8 @@
 namespace polyest::internal {
 
 struct ComponentState {
-  int runs = 1;                   // of its problem, and
-  double relative_tolerance = 0;  // that of its integrators, which follows the noise
+  int runs = 1;                   // runs of the component's problem
+  double relative_tolerance = 0;  // of the problem's integrators; it follows the noise
   ExpansionState expansion;
   Matrix particles;
   double weight = 1;

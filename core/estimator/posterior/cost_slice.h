@@ -1,7 +1,7 @@
 #pragma once
 
-// The least of a function of η on one of the parallel hyperplanes aᵀη = b, in the box and the
-// constraints of its minimization.
+// Minimizes a function of η on one of the parallel hyperplanes aᵀη = b, within the box and the
+// constraints of its minimization problem.
 
 #include <optional>
 #include <vector>
@@ -10,15 +10,15 @@
 
 namespace polyest::internal {
 
-// On a hyperplane η = base + N v, with N an orthonormal basis of the directions in it and base the
-// first start's nearest point in it.
+// Points of a hyperplane are η = base + N v. N is an orthonormal basis of its directions, and base
+// is the point of the hyperplane nearest to the first start.
 class CostSlice {
  public:
-  // normal: a (n), not 0. `search` must outlive it.
+  // `normal` is a (n), which must not be 0. `search` must outlive the slice.
   CostSlice(const MinimizationProblem& search, const Vector& normal);
 
-  // From at least one start η, not necessarily in the hyperplane; none where the function is
-  // nowhere finite.
+  // Returns the minimum found from at least one start η, which need not lie in the hyperplane.
+  // Returns nothing if the function is nowhere finite.
   std::optional<Minimum> Minimize(double b, const std::vector<Vector>& starts,
                                   const Stop& stop) const;
 
@@ -29,7 +29,7 @@ class CostSlice {
   const MinimizationProblem& search_;
   Vector a_;
   Matrix n_;
-  Matrix rows_;  // of the box and the constraints: rows η ≤ bounds
+  Matrix rows_;  // rows of the box and the constraints: rows η ≤ bounds
   Vector bounds_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the engineer should be warned of, each as one sentence.
+// Warnings to the user about an estimate, each in one sentence.
 
 #include <vector>
 
@@ -11,7 +11,7 @@
 
 namespace polyest::internal {
 
-// An expansion is called inaccurate when a posterior mean may be off by this many of its standard
+// An expansion is called inaccurate when a posterior mean may be wrong by this many of its standard
 // deviations.
 inline constexpr double kInaccurateShift = 0.25;
 
@@ -22,14 +22,15 @@ struct Findings {
   Vector map_xi;  // the minimum, germ coordinates
   bool converged = true;
   std::string minimizer_reason;
-  std::vector<Vector> other_minima;  // θ of other minima of comparable cost
-  double left_out = 0;               // share of a mixture's components there was no room for
+  std::vector<Vector> other_minima;  // θ of other minima with comparable cost
+  double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations
-  // Why the rule asked for has not chosen α²; empty where it has, or none was asked for.
+  // Why the requested rule did not choose α²; empty if it did or if no rule was requested.
   std::string regularization_not_determined;
 };
 
-// Reads what `estimate` holds already; the result goes into its diagnostics.
+// Returns the diagnostics. Reads the parts of `estimate` that are filled in already; the caller
+// stores the result in its diagnostics.
 std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate);
 
 }  // namespace polyest::internal

@@ -1,8 +1,8 @@
 #pragma once
 
-// One component of the posterior's mixture on its way along the record: an expansion over a region
-// of its own, and the windows, settlements, noise and tolerance that go with it. What it does is a
-// function of the rows taken, never of how they came.
+// One component of the posterior's mixture, which advances along the record. It has an expansion
+// over its own region, and its own windows, settlements, noise and tolerance. Its results are a
+// function of the rows taken, regardless of the batches in which they arrived.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -16,50 +16,53 @@
 
 namespace polyest::internal {
 
-// Where a window that begins after so many rows ends, windows being counted from a row on.
+// Returns the row at which a window starting at `rows` ends. Windows grow in proportion to the
+// number of rows since `from` and have at least two rows.
 int64_t NextWindow(int64_t rows, int64_t from = 0);
 
 struct ComponentState;
 
 class MixtureComponent {
  public:
-  // The whole prior. FAILED_PRECONDITION when its expansion cannot be factored. `store` must
-  // outlive the component.
+  // Makes a component over the whole prior. Returns FailedPrecondition when its expansion cannot be
+  // factored. `store` must outlive the component.
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(const ResolvedProblem& problem,
                                                                    const SampleStore* store,
                                                                    int threads);
 
-  // One in that state (State), on a store that has its rows at least. DATA_LOSS when the state
-  // cannot be of such a problem, FAILED_PRECONDITION when it is not of those rows.
+  // Restores a component from a state that State returned. The store must hold at least its rows.
+  // Returns DataLoss when the state cannot belong to such a problem, FailedPrecondition when the
+  // rows differ from those of the state.
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> FromState(const ResolvedProblem& problem,
                                                                      ComponentState state,
                                                                      const SampleStore* store,
                                                                      int threads);
-  // After TakeUpTo a checkpoint or the row before a new run, while not is_multimodal().
+  // Returns the state. May be called after TakeUpTo a checkpoint or the row before a new run,
+  // unless is_multimodal().
   ComponentState State() const;
 
-  // Takes rows of the store up to the first `rows`. On a stop request returns its status; what was
-  // taken stays, the next call goes on from there.
+  // Takes rows of the store up to the first `rows`. On a stop request returns its status. The rows
+  // taken until then are kept, and the next call continues from there.
   absl::Status TakeUpTo(int64_t rows, const Stop& stop);
   int64_t rows_taken() const { return taken_; }
 
-  // Whether the posterior lies in separated pieces that one expansion does not serve. No more rows
-  // are taken before it has been divided.
+  // Whether the posterior consists of separated pieces that a single expansion cannot represent. No
+  // more rows are taken until Divide has been called.
   bool is_multimodal() const { return !pieces_.empty(); }
-  // A component for each piece, at the same row. None, and this one goes on whole, where one of
-  // them could not be expanded.
+  // Returns a component for each piece, at the same row. Returns none if one of them could not be
+  // expanded; this component then continues undivided.
   absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> Divide(const Stop& stop);
 
-  // Before it is weighed: settled anew, once at a row, where the posterior has become so narrow
-  // that the check points no longer tell its cost's height (mixture_share.h).
+  // Prepares for weighing: settles again, at most once at a row, if the posterior has become so
+  // narrow that the check points no longer determine the height of its cost (mixture_share.h).
   absl::Status MakeComparable(const Stop& stop);
-  // The posterior's probability of it when that was last looked at.
+  // Returns the posterior probability of the component at the last weighing.
   double weight() const { return weight_; }
   void set_weight(double weight) { weight_ = weight; }
   const RegionalExpansion& expansion() const { return *expansion_; }
   int reexpansions() const { return reexpansions_; }
   int64_t propagated_rows() const { return abandoned_rows_ + expansion_->propagated_rows(); }
-  // Refers to the component.
+  // Returns a request that refers to this component.
   AssessmentRequest RequestAssessment() const;
 
  private:
@@ -84,26 +87,26 @@ class MixtureComponent {
   absl::Status Reweigh(LearnedNoise noise, const Stop& stop);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
-  ResolvedProblem problem_;  // of its own: the tolerance follows the noise
+  ResolvedProblem problem_;  // own copy, because the tolerance follows the noise
   const SampleStore* store_;
   int threads_;
   bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
-  bool broken_ = false;         // a stop left the expansion between two rows
+  bool broken_ = false;         // whether a stop left the expansion between two rows
   Matrix particles_;            // of the last settlement, germ coordinates
-  std::vector<Matrix> pieces_;  // of them, where there are several
+  std::vector<Matrix> pieces_;  // pieces of the particles if there are several
   double weight_ = 1;
   int64_t taken_ = 0;
-  int64_t windows_from_ = 0;  // the row that the present windows count from
+  int64_t windows_from_ = 0;  // row from which the present windows are counted
   int64_t window_end_ = 2;
-  int64_t patient_until_ = 0;  // rows before this one are taken whatever their residual
-  int64_t whole_until_ = 0;    // no pieces are looked for before this one
+  int64_t patient_until_ = 0;  // rows before this one are taken regardless of residual
+  int64_t whole_until_ = 0;    // no search for pieces before this row
   int64_t settled_row_ = -1;
   int settlements_at_row_ = 0;
   int64_t comparable_row_ = -1;
   uint64_t settlements_ = 0;
   int reexpansions_ = 0;
-  int64_t abandoned_rows_ = 0;  // propagated by expansions given up since
+  int64_t abandoned_rows_ = 0;  // propagated by expansions that were replaced
   RecordSummary summary_;
 };
 

@@ -1,17 +1,19 @@
 #pragma once
 
-// What of the posterior is a mixture component's own. The regions of components may overlap; so
-// that nothing is counted twice, each point ξ belongs to one of them, the one in whose region it is
-// most central,
+// The share of the posterior that belongs to a mixture component. The regions of components may
+// overlap. To count nothing twice, each point ξ belongs to exactly one component, the one in whose
+// region it is most central,
 //   argmin_k ‖η_k(ξ)‖_∞,   η_k ∈ [−1, 1]^n the coordinates of component k's region,
-// the first of equals. A point that lies in anybody's box of draws lies in its owner's.
+// the first one if several are equal. A point that lies in any component's sampling box also lies
+// in its owner's.
 //
-// A component's weight is its evidence, the integral of the density over what is its own,
+// A component's weight is its evidence, the integral of the density over its share,
 //   log Z_k = log ∫ e^{−J_k(ξ)} dξ − c_k.
-// c_k makes costs comparable: Σ ½ log σ² of the component's own noise, and what its expansion's own
-// error has made of its cost's height, ΔJ in the mean over its check points (reexpansion.h). Where
-// those do not tell, R with the expansion's error in place of σ², by which a discounted sample is
-// neither won nor lost in the mean, to first order in the discount.
+// c_k makes the costs comparable. It is Σ ½ log σ² of the component's own noise, plus the mean over
+// the check points of ΔJ, the change of the cost's height by the expansion's own error
+// (reexpansion.h). If the check points do not determine that mean, c_k instead uses R, which
+// includes the expansion's error, in place of σ². A discounted sample then neither gains nor loses
+// in the mean, to first order in the discount.
 
 #include <vector>
 
@@ -22,10 +24,10 @@ namespace polyest::internal {
 
 class MixturePartition {
  public:
-  // One design a component, at least one.
+  // Takes one design per component, at least one.
   explicit MixturePartition(const std::vector<const ExpansionDesign*>& designs);
 
-  // Of each row of xis (W × n, germ coordinates): whether it is the component's.
+  // Returns for each row of `xis` (W × n, germ coordinates) whether it belongs to the component.
   std::vector<bool> Owned(size_t component, const Matrix& xis) const;
 
  private:
@@ -33,17 +35,17 @@ class MixturePartition {
 };
 
 struct MixtureShare {
-  double owned = 1;         // of the component's draws
-  double height = 0;        // c_k: J_k + c_k may be compared among components
-  double log_evidence = 0;  // −∞ where it owns none
+  double owned = 1;         // share of the component's draws that belong to it
+  double height = 0;        // c_k: J_k + c_k is comparable among components
+  double log_evidence = 0;  // −∞ if it owns no draw
 };
 
-// Of draws of the cost on the expansion. What is left of the draws and their minima afterwards is
-// the component's own; all of them where it owns no draw.
+// Returns the component's share from draws of the cost on the expansion. Removes the draws and
+// minima that belong to other components, except that a component that owns no draw keeps all.
 MixtureShare TakeShare(const MixturePartition& partition, size_t component,
                        const RegionalExpansion& expansion, const Cost& cost, PosteriorDraws& draws);
 
-// exp(log_evidence), Σ = 1; equal where none has any.
+// Returns exp(log_evidence) scaled to Σ = 1; equal weights if no component has evidence.
 std::vector<double> WeightsOf(const std::vector<double>& log_evidence);
 
 }  // namespace polyest::internal

@@ -1,17 +1,20 @@
 #pragma once
 
-// Draws of the posterior on an expansion, as few model-free evaluations as an honest answer takes:
-// importance sampling from the curvature's Gaussian where the posterior is nearly that
-// (bayes/importance.h), Markov chains from tempered particles everywhere else
+// Draws of the posterior on an expansion, with as few evaluations as a reliable result needs.
+// Importance sampling from the curvature's Gaussian is used where the posterior is nearly Gaussian
+// (bayes/importance.h). Elsewhere Markov chains are started from tempered particles
 // (bayes/posterior.h, bayes/markov_chains.h).
 //
-// Importance sampling is taken only if all of these hold:
-// - one minimum, found from starts spread over the best of a cover of the box and of the guesses;
-//   other minima have e^{−J} too small to matter;
-// - it lies inside of Ω and of the box, the Hessian there is positive definite and the gradient
-//   vanishes: Newton's decrement gᵀH⁻¹g/2 is below 10⁻³;
-// - no point of the cover and no guess that is probable lies where the Gaussian has nothing;
-// - the effective size is at least half of the points, and no weight is above 1 % of all.
+// Importance sampling is used only if all of these hold:
+//   - There is one minimum, searched from starts spread over the best points of a cover of the box
+//   and of
+//     the guesses. Other minima have a negligible e^{−J}.
+//   - It lies inside Ω and the box, the Hessian there is positive definite and the gradient
+//   vanishes:
+//     Newton's decrement gᵀH⁻¹g/2 is below 10⁻³.
+//   - No probable point of the cover or of the guesses lies outside the reach of the Gaussian.
+//   - The effective size is at least half the number of points, and no weight exceeds 1 % of the
+//   total.
 
 #include <absl/status/statusor.h>
 
@@ -25,27 +28,29 @@
 
 namespace polyest::internal {
 
-// How much work draws are worth.
+// The computing effort to spend on draws.
 struct PosteriorEffort {
   int importance_points = 16'384;        // ≥ 100
-  double chain_effective_size = 30'000;  // asked for, of every parameter
-  int max_sweeps = 300;                  // of the chains
+  double chain_effective_size = 30'000;  // target for every parameter
+  int max_sweeps = 300;                  // maximum for the chains
 };
 
 struct PosteriorDraws {
   PosteriorMethod method = PosteriorMethod::kMarkovChains;
-  Matrix scores;   // draws × n: z of the uncertain parameters
+  Matrix scores;   // draws × n, scores z of the uncertain parameters
   Vector weights;  // Σ = 1
-  // Of each parameter: independent draws that would do as well. Importance sampling: 1/Σ w².
+  // Number of independent draws of the same accuracy, per parameter. For importance sampling: 1/Σ
+  // w².
   Vector effective_size;
-  Vector r_hat;                 // of each parameter's chains; empty for importance sampling
+  Vector r_hat;                 // per parameter, over its chains; empty for importance sampling
   std::vector<Minimum> minima;  // distinct, local coordinates, lowest first; at least one
 
-  Vector Parameter(const Prior& prior, int i) const;  // the draws of θ_i
+  Vector Parameter(const Prior& prior, int i) const;  // returns the draws of θ_i
 };
 
-// guesses (any number × n, may be none; germ coordinates): where the posterior was before.
-// FAILED_PRECONDITION when the cost is nowhere finite; else only a stop request makes it not OK.
+// Draws from the posterior. `guesses` (any number × n, may be empty; germ coordinates) tells where
+// the posterior was before. Returns FailedPrecondition when the cost is nowhere finite; otherwise
+// only a stop request returns an error.
 absl::StatusOr<PosteriorDraws> DrawPosterior(const Cost& cost, const ExpansionDesign& design,
                                              const Matrix& guesses, const PosteriorEffort& effort,
                                              const Stop& stop);

@@ -1,7 +1,7 @@
 #pragma once
 
-// The posterior of several components as one: their weights, which of them to go on with, and the
-// estimate of the mixture.
+// Combines the components of the posterior: their weights, the choice of those to continue with,
+// and the estimate of the mixture.
 
 #include <absl/status/statusor.h>
 
@@ -12,32 +12,33 @@
 
 namespace polyest::internal {
 
-// So many components at most, the heaviest, are followed.
+// Maximum number of components that are followed; the heaviest are kept.
 inline constexpr size_t kMaxComponents = 4;
-// A component of less weight is dropped: what it says no longer changes any answer.
+// A component of smaller weight is dropped, because it no longer affects any result.
 inline constexpr double kMinWeight = 1e-6;
-// So is one more than half of whose draws are other components' own: they have met.
+// A component that owns a smaller share of its draws is dropped: it has met another component.
 inline constexpr double kMinOwned = 0.5;
 
 struct MixtureWeighing {
-  std::vector<size_t> kept;     // of the requests, ascending; at least one
-  std::vector<double> weights;  // of those, Σ = 1
-  double left_out = 0;          // share of those for which there was no room
+  std::vector<size_t> kept;     // indices of the requests, ascending; at least one
+  std::vector<double> weights;  // weights of those kept, Σ = 1
+  double left_out = 0;          // share of those dropped for lack of room
 };
 
-// One request a component, at least one, all of the same rows. Only a stop request makes it not OK.
+// Weighs the components. Takes one request per component, at least one, all at the same row.
+// Returns an error only on a stop request.
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
                                              const Stop& stop);
 
 struct AssessedMixture {
-  Assessed whole;                    // of a single component, that one's
-  std::vector<Assessed> components;  // of several, heaviest first; empty of a single one
-  std::vector<size_t> order;         // their places among the requests; {0} of a single one
+  Assessed whole;                    // for a single component, its own assessment
+  std::vector<Assessed> components;  // heaviest first; empty for a single component
+  std::vector<size_t> order;         // their indices among the requests; {0} for a single one
 };
 
-// One request a component, at least one; partition and component are filled in. Where a stop has
-// left the components at different rows their last weights are taken. left_out: as of the last
-// weighing. Only a stop request makes it not OK.
+// Assesses the mixture. Takes one request per component, at least one, and fills in partition and
+// component. If a stop has left the components at different rows, their last weights are used.
+// `left_out` is that of the last weighing. Returns an error only on a stop request.
 absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> requests,
                                               double left_out, const Stop& stop);
 

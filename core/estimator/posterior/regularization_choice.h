@@ -1,8 +1,8 @@
 #pragma once
 
-// The regularization weight α² of (56) that a rule of bayes/regularization.h or bayes/l_curve.h
-// chooses, on the expansion where the posterior of α² = 1 is. The rules do not look at an α² that
-// pulls the minimum out of the region in which the expansion is trusted.
+// Chooses the regularization weight α² of (56) by a rule of bayes/regularization.h or
+// bayes/l_curve.h, on the expansion around the posterior of α² = 1. The rules do not consider an α²
+// that pulls the minimum out of the region in which the expansion is trusted.
 
 #include <absl/status/statusor.h>
 
@@ -19,17 +19,17 @@
 
 namespace polyest::internal {
 
-// The minima of the cost on one expansion over α², each looked for from the one before and from the
-// expansion's reference. `expansion` and `stop` outlive it.
+// The minima of the cost on one expansion as a function of α². Each is searched from the previous
+// one and from the expansion's reference. `expansion` and `stop` must outlive it.
 class RegularizedMinima {
  public:
   RegularizedMinima(const RegionalExpansion& expansion, const Stop& stop);
 
-  // The minimum for α² = `regularization`; nothing where it leaves the region in which the
-  // expansion is trusted, and after a stop request.
+  // Returns the minimum for α² = `regularization`. Returns nothing if the minimum leaves the region
+  // in which the expansion is trusted, or after a stop request.
   std::optional<RegularizedMinimum> At(double regularization);
 
-  // At(), for the rules.
+  // Returns At as a function, for the rules.
   MinimumAt Function();
 
  private:
@@ -42,13 +42,14 @@ class RegularizedMinima {
   Matrix starts_;
 };
 
-// What each rule chooses, from one sweep over the rules' range of α². The arguments outlive it.
+// The choice of each rule, from one sweep over the rules' range of α². The arguments must outlive
+// it.
 class RegularizationRules {
  public:
   RegularizationRules(const ResolvedProblem& problem, const RegionalExpansion& expansion,
                       const Stop& stop);
 
-  // After a stop request the choice is meaningless.
+  // Returns the choice of the rule. After a stop request it is meaningless.
   RegularizationChoice Choose(RegularizationMode mode);
 
  private:
@@ -57,12 +58,12 @@ class RegularizationRules {
   const ResolvedProblem& problem_;
   const RegionalExpansion& expansion_;
   RegularizedMinima minima_;
-  std::string no_effect_;  // why α² has none, or empty
+  std::string no_effect_;  // why α² has no effect, or empty
   std::vector<RegularizedMinimum> points_;
 };
 
-// The choice of the problem's own rule (not FIXED) for an estimate. Only a stop request makes it
-// not OK.
+// Returns the choice of the problem's own rule (not FIXED) for an estimate. Returns an error only
+// on a stop request.
 absl::StatusOr<RegularizationChoice> ChooseRegularization(const ResolvedProblem& problem,
                                                           const RegionalExpansion& expansion,
                                                           const Stop& stop);

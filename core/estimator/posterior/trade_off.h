@@ -1,11 +1,11 @@
 #pragma once
 
-// Parameters that the data cannot tell apart, in words an engineer uses: of two of which at least
-// one is not identified, the combination that is known far better, k/m or k1 + k2.
+// Finds parameters that the data cannot tell apart. For two parameters of which at least one is not
+// identified, it finds the combination that is known far better, such as k/m or k1 + k2.
 //
-// For positive parameters θ_i θ_j^q with q = ±½, ±1, ±2, by the posterior's standard deviation of
-// log θ_i + q log θ_j; for any of the same unit θ_i ± θ_j. A combination is told when it is known
-// ten times better than either alone.
+// For positive parameters the combinations are θ_i θ_j^q with q = ±½, ±1, ±2, judged by the
+// posterior's standard deviation of log θ_i + q log θ_j. For any two of the same unit they are θ_i
+// ± θ_j. A combination is reported when it is known ten times better than either parameter alone.
 
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@
 
 namespace polyest::internal {
 
-// thetas: draws of the posterior × n, with weights (Σ = 1). Each parameter occurs once at most, in
-// the combination that is known best.
+// Returns the trade-offs. `thetas` holds draws of the posterior (draws × n), with weights (Σ = 1).
+// Each parameter occurs at most once, in the combination that is known best.
 std::vector<TradeOff> FindTradeOffs(const Matrix& thetas, const Vector& weights,
                                     const std::vector<std::string>& names,
                                     const std::vector<std::string>& units,

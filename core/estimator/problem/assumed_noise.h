@@ -1,6 +1,6 @@
 #pragma once
 
-// The noise in whose units the changes of an output are weighed before anything is measured.
+// The noise in whose units changes of an output are judged before anything is measured.
 
 #include <algorithm>
 
@@ -9,15 +9,17 @@
 
 namespace polyest::internal {
 
-// Of an output whose noise nobody has told: this much of the range of its predictions.
+// Assumed noise of an output whose noise is not given, as a fraction of the range of its
+// predictions.
 inline constexpr double kAssumedNoise = 0.01;
 
+// Whether the noise model gives a size of the noise.
 inline bool HasNumbers(const NoiseModel& noise) {
   return noise.absolute > 0 || noise.relative > 0 || noise.relative_to_max > 0;
 }
 
-// The noise that the problem gives of the output `column` of its model; null when it does not
-// measure the output, or does not know the noise.
+// Returns the noise that the problem gives for the model's output `column`, or nullptr when it does
+// not measure the output or does not know the noise.
 inline const NoiseModel* GivenNoise(const ResolvedProblem& problem, int column) {
   const auto& outputs = problem.outputs();
   const auto found = std::find(outputs.begin(), outputs.end(), column);
@@ -27,8 +29,8 @@ inline const NoiseModel* GivenNoise(const ResolvedProblem& problem, int column) 
   return HasNumbers(noise) ? &noise : nullptr;
 }
 
-// kAssumedNoise of the range from the least mean − 2 standard deviations to the largest mean + 2
-// standard deviations over the times.
+// Returns a noise of kAssumedNoise times the range over all times, from the lowest mean − 2
+// standard deviations to the highest mean + 2 standard deviations.
 inline NoiseModel AssumedNoise(const ConstVectorRef& mean, const ConstVectorRef& deviation) {
   const double highest = (mean + 2 * deviation).maxCoeff();
   const double lowest = (mean - 2 * deviation).minCoeff();

@@ -1,7 +1,7 @@
 #pragma once
 
-// Parameters that each run of the record has for itself, such as its initial states, beside those
-// that all runs share.
+// Parameters that differ between the runs of a record, such as initial states, beside those that
+// all runs share.
 
 #include <absl/status/statusor.h>
 
@@ -11,13 +11,15 @@
 
 namespace polyest::internal {
 
-// The uncertain parameters of a record of `runs` ≥ 1 runs: all of run 0 in the order given, then
-// those per run of run 1, of run 2, … One per run has its run's number in its name: x_0[2].
+// Returns the uncertain parameters of a record of `runs` ≥ 1 runs: all parameters for run 0 in the
+// order given, then the per-run parameters of run 1, of run 2, … The name of a per-run parameter
+// includes the run: x_0[2].
 std::vector<UncertainParameter> ParametersOfRuns(const std::vector<UncertainParameter>& given,
                                                  int runs);
 
-// Their prior; a correlation between parameters per run holds within each run. INVALID_ARGUMENT as
-// Prior::Make, and for a correlation with a shared parameter: so many runs could not all have it.
+// Returns the prior of those parameters. A correlation between per-run parameters holds within each
+// run. Returns InvalidArgument as Prior::Make does, and for a correlation between a per-run and a
+// shared parameter, which many runs could not all have.
 absl::StatusOr<Prior> PriorOfRuns(const std::vector<UncertainParameter>& given,
                                   const std::vector<Correlation>& correlations, int runs);
 

@@ -1,12 +1,12 @@
 #pragma once
 
-// What of a model can be given a value or a prior, by name: its parameters, initial states among
-// them, and the parameters of its channels,
+// The quantities of a model that can be given a value or a prior by name: its parameters, including
+// the initial states, and the parameters of its channels,
 //
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
 //   sample = x.gain · x + x.offset + noise                         of an output x.
 //
-// Their values stand in one vector: the parameters, then amplitude, gain, delay and offset of each
+// Their values form one vector: the parameters, then amplitude, gain, delay and offset of each
 // input, then gain and offset of each output.
 
 #include <optional>
@@ -34,10 +34,10 @@ class SettableQuantities {
   struct Settable {
     std::string name;
     std::string unit;
-    double default_value;  // of an amplitude: 0, until an input has a signal
+    double default_value;  // 0 for an amplitude, until the input has a signal
     bool has_default;
     Kind kind;
-    int column;  // of the model's parameters, inputs or outputs
+    int column;  // column of the model's parameters, inputs or outputs
 
     bool of_input() const {
       return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
@@ -53,13 +53,13 @@ class SettableQuantities {
   std::optional<int> Find(std::string_view name) const;
   std::vector<std::string> Names() const;
   Vector Defaults() const;
-  // Index of the amplitude of the model's input `column`.
+  // Returns the index of the amplitude of the model's input `column`.
   int Amplitude(int column) const { return parameters_ + 4 * column; }
-  // What there is, for a message.
+  // Returns a list of all names, for a message.
   std::string Describe() const;
 
-  // Parameters and channels of the ensemble from values (Q × size); the outputs to read must be set
-  // already.
+  // Sets the ensemble's parameters and channels from `values` (Q × size). The outputs to read must
+  // already be set.
   void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
 
  private:

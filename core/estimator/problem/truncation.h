@@ -1,6 +1,6 @@
 #pragma once
 
-// The truncations that follow from options of an expansion (polyest/expansion_options.h).
+// Truncations that follow from the options of an expansion (polyest/expansion_options.h).
 
 #include <optional>
 
@@ -9,11 +9,11 @@
 
 namespace polyest::internal {
 
-// Returns the truncation an expansion in n uncertain parameters begins with.
+// Returns the initial truncation of an expansion in n uncertain parameters.
 Truncation FirstTruncation(const ExpansionOptions& options, int dimension);
-// Returns a truncation of two orders more, or one; nothing when the order is given or more is not
-// affordable: past 500 terms or order 9, beyond which two points a term no longer determine the
-// terms well.
+// Returns a truncation that is two orders higher, or one if two are too expensive. Returns nothing
+// when the order is given, or when more is too expensive: beyond 500 terms or order 9. Past order
+// 9, two points per term no longer determine the terms well.
 std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
                                          const Truncation& present);
 

@@ -6,8 +6,8 @@
 
 namespace polyest::internal {
 
-// Of `regularization` and `regularizationMode`: INVALID_ARGUMENT names the field, the value and the
-// rule.
+// Checks `regularization` and `regularizationMode`. Returns InvalidArgument that names the field,
+// the value and the rule.
 absl::Status ValidateRegularization(const Problem& problem);
 
 }  // namespace polyest::internal

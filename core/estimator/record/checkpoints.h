@@ -1,8 +1,9 @@
 #pragma once
 
-// The rows of a record after which a snapshot can be made, a function of the record alone:
-//   every `interval` rows of a run, where models can be restored inside a run;
-//   before the first row of a run, once `interval` rows have passed since the checkpoint before.
+// The rows of a record after which a snapshot can be made. They are a function of the record alone:
+//   every `interval` rows of a run, if the model can be restored inside a run;
+//   before the first row of a run, if at least `interval` rows have passed since the last
+//   checkpoint.
 
 #include <cstdint>
 #include <deque>
@@ -15,15 +16,15 @@ namespace polyest::internal {
 
 class Checkpoints {
  public:
-  // interval ≥ 1.
+  // Takes an interval ≥ 1.
   Checkpoints(int64_t interval, bool inside_runs)
       : interval_(interval), inside_runs_(inside_runs) {}
 
-  // The record goes on with these rows.
+  // Appends these rows to the record.
   void Add(const std::vector<SampleRow>& rows);
-  // How many rows come before the next checkpoint, where that is in the record already.
+  // Returns the number of rows before the next checkpoint, if the record already contains it.
   std::optional<int64_t> next() const;
-  // Those up to so many rows are behind.
+  // Discards the checkpoints up to the first `rows` rows.
   void Pass(int64_t rows);
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the record has taught of the noise so far: what the samples are weighed with, so that a
-// change of it asks for the sums to be taken anew.
+// What has been learned about the noise from the record so far. Samples are weighed with it, so
+// when it changes, the sums must be taken again.
 
 #include <vector>
 
@@ -11,15 +11,15 @@ namespace polyest::internal {
 
 struct ChannelNoise {
   double scale = 1;            // σ in units of NoiseModel::StandardDeviation
-  double time_constant_s = 0;  // of the correlation; 0: white
-  // Whether what is unknown of it has been learned. Until then an unknown scale is as large as the
-  // signal, and taken as known: that errs on the side of too much uncertainty.
+  double time_constant_s = 0;  // correlation time; 0 for white noise
+  // Whether the unknown parts have been learned. Until then an unknown scale is as large as the
+  // signal and treated as known, which overestimates the uncertainty.
   bool learned = false;
 };
 
-// Where the posterior was last looked at, for the residuals that tell outliers from samples.
+// Where the posterior was at the last revision; outliers are judged by their residuals there.
 struct PosteriorSummary {
-  Vector centre;  // ξ (n); empty: not looked at yet
+  Vector centre;  // ξ (n); empty if not known yet
   Matrix factor;  // F Fᵀ = covariance of ξ, n × n
 };
 

@@ -4,7 +4,7 @@
 
 namespace polyest::internal {
 
-// Samples kept in memory.
+// A sample store in memory.
 class MemoryStore final : public SampleStore {
  public:
   int64_t rows() const override { return static_cast<int64_t>(record_.rows.size()); }

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an estimate reports of the record itself, in constant memory.
+// The statistics of the record that an estimate reports, in constant memory.
 
 #include <cstdint>
 #include <vector>
@@ -14,16 +14,17 @@ class RecordSummary {
  public:
   struct Channel {
     int64_t samples = 0;
-    double noise_variance_sum = 0;  // of the noise as the problem gives it
-    double largest = 0;             // |z|
+    double noise_variance_sum = 0;  // sum of the variances that the problem gives
+    double largest = 0;             // largest |z|
     int64_t intervals = 0;          // between successive samples of a run
     double interval_sum_s = 0;
     double last_time_s = 0;
     int last_run = -1;
 
-    double RootMeanSquareNoise() const;  // as the problem gives it
-    double MeanInterval() const;         // s; 0 without intervals
-    // Of successive samples with this noise, at the mean interval: exp(−Δt/τ).
+    double RootMeanSquareNoise() const;  // of the noise that the problem gives
+    double MeanInterval() const;         // in s; 0 without intervals
+    // Returns exp(−Δt/τ), the correlation of successive samples with this noise, at the mean
+    // interval.
     double Correlation(const ChannelNoise& noise) const;
     void AddTime(const SampleRow& row);
   };
@@ -33,16 +34,17 @@ class RecordSummary {
   int64_t rows() const { return rows_; }
   int64_t samples() const;  // over all channels
   double time_s() const { return time_s_; }
-  // The least over the channels of root mean square noise ÷ largest sample, of correlated noise its
-  // innovations; 1 before any sample.
+  // Returns the least ratio over the channels of root mean square noise to largest sample, at most
+  // 1. For correlated noise the ratio is that of its innovations. Returns 1 before any sample.
   double NoiseToSignal(const LearnedNoise& noise) const;
   const std::vector<Channel>& channels() const { return channels_; }
-  // The first rows of the first run, at most kBeginning: enough to see how the record is sampled.
+  // Returns the first rows of the first run, at most kBeginning, which suffice to see how the
+  // record is sampled.
   const RowBlock& beginning() const { return beginning_; }
 
   static constexpr int kBeginning = 64;
 
-  // As cereal has it: for writing and for reading.
+  // cereal calls this for writing and for reading.
   template <class Archive>
   void serialize(Archive& archive) {
     archive(rows_, time_s_, channels_, beginning_);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Reads rows together with those after them that tell how the streamed inputs go on.
+// Reads rows together with the later rows that determine how the streamed inputs continue.
 
 #include <absl/status/status.h>
 
@@ -10,7 +10,7 @@
 
 namespace polyest::internal {
 
-// Reads rows [first, first + count) and up to `ahead` rows after them, as far as there are any.
+// Reads rows [first, first + count) and up to `ahead` rows after them, as far as they exist.
 absl::Status ReadWithRowsAhead(const SampleStore& store, int64_t first, int64_t count, int ahead,
                                RowBlock& block);
 

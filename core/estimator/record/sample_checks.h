@@ -1,7 +1,7 @@
 #pragma once
 
-// Checks measurements against a problem and gives each sample its noise, in time order across
-// batches: what is checked here is what the numerics may rely on.
+// Checks measurements against a problem, across batches and in time order, and assigns each sample
+// its noise. The numerical code relies on these checks.
 
 #include <absl/status/statusor.h>
 
@@ -12,17 +12,17 @@
 
 namespace polyest::internal {
 
-// Where the record stands after the rows accepted so far.
+// The position in the record after the rows accepted so far.
 struct RecordPosition {
   int64_t rows = 0;
   int run = 0;
   double time_s = 0;
   int64_t rows_in_run = 0;
-  bool run_ended = false;  // no more rows of `run`
-  Vector largest;          // by channel: max |z| so far, for NoiseModel::relative_to_max
+  bool run_ended = false;  // whether no more rows of `run` follow
+  Vector largest;          // per channel: max |z| so far, for NoiseModel::relative_to_max
 };
 
-// Rows that have passed, and where the record stands after them.
+// Rows that have passed the checks, and the position after them.
 struct CheckedSamples : RowBlock {
   RecordPosition after;
 };
@@ -37,10 +37,10 @@ class SampleChecks {
   // Checks what follows `position`.
   SampleChecks(const ResolvedProblem& problem, const RecordPosition& position);
 
-  // The whole of `samples`, or INVALID_ARGUMENT that names row (counted from 0 in the samples
-  // given), column, value and rule. Changes nothing.
+  // Returns all rows of `samples`, or InvalidArgument that names the row (counted from 0 in
+  // `samples`), the column, the value and the rule. Changes nothing.
   absl::StatusOr<CheckedSamples> Check(const Samples& samples) const;
-  // The rows checked have been stored; the next samples must follow them.
+  // Records that the checked rows have been stored. The next samples must follow them.
   void Accept(const CheckedSamples& samples) { position_ = samples.after; }
   const RecordPosition& position() const { return position_; }
 

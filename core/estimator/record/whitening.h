@@ -1,11 +1,11 @@
 #pragma once
 
-// Turns correlated noise into white: with e_k the noise of a channel's k-th sample, correlated with
-// the one before by a_k = exp(−(t_k − t_{k−1})/τ), the innovations
+// Whitens correlated noise. Let the noise of a channel's k-th sample be correlated with that of the
+// sample before by a_k = exp(−(t_k − t_{k−1})/τ). The innovations
 //   z'_k = z_k − g_k z_{k−1},   g_k = a_k σ_k/σ_{k−1},   σ'_k² = σ_k² (1 − a_k²)
-// have independent noise. The model's outputs are combined alike, so that whatever follows may take
-// the samples for white. Exact for any sampling times; a sample missing only makes the next
-// interval longer. Each run begins anew.
+// then have independent noise. The model's outputs are combined in the same way, so all later steps
+// may treat the samples as white. This is exact for any sampling times; a missing sample only
+// lengthens the next interval. Each run begins anew.
 
 #include <vector>
 
@@ -15,27 +15,28 @@
 
 namespace polyest::internal {
 
-// The sample before, of one channel: all that is remembered of a run.
+// The previous sample of one channel. Nothing else of a run is kept.
 struct PreviousSample {
   bool known = false;
   double time_s = 0;
   double value = 0;
   double noise = 0;
-  Vector output;  // of each trajectory; of any content while not known
+  Vector output;  // of each trajectory; unspecified while not known
 };
 
 class Whitening {
  public:
-  // outputs have `trajectories` rows.
+  // Whitens outputs with `trajectories` rows.
   Whitening(const std::vector<ChannelNoise>& noise, Eigen::Index trajectories);
 
   void BeginRun();
-  // Rows [first, first + count) of the block, in order: values and noise of their channels, and the
-  // model's outputs at them (column (row − first)·m + channel). The noise is scaled as well.
+  // Whitens rows [first, first + count) of the block in place, in order: the values and the noise
+  // of its channels, and the model's outputs (column (row − first)·m + channel). Also scales the
+  // noise.
   void Apply(int first, int count, RowBlock& block, MatrixRef outputs);
 
   std::vector<PreviousSample> State() const;
-  // Of as many channels and trajectories.
+  // Restores a state with the same numbers of channels and trajectories.
   void Restore(std::vector<PreviousSample> state);
 
  private:

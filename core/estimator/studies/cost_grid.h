@@ -1,7 +1,8 @@
 #pragma once
 
-// J_mismatch, J_apriori and J_total (25), (56) over one or two uncertain parameters, for a resolved
-// problem. Noise of unknown size or correlation is marginalized as bayes/mismatch.h says.
+// J_mismatch, J_apriori and J_total, equations (25) and (56), over one or two uncertain parameters
+// of a resolved problem. Noise of unknown size or correlation is marginalized as in
+// bayes/mismatch.h.
 
 #include <absl/status/statusor.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Profiles of the cost on the expansion, where the posterior is (polyest/cost_profile.h).
+// Profiles of the cost on the expansion around the posterior (polyest/cost_profile.h).
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -12,17 +12,17 @@
 
 namespace polyest::internal {
 
-// INVALID_ARGUMENT names the field, the value and the rule.
+// Returns InvalidArgument that names the field, the value and the rule if the options are invalid.
 absl::Status Validate(const ProfileOptions& options, const Prior& prior);
 
-// Those of the components of a mixture as one: at every value that any of them has, the lowest. A
-// component's costs count from its own height (MixtureShare::height), the first's is kept. At least
-// one component, as many heights.
+// Combines the profiles of a mixture's components: at every value that any of them has, the lowest
+// cost. A component's costs are relative to its own height (MixtureShare::height); the result uses
+// the height of the first. Takes at least one component, and as many heights.
 CostProfiles LowestOf(const std::vector<CostProfiles>& components,
                       const std::vector<double>& heights);
 
-// options have been validated. `cost` is that of the assessment, on the design. Only a stop request
-// makes it not OK.
+// Computes the profiles. `options` must be valid. `cost` is the cost of the assessment, on the
+// design. Returns an error only on a stop request.
 absl::StatusOr<CostProfiles> ProfileCost(const Assessed& assessed, const Cost& cost,
                                          const ExpansionDesign& design,
                                          const ProfileOptions& options, const Stop& stop);

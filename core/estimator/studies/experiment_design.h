@@ -1,7 +1,7 @@
 #pragma once
 
-// The next experiment, for a resolved problem. information_gain.h has the formulas; the noise of an
-// output that the problem does not know is that of assumed_noise.h.
+// Designs the next experiment for a resolved problem. The formulas are in information_gain.h; the
+// noise of an output is that of assumed_noise.h if the problem does not give it.
 
 #include <absl/status/statusor.h>
 
@@ -14,7 +14,7 @@ absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem
                                                   const ExperimentOptions& options,
                                                   const Stop& stop);
 
-// Returns the problem with what an estimate says of its parameters for its prior.
+// Returns the problem with the estimate of its parameters as their prior.
 absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& problem,
                                                     const Estimate& estimate);
 

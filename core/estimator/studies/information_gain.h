@@ -1,17 +1,17 @@
 #pragma once
 
-// What an experiment is expected to tell, before it is made.
+// The expected information gain of an experiment that has not been made yet.
 //
-// With samples y_k(ξ) + noise of variance R_k, and a_k = L ∂y_k/∂ξ /√R_k (L = diag of the germs'
-// standard deviations), the posterior of the scaled germs near a truth ξ is Gaussian with the
-// precision
+// Let the samples be y_k(ξ) + noise of variance R_k, and a_k = L ∂y_k/∂ξ /√R_k, where L is the
+// diagonal matrix of the germs' standard deviations. Near a true value ξ, the posterior of the
+// scaled germs is Gaussian with the precision
 //   M(ξ) = Id + Σ_k a_k a_kᵀ,
-// the prior being taken for Gaussian too, and the information gained is
+// if the prior is taken as Gaussian too, and the information gained is
 //   ½ log₂ det M(ξ)  bits:
-// one bit halves the standard deviation in one direction. Its expectation is the mean over draws of
-// the truth (Laplace's approximation of the expected information gain; K. Chaloner and I.
-// Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10, 1995). It does not see
-// that a posterior may have several pieces.
+// one bit halves the standard deviation in one direction. The expected gain is the mean over draws
+// of the true value (Laplace's approximation of the expected information gain; K. Chaloner and I.
+// Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10, 1995). It does not
+// account for posteriors with several pieces.
 
 #include <vector>
 
@@ -22,25 +22,25 @@
 
 namespace polyest::internal {
 
-// Draws of the truth from a prior: a stretch of Halton's sequence.
+// Draws of the true value from a prior: a section of Halton's sequence.
 class TruthDraws {
  public:
-  // Points first … first + count − 1 of the sequence. `prior` must outlive the draws.
+  // Takes points first … first + count − 1 of the sequence. `prior` must outlive the draws.
   TruthDraws(const Prior& prior, int first, int count);
 
   int count() const { return static_cast<int>(xis_.rows()); }
   Vector xi(int draw) const { return xis_.row(draw).transpose(); }
   const Vector& germ_standard_deviation() const { return scale_; }
 
-  // From Σ_k a_k a_kᵀ (n × n) of each draw.
+  // Returns the expected gain, from Σ_k a_k a_kᵀ (n × n) for each draw.
   InformationGain Expected(const std::vector<Matrix>& information) const;
 
  private:
   Vector StandardDeviation(int draw, const Matrix& lower_root) const;
 
   const Prior& prior_;
-  Vector mean_;   // of ξ
-  Vector scale_;  // its standard deviations
+  Vector mean_;   // mean of ξ
+  Vector scale_;  // standard deviations of ξ
   Matrix xis_;    // draws × n
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// The posterior (21)–(23) in full, on the expansion (polyest/posterior.h).
+// The full posterior, equations (21) to (23), on the expansion (polyest/posterior.h).
 
 #include <absl/status/status.h>
 
@@ -10,12 +10,12 @@
 
 namespace polyest::internal {
 
-// INVALID_ARGUMENT names the field, the value and the rule.
+// Returns InvalidArgument that names the field, the value and the rule if the options are invalid.
 absl::Status Validate(const PosteriorOptions& options, const Prior& prior);
-// Returns the work that answers deserve that go into such detail.
+// Returns the computing effort for results in the detail that the options request.
 PosteriorEffort EffortOf(const PosteriorOptions& options);
 
-// options have been validated.
+// Describes the posterior. `options` must be valid.
 Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
                             const PosteriorOptions& options);
 

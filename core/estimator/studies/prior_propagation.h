@@ -1,6 +1,6 @@
 #pragma once
 
-// What the prior predicts of the outputs over time (3)–(13), for a resolved problem.
+// Propagates the prior to the outputs over time, equations (3) to (13), for a resolved problem.
 
 #include <absl/status/statusor.h>
 

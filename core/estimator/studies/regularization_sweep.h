@@ -1,7 +1,7 @@
 #pragma once
 
-// The minima of the cost over the regularization weight α² of (56), Figure 14 of the paper, and the
-// α² that the rules of bayes/regularization.h and bayes/l_curve.h choose
+// The minima of the cost as a function of the regularization weight α² of (56) (Figure 14 of the
+// paper), and the α² that the rules of bayes/regularization.h and bayes/l_curve.h choose
 // (polyest/regularization.h).
 
 #include <absl/status/statusor.h>
@@ -12,8 +12,8 @@
 
 namespace polyest::internal {
 
-// options have been validated; `assessed` is the assessment on the expansion. Only a stop request
-// makes it not OK.
+// Computes the sweep. `options` must be valid, and `assessed` the assessment on the expansion.
+// Returns an error only on a stop request.
 absl::StatusOr<RegularizationSweep> SweepRegularization(const ResolvedProblem& problem,
                                                         const RegionalExpansion& expansion,
                                                         const Assessed& assessed,

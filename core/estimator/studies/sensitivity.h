@@ -1,6 +1,6 @@
 #pragma once
 
-// Sobol' indices of the outputs over the prior, for a resolved problem.
+// Computes Sobol' indices of the outputs over the prior, for a resolved problem.
 
 #include <absl/status/statusor.h>
 
