@@ -6,14 +6,12 @@
 // it changes the minimum, so the caller repeats this until nothing is left to revise.
 //
 //   scale        s² ← s² (χ² − D)/(N − D − p). D is the expansion's own share of χ², and p the
-//   channel's
-//                share of the number of fitted parameters Σ λ/(1 + λ). In one revision s² falls at
-//                most by a factor 4 and rises at most by a factor 16.
-//   correlation  a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval Δt. x is the
-//   correlation
-//                that explains the lag-1 correlation r which the whitened residuals still have
-//                (after removing its bias), r = (x − a)(1 − a x)/(1 − 2 a x + a²). The step is
-//                taken while x − a is significant. From white noise, a ← r.
+//                channel's share of the number of fitted parameters Σ λ/(1 + λ). In one revision
+//                s² falls at most by a factor 4 and rises at most by a factor 16.
+//   correlation  a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval Δt. x is the noise
+//                correlation that explains the lag-1 correlation r which the whitened residuals
+//                still have (after removing its bias), r = (x − a)(1 − a x)/(1 − 2 a x + a²). The
+//                step is taken while x − a is significant. From white noise, a ← r.
 //
 // Neither is learned before there are kMinSamplesForNoise + 4 n samples.
 

@@ -6,14 +6,12 @@
 // (bayes/posterior.h, bayes/markov_chains.h).
 //
 // Importance sampling is used only if all of these hold:
-//   - There is one minimum, searched from starts spread over the best points of a cover of the box
-//   and of
-//     the guesses. Other minima have a negligible e^{−J}.
-//   - It lies inside Ω and the box, the Hessian there is positive definite and the gradient
-//   vanishes:
-//     Newton's decrement gᵀH⁻¹g/2 is below 10⁻³.
-//   - No probable point of the cover or of the guesses lies outside the reach of the Gaussian.
-//   - The effective size is at least half the number of points, and no weight exceeds 1 % of the
+// - There is one minimum, searched from starts spread over the best points of a cover of the box
+//   and of the guesses. Other minima have a negligible e^{−J}.
+// - It lies inside Ω and the box, the Hessian there is positive definite and the gradient
+//   vanishes: Newton's decrement gᵀH⁻¹g/2 is below 10⁻³.
+// - No probable point of the cover or of the guesses lies outside the reach of the Gaussian.
+// - The effective size is at least half the number of points, and no weight exceeds 1 % of the
 //   total.
 
 #include <absl/status/statusor.h>

@@ -3,13 +3,11 @@
 // Finds well-separated pieces of a posterior from its particles and its cost on an expansion.
 //
 // Two sets of particles are separate pieces when a hyperplane passes between them such that
-//   - no particle lies near it: along its normal the sets leave a gap of at least one standard
-//   deviation
-//     of the particles about their own set's mean,
-//   - each set has at least 2 % of the particles,
-//   - the cost on it is everywhere at least 8 above the higher of the two sides' least costs: every
-//   path
-//     from one piece to the other passes through a density below e^−8 of either peak.
+// - no particle lies near it: along its normal the sets leave a gap of at least one standard
+//   deviation of the particles about their own set's mean,
+// - each set has at least 2 % of the particles,
+// - the cost on it is everywhere at least 8 above the higher of the two sides' least costs: every
+//   path from one piece to the other passes through a density below e^−8 of either peak.
 //
 // The hyperplane's normal is Fisher's discriminant of the sets. The sets are found from pairs of
 // minima of the cost, and are divided further in the same way.
