@@ -33,10 +33,10 @@ constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 
 }  // namespace
 
-// Owns the record and the components of the posterior's mixture: one at first, and as long as one
-// expansion serves. Which there are is decided at rows that are a function of the record alone, all
-// components being at the same row: where one is divided only its own parts are weighed, all of
-// them only where a window of the mixture ends.
+// Owns the record and the components of the posterior's mixture. There is one component at first,
+// and as long as one expansion suffices. Components are added and dropped only at rows that are a
+// function of the record alone, with all components at the same row. When one component is divided,
+// only its parts are weighed. All components are weighed only where a window of the mixture ends.
 class Estimator::Implementation {
  public:
   Implementation(ResolvedProblem problem, EstimatorOptions options)
@@ -90,9 +90,9 @@ class Estimator::Implementation {
   std::function<void(EstimatorSnapshot)> snapshot_;
   Checkpoints checkpoints_;
   Components components_;
-  int64_t weighing_row_ = 0;  // of several components: where they are weighed next
-  double left_out_ = 0;       // largest share of components for which there was no room
-  int reexpansions_ = 0;      // of components there were
+  int64_t weighing_row_ = 0;  // row of the next weighing, if there are several components
+  double left_out_ = 0;       // largest share of components dropped for lack of room
+  int reexpansions_ = 0;      // by components that no longer exist
   int64_t propagated_rows_ = 0;
 };
 
@@ -109,7 +109,7 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
   return absl::OkStatus();
 }
 
-// Rows up to which the streamed inputs are settled, whatever rows may follow.
+// Returns the number of rows up to which the streamed inputs are settled, whatever rows may follow.
 int64_t Estimator::Implementation::SettledRows() const {
   const RecordPosition& last = checks_.position();
   if (last.run_ended) return last.rows;
@@ -189,7 +189,8 @@ absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation:
   return components;
 }
 
-// True when one of the components has been divided, or could not be; then not all have got there.
+// Returns true when a component has been divided or its division has failed; then not all
+// components have reached `rows`.
 absl::StatusOr<bool> Estimator::Implementation::TakeUpTo(int64_t rows, const Stop& stop) {
   for (size_t k = 0; k < components_.size(); ++k) {
     POLYEST_RETURN_IF_ERROR(components_[k]->TakeUpTo(rows, stop));
@@ -224,7 +225,7 @@ absl::Status Estimator::Implementation::Weigh(const Stop& stop) {
   return absl::OkStatus();
 }
 
-// weight: of all of them together.
+// Keeps the heaviest components. `weight` is the weight of all of them together.
 absl::Status Estimator::Implementation::KeepHeaviest(Components& components, double weight,
                                                      const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const MixtureWeighing weighing,

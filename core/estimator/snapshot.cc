@@ -19,7 +19,7 @@ uint32_t Checksum(std::string_view bytes) {
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-// A byte may be anything; a bool may not.
+// A byte read from a snapshot may have any value, which a bool must not have.
 template <class Archive>
 void Flag(Archive& archive, bool& flag) {
   uint8_t byte = flag ? 1 : 0;
@@ -35,14 +35,14 @@ namespace polyest {
 
 using namespace internal;
 
-// As cereal has it: each for writing and for reading.
+// cereal calls each of these for writing and for reading.
 
 template <class Archive>
 void serialize(Archive& archive, SampleRow& row) {
   archive(row.run, row.time_s);
 }
 
-// Without rows ahead.
+// Rows ahead are not included.
 template <class Archive>
 void serialize(Archive& archive, RowBlock& block) {
   archive(block.rows, block.values, block.noise);
@@ -155,7 +155,7 @@ std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fing
 
 namespace {
 
-// The last four bytes, lowest first.
+// Returns the checksum in the last four bytes, lowest byte first.
 uint32_t ChecksumAtEnd(std::string_view bytes) {
   uint32_t checksum = 0;
   for (size_t i = bytes.size(); i-- > bytes.size() - kChecksumBytes;) {

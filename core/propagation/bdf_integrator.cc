@@ -42,7 +42,7 @@ class BdfIntegrator final : public SundialsIntegrator {
   void* memory_ = nullptr;
   SUNLinearSolver solver_ = nullptr;
   NewtonMatrix newton_matrix_;
-  double factored_gamma_ = 0;  // 0: nothing yet
+  double factored_gamma_ = 0;  // 0 before the first factorization
   long differentiated_at_step_ = 0;
   long convergence_failures_ = 0;
 };
@@ -57,7 +57,7 @@ BdfIntegrator::BdfIntegrator(BlockSystem* system, double relative_tolerance, dou
   solver_->ops->gettype = LinearSolverType;
   solver_->ops->solve = SolveLinear;
   solver_->content = this;
-  // More rejections than the defaults of seven and ten: the first step is a guess.
+  // The first step is a guess, so more rejections are allowed than the defaults of seven and ten.
   constexpr int kMaxFailures = 30;
   const bool accepted =
       CVodeSetErrHandlerFn(memory_, IgnoreMessage, nullptr) == CV_SUCCESS &&

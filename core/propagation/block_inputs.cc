@@ -41,7 +41,7 @@ BlockInputs::Break BlockInputs::NextBreak() {
     if (!Stops(i)) continue;
     const InputSignal& signal = (*signals_)[i];
     for (Cursor& cursor : cursors_[i]) {
-      // Anew each time: knots may have been appended.
+      // The break is computed again each time, because knots may have been appended.
       cursor.next_s = signal.NextBreak(cursor.last_s);
       const double break_s = cursor.next_s + cursor.delay_s;
       if (break_s > next.time_s || break_s == kInfinity) continue;

@@ -53,7 +53,7 @@ void BlockLu::Factor() {
         At(chunk, i, k) = factor;
         for (Eigen::Index j = k + 1; j < size_; ++j) At(chunk, i, j) -= factor * At(chunk, k, j);
       }
-      At(chunk, k, k) = inverse_pivot;  // all that is needed of u_kk
+      At(chunk, k, k) = inverse_pivot;  // only the inverse of u_kk is needed
     }
   }
 }

@@ -64,7 +64,8 @@ void Scale(double c, N_Vector x, N_Vector z) {
   }
 }
 
-// z = Σ_k c_k x_k, all terms at once for each eight numbers, so that z may be one of the x_k.
+// Computes z = Σ_k c_k x_k with all terms at once for each eight numbers, so z may be one of the
+// x_k.
 template <int kTerms>
 void Combine(const double* c, const double* const* x, double* z, Eigen::Index size) {
   for (Eigen::Index i = 0; i < size; i += kLanes) {
@@ -110,7 +111,7 @@ int CombineTerms(int terms, const double* c, const double* const* x, double* z, 
 
 int LinearCombination(int vectors, double* c, N_Vector* x, N_Vector z) {
   if (vectors > kMaxTerms) {
-    // z may be X[0] only, so that the first eight terms can go there.
+    // z may be X[0] only, so the first eight terms can be summed into it.
     LinearCombination(kMaxTerms, c, x, z);
     for (int k = kMaxTerms; k < vectors; ++k) Of(z) += c[k] * Of(x[k]);
     return 0;
@@ -119,7 +120,7 @@ int LinearCombination(int vectors, double* c, N_Vector* x, N_Vector z) {
   std::array<const double*, kMaxTerms> terms;
   int used = 0;
   for (int k = 0; k < vectors; ++k) {
-    if (c[k] == 0) continue;  // the zeros of a Butcher table
+    if (c[k] == 0) continue;  // skips the zeros of a Butcher table
     factors[used] = c[k];
     terms[used++] = Of(x[k]).data();
   }

@@ -37,7 +37,7 @@ namespace polyest::internal {
 
 namespace {
 
-// An ensemble of a state-space model in blocks of trajectories.
+// An ensemble of a state-space model, integrated in blocks of trajectories.
 class IntegratedEnsemble final : public TrajectoryEnsemble {
  public:
   IntegratedEnsemble(EnsembleSpecification specification, const InputSignals* inputs);
@@ -55,9 +55,9 @@ class IntegratedEnsemble final : public TrajectoryEnsemble {
 
   EnsembleSpecification specification_;
   int64_t samples_ = 0;
-  double time_s_ = 0;  // of the last of them
+  double time_s_ = 0;  // time of the last sample
   std::vector<std::unique_ptr<TrajectoryBlock>> blocks_;
-  std::vector<absl::Status> statuses_;  // one a block
+  std::vector<absl::Status> statuses_;  // one per block
   std::vector<PointFailure> failures_;
 };
 

@@ -40,7 +40,7 @@ ErkIntegrator::ErkIntegrator(BlockSystem* system, double relative_tolerance, dou
                              const ConstBlock& states)
     : SundialsIntegrator(system, relative_tolerance, time_s, states),
       memory_(ERKStepCreate(RightHandSide, time_s, vector(), context())) {
-  // More rejections than the default seven: the first step is a guess.
+  // The first step is a guess, so more rejections are allowed than the default seven.
   constexpr int kMaxErrorTestFailures = 30;
   const bool accepted =
       memory_ != nullptr &&
@@ -99,8 +99,8 @@ const char* ErkIntegrator::InWords(int flag) const {
   }
 }
 
-// The largest |λ| of ∂f/∂x over the points, by a few power iterations from the last local error, in
-// which a mode at the limit of stability stands out:
+// Estimates the largest |λ| of ∂f/∂x over the points by a few power iterations. They start from the
+// last local error, in which a mode at the limit of stability dominates:
 //   v ← (f(x + v) − f(x)) ÷ |λ|, |λ| = max_s |(J v)_s| w_s ÷ max_s |v_s| w_s for each point.
 double ErkIntegrator::LargestRate() {
   const Eigen::ArrayXXd x = states();
@@ -113,7 +113,8 @@ double ErkIntegrator::LargestRate() {
   double largest = 0;
   constexpr int kIterations = 4;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    // A few tolerances long: small enough to be linear, large enough against rounding errors.
+    // The length is that of the tolerance: small enough for linearity, large enough against
+    // rounding errors.
     const Eigen::ArrayXd norm =
         (direction * weights).abs().rowwise().maxCoeff().max(std::numeric_limits<double>::min());
     direction.colwise() /= norm;
@@ -132,7 +133,7 @@ bool ErkIntegrator::LooksStiff() {
   steps_looked_at_ = steps;
   double step_s = 0;
   ERKStepGetLastStep(memory_, &step_s);
-  // On the negative real axis the method is stable for h |λ| ≤ 3.3; steps that accuracy limits are
+  // On the negative real axis the method is stable for h |λ| ≤ 3.3. Steps limited by accuracy are
   // many times shorter at the tolerances in use.
   constexpr double kNearTheLimit = 2;
   return step_s * LargestRate() > kNearTheLimit;

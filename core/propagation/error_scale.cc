@@ -14,7 +14,7 @@ ErrorScale::ErrorScale(Eigen::Index points, Eigen::Index states, double relative
       point_norm_(Eigen::ArrayXd::Zero(points)) {}
 
 void ErrorScale::Grow(const Eigen::ArrayXXd& states) {
-  // Once every state has passed its largest value, nothing changes any more.
+  // Nothing changes unless a state exceeds its largest magnitude so far.
   if (states.size() == 0 || !((states.abs() - largest_).maxCoeff() > 0)) return;
   largest_ = largest_.max(states.abs());
   for (Eigen::Index s = 0; s < states.cols(); ++s) {
@@ -35,7 +35,7 @@ double ErrorScale::WeightedNorm(const Eigen::ArrayXXd& error, const Eigen::Array
     const double* const w = weights.data() + s * points;
     for (Eigen::Index p = 0; p < points; ++p) {
       const double ratio = std::abs(e[p]) * w[p];
-      const double finite = ratio < kHuge ? ratio : kHuge;  // also takes NaN to kHuge
+      const double finite = ratio < kHuge ? ratio : kHuge;  // NaN also becomes kHuge
       norm[p] = norm[p] > finite ? norm[p] : finite;
     }
   }
@@ -58,8 +58,8 @@ double ErrorScale::GrowingNorm(const Eigen::ArrayXXd& error) {
 
 double ErrorScale::Norm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights) {
   const double norm = WeightedNorm(error, weights);
-  // Only a step that the known scales reject, while a state is beyond its largest so far, needs
-  // the second look.
+  // The second norm is needed only for a step that the known scales reject while a state exceeds
+  // its largest magnitude so far.
   if (norm <= 0.1 || watched_ == nullptr || !((watched_->abs() - largest_).maxCoeff() > 0)) {
     return LargestOf(norm);
   }

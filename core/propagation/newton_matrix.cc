@@ -15,7 +15,7 @@ NewtonMatrix::NewtonMatrix(BlockSystem* system)
 
 void NewtonMatrix::Differentiate(double time_s, const Eigen::ArrayXXd& states,
                                  const ErrorScale& scale) {
-  // A derivative may be infinite where the function is not, as that of √x at 0.
+  // A derivative may be infinite where the function is finite, as that of √x at 0.
   const bool exact =
       system_->StateJacobian(time_s, states, jacobian_) && jacobian_.isFinite().all();
   if (!exact) TakeDifferences(time_s, states, scale);
@@ -28,11 +28,12 @@ void NewtonMatrix::TakeDifferences(double time_s, const Eigen::ArrayXXd& states,
   system_->Derivatives(time_s, states, rates_);
   moved_ = states;
   for (Eigen::Index s = 0; s < count; ++s) {
-    // A block whose state s has been 0 so far says nothing about its size: then one SI unit.
+    // If state s has been 0 for the whole block, its size is unknown and one SI unit is used.
     const double size = scale.block_scale(s) > 0 ? scale.block_scale(s) : 1;
     moved_.col(s) += root_epsilon * states.col(s).abs().max(size);
     system_->Derivatives(time_s, moved_, moved_rates_);
-    // ∂f/∂x_s ≈ (f(x + δ e_s) − f(x))/δ, with the δ that the sum has left
+    // ∂f/∂x_s ≈ (f(x + δ e_s) − f(x))/δ, where δ is the difference that remains after rounding of
+    // the sum.
     for (Eigen::Index i = 0; i < count; ++i) {
       jacobian_.col(s * count + i) =
           (moved_rates_.col(i) - rates_.col(i)) / (moved_.col(s) - states.col(s));

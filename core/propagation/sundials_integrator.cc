@@ -25,7 +25,7 @@ int SundialsIntegrator::RightHandSide(double time_s, N_Vector states, N_Vector d
   auto* const integrator = static_cast<SundialsIntegrator*>(self);
   const Eigen::ArrayXXd& x = BlockValues(states);
   integrator->scale_.Watch(&x);
-  // A value that is not finite is left to the error norm, which names the point and makes the
+  // A value that is not finite is left to the error norm, which identifies the point and makes the
   // solver shorten the step.
   integrator->system_->Derivatives(time_s, x, BlockValues(derivatives));
   return 0;
@@ -58,7 +58,7 @@ IntegratorOutcome SundialsIntegrator::Outcome(int flag, double advance_s, double
   outcome.worst_point = scale_.worst_point();
   constexpr int kTooMuchWork = -1;
   outcome.too_many_steps = flag == kTooMuchWork;
-  // Many steps have made no progress: more of them will not help.
+  // Many steps without progress: more of them will not help.
   constexpr double kStandstill = 1e-13;
   if (outcome.too_many_steps && !(advance_s > kStandstill * std::max(std::abs(time_s_), span_s))) {
     outcome.too_many_steps = false;
@@ -76,7 +76,7 @@ IntegratorOutcome SundialsIntegrator::AdvanceTo(double time_s, double stop_time_
   if (time_s > covered_s_) {
     if (!first_step_set_) SetFirstStep(FirstStep(span_s));
     first_step_set_ = true;
-    // SUNDIALS cannot unset a stop time, so "none" is one that is never reached.
+    // SUNDIALS cannot unset a stop time, so a time that is never reached is used for "none".
     const double stop_s = std::min(stop_time_s, std::numeric_limits<double>::max());
     flag = Evolve(time_s, stop_s, max_steps, vector(), &time_s_);
     covered_s_ = std::max(InternalTime(), time_s_);

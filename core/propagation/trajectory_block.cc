@@ -15,11 +15,12 @@ namespace {
 
 // Number of steps between two checks of the stop request.
 constexpr int kStepsAtOnce = 500;
-// A multistep method sees an input only at the ends of its steps: one long step from rest over a
-// bump, 0 at both ends, would miss it. So after each break it stops once early on.
+// A multistep method evaluates an input only at the ends of its steps. One long step from rest over
+// a bump that is 0 at both ends would miss the bump. So after each break the integrator stops once
+// after this fraction of the interval to the next break.
 constexpr double kLook = 1.0 / 64;
 
-// Rows 0 … points − 1, then copies of the last up to a multiple of kLanes.
+// Returns rows 0 … points − 1, followed by copies of the last row up to a multiple of kLanes.
 std::vector<int> PaddedRows(int points) {
   std::vector<int> rows;
   for (int row = 0; row < points || row % kLanes != 0; ++row) {
@@ -171,7 +172,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
 
 void TrajectoryBlock::FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s,
                                         const char* reason) {
-  // x − x is 0 for a number and NaN for all else.
+  // x − x is 0 for a finite number and NaN otherwise.
   if ((values - values).sum() == 0) return;
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
     if (point_alive_[row] && !values.row(row).isFinite().all()) Fail(row, time_s, 0, reason);
@@ -197,7 +198,7 @@ void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::strin
   }
 }
 
-// Makes the row a copy of the point, which is in its own row.
+// Makes the row a copy of the point, whose values are in its own row.
 void TrajectoryBlock::CarryPoint(Eigen::Index row, Eigen::Index point) {
   source_[row] = static_cast<int>(point);
   parameters_.row(row) = parameters_.row(point);
@@ -206,7 +207,7 @@ void TrajectoryBlock::CarryPoint(Eigen::Index row, Eigen::Index point) {
 
 void TrajectoryBlock::Restart() {
   if (states_.cols() == 0 || !alive()) return;
-  // Whatever is known of the inputs by now, breaks up to here are behind.
+  // Whatever is known of the inputs now, breaks up to the present time are in the past.
   inputs_.NextBreak();
   inputs_.Pass(time_s_);
   StartIntegrator(time_s_);

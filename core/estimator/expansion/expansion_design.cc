@@ -13,21 +13,21 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kTrustedProbability = 1e-3;  // left out in each tail of an unbounded germ
-constexpr double kMargin = 1.35;              // of a region around its particles
-constexpr double kMinHalfWidth = 1e-10;       // of a region, in germ units
+constexpr double kTrustedProbability = 1e-3;  // omitted in each tail of an unbounded germ
+constexpr double kMargin = 1.35;              // widening of a region beyond its particles
+constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
 constexpr double kLeaningFraction = 0.01;
-constexpr double kBeyond = 1.12;         // where to look for Ω past an edge, of the half width
-constexpr double kGoesOnFraction = 0.2;  // of the particles at an edge
+constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
+constexpr double kGoesOnFraction = 0.2;  // minimum fraction of the particles at an edge
 constexpr double kWiden = 1.5;
 constexpr int kChecksPastDimension = 3;
-constexpr double kJustInside = 1 - 1e-12;  // so that rounding does not put a point outside Ω
+constexpr double kJustInside = 1 - 1e-12;  // keeps rounding from putting a point outside Ω
 
 int PointCount(const ResolvedProblem& problem, const Basis& basis) {
   return static_cast<int>(std::ceil(problem.problem().expansion.points_per_term * basis.size()));
 }
 
-// The largest s ≤ 1 with inside + s (xi − inside) in Ω.
+// Returns the largest s ≤ 1 for which inside + s (xi − inside) lies in Ω.
 double FractionInside(const Prior& prior, const Vector& xi, const Vector& inside) {
   double fraction = 1;
   for (Eigen::Index j = 0; j < xi.size(); ++j) {
@@ -41,7 +41,7 @@ double FractionInside(const Prior& prior, const Vector& xi, const Vector& inside
   return fraction;
 }
 
-// Local coordinates in units of the trusted box: η = middle + half ∘ e.
+// Returns local coordinates in units of the trusted box: e with η = middle + half ∘ e.
 Matrix InBoxUnits(const ExpansionDesign& design, const Matrix& etas) {
   const Vector middle = 0.5 * (design.lower + design.upper);
   const Vector half = 0.5 * (design.upper - design.lower);
@@ -70,7 +70,8 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   const int count = PointCount(problem, *design.basis);
   POLYEST_ASSIGN_OR_RETURN(design.points, CollocationPoints(options.points, prior.germs(), order,
                                                             count, static_cast<int>(kMaxPoints)));
-  // Points of the same sequence after the collocation points: draws of the prior.
+  // The check points are later points of a Halton sequence than the collocation points, so they are
+  // draws of the prior.
   POLYEST_ASSIGN_OR_RETURN(
       const Matrix sequence,
       CollocationPoints(PointSet::kHalton, prior.germs(), order, count + CheckCount(n),
@@ -121,7 +122,7 @@ Region RegionOfParticles(const Matrix& xis) {
   const Vector mean = xis.colwise().mean().transpose();
   const Matrix centred = xis.rowwise() - mean.transpose();
   const Matrix covariance = centred.transpose() * centred / static_cast<double>(xis.rows());
-  // Scaled to unit variances, so that axes are principal whatever the germs' own scales are.
+  // Scaling to unit variances makes the axes principal whatever the scales of the germs are.
   const Vector scale = covariance.diagonal().cwiseSqrt().cwiseMax(kMinHalfWidth);
   const Matrix correlation =
       scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();

@@ -12,7 +12,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kKnotRows = 256;  // at a time
+constexpr int64_t kKnotRows = 256;  // read at once
 
 bool IsVector(const Vector& vector, Eigen::Index size) {
   return vector.size() == size && vector.allFinite();
@@ -22,7 +22,8 @@ bool IsMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
   return matrix.rows() == rows && matrix.cols() == columns && matrix.allFinite();
 }
 
-// One that an expansion of the problem may come to have: its first or, of automatic order, more.
+// Whether an expansion of the problem can have this truncation: its first one or, for an automatic
+// order, a higher one.
 bool IsTruncationOf(const ResolvedProblem& problem, const Truncation& truncation,
                     bool whole_prior) {
   const ExpansionOptions& options = problem.problem().expansion;
@@ -65,7 +66,7 @@ bool AreSums(const MismatchSums& sums, int terms) {
          sums.count() >= 0;
 }
 
-// What the check points have gathered may be infinite: a trajectory may go far astray.
+// Values accumulated at the check points may be infinite, since a trajectory may diverge.
 bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
   const auto terms = static_cast<int>(fresh.previous_coefficients.rows());
   const auto channels = fresh.discount.size();
@@ -150,7 +151,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
   return expansion;
 }
 
-// The run as it was after the rows absorbed.
+// Restores the run to its state after the absorbed rows.
 absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const SampleStore& store) {
   const int64_t rows = state.absorbed.rows;
   const int64_t samples = state.ensemble->samples;
@@ -175,11 +176,12 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
   return propagator_->Restore(*state.ensemble) ? absl::OkStatus() : Inconsistent("ensemble");
 }
 
-// What of the fit, the noise and the sums follows from the rows absorbed.
+// Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
 absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
   if (!HasSizesOf(state.absorbed, absorbed_)) return Inconsistent("sums");
   for (size_t c = 0; c < absorbed_.sums.size(); ++c) {
-    ChannelSums sums = absorbed_.sums[c];  // what is unknown of its noise is not of the rows
+    // The flags of the channel's noise are kept, since they do not come from the rows.
+    ChannelSums sums = absorbed_.sums[c];
     sums.samples = std::move(state.absorbed.sums[c].samples);
     sums.differences = std::move(state.absorbed.sums[c].differences);
     state.absorbed.sums[c] = std::move(sums);

@@ -17,8 +17,8 @@ std::vector<Germ> NewGerms(const ResolvedProblem& grown, Eigen::Index known) {
   return {germs.begin() + known, germs.end()};
 }
 
-// The region as it is, beside the box of the new germs that holds all but a negligible part of
-// their prior.
+// Returns the present region, extended by the box of the new germs that contains all but a
+// negligible part of their prior.
 Region RegionWith(const Region& present, const std::vector<Germ>& germs) {
   const Eigen::Index known = present.dimension(), n = known + std::ssize(germs);
   Vector centre(n);
@@ -33,7 +33,8 @@ Region RegionWith(const Region& present, const std::vector<Germ>& germs) {
   return Region(std::move(centre), std::move(axes));
 }
 
-// The present check points, over again until there are enough, with draws of the prior beside them.
+// Adds the present check points, repeated until there are enough, with draws of the prior in the
+// new dimensions.
 void AddCheckPoints(const ResolvedProblem& grown, const ExpansionDesign& present,
                     ExpansionDesign& design) {
   const Eigen::Index count = CheckCount(grown.dimension()), known = present.check_points.rows();

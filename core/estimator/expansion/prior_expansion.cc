@@ -18,8 +18,8 @@
 namespace polyest::internal {
 namespace {
 
-// Columns (output × time) worked on at once: bounds the memory and the time between two looks at
-// Stop.
+// Number of columns (output × time) processed at once. It bounds the memory and the time between
+// two checks of the stop request.
 constexpr int64_t kColumnsAtATime = 128;
 
 absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
@@ -50,7 +50,7 @@ absl::StatusOr<std::vector<int>> FindOutputs(const ModelDescription& model,
   return columns;
 }
 
-// Variances, and what is weighed with them, are squares.
+// Variances and products with them are squares of coefficients, which must not overflow.
 absl::Status CheckMagnitude(const Matrix& coefficients, double time_s) {
   constexpr double kLargest = 1e140;
   const double largest = coefficients.cwiseAbs().maxCoeff();
@@ -171,7 +171,7 @@ Matrix PriorExpansion::Thetas() const {
   return thetas;
 }
 
-// Points that failed are left out of the fit from the times of this call of Advance on.
+// Leaves failed points out of the fit, beginning with the times of this call of Advance.
 absl::Status PriorExpansion::LeaveOutFailed() {
   if (kept_.size() + failures().size() == static_cast<size_t>(points_.rows())) {
     return absl::OkStatus();

@@ -13,16 +13,17 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kMaxAttempts = 15;
-constexpr double kPays = 0.5;  // of the volume: a move that saves less is not made
-// Mean square of the expansion's error, in units of the noise's. A higher order that leaves more
-// does not follow the model, and its ripples would be taken for pieces of the posterior.
+constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not made
+// Maximum mean square of the expansion's error in units of the noise's. A higher order with a
+// larger error does not follow the model, and its ripples would be mistaken for pieces of the
+// posterior.
 constexpr double kMaxErrorOfRaised = 0.05;
 constexpr int64_t kReplayRows = 256;
-constexpr double kMinEffectiveChecks = 2;   // for a spread over them to be seen
-constexpr double kMaxSpread = 0.25;         // of ΔJ, for its mean to be known
-constexpr double kNegligibleWeight = 1e-3;  // of a check point, relative to the heaviest
+constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be meaningful
+constexpr double kMaxSpread = 0.25;  // standard deviation of ΔJ at which its mean counts as known
+constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
 
-// Loop of one settlement; holds what changes from attempt to attempt.
+// Carries out one settlement; holds the state that changes between attempts.
 class Settler {
  public:
   Settler(const RegionalExpansion& present, const SettleRequest& request, const Stop& stop)
@@ -70,7 +71,7 @@ class Settler {
     return truncation;
   }
 
-  // To the first order that follows the model; the present one stays when none does.
+  // Raises the order to the first one that follows the model; the present order stays if none does.
   absl::Status RaiseOrder(const Region& region) {
     if (!request_.may_raise_order) return absl::OkStatus();
     auto next = NextTruncation(options(), request_.problem->dimension(), present());
@@ -85,7 +86,8 @@ class Settler {
     return absl::OkStatus();
   }
 
-  // ρ/σ² of the samples taken, in the mean, with all of them alike: D/(N − D), D = Σ ρ_k/R_k.
+  // Returns the mean ρ/σ² of the absorbed samples, treating all of them as equal: D/(N − D) with D
+  // = Σ ρ_k/R_k.
   static double ErrorOf(const RegionalExpansion& expansion) {
     double discount = 0, samples = 0;
     for (size_t c = 0; c < expansion.sums().size(); ++c) {
@@ -95,7 +97,7 @@ class Settler {
     return discount / std::max(samples - discount, std::numeric_limits<double>::min());
   }
 
-  // False when the sampler finds nowhere to start.
+  // Returns false when the sampler finds no starting point.
   absl::StatusOr<bool> Sample(int attempt) {
     const Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
     Vector lower, upper;
@@ -112,7 +114,7 @@ class Settler {
     return true;
   }
 
-  // False when the expansion there cannot be built; the present one then stays.
+  // Returns false when the new expansion cannot be built; the present one then stays.
   absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
     const Vector inside = result_.particles.colwise().mean().transpose();
     ExpansionDesign design =
@@ -167,7 +169,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
 
 namespace {
 
-// J_mismatch of the model itself at check point i.
+// Returns J_mismatch of the model itself at check point i.
 double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
                      const RegionalExpansion::Check& check, Eigen::Index i) {
   double mismatch = 0;

@@ -77,7 +77,8 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
 void RegionalExpansion::LookFromPosterior() {
   const int terms = design_.basis->size();
   if (noise_.posterior.centre.size() == 0) {
-    // Not known yet: what the expansion itself leaves open, Σ c_s² over s ≥ 1 (12).
+    // The posterior is not known yet, so outliers are judged by the spread of the expansion itself,
+    // Σ c_s² over s ≥ 1 (12).
     centre_phi_ = reference_phi_;
     spread_ = Matrix::Identity(terms, terms).rightCols(terms - 1);
     return;
@@ -89,7 +90,7 @@ void RegionalExpansion::LookFromPosterior() {
   spread_ = phi_gradient * Inverse(design_.region.axes()) * noise_.posterior.factor;
 }
 
-// A run begins at t = 0 from the initial states, with inputs of its own.
+// Each run begins at t = 0 from the initial states, with its own inputs.
 void RegionalExpansion::StartRun(int run) {
   run_ = run;
   knot_time_s_ = -std::numeric_limits<double>::infinity();
@@ -134,8 +135,8 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
   return absl::OkStatus();
 }
 
-// The streamed inputs of the present run as far as the block tells, from this row on. Rows ahead
-// come again with the next block.
+// Appends the knots of the present run's streamed inputs that the block contains, from this row on.
+// Rows ahead come again with the next block.
 void RegionalExpansion::AppendKnots(int row) {
   const std::vector<int>& streamed = problem_.streamed_inputs();
   if (streamed.empty()) return;
@@ -156,7 +157,7 @@ void RegionalExpansion::AppendKnots(int row) {
   inputs_finished_ = true;
 }
 
-// Fits each stretch of rows over which the same trajectories are good.
+// Fits each stretch of rows over which the same trajectories are valid.
 void RegionalExpansion::FitRows(int first, int count) {
   for (int begin = first; begin < first + count;) {
     shortage_ = DropFailed(begin);
@@ -186,7 +187,8 @@ bool RegionalExpansion::FailsAt(int row) const {
   return false;
 }
 
-// Leaves out the trajectories without output at this row, and factors again what is left.
+// Leaves out the trajectories without output at this row, and factors the remaining collocation
+// points again.
 absl::Status RegionalExpansion::DropFailed(int row) {
   if (!FailsAt(row)) return absl::OkStatus();
   NoteFailures(row);
@@ -206,8 +208,8 @@ absl::Status RegionalExpansion::DropFailed(int row) {
   return absl::OkStatus();
 }
 
-// The trajectories that fail at this row, once each; the propagator may be ahead of it and know of
-// later ones.
+// Records each trajectory that fails at this row once. The propagator may be ahead of the row and
+// report later failures too.
 void RegionalExpansion::NoteFailures(int row) {
   for (const PointFailure& failure : propagator_->failures()) {
     const bool kept = std::binary_search(kept_.begin(), kept_.end(), failure.point);
@@ -273,8 +275,8 @@ void RegionalExpansion::Absorb(int row) {
   absorbed_.propagated += thetas_.rows();
 }
 
-// In units of what the sample may be off by there; variance: of the sample about the expansion.
-// 0 where nobody looks for outliers.
+// Returns the deviation of the sample in units of its possible error there, or 0 if outliers are
+// not handled. `variance` is that of the sample about the expansion.
 double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,
                                               double z, double variance) const {
   const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
@@ -284,13 +286,14 @@ double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef&
   return error / std::sqrt(variance + open);
 }
 
-// noise: σ²; own_error: the residual's variance ρ; lack: of the outlier's weight.
+// Adds to the normalization. `noise` is σ², `own_error` the residual's variance ρ, and `lack` the
+// part of the likelihood that the outlier's weight leaves out.
 void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
   absorbed_.log_noise += 0.5 * std::log(noise) + lack;
   absorbed_.log_variance += 0.5 * std::log(noise + own_error) + lack;
 }
 
-// u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
+// Adds u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
 void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                                       double variance) {
   const double unit = 1 / std::sqrt(variance);
@@ -302,7 +305,7 @@ void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coeffic
   absorbed_.previous_error[channel] = unit * error;
 }
 
-// The check points' own trajectories beside the expansion at one sample.
+// Compares the check points' own trajectories with the expansion at one sample.
 void RegionalExpansion::Compare(int column, double z, double variance) {
   const int channel = column % channels_;
   for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {

@@ -7,10 +7,11 @@
 namespace polyest::internal {
 namespace {
 
-// Kept from a bound of Ω, of its width: a density that vanishes at the bound has no finite cost.
+// Distance kept from a bound of Ω, as a fraction of its width: a density that vanishes at the bound
+// has no finite cost.
 constexpr double kOffBound = 1e-9;
 
-// Ω in local coordinates as rows a with aᵀη ≤ bound, and the box of the search.
+// Returns the box of the search, with Ω in local coordinates as rows a with aᵀη ≤ bound.
 MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& prior) {
   MinimizationProblem search;
   SamplingBox(design, search.lower, search.upper);

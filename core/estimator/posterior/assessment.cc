@@ -20,10 +20,10 @@ namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kDrawsForNoise = 200;
-constexpr double kMinMeanSquare = 1e-24;  // of residuals that vanish
-// Other minima count when their density is not below this part of the best one's: e^−7 ≈ 10⁻³.
+constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
+// Other minima count when their density is at least this fraction of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
-// An isolated minimum has all its curvatures above the prior's; a valley's floor has not.
+// An isolated minimum has all curvatures above the prior's; the floor of a valley does not.
 constexpr double kIsolatedCurvature = 1;
 
 class Assessment {
@@ -73,7 +73,7 @@ class Assessment {
   }
 
  private:
-  // J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
+  // Returns J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
   Matrix ToGermHessian(const Matrix& hessian) const {
     const Matrix inverse = Inverse(design_.region.axes());
     return inverse.transpose() * hessian * inverse;
@@ -158,9 +158,10 @@ class Assessment {
         FindTradeOffs(thetas, posterior_.weights, names, problem_.units(), verdicts);
   }
 
-  // Covariance and standard deviations: never above the prior's. Where the map of a parameter is
-  // curved its slope at the estimate scales what is known of it: a parameter that the data do not
-  // identify then has the prior's own standard deviation, wherever they drew it.
+  // Fills in the covariance and the standard deviations, never above the prior's. A standard
+  // deviation is scaled by the slope of the parameter's map at the estimate. A parameter with a
+  // curved map that the data do not identify is given the prior's own standard deviation instead,
+  // wherever the estimate lies.
   void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
                       double widening) {
     const Curvature curvature =
@@ -177,11 +178,12 @@ class Assessment {
     estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
   }
 
-  // Posterior ÷ prior standard deviation of the scores as far as it is the data's doing: the larger
-  // of what the curvature gives with the prior at its own weight, whatever α² is (a heavy prior
-  // narrows the posterior, but that is not knowledge), and of
+  // Returns the ratio of posterior to prior standard deviation of the scores that is due to the
+  // data. It is the larger of two values. The first comes from the curvature with the prior at its
+  // own weight, whatever α² is: a heavy prior narrows the posterior, but that is not information.
+  // The second comes from
   //   (H_mismatch + Σ_prior⁻¹)⁻¹,
-  // in which a skewed prior's sharp mode does not pass for information either.
+  // in which the sharp mode of a skewed prior does not count as information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
     const Vector& xi = findings_.map_xi;
     const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta, spent_));
@@ -193,7 +195,7 @@ class Assessment {
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
   }
 
-  // Draws' scores widened about their mean but not past Ω.
+  // Widens the draws' scores about their mean, but not beyond Ω.
   void WidenPosterior(double widening) {
     if (!(widening > 1)) return;
     for (int i = 0; i < prior_.dimension(); ++i) {
@@ -221,7 +223,7 @@ class Assessment {
     channel.samples = summary.samples;
     if (summary.samples == 0) return;
     const auto samples = static_cast<double>(summary.samples);
-    // With N the degrees of freedom, χ² ÷ N of a working noise of the right size is 1 in the mean.
+    // With N degrees of freedom, χ²/N has the mean 1 if the working noise has the right size.
     const double mean_square =
         sums.scale_unknown ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums) / sums.Degrees())
                            : 1;
@@ -232,13 +234,13 @@ class Assessment {
         std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
     channel.noise_time_constant_s = noise.time_constant_s;
     channel.outliers = request_.expansion->Outliers(c);
-    // That of the noise before whitening.
+    // Correlation of the noise before whitening.
     const double a = noise.time_constant_s > 0 ? summary.Correlation(noise)
                                                : std::max(0.0, channel.lag1_correlation);
     channel.effective_samples = samples * (1 - a) / (1 + a);
   }
 
-  // E[χ²] over the posterior, where E[σ²] = E[χ²]/N of an unknown scale.
+  // Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
   double MeanChiSquared(const Cost& cost, const ChannelSums& sums) const {
     const Eigen::Index stride =
         std::max<Eigen::Index>(1, posterior_.scores.rows() / kDrawsForNoise);
@@ -257,10 +259,10 @@ class Assessment {
   const AssessmentRequest& request_;
   const ExpansionDesign& design_;
   double regularization_ = 1;
-  double fitted_ = 0;  // parameters fitted by the data
-  double spent_ = 0;   // degrees of freedom, see Cost::MismatchHessian
+  double fitted_ = 0;  // number of parameters fitted by the data
+  double spent_ = 0;   // degrees of freedom used up, see Cost::MismatchHessian
   PosteriorDraws posterior_;
-  Vector deviation_;  // of the parameters
+  Vector deviation_;  // standard deviations of the parameters
   Findings findings_;
   Estimate estimate_;
 };

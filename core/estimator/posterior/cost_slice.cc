@@ -20,7 +20,7 @@ CostSlice::CostSlice(const MinimizationProblem& search, const Vector& normal)
     : search_(search), a_(normal) {
   const Eigen::Index n = normal.size();
   n_ = OrthonormalBasisFrom(normal).rightCols(n - 1);
-  // −η ≤ −lower, η ≤ upper and the search's own rows, all in v
+  // The rows −η ≤ −lower, η ≤ upper and the search's own rows.
   const Eigen::Index rows = search.constraint.rows();
   rows_.resize(2 * n + rows, n);
   rows_ << -Matrix::Identity(n, n), Matrix::Identity(n, n), search.constraint;
@@ -59,7 +59,8 @@ std::optional<Minimum> CostSlice::Minimize(double b, const std::vector<Vector>& 
   return At(base + n_ * minimum.point, minimum);
 }
 
-// Those parallel to the hyperplane say nothing in it; rounding would make up a direction of them.
+// Removes rows parallel to the hyperplane: they do not constrain points in it, and rounding would
+// give them an arbitrary direction.
 void CostSlice::KeepRowsThatCross() {
   constexpr double kParallel = 1e-9;
   Eigen::Index kept = 0;
@@ -72,7 +73,7 @@ void CostSlice::KeepRowsThatCross() {
   bounds_.conservativeResize(kept);
 }
 
-// The nearest point of the hyperplane.
+// Returns the point of the hyperplane nearest to η.
 Vector CostSlice::ToSlice(const Vector& eta, double b) const {
   return eta + a_ * ((b - a_.dot(eta)) / a_.squaredNorm());
 }

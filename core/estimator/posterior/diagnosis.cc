@@ -10,19 +10,20 @@
 namespace polyest::internal {
 namespace {
 
-// χ² of a right model has mean N and standard deviation √(2N); far larger is both many of those
-// and half as much again.
+// For a correct model, χ² has mean N and standard deviation √(2N). A misfit is reported when χ²
+// exceeds N both by many standard deviations and by half.
 constexpr double kMisfitDeviations = 6;
 constexpr double kMisfitRatio = 1.5;
-// A lag-1 correlation of independent residuals has a standard deviation of 1/√N. Below kCorrelated
-// it changes the uncertainty by less than a sixth.
+// The lag-1 correlation of independent residuals has a standard deviation of 1/√N. A correlation
+// below kCorrelated changes the uncertainty by less than a sixth.
 constexpr double kCorrelationDeviations = 4;
 constexpr double kCorrelated = 0.15;
 constexpr int64_t kMinForCorrelation = 20;
-constexpr double kAtBound = 1e-6;  // of the width of Ω
-// The same for a correlated parameter: its score has no bound, and only ever nears the parameter's.
+constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
+// As kAtBound, for a correlated parameter: its score has no bound, and only approaches the
+// parameter's.
 constexpr double kNearBound = 1e-4;
-// Of the posterior's and the curvature's standard deviations, either way.
+// Maximum ratio of the posterior's and the curvature's standard deviations, in either direction.
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
 
@@ -64,7 +65,7 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
   }
 }
 
-// Of a scale learned, χ² says nothing: it is what the scale was learned from.
+// A learned scale is skipped: it was learned from χ², which is therefore no test of it.
 void AddMisfit(const Findings& findings, const Estimate& estimate,
                std::vector<Diagnostic>& diagnostics) {
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
@@ -79,7 +80,7 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
                            "prior is wrong, and the uncertainty reported is too small",
                            channel.output, std::sqrt(channel.chi_squared / samples))});
     }
-    // What the expansion's own error takes from a sample's weight it takes from χ².
+    // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
     if (channel.chi_squared < expected / kMisfitRatio &&
         channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
@@ -94,8 +95,8 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
   }
 }
 
-// Residuals that hang together in time although the noise is taken not to, or otherwise than it is
-// taken to.
+// Reports residuals that are correlated in time, if the noise is assumed white or differently
+// correlated.
 void AddCorrelation(const Findings& findings, const Estimate& estimate,
                     std::vector<Diagnostic>& diagnostics) {
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
@@ -148,9 +149,9 @@ void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
   }
 }
 
-// Whether the estimate lies on a bound of parameter i: < 0 the lower one, > 0 the upper one. Looked
-// for in the marginal's own germ, which has bounds even where a correlated parameter's score has
-// none.
+// Returns < 0 if the estimate lies on the lower bound of parameter i, > 0 on the upper one, else 0.
+// The marginal's own germ is examined because it has bounds even where the score of a correlated
+// parameter has none.
 int BoundReached(const Findings& findings, int i) {
   const Prior& prior = findings.problem->prior();
   const Germ germ(prior.parameters()[static_cast<size_t>(i)].germ);
@@ -162,7 +163,8 @@ int BoundReached(const Findings& findings, int i) {
   return germ.Upper() - x < near ? 1 : 0;
 }
 
-// A prior that is densest at a bound puts the estimate there by itself, where the data are silent.
+// Whether the prior alone puts the estimate at a bound: it is densest there and the data do not
+// inform the parameter.
 bool PriorAsksForBound(const Findings& findings, const Estimate& estimate, int i) {
   const Germ& germ = findings.problem->prior().germs()[static_cast<size_t>(i)];
   return (germ.Mode() == germ.Lower() || germ.Mode() == germ.Upper()) &&
@@ -181,7 +183,8 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
   }
 }
 
-// Of what the data inform: where they say nothing, what is reported is the prior's by contract.
+// Reports a posterior that differs from the curvature's Gaussian. Parameters that the data do not
+// inform are skipped, because the reported values are then the prior's by definition.
 void AddNonGaussian(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
   std::vector<std::string> ratios;
   for (const ParameterEstimate& parameter : estimate.parameters) {
@@ -213,7 +216,7 @@ void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics)
   diagnostics.push_back({DiagnosticCode::kPointsFailed, message});
 }
 
-// The pieces of a mixture, with their weights.
+// Reports the pieces of a mixture with their weights.
 void AddComponents(const Findings& findings, const Estimate& estimate,
                    std::vector<Diagnostic>& diagnostics) {
   if (estimate.components.empty()) return;

@@ -18,31 +18,32 @@ namespace polyest::internal {
 namespace {
 
 constexpr int64_t kBlockRows = 64;
-// A sample whose expansion residual passes this part of the noise ends the window before it.
+// A sample whose expansion residual exceeds this fraction of the noise ends the window before it.
 constexpr double kResidualToNoise = 0.1;
-// Where a window ends the expansion is compared with the model: it is settled anew when the
-// posterior's means may be off by this many of its standard deviations.
+// At the end of a window the expansion is compared with the model. It is settled again when the
+// posterior's means may be wrong by this many standard deviations.
 constexpr double kMaxShift = 0.1;
-// Pieces are believed of an expansion that is too coarse for more samples, but not so coarse that
-// it may have made them up, or left others out: ΔJ over them is no more than this.
+// Pieces are accepted from an expansion that is too inaccurate for further samples, but only while
+// it cannot have created or omitted them: the shift must not exceed this value.
 constexpr double kMaxShiftInPieces = 1;
 constexpr double kWindowGrowth = 1.3;
-// The integration error must stay so far below the noise that it does not add up over a long
-// record to a share of the posterior's standard deviation: relative tolerance ≤ this × noise ÷
-// signal, looked at where windows end; never tighter than double precision bears.
+// The integration error must stay so far below the noise that over a long record it does not
+// accumulate to a noticeable share of the posterior's standard deviation: relative tolerance ≤ this
+// × noise ÷ signal. The tolerance is checked where windows end, and never goes below what double
+// precision supports.
 constexpr double kTolerancePerNoise = 1e-5;
 constexpr double kTightestTolerance = 1e-12;
-// After a settlement that did not help, this part of the record so far is taken with its discount
-// before the next one is tried.
+// After a settlement that did not help, further rows are taken with their discount before the next
+// attempt: the record since the windows' beginning, divided by this number.
 constexpr int64_t kPatience = 8;
 constexpr int kMaxSettlementsAtRow = 4;
-// Of the noise, where a window ends. A scale that falls from the signal's size to 10⁻⁶ of it takes
-// 20 halvings.
+// Maximum number of revisions of the noise at the end of a window. A scale that falls from the
+// signal's size to 10⁻⁶ of it takes 20 halvings.
 constexpr int kMaxRevisions = 24;
-// By how much a scale not learned yet exceeds the largest sample.
+// Factor by which a scale that is not learned yet exceeds the largest sample.
 constexpr double kAboveSignal = 2;
 
-// Where outliers are looked for from once the posterior is there.
+// Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
 PosteriorSummary SummaryOf(const Matrix& particles) {
   PosteriorSummary summary;
   summary.centre = particles.colwise().mean().transpose();
@@ -81,7 +82,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
 absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   if (is_multimodal()) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
-  // A window's end that an earlier stop left open.
+  // An earlier stop may have left the end of a window unprocessed.
   if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
   RowBlock block;
   while (taken_ < rows && !is_multimodal()) {
@@ -95,7 +96,7 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   return absl::OkStatus();
 }
 
-// The next rows, up to the first `rows` of the store, for which there are parameters.
+// Reads the next rows, up to the first `rows` of the store, as far as the runs' parameters exist.
 absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const Stop& stop) {
   const int64_t count = std::min(kBlockRows, rows - taken_);
   const auto read = [&](int64_t some) {
@@ -111,14 +112,15 @@ absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const St
   return known < count ? read(known) : absl::OkStatus();
 }
 
-// The record so far, with the parameters that the run brings: as unknown as their prior.
+// Replays the record so far with the parameters of the new run, which are as uncertain as their
+// prior.
 absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
   LearnedNoise noise = expansion_->noise();
   noise.posterior = SummaryForNewRuns(grown, noise.posterior);
   Matrix particles = ParticlesForNewRuns(grown, particles_);
-  std::swap(problem_, grown);  // in its place, since expansions refer to it
+  std::swap(problem_, grown);  // the object stays in place, since expansions refer to it
   auto replayed =
       Replay(problem_, std::move(design), std::move(noise), *store_, taken_, threads_, stop);
   if (!replayed.ok()) {
@@ -132,7 +134,7 @@ absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   return absl::OkStatus();
 }
 
-// After a stop in the middle of a block: the same expansion, propagated again up to the last row
+// After a stop in the middle of a block, propagates the same expansion again up to the last row
 // taken.
 absl::Status MixtureComponent::Recover(const Stop& stop) {
   if (!broken_) return absl::OkStatus();
@@ -142,7 +144,7 @@ absl::Status MixtureComponent::Recover(const Stop& stop) {
   return absl::OkStatus();
 }
 
-// False when the expansion moved and the rest of the block must be propagated again.
+// Returns false when the expansion has moved and the rest of the block must be propagated again.
 absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const Stop& stop) {
   for (int row = 0; row < block.count(); ++row) {
     POLYEST_ASSIGN_OR_RETURN(const bool raised, RaiseUnlearnedScales(block, row, stop));
@@ -165,7 +167,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
   return true;
 }
 
-// The next row is too coarse for the present expansion, or too few trajectories reach it.
+// Handles a next row at which the present expansion is too coarse or too few trajectories are left.
 absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, const Stop& stop) {
   if (settled_row_ != taken_) settlements_at_row_ = 0;
   settled_row_ = taken_;
@@ -200,7 +202,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     return AgreementWithModel(*expansion_, cost).shift <= kMaxShift;
   };
   bool moved = false;
-  // Each settlement may raise the order.
+  // Each settlement may raise the order, so several may be needed.
   for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
     if (accurate()) return moved;
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));
@@ -210,8 +212,9 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   return (!accurate() && LookForPieces()) || moved;
 }
 
-// True when the posterior on the present expansion, which no move makes accurate, is in pieces. A
-// noise not learned yet makes no pieces: it would be what decides between them.
+// Returns true when the posterior is in pieces on the present expansion, which no move makes
+// accurate. Does not look for pieces before the noise is learned, because the noise would decide
+// between them.
 bool MixtureComponent::LookForPieces() {
   if (!adaptive() || taken_ < whole_until_) return false;
   for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
@@ -243,7 +246,7 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
   return parts;
 }
 
-// At the parent's row, over a region around one of its pieces.
+// Starts at the parent's row, over a region around one of the parent's pieces.
 absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Matrix& piece,
                                        const Stop& stop) {
   taken_ = window_end_ = parent.taken_;
@@ -272,12 +275,12 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Mat
   return absl::OkStatus();
 }
 
-// Scales that are not learned yet follow the signal, so that the first samples weigh little however
-// large they are. True when the record was taken anew.
+// Raises scales that are not learned yet with the signal, so the first samples have little weight
+// however large they are. Returns true when the record was replayed.
 absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& block, int row,
                                                             const Stop& stop) {
   if (!learns_noise_) return false;
-  std::optional<LearnedNoise> raised;  // made only when needed: this is done for every sample
+  std::optional<LearnedNoise> raised;  // set only when needed: this runs for every sample
   const std::vector<ChannelNoise>& present = expansion_->noise().channels;
   const size_t width = block.values.size() / block.rows.size();
   for (size_t c = 0; c < present.size(); ++c) {
@@ -293,8 +296,8 @@ absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& bloc
   return true;
 }
 
-// Returns whether the record was reweighed with another noise. Less noise asks more of the
-// expansion.
+// Returns whether the record was reweighed with another noise. Smaller noise requires a more
+// accurate expansion.
 absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
   bool moved = false;
   for (int i = 0; i < kMaxRevisions; ++i) {
@@ -318,27 +321,29 @@ absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
   return absl::OkStatus();
 }
 
-// True when the noise asked for a tighter tolerance and the record was propagated again with it.
+// Returns true when the noise required a tighter tolerance and the record was propagated again with
+// it.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
   const double needed = std::max(kTightestTolerance,
                                  kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()));
   const double present = problem_.problem().integration.relative_tolerance;
   if (needed >= present) return false;
-  // Half of what is needed now, so that a slowly falling ratio does not ask again and again.
+  // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
+  // replays.
   problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
   auto replayed =
       Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
-    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present one stays
+    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays
     return replayed.status();
   }
   Adopt(*std::move(replayed));
   return true;
 }
 
-// True when the expansion moved.
+// Returns true when the expansion moved.
 absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order) {
   SettleRequest request;
   request.may_raise_order = may_raise_order;
@@ -370,7 +375,7 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
   return absl::OkStatus();
 }
 
-// The present expansion is given up for another one that has taken the same rows.
+// Replaces the present expansion by another one that has taken the same rows.
 void MixtureComponent::Adopt(std::unique_ptr<RegionalExpansion> expansion) {
   abandoned_rows_ += expansion_->propagated_rows();
   expansion_ = std::move(expansion);

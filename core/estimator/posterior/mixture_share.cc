@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-// c_k
+// Returns c_k.
 double Height(const RegionalExpansion& expansion, const Cost& cost) {
   const Agreement agreement = AgreementWithModel(expansion, cost);
   if (!agreement.mean_difference) return expansion.LogNormalization(/*with_own_error=*/true);

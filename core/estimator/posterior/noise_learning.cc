@@ -10,27 +10,29 @@
 namespace polyest::internal {
 namespace {
 
-// Changes of a scale below this factor are left to the sums, in which it is marginalized.
+// A scale is not revised by less than this factor: the sums marginalize over it.
 constexpr double kWorthIt = 1.25;
-constexpr double kMaxFall = 0.5;  // of a scale at a time: the expansion must follow
+// Limits of a scale's change in one revision: the expansion must be able to follow.
+constexpr double kMaxFall = 0.5;
 constexpr double kMaxRise = 4;
-// Where the expansion's own error makes up more than this of χ², the scale cannot be seen.
+// If the expansion's own error makes up more than this share of χ², the scale cannot be determined.
 constexpr double kMaxDiscount = 0.8;
-constexpr double kSignificance = 2;  // standard deviations, for white noise to be given up
+constexpr double kSignificance = 2;  // in standard deviations, for giving up white noise
 constexpr double kMinCorrelation = 0.02;
 constexpr double kMaxCorrelation = 0.9999;
-// Of the change asked for. The whole of it is right for noise of the kind assumed, but goes back
-// and forth for other noise.
+// Fraction of the requested change. The whole change would be right for noise of the assumed kind,
+// but oscillates for other noise.
 constexpr double kCorrelationStep = 0.6;
-// The posterior's centre has moved when by this many of its standard deviations; its spread, when
-// by this factor.
+// Changes from which the posterior counts as different: of its centre, in standard deviations, and
+// of its spread, as a factor.
 constexpr double kMoved = 0.2;
 constexpr double kSpread = 1.3;
 
-// The correlation x of noise that has the lag-1 correlation r left when whitened with a:
-//   r = (x − a)(1 − a x)/(1 − 2 a x + a²),
-// a quadratic equation in x, whose root is a for r = 0. What has no root is not such noise; then
-// a + r, which it is to first order.
+// Returns the correlation x of noise whose residuals have the lag-1 correlation r after whitening
+// with a:
+//   r = (x − a)(1 − a x)/(1 − 2 a x + a²).
+// This is a quadratic equation in x, with the root a for r = 0. If it has no real root, the noise
+// is not of this kind, and the first-order solution a + r is returned.
 double CorrelationBehind(double r, double a) {
   if (a <= 0) return std::clamp(r, -kMaxCorrelation, kMaxCorrelation);
   const double b = 1 + a * a + 2 * r * a;
@@ -57,7 +59,7 @@ class Revision {
       if (!model.unknown && model.correlation != NoiseCorrelation::kUnknown) continue;
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
       if (sums.samples.count() < kMinSamplesForNoise + 4 * problem_.dimension()) continue;
-      // Of the parameters fitted.
+      // The channel's share of the fitted parameters.
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());
       ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
@@ -91,8 +93,8 @@ class Revision {
     const double degrees = std::max(1.0, sums.Degrees() - discount - share);
     const double chi_squared = std::max(0.0, sums.samples.ChiSquared(d_) - discount);
     const double factor = std::clamp(std::sqrt(chi_squared / degrees), kMaxFall, kMaxRise);
-    const double typical =
-        record_.channels()[static_cast<size_t>(c)].RootMeanSquareNoise();  // without the scale
+    // The learned scale is not included.
+    const double typical = record_.channels()[static_cast<size_t>(c)].RootMeanSquareNoise();
     const double revised =
         std::max(noise.scale * factor, NoiseModel::kMinStandardDeviation / typical);
     const double ratio = revised / noise.scale;
@@ -108,12 +110,12 @@ class Revision {
     const double left = sums.Lag1Correlation(d_) + Lag1Correction(share, samples);
     const double present = channel.Correlation(noise);
     const double asked = CorrelationBehind(left, present);
-    // A correlation a is known to √((1 − a²)/N).
+    // The standard error of a correlation a is √((1 − a²)/N).
     const double significance = present > 0 ? 1 : kSignificance;
     if (std::abs(asked - present) * std::sqrt(samples / (1 - asked * asked)) < significance) return;
     const double step = present > 0 ? kCorrelationStep : 1;
     const double revised = std::min(kMaxCorrelation, present + step * (asked - present));
-    // Noise that alternates is not of this kind: white is the nearest.
+    // Alternating noise is not of this kind; white noise is the nearest.
     const double time_constant_s =
         revised > kMinCorrelation ? -channel.MeanInterval() / std::log(revised) : 0;
     if (std::abs(channel.Correlation({1, time_constant_s, true}) - present) < kMinCorrelation) {
@@ -129,8 +131,8 @@ class Revision {
     });
   }
 
-  // Centre and covariance of the posterior by the curvature, no wider than the prior in any
-  // direction.
+  // Revises the posterior's centre and covariance from the curvature. The covariance is limited to
+  // the prior's in every direction.
   void RevisePosterior() {
     const Vector unit = problem_.prior().GermStandardDeviation();
     const Matrix hessian = to_local_.transpose() * cost_.Hessian(eta_) * to_local_;

@@ -23,13 +23,14 @@ constexpr int kFinalSweeps = 20;  // before the chains start
 constexpr uint64_t kSeed = 20'071'121;
 constexpr int kStarts = 6;
 constexpr int kCover = 4096;
-constexpr Eigen::Index kBest = 256;  // of the cover, and of the guesses: where starts are taken
-// Another minimum, or a point far out, matters when its cost is not above the least one by this
-// much more than a draw's is in the mean, n/2: e^−8 ≈ 3·10⁻⁴.
+// Number of points of the cover, and of the guesses, from which starts are taken.
+constexpr Eigen::Index kBest = 256;
+// Another minimum, or a distant point, matters when its cost exceeds the least one by less than the
+// mean excess of a draw, n/2, plus this: e^−8 ≈ 3·10⁻⁴.
 constexpr double kNegligibleCost = 8;
-constexpr double kReach = 4;  // standard deviations past √n that the Gaussian's points go
+constexpr double kReach = 4;  // reach of the Gaussian's points beyond √n, in standard deviations
 constexpr double kMaxDecrement = 1e-3;
-constexpr double kOnBound = 1e-6;  // of the box's width
+constexpr double kOnBound = 1e-6;  // fraction of the box's width
 constexpr double kMinEffective = 0.5;
 constexpr double kHeaviest = 0.01;
 
@@ -57,7 +58,7 @@ class Drawing {
   }
 
  private:
-  // Costs of the cover and the guesses, and the minima found from the best of them.
+  // Computes the costs of the cover and the guesses, and the minima found from the best of them.
   void Look() {
     const Matrix cover = lower_.transpose().replicate(kCover, 1) +
                          UnitCubePoints(PointSet::kHalton, cost_.dimension(), kCover) *
@@ -73,7 +74,7 @@ class Drawing {
     draws_.minima = FindMinima(search_, starts, MinimizerOptions(), stop_);
   }
 
-  // Spread over the best of the known points [first, first + count).
+  // Adds starts spread over the best of the known points [first, first + count).
   void AddStarts(Eigen::Index first, Eigen::Index count, Matrix& starts) const {
     std::vector<Eigen::Index> order;
     for (Eigen::Index i = first; i < first + count; ++i) {
@@ -110,8 +111,7 @@ class Drawing {
     return true;
   }
 
-  // L of H = L Lᵀ where the curvature's Gaussian may stand for the posterior; none where it must
-  // not.
+  // Returns L of H = L Lᵀ if the curvature's Gaussian may approximate the posterior, else nothing.
   std::optional<Matrix> GaussianFactor() const {
     const std::vector<Minimum>& minima = draws_.minima;
     if (minima.empty()) return std::nullopt;
@@ -176,7 +176,8 @@ class Drawing {
     return absl::OkStatus();
   }
 
-  // Again, from where the posterior is, and from what had been found.
+  // Searches the minima again, from the particles of the posterior and from the minima known so
+  // far.
   void FindMinimaFrom(const Particles& particles) {
     Matrix starts = SpreadStarts(particles.etas, particles.costs, kStarts);
     for (const Minimum& minimum : draws_.minima) {

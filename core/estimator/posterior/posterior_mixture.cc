@@ -10,11 +10,11 @@
 namespace polyest::internal {
 namespace {
 
-// For weights that decide no more than which components to go on with.
+// Effort for weights that only decide which components to continue with.
 constexpr PosteriorEffort kWeighingEffort = {
     .importance_points = 4'096, .chain_effective_size = 2'000, .max_sweeps = 64};
 
-// The expansion of a component that weighs less does no harm.
+// The expansion of a lighter component has no noticeable effect.
 constexpr double kMinWeightToWarn = 0.01;
 
 MixturePartition PartitionOf(const std::vector<AssessmentRequest>& requests,
@@ -24,7 +24,7 @@ MixturePartition PartitionOf(const std::vector<AssessmentRequest>& requests,
   return MixturePartition(designs);
 }
 
-// Draws of all components, from which their shares among any of them are taken.
+// Draws from all components, and computes their shares among any subset of them.
 class Weighing {
  public:
   explicit Weighing(const std::vector<AssessmentRequest>& requests) : requests_(requests) {}
@@ -60,7 +60,8 @@ class Weighing {
     }
   }
 
-  // The one that owns the least of its draws, if that is too little.
+  // Drops the component that owns the smallest share of its draws, if that share is too small.
+  // Returns whether one was dropped.
   bool DropMet() {
     const auto least = std::ranges::min_element(shares_, {}, &MixtureShare::owned);
     if (shares_.size() == 1 || least->owned >= kMinOwned) return false;
@@ -96,11 +97,11 @@ class Weighing {
   const std::vector<AssessmentRequest>& requests_;
   std::vector<Cost> costs_;
   std::vector<PosteriorDraws> draws_;
-  std::vector<MixtureShare> shares_;  // of those kept
+  std::vector<MixtureShare> shares_;  // of the components kept
   MixtureWeighing weighing_;
 };
 
-// The draws of all components, heaviest first.
+// Returns the draws of all components in their order, heaviest first.
 PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<double>& weights) {
   PosteriorDraws mixture;
   Eigen::Index count = 0;
@@ -160,7 +161,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   return whole;
 }
 
-// With a partition among them.
+// Assesses all components with a partition among them.
 absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& requests,
                                                 const MixturePartition& partition,
                                                 const Stop& stop) {
@@ -168,7 +169,7 @@ absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& 
   for (size_t k = 0; k < requests.size(); ++k) {
     requests[k].partition = &partition;
     requests[k].component = k;
-    // One α² for all: that of the first.
+    // All components use the α² of the first.
     if (k > 0) requests[k].regularization = components.front().estimate.regularization;
     POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(requests[k], stop));
     if (k > 0) {
@@ -192,8 +193,8 @@ std::vector<double> WeightsNow(const std::vector<AssessmentRequest>& requests,
   return level ? WeightsOf(evidences) : last;
 }
 
-// A stop may have left some components before a run that has parameters of its own and others in
-// it; those with the fewest parameters answer then. The places of those kept.
+// A stop may have left some components before a run with its own parameters and others in it. Then
+// only those with the fewest parameters are kept. Returns the indices of those kept.
 std::vector<size_t> KeepSameProblem(std::vector<AssessmentRequest>& requests) {
   std::vector<size_t> places(requests.size());
   std::iota(places.begin(), places.end(), size_t{0});

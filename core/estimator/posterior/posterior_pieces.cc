@@ -16,14 +16,14 @@ namespace {
 using Rows = std::vector<Eigen::Index>;
 
 constexpr int kStarts = 12;
-constexpr double kMinShare = 0.02;  // of the particles
+constexpr double kMinShare = 0.02;  // fraction of the particles
 constexpr double kMinGap = 1;       // in standard deviations within the sets
-constexpr double kMinWall = 8;      // of the cost: e^−8 ≈ 3·10⁻⁴
-constexpr int kRefinements = 4;     // of a hyperplane
+constexpr double kMinWall = 8;      // difference in cost: e^−8 ≈ 3·10⁻⁴
+constexpr int kRefinements = 4;     // number of refinements of a hyperplane
 
 struct Gap {
   Vector normal;
-  double offset = 0;  // normalᵀη = offset in its middle
+  double offset = 0;  // normalᵀη = offset in the middle of the gap
   Rows below, above;
 };
 
@@ -71,13 +71,14 @@ class PieceFinder {
     pieces_.push_back(rows);
   }
 
-  // The gap among the rows that Fisher's discriminant comes to from the sets nearer to a and to b.
+  // Returns the gap among the rows that Fisher's discriminant finds, starting from the sets nearer
+  // to a and to b.
   std::optional<Gap> GapBetween(const Rows& rows, const Vector& a, const Vector& b) const {
     const Matrix points = particles_(rows, Eigen::all);
     const Vector scale = Covariance(points).diagonal().cwiseSqrt();
     if (!(scale.minCoeff() > 0)) return std::nullopt;
     Gap gap;
-    // (η − (a + b)/2)ᵀ S⁻² (b − a) = 0 is as far from a as from b.
+    // Points of (η − (a + b)/2)ᵀ S⁻² (b − a) = 0 are equally far from a and from b.
     gap.normal = (b - a).cwiseQuotient(scale.cwiseAbs2());
     gap.offset = gap.normal.dot(a + b) / 2;
     double width = 0;
@@ -99,8 +100,8 @@ class PieceFinder {
     }
   }
 
-  // The normal and the offset anew from the sets; the width of the gap in standard deviations
-  // within them.
+  // Recomputes the normal and the offset from the sets. Returns the width of the gap in standard
+  // deviations within them.
   double Discriminate(const Rows& rows, Gap& gap) const {
     const Matrix below = particles_(gap.below, Eigen::all);
     const Matrix above = particles_(gap.above, Eigen::all);

@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kAtEdge = 1e-6;  // of the box's width
+constexpr double kAtEdge = 1e-6;  // fraction of the box's width
 
 bool AllUniform(const Prior& prior) {
   return std::ranges::all_of(
@@ -32,7 +32,7 @@ RegularizedMinima::RegularizedMinima(const RegionalExpansion& expansion, const S
 }
 
 std::optional<RegularizedMinimum> RegularizedMinima::At(double regularization) {
-  if (!stop_.Check().ok()) return std::nullopt;  // and the caller will see to it
+  if (!stop_.Check().ok()) return std::nullopt;  // the caller reports the stop
   const Cost cost = expansion_.MakeCost(regularization);
   const MinimizationProblem search = SearchOf(cost, expansion_.design());
   const Minimum best = FindMinima(search, starts_, MinimizerOptions(), stop_).front();
@@ -53,7 +53,7 @@ bool RegularizedMinima::HeldByEdge(const MinimizationProblem& search, const Vect
   SamplingBox(design, lower, upper);
   for (Eigen::Index i = 0; i < eta.size(); ++i) {
     const double near = kAtEdge * (upper[i] - lower[i]);
-    // Ω's own bound has moved the search's.
+    // A bound of Ω inside the box has moved the search's bound; it does not count.
     if (search.lower[i] == lower[i] && eta[i] - lower[i] < near) return true;
     if (search.upper[i] == upper[i] && upper[i] - eta[i] < near) return true;
   }

@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kTold = 0.1;  // of the standard deviation of either alone
+constexpr double kTold = 0.1;  // maximum ratio to the standard deviation of either alone
 
 struct Moments {
   double mean = 0;
@@ -24,7 +24,7 @@ Moments MomentsOf(const Eigen::ArrayXd& values, const Vector& weights) {
 
 struct Power {
   double exponent;
-  const char* before;  // between the two names, and after them
+  const char* before;  // text between the two names, and after them
   const char* after;
 };
 constexpr std::array<Power, 6> kPowers = {{{-1, "/", ""},
@@ -36,7 +36,7 @@ constexpr std::array<Power, 6> kPowers = {{{-1, "/", ""},
 
 struct Candidate {
   TradeOff trade_off;
-  double ratio = kTold;  // to the lesser of the standard deviations alone
+  double ratio = kTold;  // to the smaller of the two standard deviations alone
 };
 
 class Search {
@@ -57,7 +57,7 @@ class Search {
       const double alone_a = MomentsOf(log_a, weights_).std_dev;
       const double alone_b = MomentsOf(log_b, weights_).std_dev;
       for (const Power& power : kPowers) {
-        // In the units of either: log θ_i + q log θ_j, and the same ÷ |q|.
+        // In the units of either parameter: log θ_i + q log θ_j, and this divided by |q|.
         const double known = MomentsOf(log_a + power.exponent * log_b, weights_).std_dev;
         const double ratio = std::max(known / alone_a, known / std::abs(power.exponent) / alone_b);
         if (ratio >= best.ratio) continue;

@@ -8,11 +8,11 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kPhases = 8;  // equal parts of an interval between samples
+constexpr int kPhases = 8;  // number of equal parts of an interval between samples
 
 struct Times {
-  std::vector<double> time_s;  // of every phase of every interval, from t = 0 or the sample before
-  std::vector<int> row;        // of the sample that ends the interval
+  std::vector<double> time_s;  // every phase of every interval; the first begins at t = 0
+  std::vector<int> row;        // row of the sample that ends the interval
 };
 
 Times FineTimes(const RowBlock& beginning) {
@@ -38,7 +38,7 @@ SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
   SamplingInformation information;
   if (beginning.count() == 0 || !problem.streamed_inputs().empty()) return information;
   const Prior& prior = problem.prior();
-  // Scores, so that this parameter moves alone.
+  // Scores are used because with them this parameter can move alone.
   const Vector map_z = prior.ToScores(map_xi);
   const double deviation = prior.GermStandardDeviation()[parameter];
   const double low = std::max(prior.lower()[parameter], map_z[parameter] - 0.5 * deviation);

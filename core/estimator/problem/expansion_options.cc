@@ -41,7 +41,8 @@ absl::Status ExpansionOptions::Validate(int dimension) const {
         absl::StatusCode::kResourceExhausted, "expansion",
         absl::StrFormat("%.0f collocation points are needed; the limit is %d", count, kMaxPoints));
   }
-  // A tensor grid is of the prior alone; a moved expansion has points_per_term points a term.
+  // A tensor grid is used for the prior only; a moved expansion has points_per_term points per
+  // term.
   const double moved = std::ceil(points_per_term * static_cast<double>(terms));
   const double fewest = std::min(count, moved);
   if (adaptive && fewest <= static_cast<double>(terms)) {

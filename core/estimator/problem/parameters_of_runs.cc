@@ -12,7 +12,8 @@
 namespace polyest::internal {
 namespace {
 
-// Between shared parameters, and between those of each run.
+// Returns the correlations between shared parameters, and those between per-run parameters for each
+// run.
 absl::StatusOr<std::vector<Correlation>> CorrelationsOfRuns(
     const std::vector<UncertainParameter>& parameters, const std::vector<Correlation>& correlations,
     int runs) {

@@ -72,7 +72,7 @@ absl::Status ValidatePriors(const Problem& problem) {
   return absl::OkStatus();
 }
 
-// What can be said without looking into the model.
+// Returns the errors that can be found without examining the model.
 std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
   std::vector<absl::Status> refusals;
   const auto add = [&refusals](absl::Status status) {
@@ -105,7 +105,7 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
 
 }  // namespace
 
-// Finds every name of a problem in its model, and collects what is wrong.
+// Resolves every name of a problem in its model, and collects the errors.
 class ResolvedProblem::Resolver {
  public:
   explicit Resolver(ResolvedProblem& resolved)
@@ -148,7 +148,7 @@ class ResolvedProblem::Resolver {
   const Problem& problem_;
   const ModelDescription& model_;
   const SettableQuantities& settable_;
-  std::set<int> signals_;  // inputs that have one
+  std::set<int> signals_;  // inputs that have a signal
   std::vector<bool> has_value_ = std::vector<bool>(static_cast<size_t>(settable_.size()));
   std::vector<absl::Status> refusals_;
 };
@@ -167,7 +167,7 @@ void ResolvedProblem::Resolver::ResolveInputs() {
       continue;
     }
     const absl::StatusOr<InputSignal> signal = InputSignal::Make(input.signal);
-    if (!signal.ok()) continue;  // CheckOptions has said so
+    if (!signal.ok()) continue;  // reported by CheckOptions
     resolved_.base_[settable_.Amplitude(*column)] = signal->default_amplitude();
     if (!signal->streamed()) continue;
     resolved_.streamed_inputs_.push_back(*column);
@@ -194,7 +194,7 @@ bool ResolvedProblem::Resolver::Measured(int output) const {
   return std::count(resolved_.outputs_.begin(), resolved_.outputs_.end(), output) > 0;
 }
 
-// The settable quantity of that name, if setting it makes a difference.
+// Returns the settable quantity of that name, if setting it has an effect.
 std::optional<int> ResolvedProblem::Resolver::Find(const FieldPath& field,
                                                    const std::string& name) {
   const auto index = settable_.Find(name);
@@ -323,8 +323,8 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs)
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   std::vector<absl::Status> refusals = CheckOptions(problem, 1);
   if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
-  // For its names, as the correlations may be wrong. It needs a parameter: if there is none, then
-  // one that no name refers to.
+  // The prior only provides the names, because the correlations may be invalid. It needs at least
+  // one parameter; without any, a placeholder that no name refers to is used.
   Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);
   ResolvedProblem resolved(std::move(problem), std::move(prior), 1);
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
@@ -376,7 +376,7 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   return specification;
 }
 
-// A derived value that is not finite makes the whole point one that fails.
+// A derived value that is not finite makes the whole point fail.
 void ResolvedProblem::Derive(Matrix& values) const {
   Matrix results(values.rows(), std::ssize(derived_targets_));
   derived_->Evaluate(values(Eigen::all, derived_variables_), results);

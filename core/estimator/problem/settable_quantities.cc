@@ -6,7 +6,7 @@
 namespace polyest::internal {
 namespace {
 
-// `block` or, when it is `neutral` throughout, nothing.
+// Returns `block`, or an empty matrix if all its elements are `neutral`.
 Matrix UnlessNeutral(const Matrix& block, double neutral) {
   return (block.array() == neutral).all() ? Matrix() : block;
 }

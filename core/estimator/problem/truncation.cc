@@ -8,7 +8,7 @@ namespace {
 constexpr int kFirstOrder = 3;
 constexpr int kLastOrder = 9;
 constexpr int64_t kAffordableTerms = 500;
-// An expansion that may yet grow should begin well below what is affordable.
+// An expansion whose order may still rise must begin well below the maximum.
 constexpr int64_t kAffordableAtFirst = 250;
 
 }  // namespace
@@ -26,7 +26,7 @@ Truncation FirstTruncation(const ExpansionOptions& options, int dimension) {
 std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
                                          const Truncation& present) {
   if (options.order) return std::nullopt;
-  // One order alone would bring nothing to even or odd functions.
+  // A step of one order adds nothing for even or odd functions, so two are tried first.
   for (const int more : {2, 1}) {
     const Truncation next{present.order + more, present.exponent};
     if (next.order > kLastOrder) continue;

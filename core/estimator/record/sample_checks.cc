@@ -14,12 +14,13 @@
 namespace polyest::internal {
 namespace {
 
-// A sample farther than this from zero, in standard deviations of its noise, is a wrong unit or a
-// wrong noise; its square would drown every other sample's in rounding.
+// Maximum distance of a sample from zero, in standard deviations of its noise. A larger one
+// indicates a wrong unit or a wrong noise, and its square would drown all other samples in rounding
+// errors.
 constexpr double kMaxSignalToNoise = 1e9;
 
-// A refusal that names the place by row and column, as whoever looks at the rows knows it. `field`
-// is within the samples.
+// Returns an error that names the place by row and column, as the user knows it. `field` is
+// relative to the samples.
 template <class... Arguments>
 absl::Status Refusal(const FieldPath& field, const absl::FormatSpec<Arguments...>& format,
                      const Arguments&... arguments) {

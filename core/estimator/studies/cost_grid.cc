@@ -16,10 +16,10 @@
 namespace polyest::internal {
 namespace {
 
-// Grid points run together and sample times advanced at once: bound the memory.
+// Numbers of grid points and of sample times processed at once; they bound the memory.
 constexpr Eigen::Index kPointsAtATime = 1024;
 constexpr size_t kTimesAtATime = 64;
-// An axis without a bound goes this many standard deviations from the mean.
+// Half the range of an axis without a bound, in standard deviations from the mean.
 constexpr double kDeviations = 4;
 
 absl::StatusOr<int> FindUncertain(const Prior& prior, const FieldPath& field,
@@ -31,7 +31,7 @@ absl::StatusOr<int> FindUncertain(const Prior& prior, const FieldPath& field,
                                              name, absl::StrJoin(names, ", ")));
 }
 
-// The uncertain parameters on the axes, by column.
+// Returns the columns of the uncertain parameters on the axes.
 absl::StatusOr<std::vector<int>> ChooseAxes(const Prior& prior, const CostGridOptions& options) {
   if (options.parameters.empty()) {
     return prior.dimension() == 1 ? std::vector<int>{0} : std::vector<int>{0, 1};
@@ -69,7 +69,7 @@ absl::StatusOr<Eigen::Index> ChoosePoints(const CostGridOptions& options, size_t
   return static_cast<Eigen::Index>(points);
 }
 
-// The scores at which everything is held: the prior mean, but for the values given.
+// Returns the scores of the held parameters: those of the prior mean, except for the given values.
 absl::StatusOr<Vector> HeldScores(const Prior& prior, const CostGridOptions& options,
                                   const std::vector<int>& axes) {
   const Vector mean = prior.Mean();
@@ -91,7 +91,7 @@ absl::StatusOr<Vector> HeldScores(const Prior& prior, const CostGridOptions& opt
   return z;
 }
 
-// α² of the total.
+// Returns α² of the total cost.
 absl::StatusOr<double> ChooseRegularization(const Problem& problem,
                                             const CostGridOptions& options) {
   if (options.regularization) {
@@ -105,18 +105,18 @@ absl::StatusOr<double> ChooseRegularization(const Problem& problem,
   return InvalidField("regularization", "must be given for a problem in which a rule chooses it");
 }
 
-// Scores along an axis: over Ω, or mean ± 4 standard deviations where it has no bound.
+// Returns scores along an axis: over Ω, or mean ± 4 standard deviations where Ω has no bound.
 Vector AxisScores(const Germ& germ, Eigen::Index points) {
   const double reach = kDeviations * germ.StandardDeviation();
   const double lower = std::isfinite(germ.Lower()) ? germ.Lower() : germ.Mean() - reach;
   const double upper = std::isfinite(germ.Upper()) ? germ.Upper() : germ.Mean() + reach;
   Vector axis = Vector::LinSpaced(points, lower, upper);
-  axis[points - 1] = upper;  // exactly, so that it lies in Ω
+  axis[points - 1] = upper;  // exact, so the point lies in Ω
   return axis;
 }
 
-// J_mismatch of every row of `thetas`, from runs of the model over the whole record. Outliers are
-// not looked for: there is no estimate to look from.
+// Computes J_mismatch of every row of `thetas` from runs of the model over the whole record.
+// Outliers are not handled, since there is no estimate to judge them by.
 class ModelMismatch {
  public:
   ModelMismatch(const ResolvedProblem& problem, const CheckedSamples& record, int threads)
@@ -141,13 +141,13 @@ class ModelMismatch {
 
  private:
   // With u_k a residual in units of its noise: Σ u_k², Σ (u_k − u_{k−1})² and the last u_k, by
-  // point and channel; samples by channel.
+  // point and channel, and the number of samples by channel.
   struct Sums {
     Matrix chi_squared, differences, previous;
     Vector samples;
   };
 
-  // The rows [first, end) of one run: the model starts anew, with inputs of its own.
+  // Adds the rows [first, end) of one run. The model starts anew, with the run's own inputs.
   absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Sums& sums,
                       const Stop& stop) const {
     sums.previous.setZero();
@@ -207,7 +207,7 @@ class ModelMismatch {
       const NoiseModel& noise = problem_.problem().measured[static_cast<size_t>(c)].noise;
       for (Eigen::Index i = 0; i < mismatch.size(); ++i) {
         const double chi_squared = sums.chi_squared(i, c);
-        // A failed point's later values are no numbers.
+        // The values of a failed point are NaN from its failure on.
         mismatch[i] += std::isfinite(chi_squared)
                            ? NegativeLogLikelihood(sums.samples[c], chi_squared,
                                                    sums.differences(i, c), noise.unknown,
@@ -222,10 +222,10 @@ class ModelMismatch {
   const CheckedSamples& record_;
   int threads_;
   size_t channels_;
-  size_t width_;  // of a row's values: channels, then streamed inputs
+  size_t width_;  // number of values in a row: channels, then streamed inputs
 };
 
-// Where the model could not be run J is +∞, never a value that is not a number.
+// Replaces NaN by +∞, the value of J where the model could not be run.
 Matrix WithoutNotANumber(Matrix values) {
   for (double& value : values.reshaped()) {
     if (std::isnan(value)) value = kInfinity;
@@ -233,7 +233,7 @@ Matrix WithoutNotANumber(Matrix values) {
   return values;
 }
 
-// J of the points of the grid, given by their scores with the first axis running fastest.
+// Fills in J at the points of the grid, given by their scores with the first axis running fastest.
 absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model,
                       const Matrix& scores, CostGrid& grid, const Stop& stop) {
   const Prior& prior = problem.prior();

@@ -18,8 +18,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kReach = 4;        // posterior standard deviations to each side of the minimum
-constexpr double kOffBound = 1e-9;  // kept from a bound of Ω, of its width (or of 1)
+constexpr double kReach = 4;  // in posterior standard deviations to each side of the minimum
+// Distance from a bound of Ω, as a fraction of its width (or of 1).
+constexpr double kOffBound = 1e-9;
 
 class Profiler {
  public:
@@ -45,7 +46,7 @@ class Profiler {
     const Eigen::Index middle =
         std::lower_bound(scores.data(), scores.data() + scores.size(), map_score) - scores.data();
     std::vector<std::optional<Minimum>> found(static_cast<size_t>(points_));
-    // Outwards to either side, each from its neighbour.
+    // The search goes outwards on either side; each point starts from its neighbour.
     for (const int step : {1, -1}) {
       std::vector<Vector> starts = {minima.front().point};
       for (const Minimum& minimum : minima) starts.push_back(minimum.point);
@@ -61,7 +62,7 @@ class Profiler {
   }
 
  private:
-  // Evenly spaced scores over the posterior's width, in Ω and in the box of the search.
+  // Returns evenly spaced scores over the posterior's width, within Ω and the box of the search.
   Vector Scores(int i) const {
     const Prior& prior = cost_.prior();
     const double map =
@@ -120,7 +121,7 @@ class Profiler {
 
 namespace {
 
-// Where a profile goes on at a value between its points; +∞ elsewhere.
+// Returns a profile's total at a value, interpolated between its points; +∞ outside.
 double TotalAt(const CostProfile& profile, double value) {
   const double* const first = profile.value.data();
   const double* const last = first + profile.value.size();
@@ -133,7 +134,7 @@ double TotalAt(const CostProfile& profile, double value) {
   return (1 - part) * profile.total[above - 1] + part * profile.total[above];
 }
 
-// The points of all profiles at which none of the others is lower.
+// Returns the points of all profiles at which no other profile is lower.
 CostProfile LowestOf(const std::vector<CostProfile>& profiles) {
   struct Point {
     size_t profile;

@@ -10,8 +10,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kFarBound = 5;  // standard deviations at which a bound no longer matters
-// Correlations are shortened by this much, so that they are positive definite in spite of rounding:
-// a direction known 10⁻³·⁵ times as well as the parameters is made that much less known.
+// Correlations are reduced by this fraction to remain positive definite in spite of rounding. A
+// direction known 10⁻³·⁵ times as well as the parameters becomes that much less certain.
 constexpr double kShortened = 1e-7;
 
 absl::StatusOr<UncertainParameter> PriorAfter(const UncertainParameter& before,
@@ -39,9 +39,10 @@ void TakeNoise(const Estimate& estimate, std::vector<MeasuredOutput>& measured) 
 absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& problem,
                                                     const Estimate& estimate) {
   const auto n = static_cast<int>(problem.problem().uncertain.size());
-  POLYEST_CHECK(estimate.covariance.rows() >= n);  // those of the first run come first
+  POLYEST_CHECK(estimate.covariance.rows() >= n);  // the parameters of the first run come first
   const Vector std_dev = estimate.covariance.diagonal().cwiseSqrt();
-  // Of a posterior in several pieces the heaviest, whose covariance it is.
+  // For a posterior in several pieces the covariance is that of the heaviest, so its parameters are
+  // used.
   const std::vector<ParameterEstimate>& parameters =
       estimate.components.empty() ? estimate.parameters : estimate.components.front().parameters;
   Problem next = problem.problem();

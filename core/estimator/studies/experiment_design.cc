@@ -18,14 +18,15 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kDraws = 64;  // of the truth
-// Root mean square of the residual, in units of the noise, from which an expansion is reported.
+constexpr int kDraws = 64;  // number of draws of the true value
+// Root mean square of the residual, in units of the noise, above which an expansion is reported as
+// inaccurate.
 constexpr double kInaccurateResidual = 0.5;
 
 // An output that is, or could be, measured.
 struct Candidate {
-  int column;               // of the model's outputs
-  const NoiseModel* noise;  // null: not known
+  int column;               // column of the model's outputs
+  const NoiseModel* noise;  // nullptr if not known
 };
 
 absl::Status CheckNoise(const NoiseModel& noise, const FieldPath& field) {
@@ -37,7 +38,7 @@ absl::Status CheckNoise(const NoiseModel& noise, const FieldPath& field) {
   return absl::OkStatus();
 }
 
-// The problem's channels, then the others that are possible.
+// Returns the problem's channels, then the other possible outputs.
 absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& problem,
                                                       const ExperimentOptions& options) {
   const ModelDescription& model = problem.problem().model->description();
@@ -74,7 +75,7 @@ absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& pro
   return candidates;
 }
 
-// The expansions of all candidates at all times: column k·m + i of output i at time k.
+// The expansions of all candidates at all times; output i at time k is column k·m + i.
 struct ExpandedRecord {
   Matrix coefficients;  // S × (m · times)
   Vector residual_variance;
@@ -96,7 +97,7 @@ absl::StatusOr<ExpandedRecord> Expand(PriorExpansion& expansion, const TimeGrid&
   return record;
 }
 
-// The experiment as each draw of the truth would see it.
+// The samples of the experiment as each draw of the true value predicts them.
 class Outlook {
  public:
   Outlook(const ResolvedProblem& problem, const PriorExpansion& expansion,
@@ -111,10 +112,10 @@ class Outlook {
 
   int times() const { return static_cast<int>(slopes_.front().rows()) / m_; }
   const TruthDraws& draws() const { return draws_; }
-  // Mean of σ² of output i over times and draws.
+  // Returns the mean of σ² of output i over times and draws.
   double NoiseVariance(int i) const { return noise_variance_[i]; }
 
-  // Σ a aᵀ of each draw over all samples of output i.
+  // Returns Σ a aᵀ of each draw over all samples of output i.
   std::vector<Matrix> Information(int i) const {
     std::vector<Matrix> information;
     for (const Matrix& slopes : slopes_) {
@@ -124,7 +125,7 @@ class Outlook {
     return information;
   }
 
-  // a of each draw for the first `count` outputs: times · count × n.
+  // Returns a of each draw for the first `count` outputs, (times · count) × n.
   std::vector<Matrix> Slopes(int count) const {
     std::vector<Matrix> all;
     for (const Matrix& slopes : slopes_) {
@@ -152,7 +153,7 @@ class Outlook {
     return noises;
   }
 
-  // a_k = L ∂y_k/∂ξ /√R_k at the draw.
+  // Adds a_k = L ∂y_k/∂ξ /√R_k at the draw.
   void AddDraw(int draw, const Basis& basis, const std::vector<NoiseModel>& noises,
                const ExpandedRecord& record) {
     Vector phi(basis.size());
@@ -175,7 +176,7 @@ class Outlook {
 
   int m_;
   TruthDraws draws_;
-  std::vector<Matrix> slopes_;  // of each draw, (m · times) × n
+  std::vector<Matrix> slopes_;  // one per draw, (m · times) × n
   Vector noise_variance_;
 };
 
@@ -185,7 +186,7 @@ std::vector<Matrix> Sum(const std::vector<Matrix>& a, const std::vector<Matrix>&
   return sum;
 }
 
-// `planned`: how many of the candidates, from the first on, are to be measured in any case.
+// `planned` is the number of candidates, from the first on, that will be measured in any case.
 absl::Status CompareOutputs(const ResolvedProblem& problem,
                             const std::vector<Candidate>& candidates, const Outlook& outlook,
                             int planned, const Stop& stop, ExperimentDesign& design) {

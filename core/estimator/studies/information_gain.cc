@@ -29,14 +29,15 @@ InformationGain TruthDraws::Expected(const std::vector<Matrix>& information) con
   return gain;
 }
 
-// lower_root: R with R Rᵀ = M.
+// Returns the posterior standard deviations. `lower_root` is R with R Rᵀ = M.
 Vector TruthDraws::StandardDeviation(int draw, const Matrix& lower_root) const {
   // M⁻¹ = R⁻ᵀ R⁻¹ is the posterior covariance of the scaled germs.
   const Matrix inverse_root =
       SolveLower(lower_root, Matrix(Matrix::Identity(mean_.size(), mean_.size())));
   const Matrix root = inverse_root.transpose();
-  // Where data of this truth would put the posterior's centre: (Id − M⁻¹) u beside the prior's, at
-  // the truth itself when they tell all and at the prior's mean when they tell nothing.
+  // The centre of the posterior that data from this true value would give: (Id − M⁻¹) u relative to
+  // the prior's mean. It is the true value for perfect data and the prior's mean for data without
+  // information.
   const Vector u = (xi(draw) - mean_).cwiseQuotient(scale_);
   const Vector centre = mean_ + scale_.asDiagonal() * (u - root * (inverse_root * u));
   const Matrix& F = prior_.factor();

@@ -14,12 +14,12 @@ namespace {
 constexpr int kImportancePoints = 65'536;
 constexpr double kChainEffectiveSize = 60'000;
 constexpr int kMaxSweeps = 2'000;
-// Importance points for each sample given out, so that hardly any is given out twice.
+// Number of importance points for each returned sample; hardly any point is then returned twice.
 constexpr int kPointsPerSample = 4;
 constexpr double kMaxRHat = 1.01;
 constexpr double kMinEffectiveSize = 400;
 
-// −1 when there is none.
+// Returns the index of the parameter, or −1 if there is none of that name.
 int Find(const Prior& prior, const std::string& name) {
   const std::vector<std::string> names = prior.Names();
   const auto found = std::find(names.begin(), names.end(), name);
@@ -47,7 +47,7 @@ absl::Status CheckJoint(const Prior& prior, size_t index,
   return absl::OkStatus();
 }
 
-// By the rules of Vehtari et al. (bayes/convergence.h).
+// Applies the criteria of Vehtari et al. (bayes/convergence.h).
 void AddNotConverged(Posterior& posterior) {
   if (posterior.method != PosteriorMethod::kMarkovChains) return;
   if (posterior.r_hat <= kMaxRHat && posterior.effective_size >= kMinEffectiveSize) return;

@@ -44,7 +44,7 @@ void Describe(const ConstVectorRef& samples, Eigen::Index k, const PropagationOp
   }
 }
 
-// What is read off the expansion of some times.
+// Derives the results at some times from their expansion.
 void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options,
               Propagation& result) {
   const bool sampled = !options.probabilities.empty() || options.density_bins > 0;
@@ -102,7 +102,7 @@ absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
   const TimeGrid grid{options.until_s, options.step_s};
   const auto numbers = static_cast<int64_t>(4 + options.probabilities.size() +
                                             2 * static_cast<size_t>(options.density_bins));
-  // Past this a caller wants another tool, not more memory.
+  // A larger result needs a different tool, not more memory.
   POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(), numbers, kMaxPropagatedValues));
   POLYEST_ASSIGN_OR_RETURN(const auto expansion,
                            PriorExpansion::Make(problem, columns, options.threads));

@@ -7,9 +7,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kMinAddedGain = 1e-9;  // nats: less is rounding
+constexpr double kMinAddedGain = 1e-9;  // in nats: a smaller gain is rounding
 
-// The greedy choice, one time at a time.
+// Makes the greedy choice, one time after the other.
 class SampleTimeChoice {
  public:
   SampleTimeChoice(const std::vector<Matrix>& slopes, int m)
@@ -19,7 +19,7 @@ class SampleTimeChoice {
         covariances_(slopes.size(), Matrix::Identity(slopes.front().cols(), slopes.front().cols())),
         taken_(static_cast<size_t>(times_), false) {}
 
-  // The best time not yet taken, or −1 when none adds anything.
+  // Returns the best time not yet taken, or −1 when none adds information.
   int Best() const {
     int best = -1;
     double most = kMinAddedGain;
@@ -34,7 +34,7 @@ class SampleTimeChoice {
     return best;
   }
 
-  // P ← P − P a aᵀ P/(1 + aᵀ P a) for each of its samples a, P = M⁻¹.
+  // Takes time k: P ← P − P a aᵀ P/(1 + aᵀ P a) for each of its samples a, where P = M⁻¹.
   void Take(int k) {
     taken_[static_cast<size_t>(k)] = true;
     for (size_t d = 0; d < slopes_.size(); ++d) {
@@ -47,7 +47,8 @@ class SampleTimeChoice {
   }
 
  private:
-  // Mean over the draws of ½ log det(Id + A P Aᵀ), A the samples' slopes (m × n), in nats.
+  // Returns the mean over the draws of ½ log det(Id + A P Aᵀ) in nats, where A are the samples'
+  // slopes (m × n).
   double AddedGain(int k) const {
     double sum = 0;
     for (size_t d = 0; d < slopes_.size(); ++d) {

@@ -14,11 +14,11 @@
 namespace polyest::internal {
 namespace {
 
-// What an output varies by, or a residual, is an error of the integration when it is no more than
-// this many times the relative tolerance of the output's largest magnitude.
+// A variation of an output, or a residual, counts as an integration error if it is at most this
+// many times the relative tolerance of the output's largest magnitude.
 constexpr double kIntegrationErrors = 10;
 
-// The terms (S × n, 0 or 1) in which a variable occurs, and those in which it occurs alone.
+// The terms (S × n, 0 or 1) in which each variable occurs, and those in which it occurs alone.
 struct TermMasks {
   explicit TermMasks(const Basis& basis)
       : total((basis.indices() > 0).cast<double>().matrix()), first_order(total) {
@@ -67,7 +67,7 @@ SensitivityAnalysis EmptyAnalysis(const ResolvedProblem& problem, const TimeGrid
 void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
                  SensitivityAnalysis& result) {
   const Matrix squares = expanded.expansion.coefficients().cwiseAbs2();
-  // Σ c_s² over the terms of each variable: columns × n
+  // Σ c_s² over the terms of each variable, columns × n.
   const Matrix first_order = squares.transpose() * masks.first_order;
   const Matrix total = squares.transpose() * masks.total;
   const Vector mean = expanded.expansion.Mean();
@@ -89,7 +89,7 @@ double Accuracy(const ResolvedProblem& problem, const OutputSensitivity& output)
          (output.mean.cwiseAbs() + output.standard_deviation).maxCoeff();
 }
 
-// From Σ c_s² to S_i and T_i.
+// Turns Σ c_s² into S_i and T_i.
 void DivideByVariance(double accuracy, OutputSensitivity& output) {
   for (Eigen::Index k = 0; k < output.mean.size(); ++k) {
     const double deviation = output.standard_deviation[k];
@@ -114,7 +114,8 @@ void TakeNoise(const NoiseModel* given, OutputSensitivity& output) {
   }
 }
 
-// The trapezoidal rule's weights, up to the step; the last interval is as long as the others.
+// Returns the weights of the trapezoidal rule, up to the factor of the step. The last interval is
+// treated as being as long as the others.
 Vector TimeWeights(Eigen::Index times) {
   Vector weights = Vector::Ones(times);
   weights[0] = 0.5;
@@ -122,7 +123,7 @@ Vector TimeWeights(Eigen::Index times) {
   return weights;
 }
 
-// a_i = Σ_o ∫ T_i V/σ_o² dt ÷ Σ_o ∫ V/σ_o² dt
+// Ranks by a_i = Σ_o ∫ T_i V/σ_o² dt ÷ Σ_o ∫ V/σ_o² dt.
 void RankParameters(SensitivityAnalysis& result) {
   const auto times = static_cast<Eigen::Index>(result.time_s.size());
   const auto n = static_cast<Eigen::Index>(result.parameters.size());
@@ -145,7 +146,7 @@ void RankParameters(SensitivityAnalysis& result) {
                    [](const auto& a, const auto& b) { return a.share > b.share; });
 }
 
-// What the expansion leaves unexplained of an output's variance over all of the time.
+// Reports the part of an output's variance over all time that the expansion leaves unexplained.
 void CheckResidual(const OutputSensitivity& output, double accuracy,
                    const std::vector<double>& time_s, std::vector<Diagnostic>& diagnostics) {
   const Vector weights = TimeWeights(output.mean.size());

@@ -1,4 +1,4 @@
-// The studies of a problem as users state it: resolves it and does them.
+// The studies as users call them: each resolves the problem and runs the study.
 
 #include "core/common/status.h"
 #include "core/estimator/problem/resolved_problem.h"
