@@ -28,6 +28,7 @@ struct EstimatorState {
 // computed from them.
 inline constexpr uint32_t kSnapshotVersion = 1;
 
+// Encodes the state of an estimator after `rows` rows of the problem of that fingerprint.
 std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint);
 
 // Decodes a snapshot of `rows` rows. Returns DataLoss for bytes that are truncated, corrupted or

@@ -39,9 +39,10 @@ class WorkerProcess {
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  // Queues a message. A message that has no answer may be followed by one that has; AwaitAnswer
-  // after the latter.
+  // Queues a message. Several messages may be queued before AwaitAnswer.
   void Send(const std::string& message);
+  // Declares that the last queued message has an answer, which Exchange then receives. No other
+  // answer may be awaited.
   void AwaitAnswer();
   bool awaits_answer() const { return awaits_answer_; }
 

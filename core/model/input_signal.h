@@ -19,7 +19,9 @@ class InputSignal {
   // and the rule: "sinusoid: frequencyHz 0 must be finite and above 0".
   static absl::StatusOr<InputSignal> Make(InputSpecification specification);
 
+  // Returns the amplitude of the specification.
   double default_amplitude() const;
+  // Whether the knots arrive with the measurements (StreamedInput).
   bool streamed() const;
   // Returns the specification that the signal was made from, without a table's knots: those are in
   // knot_times_s() and knot_values(), as are the knots of a streamed signal.

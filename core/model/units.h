@@ -31,6 +31,7 @@ absl::StatusOr<Unit> ParseUnit(std::string_view text);
 
 Unit operator*(const Unit& a, const Unit& b);
 Unit operator/(const Unit& a, const Unit& b);
+// Returns the unit raised to a power, which need not be an integer.
 Unit Power(const Unit& unit, double exponent);
 
 // Whether the units agree up to rounding; SameDimension ignores the scale.

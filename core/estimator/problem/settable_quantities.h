@@ -50,8 +50,10 @@ class SettableQuantities {
 
   int size() const { return static_cast<int>(all_.size()); }
   const Settable& operator[](int index) const { return all_[static_cast<size_t>(index)]; }
+  // Returns the index of the quantity of that name, or nothing if there is none.
   std::optional<int> Find(std::string_view name) const;
   std::vector<std::string> Names() const;
+  // Returns the default values, in the order of the quantities.
   Vector Defaults() const;
   // Returns the index of the amplitude of the model's input `column`.
   int Amplitude(int column) const { return parameters_ + 4 * column; }

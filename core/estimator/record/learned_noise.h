@@ -1,6 +1,6 @@
 #pragma once
 
-// What has been learned about the noise from the record so far. Samples are weighed with it, so
+// The noise as learned from the record so far. Samples are weighed with it, so
 // when it changes, the sums must be taken again.
 
 #include <vector>
@@ -17,7 +17,8 @@ struct ChannelNoise {
   bool learned = false;
 };
 
-// Where the posterior was at the last revision; outliers are judged by their residuals there.
+// The position and spread of the posterior at the last revision; outliers are judged by their
+// residuals there.
 struct PosteriorSummary {
   Vector centre;  // ξ (n); empty if not known yet
   Matrix factor;  // F Fᵀ = covariance of ξ, n × n

@@ -26,14 +26,16 @@ class RecordSummary {
     // Returns exp(−Δt/τ), the correlation of successive samples with this noise, at the mean
     // interval.
     double Correlation(const ChannelNoise& noise) const;
+    // Adds the time of a sample: the interval since the sample before, if that is of the same run.
     void AddTime(const SampleRow& row);
   };
 
+  // Adds row `row` of the block, whose samples are those of `channels` channels.
   void Add(const RowBlock& block, int row, int channels);
 
   int64_t rows() const { return rows_; }
-  int64_t samples() const;  // over all channels
-  double time_s() const { return time_s_; }
+  int64_t samples() const;                   // over all channels
+  double time_s() const { return time_s_; }  // of the last row
   // Returns the least ratio over the channels of root mean square noise to largest sample, at most
   // 1. For correlated noise the ratio is that of its innovations. Returns 1 before any sample.
   double NoiseToSignal(const LearnedNoise& noise) const;

@@ -29,12 +29,14 @@ class Whitening {
   // Whitens outputs with `trajectories` rows.
   Whitening(const std::vector<ChannelNoise>& noise, Eigen::Index trajectories);
 
+  // Forgets the previous samples, because correlation does not extend over runs.
   void BeginRun();
   // Whitens rows [first, first + count) of the block in place, in order: the values and the noise
   // of its channels, and the model's outputs (column (row − first)·m + channel). Also scales the
   // noise.
   void Apply(int first, int count, RowBlock& block, MatrixRef outputs);
 
+  // Returns the previous sample of each channel.
   std::vector<PreviousSample> State() const;
   // Restores a state with the same numbers of channels and trajectories.
   void Restore(std::vector<PreviousSample> state);

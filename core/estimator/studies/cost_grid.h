@@ -11,6 +11,8 @@
 
 namespace polyest::internal {
 
+// Does the work of polyest::EvaluateCostGrid (polyest/cost_grid.h) and returns its errors, except
+// those of resolving the problem.
 absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
                                           const CostGridOptions& options, const Stop& stop);
 

@@ -10,6 +10,8 @@
 
 namespace polyest::internal {
 
+// Does the work of polyest::DesignExperiment (polyest/experiment_design.h) and returns its errors,
+// except those of resolving the problem.
 absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem,
                                                   const ExperimentOptions& options,
                                                   const Stop& stop);

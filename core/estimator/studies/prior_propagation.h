@@ -9,6 +9,8 @@
 
 namespace polyest::internal {
 
+// Does the work of polyest::PropagatePrior (polyest/prior_propagation.h) and returns its errors,
+// except those of resolving the problem.
 absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
                                            const PropagationOptions& options, const Stop& stop);
 

@@ -26,7 +26,7 @@ RegularizationPoint Describe(const RegularizedMinimum& minimum, const RegionalEx
     return inverse.transpose() * hessian * inverse;
   };
   const Vector xi = cost.region().ToGerm(minimum.point);
-  // The same degrees of freedom as in an estimate.
+  // An estimate uses these degrees of freedom too.
   const double spent = FittedParameters(to_germ(cost.MismatchHessian(minimum.point)), prior) + 2;
   RegularizationPoint point;
   point.regularization = minimum.regularization;

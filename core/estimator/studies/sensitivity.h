@@ -9,6 +9,8 @@
 
 namespace polyest::internal {
 
+// Does the work of polyest::AnalyzeSensitivity (polyest/sensitivity.h) and returns its errors,
+// except those of resolving the problem.
 absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& problem,
                                                        const SensitivityOptions& options,
                                                        const Stop& stop);

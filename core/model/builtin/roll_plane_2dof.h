@@ -15,10 +15,13 @@
 //
 //   M (ẍ₁ + ẍ₂)/2 + F₁ + F₂ = 0,   I (ẍ₂ − ẍ₁)/L − (L/2) (F₁ − F₂) = 0.
 //
-// The first is equation (58) of the paper. The second differs from the paper, which prints I (ẍ₂ −
-// ẍ₁)/L + F₁ − F₂ = 0. The printed form adds a moment to a force because the arm L/2 is missing,
-// and with its sign the springs would push the bar further over (with k₁ = k₂ = k, roll would grow
-// like exp(t √(k L/I))), so it must be a misprint.
+// The first is equation (58) of the paper. The second differs from the paper, which prints
+//
+//   I (ẍ₂ − ẍ₁)/L + F₁ − F₂ = 0.
+//
+// The printed form adds a moment to a force because the arm L/2 is missing. With its sign the
+// springs would push the bar further over (with k₁ = k₂ = k, roll would grow like exp(t √(k L/I))),
+// so it must be a misprint.
 
 #include <array>
 

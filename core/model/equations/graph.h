@@ -33,8 +33,10 @@ class Graph {
   static constexpr NodeId kZero = 0;
   static constexpr NodeId kOne = 1;
 
+  // Makes a graph of at most `max_nodes` nodes, more than 2. It holds kZero and kOne already.
   explicit Graph(int max_nodes);
 
+  // Each of these returns the node of the expression in its canonical form.
   NodeId Constant(double value);  // `value` must be finite
   NodeId Variable(int index);
   NodeId Apply(Operation operation, NodeId a, NodeId b = -1, NodeId c = -1);
@@ -43,6 +45,7 @@ class Graph {
   // Whether a node was refused because the graph is full. From then on every added expression is
   // kZero.
   bool exhausted() const { return exhausted_; }
+  // Changes the maximum number of nodes.
   void set_most_nodes(int max_nodes) { max_nodes_ = max_nodes; }
 
   int size() const { return static_cast<int>(nodes_.size()); }

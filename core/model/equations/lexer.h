@@ -24,6 +24,8 @@ class Lexer {
   // Reads `text`; errors name `field`. Both must outlive the lexer and its tokens.
   Lexer(const FieldPath& field, std::string_view text) : field_(field), text_(text) {}
 
+  // Returns the next token, kEnd at the end of the text. Returns InvalidArgument with the column if
+  // the text contains no valid token there.
   absl::StatusOr<Token> Next();
 
  private:

@@ -35,8 +35,8 @@ absl::Status CheckGrid(const char* name, const std::vector<double>& grid) {
 // Computes the second derivatives M at the knots of the natural cubic spline through values that
 // are `stride` apart, by elimination of the tridiagonal system
 //
-//   h_{i−1} M_{i−1} + 2 (h_{i−1} + h_i) M_i + h_i M_{i+1} = 6 ((f_{i+1} − f_i)/h_i − (f_i −
-//   f_{i−1})/h_{i−1}),
+//   h_{i−1} M_{i−1} + 2 (h_{i−1} + h_i) M_i + h_i M_{i+1}
+//     = 6 ((f_{i+1} − f_i)/h_i − (f_i − f_{i−1})/h_{i−1}),
 //
 // with M = 0 at both ends.
 void NaturalCurvature(const std::vector<double>& grid, const double* values, size_t stride,

@@ -17,7 +17,7 @@
 
 namespace polyest::internal::equations {
 
-// Where the values of a variable are stored: in a column of one of the blocks, or in the time,
+// The place where the values of a variable are stored: a column of one of the blocks, or the time,
 // which is one value for all rows.
 struct VariablePlace {
   static constexpr int kTime = -1;
