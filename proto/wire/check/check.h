@@ -6,8 +6,9 @@
 
 namespace polyest::internal {
 
-// Tells all that is wrong with a problem and with the measurements for it, as ProblemService does;
-// without an error also what deserves a second look, and what the problem and the data say.
+// Checks a problem and the measurements for it, as ProblemService does. Returns all errors of the
+// problem; if it has none, the first error of its size or of the measurements; if there is none
+// either, the warnings and a summary of the problem and the data.
 v1::CheckProblemResponse CheckProblem(const v1::CheckProblemRequest& request,
                                       const ModelLibrary& models = {},
                                       const ProblemLimits& limits = {});

@@ -11,10 +11,10 @@
 namespace polyest::internal {
 namespace {
 
-// A step this many times the usual one is a gap, and a first row this many usual steps after t = 0
-// makes one wonder.
+// A step longer than this many usual steps is a gap. A first row later than this many usual steps
+// after t = 0 is suspicious.
 constexpr double kGapSteps = 10;
-// A smallest noise this far below the largest makes a few samples outweigh all others.
+// If the smallest noise is below this part of the largest, a few samples outweigh all others.
 constexpr double kNoiseRange = 1e-3;
 
 std::string Counted(int64_t count, const char* what) {
@@ -25,10 +25,10 @@ struct Steps {
   double usual_s = 0;  // the median; 0: there is none
   double shortest_s = 0;
   double longest_s = 0;
-  double longest_after_s = 0;  // where the longest begins
+  double longest_after_s = 0;  // time at which the longest begins
   int gaps = 0;
   int runs = 0;
-  double largest_first_s = 0;  // time of a run's first row
+  double largest_first_s = 0;  // latest time of a run's first row
 };
 
 Steps StepsOf(const std::vector<SampleRow>& rows) {
@@ -58,9 +58,9 @@ Steps StepsOf(const std::vector<SampleRow>& rows) {
   return steps;
 }
 
-// A column of the record as numbers.
+// Values of a column of the record, and their statistics.
 struct Channel {
-  std::vector<double> values;  // without those missing
+  std::vector<double> values;  // without missing ones
   double smallest = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
   double spread = 0;  // standard deviation of the values
@@ -90,8 +90,8 @@ Channel ChannelOf(const CheckedSamples& samples, size_t place, size_t width, siz
   return channel;
 }
 
-// The step that all values are multiples of, as of a converter or of a file with few digits; 0 if
-// there is none.
+// Returns the step of which all differences between values are multiples, such as that of an
+// analogue-to-digital converter or of a file with few digits; 0 if there is none.
 double Resolution(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
@@ -205,7 +205,7 @@ class Summarizer {
       Warn("%s: its noise of at most %g is less than the rounding of its samples, %.2g", name,
            channel.max_noise, rounding);
     }
-    // With a part of the largest so far it is that small only while all is at rest.
+    // Noise with a part relative to the largest value so far is that small only during rest.
     if (measured.noise.relative_to_max == 0 &&
         channel.min_noise < kNoiseRange * channel.max_noise) {
       Warn(

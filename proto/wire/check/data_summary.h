@@ -1,6 +1,6 @@
 #pragma once
 
-// Says in words what a record holds, and what in it deserves a second look.
+// Summarizes a record of measurements in words and warns of suspicious data.
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
 
-// Says in words what a problem asks for.
+// Describes a problem in words.
 
 #include <absl/status/statusor.h>
 
@@ -13,17 +13,18 @@
 
 namespace polyest::internal {
 
-// Returns "uniform on [3, 5] N/m"; the unit left out for a plain number.
+// Returns a text like "uniform on [3, 5] N/m"; without the unit if it is empty or "1".
 std::string DescribePrior(const v1::UncertainParameter& parameter, const std::string& unit);
-// Returns "0.01 m + 1 % of the value + 0.1 % of the largest"
+// Returns a text like "0.01 m + 1 % of the value + 0.1 % of the largest".
 std::string DescribeNoise(const v1::MeasuredOutput::Noise& noise, const std::string& unit);
-// Returns "sinusoid of 3 N at 0.5 Hz", "streamed, cubic"
+// Returns a text like "sinusoid of 3 N at 0.5 Hz" or "streamed, cubic".
 std::string DescribeSignal(const v1::Input& input, const std::string& unit);
 
 using Remarks = std::vector<v1::CheckProblemResponse::Remark>;
 
-// Describes model, unknowns, inputs, measured outputs and the size of the expansion. An error if
-// the problem, though `resolved` from it, has no expansion.
+// Describes the model, the unknowns, their correlations, derived quantities, inputs, measured
+// outputs and the size of the expansion. `resolved` must be made from `problem`. Fails when no
+// expansion can be designed for it.
 absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
                                          const ResolvedProblem& resolved);
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Refusals of what a message may hold and no structure of the core can.
+// Errors for values that a protobuf message can hold, but no structure of the core.
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
@@ -9,7 +9,8 @@
 
 namespace polyest::internal {
 
-// proto3 lets any number through where an enumeration is meant.
+// Returns the error for an enumeration field with a number that is none of its values. proto3
+// accepts any number there.
 inline absl::Status UnknownEnumerator(const FieldPath& field, int value) {
   return InvalidField(field, absl::StrCat(value, " is not one of its values"));
 }

@@ -103,7 +103,7 @@ void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
   }
 }
 
-// A direction's coefficients are over the estimate's parameters, by name.
+// Adds the directions. Their coefficients are keyed by the names of the estimate's parameters.
 void AddDirections(const Estimate& estimate, v1::Estimate& proto) {
   for (const Direction& direction : estimate.directions) {
     v1::Direction& added = *proto.add_directions();

@@ -5,7 +5,7 @@
 
 namespace polyest::internal {
 
-// `sequence` stays 0: batches are the session's, not the core's.
+// Converts an estimate. `sequence` stays 0: only the session knows the numbers of its batches.
 v1::Estimate ToProto(const Estimate& estimate);
 
 v1::Diagnostic ToProto(const Diagnostic& diagnostic);

@@ -4,7 +4,7 @@
 
 namespace polyest::internal {
 
-// The expansion that a study of the core says it has used.
+// Returns order, number of terms and number of points of the expansion that a study has used.
 template <typename Study>
 v1::ExpansionUsed ToExpansionUsed(const Study& study) {
   v1::ExpansionUsed proto;

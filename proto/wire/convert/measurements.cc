@@ -78,7 +78,7 @@ v1::Measurements::Channel& ChannelOf(const std::string& name, v1::Measurements& 
   return added;
 }
 
-// Adds rows without a sample until there are so many.
+// Adds rows without a sample until the channel has `rows` rows.
 void FillUp(int rows, v1::Measurements::Channel& channel) {
   for (int row = channel.values_size(); row < rows; ++row) {
     channel.add_values(0);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Measurements off the wire, as the core understands them.
+// Converts measurements from their protobuf message to the samples of the core.
 
 #include <absl/status/statusor.h>
 
@@ -9,13 +9,14 @@
 
 namespace polyest::internal {
 
-// Checks what the wire format leaves open: that columns are as long as there are rows, that missing
-// rows exist and increase, and that every number is finite. Whether names and times suit the
-// problem is for the estimator to say. INVALID_ARGUMENT names the field, the channel and the row.
+// Converts measurements and checks what the message format leaves open: that each column has one
+// value per row, that missing rows exist and increase, and that every number is finite. The
+// estimator checks whether names and times suit the problem. INVALID_ARGUMENT names the field, the
+// channel and the row.
 absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements);
 
-// Adds the rows of a batch to those of the batches before it. A channel that only some batches have
-// misses its samples in the others.
+// Appends the rows of a batch to those of the batches before it. In the rows of a batch that lacks
+// a channel, the samples of that channel are missing.
 void AppendRows(const v1::Measurements& batch, v1::Measurements& all);
 
 }  // namespace polyest::internal

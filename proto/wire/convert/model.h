@@ -5,7 +5,7 @@
 
 namespace polyest::internal {
 
-// Named `models/{name}`.
+// Converts the description of a model. Its resource name is `models/{name}`.
 v1::Model ToProto(const Model& model);
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Requests and answers of ComputePosterior and ComputeCostProfiles.
+// Converts the requests and the responses of ComputePosterior and ComputeCostProfiles.
 
 #include "core/estimator/studies/cost_profile.h"
 #include "core/estimator/studies/posterior_study.h"
@@ -9,11 +9,12 @@
 namespace polyest::internal {
 
 PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request);
-// options: those used. `sequence` stays 0.
+// Converts a posterior that was computed with `options`. `sequence` stays 0: only the session knows
+// it.
 v1::ComputePosteriorResponse ToProto(const Posterior& posterior, const PosteriorOptions& options);
 
 ProfileOptions ToProfileOptions(const v1::ComputeCostProfilesRequest& request);
-// `sequence` stays 0.
+// Converts cost profiles. `sequence` stays 0: only the session knows it.
 v1::ComputeCostProfilesResponse ToProto(const CostProfiles& profiles);
 
 }  // namespace polyest::internal

@@ -34,10 +34,11 @@ EquationSpecification ToEquations(const v1::Equations& given) {
   return equations;
 }
 
-// All that is wrong with a problem, as far as it is read.
+// Errors found in a problem so far.
 using Refusals = std::vector<absl::Status>;
 
-// The value, or else `instead`, which has nothing wrong with it that the refusal has not said.
+// Returns the value. On an error, adds it to the refusals and returns `instead`, which must not
+// lead to further errors.
 template <typename Value>
 Value ValueOr(absl::StatusOr<Value> value, Value instead, Refusals& refusals) {
   if (value.ok()) return *std::move(value);
@@ -53,14 +54,14 @@ std::shared_ptr<const Model> ToEquationModel(const v1::Equations& given, Refusal
   return nullptr;
 }
 
-// Null if there is none.
+// Returns the model of a problem. On an error, adds it to the refusals and returns null.
 std::shared_ptr<const Model> ToModel(const v1::Problem& problem, const ModelLibrary& models,
                                      Refusals& refusals) {
   switch (problem.model().source_case()) {
     case v1::Problem::Model::kBuiltin: {
       auto model = FindBuiltinModel(problem.model().builtin());
       if (model.ok()) return *std::move(model);
-      // A name that does not exist is here a wrong field of the request, not a missing resource.
+      // Here a name that does not exist is an invalid field of the request, not a missing resource.
       refusals.push_back(InvalidField("model.builtin", model.status().message()));
       return nullptr;
     }
@@ -129,7 +130,7 @@ std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals
   std::vector<UncertainParameter> uncertain;
   for (int i = 0; i < problem.uncertain_size(); ++i) {
     const std::string& name = problem.uncertain(i).name();
-    // Instead of a bad one, half a line, which suits every quantity.
+    // An invalid prior is replaced by one on the positive half-line, which suits every quantity.
     uncertain.push_back(ValueOr(Within({"uncertain", i}, ToPrior(problem.uncertain(i))),
                                 {name, Germ::Gamma(1)}, refusals));
     uncertain.back().per_run = problem.uncertain(i).per_run();
@@ -145,7 +146,8 @@ std::vector<Correlation> ToCorrelations(const v1::Problem& problem) {
   return correlations;
 }
 
-// `path` is that of a table or a streamed signal.
+// Returns the interpolation of the table or streamed signal at `path`; `preset` if none is given.
+// Refuses `hold` together with an interpolation.
 absl::StatusOr<Interpolation> ToInterpolation(bool hold, v1::Input::Interpolation given,
                                               Interpolation preset, const FieldPath& path) {
   if (hold && given != v1::Input::INTERPOLATION_UNSPECIFIED) {
@@ -326,7 +328,7 @@ absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::Regularizat
   }
 }
 
-// The problem as far as it can be understood.
+// Converts a problem as far as possible and adds its errors to the refusals.
 Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& refusals) {
   Problem problem;
   problem.model = ToModel(given, models, refusals);
@@ -359,7 +361,7 @@ std::vector<absl::Status> CheckProblem(const v1::Problem& given, const ModelLibr
   Problem problem = Convert(given, models, refusals);
   const bool has_model = problem.model != nullptr;
   for (absl::Status& refusal : ResolvedProblem::Check(std::move(problem))) {
-    // Why there is no model has been said.
+    // Convert has already reported why there is no model.
     if (!has_model && FieldOf(refusal) == FieldPath("model")) continue;
     refusals.push_back(std::move(refusal));
   }

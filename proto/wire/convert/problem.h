@@ -1,6 +1,7 @@
 #pragma once
 
-// A problem off the wire, or out of a problem file, as the core understands it.
+// Converts a problem from its protobuf message, which a request or a problem file holds, to the
+// problem of the core.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -13,14 +14,14 @@
 
 namespace polyest::internal {
 
-// Fields left out take the defaults that problem.proto names. A message on failure starts with the
-// field's path in the problem file, as in "uncertain[0].uniform: lower 5 must be below upper 3".
-// A built-in model or an FMU is looked for in `models`.
+// Converts a problem and resolves it. Fields left out take the defaults that problem.proto names.
+// An error message starts with the field's path in the problem file, as in
+// "uncertain[0].uniform: lower 5 must be below upper 3". FMUs are looked up in `models`.
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem,
                                           const ModelLibrary& models = {});
 
-// All that ToProblem has to say against it, not only the first; when the model cannot be had, what
-// can be said without it. Empty: nothing.
+// Returns all errors that ToProblem would find, not only the first; none for a valid problem. When
+// the model is not available, returns the errors that can be found without it.
 std::vector<absl::Status> CheckProblem(const v1::Problem& problem, const ModelLibrary& models = {});
 
 }  // namespace polyest::internal

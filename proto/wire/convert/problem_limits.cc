@@ -14,7 +14,7 @@
 namespace polyest::internal {
 namespace {
 
-// The most collocation points of an expansion, whose order may go up.
+// Returns the largest number of collocation points that an expansion may have as its order rises.
 double MaxPointsOf(const ExpansionOptions& options, int dimension) {
   Truncation truncation = FirstTruncation(options, dimension);
   double most =
@@ -61,7 +61,7 @@ absl::Status CheckRuns(const ProblemLimits& limits, const ResolvedProblem& probl
                        const v1::Measurements& batch) {
   if (!problem.per_run() || batch.run().empty()) return absl::OkStatus();
   const int last = *std::max_element(batch.run().begin(), batch.run().end());
-  // What else there is against a run, the estimator says better: it knows the row.
+  // The estimator reports other errors of a run more precisely: it knows the row.
   if (last < problem.runs() || last >= problem.max_runs()) return absl::OkStatus();
   const auto with_runs = problem.WithRuns(last + 1);
   return with_runs.ok() ? CheckLimits(limits, *with_runs) : absl::OkStatus();

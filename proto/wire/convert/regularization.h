@@ -1,6 +1,6 @@
 #pragma once
 
-// Request and answer of ComputeRegularizationSweep.
+// Converts the request and the response of ComputeRegularizationSweep.
 
 #include "core/estimator/studies/regularization_sweep.h"
 #include "polyest/v1/study_service.pb.h"
@@ -8,7 +8,7 @@
 namespace polyest::internal {
 
 RegularizationOptions ToRegularizationOptions(const v1::ComputeRegularizationSweepRequest& request);
-// `sequence` stays 0.
+// Converts a sweep. `sequence` stays 0: only the session knows it.
 v1::ComputeRegularizationSweepResponse ToProto(const RegularizationSweep& sweep);
 
 }  // namespace polyest::internal

@@ -13,7 +13,7 @@ void Append(const Vector& values, Doubles& added) {
   added.Add(values.data(), values.data() + values.size());
 }
 
-// Row-major, whatever the matrix is.
+// Appends a matrix in row-major order, whatever its storage order.
 void Append(const Matrix& values, Doubles& added) {
   added.Reserve(static_cast<int>(values.size()));
   for (Eigen::Index row = 0; row < values.rows(); ++row) {

@@ -13,9 +13,9 @@ namespace {
 
 using Names = std::map<std::string, std::string>;
 
-// Where the wire's name is another one than the core's in camel case: in a request itself, where
-// counts are named as such, and in measurements. Structures inside of a request, such as
-// `expansion.points`, have the core's names.
+// Fields whose JSON name is not the core's name in camel case. They are fields of a request itself,
+// where the names of counts end in "Count", and fields of measurements. Structures inside of a
+// request, such as `expansion.points`, have the core's names.
 const Names kNamesOfRequests{{"density_bins", "densityBinCount"},
                              {"grid_points", "pointCount"},
                              {"joint_bins", "jointBinCount"},

@@ -8,8 +8,8 @@
 
 namespace polyest::internal {
 
-// The id in `name`; INVALID_ARGUMENT, naming `field`, when it is no name in `collection`. Whether
-// the resource exists is another question.
+// Returns the id in `name`. Refuses a name that is not of the form `{collection}/{id}` with
+// INVALID_ARGUMENT, naming `field`. Does not check whether the resource exists.
 absl::StatusOr<std::string> ResourceId(const std::string& field, const std::string& collection,
                                        const std::string& name);
 

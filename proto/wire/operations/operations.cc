@@ -28,7 +28,8 @@
 namespace polyest::internal {
 namespace {
 
-// The experiment of a request. What a session is belongs to a daemon: it answers those itself.
+// Returns the experiment of a request. Refuses a session: only a daemon has sessions, and it
+// handles them itself.
 absl::StatusOr<const v1::Experiment*> ExperimentOf(const v1::Subject& subject) {
   if (subject.has_experiment()) return &subject.experiment();
   if (subject.has_session()) {
@@ -38,7 +39,7 @@ absl::StatusOr<const v1::Experiment*> ExperimentOf(const v1::Subject& subject) {
   return InvalidField("subject", "must be given: a session, or an experiment with its problem");
 }
 
-// An estimator of an experiment that holds all its measurements, not yet processed.
+// Returns an estimator that holds all measurements of an experiment, none of them processed yet.
 absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const v1::Experiment& experiment, int threads,
                                                    const ModelLibrary& models,
                                                    const ProblemLimits& limits,
@@ -56,7 +57,7 @@ absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const v1::Experiment& experim
   return estimator;
 }
 
-// What the measurements of an experiment have told, if there are any.
+// Returns the estimate from the measurements of an experiment; none if it has no measurements.
 absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::Experiment& experiment, int threads,
                                                       const Stop& stop, const ModelLibrary& models,
                                                       const ProblemLimits& limits) {
@@ -66,7 +67,8 @@ absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::Experiment& expe
   return estimator->CurrentEstimate(stop);
 }
 
-// The next experiment with the inputs of a candidate.
+// Returns the problem of the next experiment: the given problem with the inputs of a candidate and,
+// if there is an estimate, with that as its prior.
 absl::StatusOr<ResolvedProblem> NextExperiment(
     const v1::Problem& given, const v1::ComputeExperimentDesignRequest::Candidate& candidate,
     const std::optional<Estimate>& known, const ModelLibrary& models, const ProblemLimits& limits) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// The rules of paging that every list shares.
+// Rules of paging that all lists share.
 
 #include <absl/status/statusor.h>
 #include <absl/strings/str_cat.h>
@@ -16,7 +16,8 @@ namespace polyest::internal {
 inline constexpr int kDefaultPageSize = 50;
 inline constexpr int kLargestPageSize = 200;
 
-// The number of entries that a page may have, at least 1.
+// Returns the number of entries that a page may have: `requested`, but at most kLargestPageSize;
+// kDefaultPageSize for 0. Refuses a negative number with INVALID_ARGUMENT.
 inline absl::StatusOr<size_t> PageSize(int requested) {
   if (requested < 0) {
     return InvalidField("pageSize", absl::StrCat(requested, " must not be negative"));
@@ -25,6 +26,7 @@ inline absl::StatusOr<size_t> PageSize(int requested) {
   return static_cast<size_t>(std::min(requested, kLargestPageSize));
 }
 
+// Returns the error for a token that does not belong to a page.
 inline absl::Status UnknownPageToken(absl::string_view token) {
   return InvalidField("pageToken",
                       absl::StrCat("\"", token, "\" is not the nextPageToken of a page"));

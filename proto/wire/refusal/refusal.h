@@ -1,7 +1,7 @@
 #pragma once
 
-// What a status says to programs beside its code: why, which limit was passed, and whether trying
-// again later may help. It travels with the status and is not part of its message.
+// Details of an error status for programs: its reason, the limit that was exceeded, and whether
+// trying again later may help. They travel with the status and are not part of its message.
 
 #include <absl/status/status.h>
 #include <absl/strings/string_view.h>
@@ -16,8 +16,8 @@ struct Refusal {
   bool operator==(const Refusal&) const = default;
 
   std::string reason;   // UPPER_SNAKE_CASE, one of those below
-  std::string limit{};  // the option that sets it, "--max-sessions"; empty: none does
-  // After which the same may be tried again; none: waiting does not help.
+  std::string limit{};  // the option that sets the limit, "--max-sessions"; empty: no option does
+  // Time after which the request may be tried again; none: waiting does not help.
   std::optional<std::chrono::milliseconds> retry_delay{};
 };
 
@@ -27,11 +27,11 @@ inline constexpr char kBusy[] = "BUSY";
 inline constexpr char kOutOfMemory[] = "OUT_OF_MEMORY";
 inline constexpr char kShuttingDown[] = "SHUTTING_DOWN";
 
-// A status of this code, not OK, that says so.
+// Returns a status with these details. `code` must not be OK and the reason must not be empty.
 absl::Status Refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);
-// RESOURCE_EXHAUSTED by a limit that waiting does not change.
+// Returns RESOURCE_EXHAUSTED for a limit that is still exceeded after waiting.
 absl::Status LimitExceeded(absl::string_view limit, absl::string_view message);
-// None when it says nothing.
+// Returns the details of a status; none if it has no reason.
 std::optional<Refusal> RefusalOf(const absl::Status& status);
 
 }  // namespace polyest::internal

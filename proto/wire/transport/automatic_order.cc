@@ -9,12 +9,12 @@ namespace {
 constexpr absl::string_view kAutomatic = "\"AUTO\"";
 constexpr absl::string_view kNull = "null  ";
 
-// Walks through JSON and knows at each string in which members of which objects it is.
+// Walks through JSON text and keeps track of the objects and members around each string.
 class Walk {
  public:
   explicit Walk(absl::string_view json) : json_(json) {}
 
-  // Returns where the value "AUTO" of expansion.order begins; npos: it is not there.
+  // Returns the position of the value "AUTO" of expansion.order; npos if it is not there.
   size_t Find() {
     for (size_t at = 0; at < json_.size();) {
       const char c = json_[at];
@@ -42,7 +42,7 @@ class Walk {
     absl::string_view name;  // of the member, with its quotes
   };
 
-  // Just after the string that begins at `at`.
+  // Returns the position just after the string that begins at `at`; npos if it does not end.
   size_t EndOfString(size_t at) const {
     for (size_t i = at + 1; i < json_.size(); ++i) {
       if (json_[i] == '\\') {

@@ -7,9 +7,9 @@
 namespace polyest::internal {
 
 // Returns the text of a problem file with the word "AUTO" of `expansion.order` replaced by null.
-// That is what the field without a value means, and protobuf's JSON knows no words for numbers. All
-// other characters keep their places. Text that is not JSON is returned as it is, for the parser to
-// refuse.
+// A field without a value means the automatic order, and protobuf's JSON parser accepts no word for
+// a number. All other characters keep their positions. Text that is not JSON is returned unchanged,
+// so that the parser refuses it.
 std::string WithoutAutomaticOrder(absl::string_view json);
 
 }  // namespace polyest::internal

@@ -6,8 +6,8 @@
 
 namespace polyest::internal {
 
-// All of a file of at most 16 MiB. NOT_FOUND, naming the file and the reason, when it cannot be
-// read.
+// Returns the content of a file. NOT_FOUND, naming the file and the reason, when it cannot be read
+// or is longer than 16 MiB.
 absl::StatusOr<std::string> ReadFileText(const std::string& file);
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which addresses stay on this machine.
+// Recognizes addresses that stay on this machine.
 
 #include <string>
 
