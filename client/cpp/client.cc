@@ -24,7 +24,7 @@ bool Unpack(const google::protobuf::Any& any, Detail& detail) {
          detail.ParseFromString(any.value());
 }
 
-// Returns what the details of a status say; an empty refusal without a reason.
+// Returns the refusal in the details of a status; an empty one if they name no reason.
 Refusal RefusalIn(const rpc::Status& detailed) {
   Refusal refusal;
   rpc::ErrorInfo info;
@@ -42,7 +42,7 @@ Refusal RefusalIn(const rpc::Status& detailed) {
   return refusal;
 }
 
-// The field that the details of a status refuse; empty: none.
+// Returns the field that the details of a status refuse; an empty string if there is none.
 std::string RefusedField(const rpc::Status& detailed) {
   rpc::BadRequest bad;
   for (const google::protobuf::Any& detail : detailed.details()) {
@@ -56,14 +56,14 @@ std::string RefusedField(const rpc::Status& detailed) {
 }  // namespace
 
 absl::Status FromGrpc(const grpc::Status& status) {
-  // The codes of both are the same numbers.
+  // gRPC and Abseil use the same numbers for their codes.
   const auto code = static_cast<absl::StatusCode>(status.error_code());
   rpc::Status detailed;
   if (status.ok() || !grpc::ExtractErrorDetails(status, &detailed).ok()) {
     return absl::Status(code, status.error_message());
   }
   const std::string field = RefusedField(detailed);
-  // The daemon's message begins with the field already, where it is to be seen.
+  // The daemon's message already begins with the field if users are to see it.
   if (!field.empty()) return NamedInWords(field, absl::Status(code, status.error_message()));
   const Refusal refusal = RefusalIn(detailed);
   if (refusal.reason.empty()) return absl::Status(code, status.error_message());
@@ -266,7 +266,7 @@ absl::StatusOr<v1::Session> Client::ImportSession(
     }
     if (!record->has_value()) break;
     *request.mutable_record() = **std::move(record);
-    if (!writer->Write(request)) break;  // refused: Finish says why
+    if (!writer->Write(request)) break;  // the daemon refused it: Finish returns the reason
   }
   writer->WritesDone();
   const grpc::Status status = writer->Finish();

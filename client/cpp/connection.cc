@@ -30,9 +30,9 @@ grpc::ChannelArguments Arguments(const ClientOptions& options) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   arguments.SetMaxReceiveMessageSize(options.max_response_bytes);
-  // A connection of its own, which others cannot block.
+  // The channel has a connection of its own, which other channels cannot block.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // A stream that reconnects has delays of its own; the channel's must not outlast them.
+  // A stream that reconnects has its own delays; those of the channel must not be longer.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5'000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1'000);
@@ -62,7 +62,7 @@ absl::StatusOr<std::string> ReadToken(const ClientOptions& options) {
           absl::StrCat("token file: ", options.token_file, " is empty"));
     }
   }
-  // Anything else would break the header, and gRPC takes that for a programmer's error.
+  // Other characters would make an invalid header, which gRPC treats as a programming error.
   if (!std::all_of(token.begin(), token.end(),
                    [](unsigned char c) { return absl::ascii_isgraph(c); })) {
     return absl::InvalidArgumentError("token: must be one word of printable ASCII characters");
@@ -82,8 +82,8 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Clie
   return grpc::SslCredentials(options);
 }
 
-// What may be wrong where no connection came about, by what gRPC and the TLS library say of it.
-// They say it in words only.
+// Returns a hint at why no connection could be made; an empty string if there is none. gRPC and the
+// TLS library report the reason only in the words of the message.
 std::string ConnectionHint(absl::string_view message, const std::optional<ClientTls>& tls) {
   const auto says = [&](absl::string_view words) {
     return absl::StrContains(absl::AsciiStrToLower(message), absl::AsciiStrToLower(words));
@@ -126,7 +126,7 @@ absl::Status WithConnectionHint(const absl::Status& status, const std::optional<
   return hint.empty() ? status : absl::UnavailableError(absl::StrCat(status.message(), "; ", hint));
 }
 
-// Any thread may call it.
+// Any thread may call Current.
 class DaemonConnection::TokenSource {
  public:
   TokenSource(const ClientOptions& options, std::string token)
@@ -165,7 +165,7 @@ absl::StatusOr<DaemonConnection> DaemonConnection::Open(const std::string& serve
       return absl::InvalidArgumentError(absl::StrCat(
           "token: ", server, " is beyond loopback, where a token goes over TLS only (--tls-ca)"));
     }
-    // A proxy would be told the token, too.
+    // An HTTP proxy would see the token.
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   }
   return DaemonConnection(grpc::CreateCustomChannel(server, credentials, arguments),

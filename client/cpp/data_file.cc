@@ -25,10 +25,10 @@ using namespace internal;
 
 namespace {
 
-// Longer lines are refused: a file without line ends must not be read into memory whole.
+// Longer lines are refused, so that a file without line ends is not read into memory whole.
 constexpr std::streamsize kMaxLineBytes = 1 << 16;
 
-// Quotes as much of a cell as a message can show.
+// Quotes a cell for a message; a long one is cut.
 std::string Quoted(absl::string_view cell) {
   constexpr size_t kMaxShown = 40;
   return absl::StrCat("\"", cell.substr(0, kMaxShown), cell.size() > kMaxShown ? "…" : "", "\"");
@@ -101,7 +101,7 @@ absl::StatusOr<DataReader> DataReader::Open(std::istream& in, std::string name,
     const absl::string_view column = absl::StripAsciiWhitespace(cell);
     absl::Status added = reader.AddColumn(column, columns);
     if (added.ok()) continue;
-    // Without a time, no row can be understood.
+    // Without a time column, no row can be read.
     if (reader.columns_.empty()) return added;
     POLYEST_RETURN_IF_ERROR(refused(std::move(added)));
     reader.columns_.push_back({std::string(column), Role::kRefused, -1});
@@ -122,7 +122,7 @@ absl::Status DataReader::AddColumn(absl::string_view name, const DataColumns& kn
   }
   Column column{std::string(name), Role::kTime, -1};
   if (name == "t") {
-    // Its role stands.
+    // The column has the role kTime already.
   } else if (Contains(known.measured, name)) {
     column.role = Role::kMeasured;
     column.channel = channels_++;
@@ -179,7 +179,7 @@ absl::StatusOr<v1::Measurements> DataReader::Read(int64_t max_rows, RefusedLine 
   return batch;
 }
 
-// Takes a row whole or not at all.
+// Adds a row to the batch. On an error, the batch and the present time and run stay unchanged.
 absl::Status DataReader::ParseRow(absl::string_view line, v1::Measurements& batch) {
   const int32_t previous_run = run_;
   previous_time_s_ = time_s_;

@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-// Limits how much of a file is looked at.
+// Number of bytes of a file that are examined.
 constexpr std::streamsize kMaxBeginning = 4096;
 
 }  // namespace

@@ -1,7 +1,7 @@
 #pragma once
 
-// Tells a problem file from a data file by how it begins, so that one given for the other is named
-// as such.
+// Tells problem files from data files by their beginning, so that a message can say that one was
+// given for the other.
 
 #include <absl/strings/string_view.h>
 
@@ -12,11 +12,11 @@ namespace polyest::internal {
 enum class FileKind { kUnknown, kJson, kCsv };
 
 // Returns kJson for text that begins with an object or an array, and kCsv for text whose first line
-// is several cells or the name of the first column, `t`. Blank space and a byte order mark before
-// it do not count.
+// consists of several cells or is the name of the first column, `t`. Ignores white space and a byte
+// order mark at the beginning.
 FileKind KindOfText(absl::string_view text);
 
-// Returns the kind of a file; kUnknown for one that cannot be read.
+// Returns the kind of a file by its first 4 KiB; kUnknown if it cannot be read.
 FileKind KindOfFile(const std::string& path);
 
 }  // namespace polyest::internal

@@ -25,14 +25,14 @@ std::string RandomId() {
   return id;
 }
 
-// Returns whether a new connection may help: the daemon is away, or has cut its calls off on its
-// way out.
+// Returns whether a new connection may help: the daemon cannot be reached, or it has cancelled its
+// calls while shutting down.
 bool IsBreak(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsCancelled(status);
 }
 
-// Returns how long to wait where waiting helps, although the daemon answers: its disk is full, it
-// is busy.
+// Returns the delay that a daemon asks for when it responds but has no room for batches, because
+// its disk is full or it is busy; none for any other error.
 std::optional<std::chrono::milliseconds> DelayOfRefusal(const absl::Status& status) {
   if (!absl::IsResourceExhausted(status)) return std::nullopt;
   const std::optional<Refusal> refusal = RefusalOf(status);
@@ -41,16 +41,17 @@ std::optional<std::chrono::milliseconds> DelayOfRefusal(const absl::Status& stat
 
 }  // namespace
 
-// One connection. The stream's mutex guards it; it never touches itself after OnDone has let go of
-// that, so the stream may then delete it. There is always a read under way until `ended`, which
-// keeps the call alive while the stream starts writes from outside a reaction.
+// One connection, guarded by the stream's mutex. It does not access its own members after OnDone
+// has released the mutex, so the stream may delete it then. A read is always pending until `ended_`
+// is set; it keeps the call alive while the stream starts writes from outside a reaction.
 class MeasurementStream::Connection
     : public grpc::ClientBidiReactor<v1::StreamMeasurementsRequest,
                                      v1::StreamMeasurementsResponse> {
  public:
   explicit Connection(MeasurementStream& stream) : stream_(stream) {}
 
-  // The first message: names the session and says how often estimates are wanted.
+  // Starts the call and sends the first message, which names the session, the writer and the policy
+  // for estimates.
   void Start() {
     auto hello = std::make_shared<v1::StreamMeasurementsRequest>();
     hello->set_session(stream_.session_);
@@ -67,7 +68,7 @@ class MeasurementStream::Connection
   bool writable() const { return !writing_ && !ended_ && !half_closed_; }
   bool done() const { return status_.has_value(); }
   const absl::Status& status() const { return *status_; }
-  // Returns whether the client would be known by another token now.
+  // Returns whether the token has changed since the connection was started.
   bool Outdated() const { return authorization_ != stream_.client_.Authorization(); }
 
   void Write(std::shared_ptr<const v1::StreamMeasurementsRequest> request) {
@@ -106,7 +107,7 @@ class MeasurementStream::Connection
   grpc::ClientContext context_;
   std::string authorization_;
   v1::StreamMeasurementsResponse response_;
-  std::shared_ptr<const v1::StreamMeasurementsRequest> writing_;  // gRPC's until OnWriteDone
+  std::shared_ptr<const v1::StreamMeasurementsRequest> writing_;  // in use until OnWriteDone
   bool ended_ = false;
   bool half_closed_ = false;
   std::optional<absl::Status> status_;
@@ -137,7 +138,8 @@ bool MeasurementStream::Wait(std::chrono::milliseconds delay) const {
   return true;
 }
 
-// Locked: once batches are acknowledged again after a refusal.
+// Reports that the daemon takes batches again, once one is acknowledged after a refusal. The lock
+// is held on entry and exit.
 void MeasurementStream::TellOfRoom(Lock& lock) {
   if (refusals_ > 0 || !std::exchange(told_of_refusal_, false)) return;
   lock.unlock();
@@ -149,7 +151,8 @@ void MeasurementStream::Tell(const std::string& sentence) const {
   if (callbacks_.connection) callbacks_.connection(sentence);
 }
 
-// Writes the next batch, or half-closes after the last, if the connection is free. Locked.
+// Writes the next batch, or half-closes the connection after the last one, if no write is pending.
+// The caller holds the lock.
 void MeasurementStream::Write() {
   if (!connection_ || !connection_->writable()) return;
   if (written_ < pending_.size()) {
@@ -182,7 +185,9 @@ void MeasurementStream::Take(const v1::StreamMeasurementsResponse& response) {
   }
 }
 
-// Locked, and no connection under way.
+// Forgets the batches up to `sequence`, the session's last, before a new connection is made. Fails
+// if the session has batches of another client or has lost acknowledged ones. The caller holds the
+// lock.
 absl::Status MeasurementStream::ForgetAcknowledged(int64_t sequence) {
   const int64_t first = last_sequence_ - static_cast<int64_t>(pending_.size()) + 1;
   if (sequence > last_sequence_) {
@@ -222,19 +227,20 @@ absl::Status MeasurementStream::Open() {
   return ConnectAgain(lock, status);
 }
 
-// Locked.
+// Returns whether another attempt to connect may help after `status`. The caller holds the lock.
 bool MeasurementStream::MayRecover(const absl::Status& status) const {
   if (IsBreak(status)) return attempts_ < options_.max_attempts;
   // After a break the daemon may still hold the old connection as the session's writer.
   if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.max_attempts;
-  // The daemon may have the new one a moment later.
+  // The token was replaced; the daemon may accept the new one a moment later.
   if (absl::IsUnauthenticated(status)) {
     return attempts_ < options_.max_attempts && connection_ && connection_->Outdated();
   }
   return DelayOfRefusal(status).has_value();
 }
 
-// Locked, for what may be recovered from: what has happened, in words.
+// Counts an attempt or a refusal after `status`, for which MayRecover is true, and returns in words
+// what has happened. The caller holds the lock.
 std::string MeasurementStream::CountAttempt(const absl::Status& status) {
   if (DelayOfRefusal(status)) {
     ++refusals_;
@@ -247,8 +253,8 @@ std::string MeasurementStream::CountAttempt(const absl::Status& status) {
   return connection_ ? "connection lost" : "no connection";
 }
 
-// Locked, with a connection that is done or none yet: connects after what has just failed, for as
-// long as that may help.
+// Connects again after `status`, for as long as MayRecover is true, and returns the last status.
+// The connection is done or does not exist yet. The lock is held on entry and exit.
 absl::Status MeasurementStream::ConnectAgain(Lock& lock, absl::Status status) {
   while (MayRecover(status)) {
     const int before = std::min(attempts_ + refusals_, 20);
@@ -269,7 +275,8 @@ absl::Status MeasurementStream::ConnectAgain(Lock& lock, absl::Status status) {
   return status;
 }
 
-// Locked, with a connection that is done: connects again or says why not.
+// Connects again after the connection is done, or returns the reason why that is not possible. The
+// lock is held on entry and exit.
 absl::Status MeasurementStream::Recover(Lock& lock) {
   const absl::Status lost = connection_->status();
   if (lost.ok()) return absl::InternalError("the daemon ended the stream before its end");

@@ -29,8 +29,8 @@ namespace {
 constexpr size_t kMaxFileBytes = size_t{16} << 20;
 
 // Returns the line of a syntax error, or 0 when it is not known. The parser's message has three
-// parts: what is wrong, the text around it, and a caret under the place. Where that text occurs
-// once, it tells the line.
+// parts: the error, the text around it, and a caret under the position. The line is known if that
+// text occurs only once.
 int64_t LineOf(absl::string_view json, absl::string_view message) {
   const size_t first = message.find('\n');
   const size_t last = message.rfind('\n');
@@ -67,7 +67,7 @@ absl::Status ParseError(absl::string_view json, absl::string_view name, absl::st
   return absl::InvalidArgumentError(absl::StrCat(name, ":", line, ": ", what));
 }
 
-// Names all of them in one line.
+// Returns an error that names all unknown fields in one line.
 absl::Status UnknownFieldsError(absl::string_view name, const std::vector<UnknownField>& fields) {
   const auto note = [](const UnknownField& field, const char* before, const char* after) {
     return field.suggestion.empty() ? "" : absl::StrCat(before, field.suggestion, after);

@@ -34,9 +34,9 @@ std::vector<std::string> FieldNames(const Descriptor& message) {
 class Walker {
  public:
   void Walk(const Struct& object, const Descriptor& message, const std::string& prefix) {
-    // Durations and the like have a JSON form of their own.
+    // Messages such as Duration have a special JSON form.
     if (absl::StartsWith(message.full_name(), "google.protobuf.")) return;
-    // Protobuf's maps have no order.
+    // A protobuf map has no order; std::map gives the fields one.
     const std::map<std::string, Value> fields(object.fields().begin(), object.fields().end());
     for (const auto& [name, value] : fields) {
       const std::string path = prefix.empty() ? name : absl::StrCat(prefix, ".", name);
@@ -68,7 +68,7 @@ class Walker {
     }
   }
 
-  // The keys are the user's own names.
+  // Checks the values of a map only: its keys are names chosen by the user.
   void WalkMap(const Value& value, const FieldDescriptor& field, const std::string& path) {
     const std::map<std::string, Value> entries(value.struct_value().fields().begin(),
                                                value.struct_value().fields().end());

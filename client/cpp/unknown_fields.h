@@ -1,6 +1,6 @@
 #pragma once
 
-// The fields of a JSON text that its message does not have: all of them, where protobuf's parser
+// Finds all fields of a JSON text that its protobuf message does not have. Protobuf's own parser
 // stops at the first.
 
 #include <absl/strings/string_view.h>
@@ -16,8 +16,8 @@ struct UnknownField {
   std::string suggestion;  // `did you mean "uniform"?`, or "there are lower, upper"; may be empty
 };
 
-// Returns the fields in the order of their paths; none for a text that is not one JSON object.
-// Values of the wrong type are passed over: the parser reports them.
+// Returns the fields in the order of their paths; none if the text is not one JSON object. Skips
+// values of the wrong type: the parser reports them.
 std::vector<UnknownField> FindUnknownFields(absl::string_view json,
                                             const google::protobuf::Descriptor& message);
 

@@ -20,13 +20,13 @@
 
 namespace polyest {
 
-// Returns a gRPC status as the same absl::Status, with the Refusal (proto/wire/refusal) in its
-// details.
+// Converts a gRPC status to an absl::Status of the same code and message. The Refusal
+// (proto/wire/refusal) or the field in its details is kept.
 absl::Status FromGrpc(const grpc::Status& status);
 
-// Threads may share a client. Every function fails with the daemon's status; UNAVAILABLE when the
-// daemon cannot be reached, DEADLINE_EXCEEDED when it did not answer in time; as
-// DaemonConnection::Open when the options cannot be used.
+// Calls a daemon. Threads may share a client. Every function fails with the daemon's status, with
+// UNAVAILABLE when the daemon cannot be reached, with DEADLINE_EXCEEDED when it did not answer in
+// time, and with the error of DaemonConnection::Open when the options cannot be used.
 class Client {
  public:
   // `server` is HOST:PORT. Connects on the first call.
@@ -36,30 +36,30 @@ class Client {
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request);
   // Returns one model.
   absl::StatusOr<v1::Model> GetModel(const v1::GetModelRequest& request);
-  // Returns all that is wrong with a problem.
+  // Returns all errors of a problem; if it has none, its warnings and a summary.
   absl::StatusOr<v1::CheckProblemResponse> CheckProblem(const v1::CheckProblemRequest& request);
   // Returns the JSON schema of problem files.
   absl::StatusOr<v1::GetProblemSchemaResponse> GetProblemSchema(
       const v1::GetProblemSchemaRequest& request);
-  // Estimates from a problem and all of its measurements.
+  // Estimates the parameters of a problem from all of its measurements.
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
       const v1::ComputeEstimateRequest& request);
-  // Returns what the prior predicts of the outputs over time.
+  // Returns the outputs over time that the prior predicts.
   absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
       const v1::ComputePropagationRequest& request);
   // Returns the cost over one or two parameters.
   absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
       const v1::ComputeCostGridRequest& request);
-  // Returns which parameters matter, and when.
+  // Returns how much of the variance of the outputs each parameter causes, over time.
   absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
       const v1::ComputeSensitivityRequest& request);
-  // Returns what an experiment is expected to tell.
+  // Returns the information that candidates for the next experiment are expected to give.
   absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
       const v1::ComputeExperimentDesignRequest& request);
-  // Returns the posterior in full.
+  // Returns the posterior's densities, quantiles and samples.
   absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
       const v1::ComputePosteriorRequest& request);
-  // Returns profiles of the cost.
+  // Returns the least cost over all other parameters, along each parameter.
   absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
       const v1::ComputeCostProfilesRequest& request);
   // Returns the minima of the cost over the regularization weight.
@@ -74,7 +74,7 @@ class Client {
       const v1::ListOperationsRequest& request);
   // Asks a computation to end early.
   absl::StatusOr<v1::Operation> CancelOperation(const v1::CancelOperationRequest& request);
-  // Forgets a computation.
+  // Deletes a computation with its result.
   absl::Status DeleteOperation(const v1::DeleteOperationRequest& request);
   // Creates a session for a problem.
   absl::StatusOr<v1::Session> CreateSession(const v1::CreateSessionRequest& request);
@@ -89,30 +89,32 @@ class Client {
       const v1::AddMeasurementsRequest& request);
   // Returns a session's present estimate.
   absl::StatusOr<v1::Estimate> GetEstimate(const v1::GetEstimateRequest& request);
-  // Returns what the daemon is doing.
+  // Returns the daemon's version, load and uptime.
   absl::StatusOr<v1::DaemonStatus> GetStatus(const v1::GetStatusRequest& request);
-  // Calls `estimate` with each one until it returns false (then OK) or the daemon ends the stream.
-  // `call`, if given, is a fresh context for this call: another thread may cancel it, which ends
-  // the watch with CANCELLED.
+  // Calls `estimate` with each response until it returns false, which gives OK, or until the daemon
+  // ends the stream. `call`, if given, is a fresh context for this call: another thread may cancel
+  // it, which ends the watch with CANCELLED.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::WatchSessionResponse&)>& estimate,
                             grpc::ClientContext* call = nullptr);
-  // Calls `take` with each record until it is not OK: its status is then the answer.
+  // Calls `take` with each record of a session. Ends with the status of `take` when that is not OK.
   absl::Status ExportSession(const v1::ExportSessionRequest& request,
                              const std::function<absl::Status(const v1::SessionRecord&)>& take);
-  // Sends what `next` gives until it gives nothing; a status of it that is not OK ends the import,
-  // of which nothing stays, and is the answer. `session_id`: as in ImportSessionRequest.
+  // Sends the records that `next` returns until it returns none. An error of `next` cancels the
+  // import, of which nothing remains, and is returned. `session_id` is that of
+  // ImportSessionRequest.
   absl::StatusOr<v1::Session> ImportSession(
       const std::string& session_id,
       const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next);
 
-  // MeasurementStream uses these once another call has gone well.
+  // Returns the stub of the session service, for MeasurementStream. Another call must have
+  // succeeded before.
   v1::SessionService::Stub& sessions() { return *sessions_; }
   // Adds the token to a call made on a stub.
   void Identify(grpc::ClientContext& call) const { connection_->Identify(call); }
-  // Returns what Identify would add now, to see whether the token has changed.
+  // Returns the value of the header that Identify would add now, to detect a changed token.
   std::string Authorization() const { return connection_->Authorization(); }
-  // The daemon's address, HOST:PORT.
+  // Returns the daemon's address, HOST:PORT.
   const std::string& server() const { return server_; }
 
  private:
@@ -125,7 +127,7 @@ class Client {
   std::string server_;
   ClientOptions options_;
   absl::StatusOr<DaemonConnection> connection_;
-  // Null without a connection.
+  // The stubs are null if the connection could not be opened.
   std::unique_ptr<v1::ModelService::Stub> models_;
   std::unique_ptr<v1::ProblemService::Stub> problems_;
   std::unique_ptr<v1::SessionService::Stub> sessions_;

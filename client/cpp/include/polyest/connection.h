@@ -1,6 +1,6 @@
 #pragma once
 
-// How a client reaches the daemon: the channel, its security, the token.
+// Connects a client to the daemon: the channel, its security, the token.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/channel.h>
@@ -13,49 +13,51 @@
 
 namespace polyest {
 
-// TLS of a connection: names of PEM files.
+// TLS of a connection. The files are in PEM form.
 struct ClientTls {
-  std::string ca_file{};  // of the CAs that may have signed the daemon's; empty: the system's
-  std::string certificate_file{};  // the client's own; empty: none
-  std::string key_file{};          // its key
+  std::string ca_file{};           // the CAs that the client trusts; empty: those of the system
+  std::string certificate_file{};  // the client's own certificate; empty: none
+  std::string key_file{};          // the key of the client's certificate
   std::string server_name{};       // the name in the daemon's certificate; empty: the host's
 };
 
-// How a client connects and calls.
+// Options of a client.
 struct ClientOptions {
-  // How long a call may take; none: as long as it takes.
+  // Longest duration of a call; none: no limit.
   std::optional<std::chrono::milliseconds> deadline{};
-  // Silence after which the connection is probed; the daemon's own, or it would refuse the probes.
+  // Silence after which the connection is probed. The daemon closes connections that are probed
+  // more often than every 10 s.
   std::chrono::milliseconds keepalive{20'000};
-  // The longest answer taken.
+  // Size of the largest response accepted, in bytes.
   int max_response_bytes = 64 << 20;
-  // None: no TLS.
+  // Settings of TLS; none: the connection is not encrypted.
   std::optional<ClientTls> tls{};
-  // What the daemon knows the client by; empty: none. It is sent over TLS, or to loopback, only.
+  // Bearer token by which the daemon knows the client; empty: none. It is sent only over TLS or to
+  // a loopback address.
   std::string token{};
-  // A file of it alone, in place of `token`; empty: none. It is read again for each call, so that a
-  // new token is taken; while it cannot be used, the last one stays.
+  // File that holds the token alone, in place of `token`; empty: none. It is read again for each
+  // call, so that a new token takes effect. While the file cannot be used, the last token stays.
   std::string token_file{};
 };
 
 // A channel to the daemon and the token that goes with each call.
 class DaemonConnection {
  public:
-  // `server` is HOST:PORT. Connects on the first call. INVALID_ARGUMENT, naming the file and never
-  // what is in it, for files that cannot be used and for a token that would go unencrypted over a
-  // network.
+  // Prepares a connection to `server`, HOST:PORT, which is made on the first call. Refuses with
+  // INVALID_ARGUMENT files that cannot be used, naming the file and never its content, and a token
+  // that would be sent unencrypted over a network.
   static absl::StatusOr<DaemonConnection> Open(const std::string& server,
                                                const ClientOptions& options);
 
-  // The channel, for stubs of the services.
+  // Returns the channel, for stubs of the services.
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
   // Adds the token to a call.
   void Identify(grpc::ClientContext& call) const;
-  // Returns what Identify would add now, to see whether the token has changed.
+  // Returns the value of the header that Identify would add now, to detect a changed token.
   std::string Authorization() const;
 
  private:
-  // The token, the last one that could be used.
+  // Provides the last token that could be used.
   class TokenSource;
 
   DaemonConnection(std::shared_ptr<grpc::Channel> channel, std::shared_ptr<TokenSource> token);
@@ -64,8 +66,8 @@ class DaemonConnection {
   std::shared_ptr<TokenSource> token_;
 };
 
-// Returns the status of a call. Where it failed because no connection came about, and the reason is
-// how the two ends use TLS, the message also says what to look at on either side.
+// Returns the status of a call. If no connection could be made because the two ends use TLS
+// differently, the message also says what to check on either side.
 absl::Status WithConnectionHint(const absl::Status& status, const std::optional<ClientTls>& tls);
 
 }  // namespace polyest

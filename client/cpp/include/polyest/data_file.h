@@ -1,6 +1,6 @@
 #pragma once
 
-// Measurements from CSV text.
+// Reads measurements from CSV text.
 //
 // The first line names the columns: `t` first (s), then measured outputs, streamed inputs and,
 // if there is more than one run, `run`. Cells are plain numbers; an empty cell of a measured output
@@ -32,26 +32,27 @@ struct DataColumns {
 // Returns the columns that data for this problem may have.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
-// Receives the error of a line that is refused. OK: the line is left out and reading goes on;
-// anything else ends the reading.
+// Receives the error of a refused line or of a refused column of the header. If it returns OK, the
+// line or column is left out and reading goes on; any other status ends the reading.
 using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
 
-// Ends the reading at the first refused line, whose refusal is the answer.
+// Ends the reading at the first refused line, with its error.
 inline absl::Status StopAtRefusedLine(absl::Status refusal) { return refusal; }
 
-// Reads batches of rows, so that neither a long file nor an endless pipe is ever held whole.
+// Reads batches of rows, so that a long file or an endless pipe is never held in memory whole.
 class DataReader {
  public:
-  // Reads the header. `name` stands for the file in messages. `in` must outlive the reader.
-  // INVALID_ARGUMENT: no header, or a column that is unknown, repeated or missing.
+  // Reads the header. Messages call the file `name`. `in` must outlive the reader. INVALID_ARGUMENT
+  // if there is no header, or if a column is unknown, repeated or missing.
   static absl::StatusOr<DataReader> Open(std::istream& in, std::string name,
                                          const DataColumns& columns,
                                          RefusedLine refused = StopAtRefusedLine);
 
-  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT
-  // names file, line, column, value and rule: a cell that is not a finite number, a time that does
-  // not increase within its run, a run that decreases, a row with too few or too many cells, a
-  // streamed input without a value, data without any row.
+  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. Refuses with
+  // INVALID_ARGUMENT, naming file, line, column, value and rule: a cell that is not a finite
+  // number, a time that is negative or does not increase within its run, a run that decreases or is
+  // not 0 in the first row, a row with too few or too many cells, a streamed input without a value,
+  // and data without any row.
   absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
 
  private:
@@ -82,9 +83,9 @@ class DataReader {
   int channels_ = 0;
   bool has_run_ = false;
   int64_t line_ = 0;          // 1-based
-  int64_t rows_ = 0;          // that were taken
-  bool any_refused_ = false;  // of the rows
-  double time_s_ = 0;         // of the present row, and of the row before while a row is read
+  int64_t rows_ = 0;          // accepted so far
+  bool any_refused_ = false;  // whether any row has been refused
+  double time_s_ = 0;         // of the last accepted row, or of the row being read
   double previous_time_s_ = 0;
   int32_t run_ = 0;
 };

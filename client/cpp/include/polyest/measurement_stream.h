@@ -1,12 +1,13 @@
 #pragma once
 
-// Batches of measurements into a session, estimates out, over a connection that may break.
+// Sends batches of measurements to a session and receives estimates, over a connection that may
+// break.
 //
 // A batch is kept until the daemon has acknowledged it. When the connection breaks, the next Send
-// or Finish connects again, asks for the last batch that the session has, and sends what came
-// after. So nothing is lost and nothing is counted twice. The same when the daemon has no room now
-// but says that it may have later (its disk is full, it is busy), and when the token was exchanged.
-// Open, too, tries again while the daemon is not reached.
+// or Finish connects again, asks for the last batch that the session has, and sends the batches
+// after it. So no batch is lost and none is counted twice. The stream also connects again when the
+// daemon has no room now but may have later (its disk is full, it is busy), and when the token was
+// replaced. Open, too, tries again while the daemon cannot be reached.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -25,54 +26,57 @@
 
 namespace polyest {
 
-// How a stream sends and connects again.
+// Options for sending and for connecting again.
 struct MeasurementStreamOptions {
-  // Send waits while this many batches are not acknowledged, ≥ 1.
+  // Number of batches without acknowledgement at which Send waits, ≥ 1.
   int max_unacknowledged = 16;
-  // How often estimates are wanted; none: after every batch.
+  // Policy that says how often the daemon sends estimates; none: after every batch.
   std::optional<v1::StreamMeasurementsRequest::EstimatePolicy> estimates;
-  // Before the first attempt to connect again; doubles from one attempt to the next.
+  // Delay before the first attempt to connect again. It doubles from one attempt to the next.
   std::chrono::milliseconds first_delay{100};
-  // Up to this delay.
+  // Longest delay between attempts, unless the daemon asks for a longer one.
   std::chrono::milliseconds max_delay{5'000};
-  // Attempts to reach the daemon without an acknowledgement in between, ≥ 0; then the stream fails.
-  // While the daemon answers, and asks to try later, it is tried without end.
+  // Number of attempts to reach the daemon, ≥ 0, without an acknowledgement in between, after which
+  // the stream fails. While the daemon responds and asks to try later, attempts are not limited.
   int max_attempts = 16;
-  // Waits so long; false: give up, the stream then fails. Null: sleeps.
+  // Waits for a delay. If it returns false, the stream gives up and fails. Null: the thread sleeps.
   std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };
 
-// What a stream tells, each of them optional. Called from a thread of gRPC, one at a time, except
-// `connection`: from within Open, Send and Finish.
+// Callbacks of a stream, all optional. They are called from a thread of gRPC, one at a time, except
+// `connection`, which is called from within Open, Send and Finish.
 struct MeasurementStreamCallbacks {
-  // A new estimate, as often as MeasurementStreamOptions::estimates says.
+  // Receives a new estimate, as often as MeasurementStreamOptions::estimates says.
   std::function<void(const v1::Estimate&)> estimate;
-  // The daemon has stored batches up to a sequence number.
+  // Receives the sequence number up to which the daemon has stored the batches.
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
-  // Receives one sentence on a connection that fails or is back, or a daemon that has no room, or
-  // again.
+  // Receives one sentence when the connection fails or is restored, and when the daemon has no room
+  // for batches or has room again.
   std::function<void(const std::string&)> connection;
 };
 
-// For one thread. After a function has failed, the stream is of no more use.
+// A stream of measurements, for use by one thread. After a function has failed, the stream cannot
+// be used any more.
 class MeasurementStream {
  public:
-  // `session` is `sessions/{id}` and exists; `client` outlives the stream.
+  // `session` is the name of an existing session, `sessions/{id}`. `client` must outlive the
+  // stream.
   MeasurementStream(Client& client, std::string session, MeasurementStreamOptions options,
                     MeasurementStreamCallbacks callbacks);
-  // Drops what is under way.
+  // Cancels the connection and drops the batches that are not acknowledged.
   ~MeasurementStream();
   MeasurementStream(const MeasurementStream&) = delete;
   MeasurementStream& operator=(const MeasurementStream&) = delete;
 
-  // Connects; once, before anything else. Batches are numbered on from the session's last.
-  // NOT_FOUND: no such session. UNAVAILABLE: no connection after all attempts.
+  // Connects. Must be called once, before any other function. The numbers of batches continue from
+  // the session's last. NOT_FOUND if there is no such session; UNAVAILABLE if there is no
+  // connection after all attempts.
   absl::Status Open();
-  // Hands over one batch; waits while too many are not acknowledged. DATA_LOSS: the daemon has lost
-  // the session. UNAVAILABLE: no connection after all attempts.
+  // Hands over one batch. Waits while too many batches are not acknowledged. DATA_LOSS if the
+  // daemon has lost the session; UNAVAILABLE if there is no connection after all attempts.
   absl::Status Send(v1::Measurements batch);
-  // No more batches: waits for all acknowledgements and the last estimate, none if the session has
-  // no samples.
+  // Ends the batches, waits for all acknowledgements and returns the last estimate; none if the
+  // session has no samples. Fails like Send.
   absl::StatusOr<std::optional<v1::Estimate>> Finish();
 
  private:
@@ -93,19 +97,20 @@ class MeasurementStream {
 
   Client& client_;
   const std::string session_;
-  const std::string writer_;  // by which the daemon knows the next connection for this stream's
+  const std::string writer_;  // random id by which the daemon recognizes this stream's connections
   const MeasurementStreamOptions options_;
   const MeasurementStreamCallbacks callbacks_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
   std::unique_ptr<Connection> connection_;
-  // Not acknowledged, in order; the first `written_` were handed to the present connection.
+  // Batches that are not acknowledged, in order. The first `written_` of them were handed to the
+  // present connection.
   std::deque<std::shared_ptr<const v1::StreamMeasurementsRequest>> pending_;
   size_t written_ = 0;
   int64_t last_sequence_ = 0;  // of the last batch handed over
-  int attempts_ = 0;  // to reach the daemon, since the last acknowledgement or other answer
-  int refusals_ = 0;  // for want of room, since the last acknowledgement
+  int attempts_ = 0;           // to reach the daemon, since the last acknowledgement or refusal
+  int refusals_ = 0;           // for lack of room, since the last acknowledgement
   bool told_of_refusal_ = false;
   bool finishing_ = false;
   std::optional<v1::Estimate> last_estimate_;

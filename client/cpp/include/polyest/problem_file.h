@@ -1,6 +1,6 @@
 #pragma once
 
-// A problem from a file: the canonical protobuf JSON of polyest.v1.Problem.
+// Reads a problem from a file, which holds the canonical protobuf JSON of polyest.v1.Problem.
 
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
@@ -11,12 +11,13 @@
 
 namespace polyest {
 
-// Reads a problem from text. INVALID_ARGUMENT, in one line that opens with `name` and, where the
-// parser tells, the line or the field: text that is not JSON, fields that the schema lacks (all of
-// them, each with the nearest name there is), a value of the wrong type.
+// Reads a problem from text. Refuses with INVALID_ARGUMENT text that is not JSON, fields that the
+// schema does not have (all of them, each with the nearest known name) and a value of the wrong
+// type. The message is one line that begins with `name` and, where the parser reports them, the
+// line or the field.
 absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_view name);
 
-// Reads a problem from a file of at most 16 MiB; its name opens every message.
+// Reads a problem from a file of at most 16 MiB. Its name begins every message.
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path);
 
 }  // namespace polyest
