@@ -23,7 +23,7 @@ class Tracer {
       for (Eigen::Index j = 0; j + 1 < y_.size(); ++j) AddCell(i, j);
     }
     std::vector<ContourLine> lines;
-    // Open lines start at an edge with one neighbour; what is left after them is closed.
+    // Open lines start at an edge with one neighbour; the remaining lines are closed.
     for (const auto& [edge, neighbours] : neighbours_) {
       if (neighbours[1] == kNoEdge && !visited_[edge]) lines.push_back(Follow(edge));
     }
@@ -38,7 +38,7 @@ class Tracer {
  private:
   bool Above(Eigen::Index i, Eigen::Index j) const { return value_(i, j) > level_; }
 
-  // Edges along x have even numbers, along y odd ones, by their lower corner.
+  // Number an edge by its lower corner: edges along x have even numbers, edges along y odd ones.
   EdgeId AlongX(Eigen::Index i, Eigen::Index j) const { return 2 * (i * y_.size() + j); }
   EdgeId AlongY(Eigen::Index i, Eigen::Index j) const { return AlongX(i, j) + 1; }
 

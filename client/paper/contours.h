@@ -1,8 +1,9 @@
 #pragma once
 
-// Contour lines of a function given on a grid, by marching squares: in each cell the level crosses
-// an edge where its ends lie on either side, at the point found by linear interpolation; a saddle
-// (all four edges crossed) is decided by the mean of the four corners. Error O(h²) in the spacing.
+// Computes contour lines of a function on a grid by marching squares. In each cell, the level
+// crosses an edge whose ends lie on either side of it, at the point found by linear interpolation.
+// The mean of the four corners decides a saddle (all four edges crossed). The error is O(h²) in the
+// spacing h.
 
 #include <array>
 #include <vector>
@@ -16,13 +17,14 @@ struct ContourLine {
   bool closed = false;                        // the last point joins the first
 };
 
-// value is x.size() × y.size(); x and y strictly increasing. Cells with a corner that is not finite
-// are left out.
+// Returns the contour lines of `value` at `level`. `value` is x.size() × y.size(); x and y must
+// increase strictly. Cells with a corner that is not finite are left out.
 std::vector<ContourLine> ContourLines(const Vector& x, const Vector& y, const Matrix& value,
                                       double level);
 
-// `count` levels between the least and the largest finite value, spaced by the square: lines of a
-// quadratic bowl are then evenly spaced. None when the values do not vary.
+// Returns `count` levels between the least and the largest finite value. Their distances from the
+// least value grow as squares, so that the contours of a quadratic bowl are evenly spaced. Returns
+// none when the values do not vary.
 std::vector<double> BowlLevels(const Matrix& value, int count);
 
 }  // namespace polyest::internal

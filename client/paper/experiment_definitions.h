@@ -1,6 +1,6 @@
 #pragma once
 
-// The definitions behind MakeExperiment, one a figure. Private to this folder.
+// Defines the experiments of MakeExperiment, one for each figure. Private to this folder.
 
 #include <absl/status/statusor.h>
 
@@ -14,26 +14,27 @@ absl::StatusOr<Experiment> Figure5();
 absl::StatusOr<Experiment> Figure6();
 absl::StatusOr<Experiment> Figure7();
 absl::StatusOr<Experiment> Figure8();
-// Section 3.3: the same driven by a force of uncertain amplitude.
+// Section 3.3: a mass on a spring, driven by a force of uncertain amplitude.
 absl::StatusOr<Experiment> Figure11();
 absl::StatusOr<Experiment> Figure12();
 // Section 3.4: mass and stiffness from the frequency alone, and regularization.
 absl::StatusOr<Experiment> Figure13();
 absl::StatusOr<Experiment> Figure14();
-// Section 3.5: a parameter that the measured output does not see.
+// Section 3.5: a parameter that does not affect the measured output.
 absl::StatusOr<Experiment> Section35();
 // Section 3.6: an excitation that is not rich enough.
 absl::StatusOr<Experiment> Section36();
-// The project's own: mass and place of a load on a half car.
+// The project's own experiment: mass and position of a load on a half car.
 absl::StatusOr<Experiment> ReferenceScenario();
 
-// The noise of (30), as a standard deviation: `percent` of the value and a thousandth of the
-// largest value so far. (The paper calls it a variance; its R_k is the square of this.)
+// Returns the noise of (30) as a standard deviation: `percent` of the value plus a thousandth of
+// the largest value so far. (The paper calls it a variance; its R_k is the square of this.)
 NoiseModel PaperNoise(double percent);
 
-// The paper's setting: the fixed expansion, 2 points a term; at order 5, 6 terms and 12 Halton
-// points for one unknown. The integration is far finer than the least noise, 10⁻⁶, so that an
-// output that is zero stays zero for the estimator as well.
+// Returns a problem with the paper's settings: an expansion of fixed order with 2 points per term;
+// at order 5, one unknown has 6 terms and 12 Halton points. The relative tolerance of the
+// integration, 10⁻¹¹, is far below the least noise, 10⁻⁶, so that an output that is zero is zero
+// for the estimator, too.
 Problem PaperProblem(std::shared_ptr<const Model> model, int order);
 
 }  // namespace polyest::internal::paper_experiments

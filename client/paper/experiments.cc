@@ -41,8 +41,8 @@ constexpr Entry kEntries[] = {
 
 constexpr int kResponsePoints = 401;
 
-// Standard normal draws that are the same with every standard library: the quantile of the middle
-// of one of 2⁵³ equal intervals.
+// Draws standard normal numbers that are the same with every standard library: each is the quantile
+// at the middle of one of 2⁵³ equal intervals of probability.
 class NormalDraws {
  public:
   explicit NormalDraws(uint64_t seed) : engine_(seed) {}
@@ -88,7 +88,7 @@ absl::StatusOr<VariantResult> RunVariant(const ExperimentVariant& variant, const
     std_dev(i) = result.estimate.parameters[i].std_dev;
   }
   result.map_germ = problem.prior().ToGerm(map);
-  // The paper's priors are affine: one slope serves everywhere.
+  // The paper's priors are affine in ξ: the slope is the same everywhere.
   const Matrix slope = problem.prior().Jacobian(result.map_germ);
   result.std_dev_germ = std_dev.cwiseQuotient(slope.diagonal());
   CostGridOptions options;
@@ -168,7 +168,7 @@ absl::StatusOr<ExperimentResult> RunExperiment(const Experiment& experiment, int
   ExperimentResult result{
       .experiment = experiment, .reference_germ = {}, .prior = problem.prior(), .variants = {}};
   result.reference_germ = problem.prior().ToGerm(experiment.reference);
-  // All variants over the same time, so that their pictures can be compared.
+  // All variants are simulated over the same time, so that their plots can be compared.
   double until_s = 0;
   for (const ExperimentVariant& variant : experiment.variants) {
     until_s = std::max(until_s, variant.sample_times_s.back());

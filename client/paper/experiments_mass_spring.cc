@@ -1,4 +1,4 @@
-// Figures 4 to 12: one unknown amplitude, with the reference value ξ = 0.23.
+// Defines figures 4 to 12: one unknown amplitude, with the reference value ξ = 0.23.
 
 #include <absl/strings/str_cat.h>
 
@@ -52,7 +52,7 @@ absl::StatusOr<Problem> ForcedMass() {
   return problem;
 }
 
-// What one figure measures of a problem, and what the paper says of it.
+// The measurements of one figure, and the result that the paper reports.
 struct Definition {
   const char* figure;
   const char* title;
@@ -60,7 +60,7 @@ struct Definition {
   const char* says;
   std::vector<std::string> outputs;
   std::vector<double> times_s;
-  std::vector<double> noise_percents;  // a variant for each
+  std::vector<double> noise_percents;  // one variant for each
 };
 
 absl::StatusOr<Experiment> Define(absl::StatusOr<Problem> problem, const Definition& definition) {
@@ -84,7 +84,7 @@ absl::StatusOr<Experiment> Define(absl::StatusOr<Problem> problem, const Definit
   return experiment;
 }
 
-// step, 2 step … until 5 s.
+// Returns `count` evenly spaced times, of which the last is 5 s.
 std::vector<double> EvenTimes(int count) {
   std::vector<double> times_s;
   for (int k = 1; k <= count; ++k) times_s.push_back(kUntil * k / count);
@@ -144,8 +144,8 @@ absl::StatusOr<Experiment> Figure7() {
               .outputs = {"x"},
               .times_s = {0.3, 0.8, 1.2, 1.7, 2.3},
               .noise_percents = {0.01}}));
-  // The zero crossings come after the informative times: these then have the same noise draws, and
-  // the same largest value so far, in both variants.
+  // The zero crossings come after the informative times, so that these have the same noise draws
+  // and the same largest value so far in both variants.
   experiment.variants.push_back(experiment.variants.front());
   experiment.variants[0].name = "5 times, noise 0.01 %";
   experiment.variants[1].name = "and 5 zero crossings";

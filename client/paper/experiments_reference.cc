@@ -1,4 +1,5 @@
-// The project's reference scenario: a half car with a point mass of unknown size and place.
+// Defines the project's reference scenario: a half car with a point mass of unknown size and
+// position.
 
 #include "client/paper/experiment_definitions.h"
 #include "core/common/status.h"

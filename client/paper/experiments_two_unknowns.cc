@@ -1,4 +1,5 @@
-// Figures 13 and 14 and sections 3.5 and 3.6: what cannot be identified, and what helps.
+// Defines figures 13 and 14 and sections 3.5 and 3.6: parameters that cannot be identified, and
+// remedies.
 
 #include <absl/strings/str_cat.h>
 
@@ -12,7 +13,7 @@
 namespace polyest::internal::paper_experiments {
 namespace {
 
-// Section 3.4, 0.01 √(K0/M0), and the number that the paper prints for it.
+// The noise of section 3.4, 0.01 √(K0/M0), and the number that the paper prints for it.
 constexpr double kFrequencyNoise = 0.0628;  // rad/s
 constexpr double kPrintedFrequencyNoise = 0.3938;
 
@@ -33,8 +34,8 @@ ExperimentVariant FrequencyVariant(const Problem& problem, double rho, double al
 
 absl::StatusOr<Problem> FrequencyProblem() {
   POLYEST_ASSIGN_OR_RETURN(auto model, FindBuiltinModel("mass_spring_frequency"));
-  // √ is smooth over the priors (ω² > 0 to 7 standard deviations of k), so that order 5 follows it
-  // to a thousandth of ρ; a valley's lowest point asks for that.
+  // √ is smooth over the priors (ω² > 0 up to 7 standard deviations of k), so that order 5
+  // approximates it to a thousandth of ρ. The lowest point of a valley needs that accuracy.
   Problem problem = PaperProblem(std::move(model), 5);
   const double k0 = 200 * 4 * std::numbers::pi * std::numbers::pi;
   POLYEST_ASSIGN_OR_RETURN(auto m, UncertainParameter::Normal("m", 200, 6.667));
@@ -43,7 +44,7 @@ absl::StatusOr<Problem> FrequencyProblem() {
   return problem;
 }
 
-// ξ_ref = (0.23, −0.38).
+// Returns the reference values, at ξ_ref = (0.23, −0.38).
 Vector FrequencyReference(const Problem& problem) {
   Vector reference(2);
   reference << problem.uncertain[0].location + 0.23 * problem.uncertain[0].scale,
@@ -133,8 +134,8 @@ absl::StatusOr<Experiment> Section35() {
 absl::StatusOr<Experiment> Section36() {
   POLYEST_ASSIGN_OR_RETURN(auto model, FindBuiltinModel("roll_plane_2dof"));
   Problem problem = PaperProblem(std::move(model), 5);
-  // Priors and excitation are the project's: a road bump 0.05 m high under the left side, then at
-  // the same time under both.
+  // Priors and excitation are the project's: a road bump 0.05 m high, under both sides at the same
+  // time in the first variant and under the left side in the second.
   POLYEST_ASSIGN_OR_RETURN(auto mass, UncertainParameter::Beta("M", 2, 2, 500, 700));
   POLYEST_ASSIGN_OR_RETURN(auto inertia, UncertainParameter::Beta("I", 2, 2, 55, 80));
   problem.uncertain = {std::move(mass), std::move(inertia)};

@@ -16,7 +16,7 @@ constexpr int kContourLevels = 14;
 
 std::vector<double> ToStdVector(const Vector& values) { return {values.begin(), values.end()}; }
 
-// The axis of one parameter of a cost grid, in units of its germ.
+// Returns the axis of one parameter of a cost grid in units of its germ.
 Vector GermAxis(const CostGrid& grid, const Prior& prior, int axis) {
   for (const UncertainParameter& parameter : prior.parameters()) {
     if (parameter.name == grid.parameters[axis]) {
@@ -26,7 +26,7 @@ Vector GermAxis(const CostGrid& grid, const Prior& prior, int axis) {
   return grid.axes[axis];
 }
 
-// One output at the reference values, with the variant's sample times.
+// Returns a panel with one output at the reference values and the variant's measurements.
 LinePanel ResponsePanel(const ExperimentResult& result, int variant, int channel) {
   const ExperimentVariant& asked = result.experiment.variants[variant];
   const std::string& name = asked.problem.measured[channel].output;
@@ -86,7 +86,7 @@ ContourPanel ContoursOf(const ExperimentResult& result, const VariantResult& var
 void AddCurves(const ExperimentResult& result, Plot& plot) {
   const auto& asked = result.experiment.variants;
   for (size_t v = 0; v < asked.size(); ++v) {
-    // Noise levels measure the same at the same times: one picture of it is enough.
+    // Variants with the same outputs and times differ in noise only: one panel is enough.
     const bool shown = v > 0 && asked[v].sample_times_s == asked[0].sample_times_s &&
                        asked[v].problem.measured.size() == asked[0].problem.measured.size();
     const int channels = static_cast<int>(asked[v].problem.measured.size());

@@ -5,8 +5,8 @@
 
 namespace polyest::internal {
 
-// The figure of an experiment: what was measured at the reference values with the sample
-// times marked, and the cost over the germ ξ with the true value and the estimate.
+// Returns the figure of an experiment: the outputs at the reference values with the measurements,
+// and the cost over the germ ξ with the true value and the estimate.
 Plot MakePlot(const ExperimentResult& result);
 
 }  // namespace polyest::internal

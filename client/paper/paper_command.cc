@@ -25,7 +25,7 @@ absl::Status RunFigure(const std::string& figure, const PaperOptions& options, s
   POLYEST_ASSIGN_OR_RETURN(Experiment experiment, MakeExperiment(figure));
   absl::StatusOr<ExperimentResult> result = RunExperiment(experiment, options.threads);
   if (!result.ok()) {
-    // Whatever an experiment of ours trips over is no fault of the command line's.
+    // An error of a built-in experiment is not an error of the command line.
     return absl::InternalError(absl::StrCat("figure ", figure, ": ", result.status().message()));
   }
   PrintExperiment(*result, out);

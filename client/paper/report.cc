@@ -55,14 +55,14 @@ const char* NameOf(DiagnosticCode code) {
   return "";
 }
 
-// Letters of UTF-8 text, which is what a terminal's columns count.
+// Returns the number of code points of UTF-8 text, which is its width on a terminal.
 size_t Letters(std::string_view text) {
   return std::count_if(text.begin(), text.end(),
                        [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
 }
 
-// "value ± deviation" to the digits that the deviation leaves meaning to, and no fewer decimals
-// than `min_decimals`.
+// Returns "value ± deviation" with two significant digits of the deviation, but at least
+// `min_decimals` and at most 9 decimals.
 std::string WithDeviation(double value, double deviation, int min_decimals) {
   const int leading = deviation > 0 ? static_cast<int>(std::floor(std::log10(deviation))) : -6;
   const int decimals = std::clamp(1 - leading, min_decimals, 9);
@@ -91,7 +91,8 @@ std::vector<std::string> Words(const std::string& text) {
   return absl::StrSplit(text, ' ', absl::SkipEmpty());
 }
 
-// Words in lines, the first behind `head` and the others under its end.
+// Prints text in lines of at most kLineWidth columns. The first follows `head`, the others are
+// indented by its width.
 void PrintWrapped(const std::string& head, const std::string& text, std::ostream& out) {
   std::string line = head;
   size_t length = Letters(head);

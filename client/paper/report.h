@@ -6,8 +6,8 @@
 
 namespace polyest::internal {
 
-// Prints what was asked, a table of what the estimator answers for each variant, what it remarks,
-// and beside it what the paper says.
+// Prints the question, the paper's or the expected result, a table of the estimates of all
+// variants, and the details and diagnostics of each variant.
 void PrintExperiment(const ExperimentResult& result, std::ostream& out);
 
 }  // namespace polyest::internal

@@ -10,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-// The least of 1, 2, 5 · 10^n that is at least `step`.
+// Returns the least of 1, 2, 5 · 10^n that is at least `step`.
 double RoundStep(double step) {
   const double power = std::pow(10.0, std::floor(std::log10(step)));
   for (double factor : {1.0, 2.0, 5.0}) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// An axis of a plot: a range with round ticks, and the map from values to pixels.
+// Defines an axis of a plot: a range with round ticks, and the map from values to pixels.
 
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@ struct AxisTick {
 struct Axis {
   double lower = 0;
   double upper = 1;
-  double first_pixel = 0;  // of lower
-  double last_pixel = 1;   // of upper
+  double first_pixel = 0;  // pixel of `lower`
+  double last_pixel = 1;   // pixel of `upper`
   std::vector<AxisTick> ticks;
   int exponent = 0;  // the ticks' texts are to be multiplied by 10^exponent
 
@@ -25,11 +25,11 @@ struct Axis {
   }
 };
 
-// An axis over [lower, upper] with about `count` ticks at multiples of 1, 2 or 5 · 10^n. An empty
-// range is opened around its value.
+// Returns an axis over [lower, upper] with about `count` ticks at multiples of 1, 2 or 5 · 10^n. An
+// empty range is widened around its value.
 Axis MakeAxis(double lower, double upper, int count, double first_pixel, double last_pixel);
 
-// 10^exponent with raised digits, as in "×10⁻³".
+// Returns 10^exponent with raised digits, as in "×10⁻³".
 std::string PowerOfTenText(int exponent);
 
 }  // namespace polyest::internal

@@ -14,7 +14,7 @@
 namespace polyest::internal {
 namespace {
 
-// Pixels.
+// Sizes in pixels.
 constexpr double kPanelWidth = 420, kPanelHeight = 320;
 constexpr double kLeft = 66, kRight = 16, kTop = 40, kBottom = 52;
 constexpr double kTitleHeight = 44, kLegendRow = 24, kMargin = 12;
@@ -28,7 +28,7 @@ struct LegendEntry {
   double Width() const { return 44 + kCharacterWidth * VisibleLength(); }
 
  private:
-  // Code points of the UTF-8 text.
+  // Returns the number of code points of the label.
   double VisibleLength() const {
     return static_cast<double>(std::count_if(label.begin(), label.end(), [](char c) {
       return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
@@ -71,7 +71,7 @@ class LegendCollector {
   void operator()(const ContourPanel& panel) {
     for (const PointMark& p : panel.points) Add({LegendEntry::kMarker, p.label, p.color, ""});
   }
-  // The entries in rows that fit into the width.
+  // Returns the entries in rows that fit into `width`.
   std::vector<std::vector<LegendEntry>> Rows(double width) const {
     std::vector<std::vector<LegendEntry>> rows(1);
     double used = 0;
@@ -111,7 +111,7 @@ void DrawLegendRow(const std::vector<LegendEntry>& row, double width, double y, 
   }
 }
 
-// Least and largest of what is finite; [0, 1] for nothing.
+// The least and the largest of the finite values; [0, 1] after Pad if there are none.
 struct Range {
   double lower = std::numeric_limits<double>::infinity();
   double upper = -std::numeric_limits<double>::infinity();
@@ -128,7 +128,8 @@ struct Range {
   }
 };
 
-// Draws a panel's frame at (x, y): axes, grid and labels; `Draw` puts the content in.
+// Draws the frame of a panel at (x, y): axes, grid and labels. The content is drawn between
+// BeginContent and SvgWriter::EndClip.
 class PanelFrame {
  public:
   PanelFrame(double x, double y, const Range& xs, const Range& ys)
@@ -140,7 +141,8 @@ class PanelFrame {
         vertical_(MakeAxis(ys.lower, ys.upper, 6, top_ + height_, top_)) {}
 
   double X(double value) const { return horizontal_.Pixel(value); }
-  // Far outside values are brought near, so that no coordinate is beyond a viewer's range.
+  // Returns the pixel of a value, limited to near the panel, so that no coordinate is beyond a
+  // viewer's range.
   double Y(double value) const {
     return std::clamp(vertical_.Pixel(value), top_ - 2000, top_ + height_ + 2000);
   }
@@ -182,7 +184,8 @@ class PanelFrame {
   Axis horizontal_, vertical_;
 };
 
-// A ring of white keeps a few markers apart; of many it would leave nothing else to see.
+// Draws one marker of a series. White rings keep few markers apart; many rings would hide the
+// markers.
 void DrawMarker(const LineSeries& series, size_t i, const PanelFrame& frame, SvgWriter& svg) {
   constexpr size_t kMany = 100;
   const bool many = series.x.size() > kMany;
@@ -235,7 +238,7 @@ void DrawPanel(const LinePanel& panel, double x, double y, SvgWriter& svg) {
   frame.DrawLabels(panel.title, panel.x_label, panel.y_label, svg);
 }
 
-// From deep blue through green to yellow with rising level.
+// Returns the colour of a level: from deep blue (`part` 0) through green to yellow (`part` 1).
 std::string LevelColor(double part) {
   constexpr double kStops[][3] = {
       {59, 28, 120}, {38, 100, 160}, {30, 150, 140}, {110, 185, 70}, {225, 170, 30}};
@@ -253,7 +256,7 @@ std::string LevelText(double level) {
   return level < 1e6 ? absl::StrFormat("%.0f", level) : absl::StrFormat("%.2e", level);
 }
 
-// The levels' numbers upon their lines, each where it overlaps none before it.
+// Places the numbers of the levels on their lines, each where it does not overlap another one.
 class LevelTexts {
  public:
   explicit LevelTexts(const PanelFrame& frame) : frame_(frame) {}
@@ -262,7 +265,7 @@ class LevelTexts {
     const std::string text = LevelText(level);
     const double width = 5.8 * static_cast<double>(text.size()) + 4;
     const size_t count = line.points.size();
-    // From the middle outwards in steps of a sixteenth of the line.
+    // Candidates go from the middle of the line outwards, in sixteenths of its length.
     for (const int sixteenth : {8, 5, 11, 3, 13, 2, 14}) {
       const auto [x, y] = line.points[(count - 1) * sixteenth / 16];
       const Box box{frame_.X(x) - width / 2, frame_.Y(y) - 6, width, 12, text, color};
@@ -272,7 +275,7 @@ class LevelTexts {
     }
   }
 
-  // Keeps the place of a point free.
+  // Keeps the surroundings of a point free.
   void Avoid(double x, double y) {
     boxes_.push_back({frame_.X(x) - 6, frame_.Y(y) - 6, 12, 12, "", ""});
   }

@@ -1,7 +1,8 @@
 #pragma once
 
-// Plots as SVG text: panels of lines or of contours in a grid under one title, with one legend
-// for all. Self-contained: no script, no style sheet, no font but the viewer's sans-serif.
+// Draws plots as SVG text: a grid of panels, each with lines or contours, under one title and with
+// one legend for all panels. The text is self-contained: it has no script, no style sheet, and no
+// font but the viewer's sans-serif.
 
 #include <string>
 #include <utility>
@@ -15,11 +16,11 @@ namespace polyest::internal {
 enum class LineStyle { kSolid, kDashed, kDotted, kMarkers };
 
 struct LineSeries {
-  std::string label;  // in the legend; empty: not in it
+  std::string label;  // text in the legend; empty: no entry
   std::string color;
   LineStyle style = LineStyle::kSolid;
   std::vector<double> x;
-  std::vector<double> y;  // the line breaks where it is not finite
+  std::vector<double> y;  // the line has a gap where y is not finite
 };
 
 // A vertical line across a panel.
@@ -68,13 +69,13 @@ using Panel = std::variant<LinePanel, ContourPanel>;
 
 struct Plot {
   std::string title;
-  std::string description;  // for readers that cannot see
+  std::string description;  // for screen readers
   int columns = 2;          // panels side by side
   std::vector<Panel> panels;
 };
 
-// The whole file. Numbers have a precision of a hundredth of a pixel, so that the same plot is the
-// same text.
+// Returns the SVG file of a plot. Coordinates are rounded to a hundredth of a pixel, so that equal
+// plots give equal texts.
 std::string RenderSvg(const Plot& plot);
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Elements of an SVG file, as text with its special characters escaped.
+// Writes the elements of an SVG file as text, with special characters escaped.
 
 #include <array>
 #include <string>
@@ -34,11 +34,11 @@ class SvgWriter {
                  double opacity = 1);
   void Circle(double x, double y, double radius, std::string_view fill, std::string_view stroke);
   void Text(double x, double y, std::string_view text, const SvgTextStyle& style);
-  // Shows what is drawn until EndClip only inside the rectangle.
+  // Clips the elements drawn until EndClip to the rectangle.
   void BeginClip(double x, double y, double width, double height);
   void EndClip();
 
-  // The whole file; the writer is used up.
+  // Returns the whole file. The writer cannot be used afterwards.
   std::string Finish();
 
  private:
@@ -46,7 +46,7 @@ class SvgWriter {
   int clips_ = 0;
 };
 
-// Returns text for a node or an attribute: & < > " ' as entities, control characters as spaces.
+// Returns the text for a node or an attribute: & < > " ' as entities, control characters as spaces.
 std::string EscapeXml(std::string_view text);
 
 }  // namespace polyest::internal
