@@ -24,7 +24,7 @@ constexpr int kMaxThreads = 256;
 const std::map<std::string, ColorChoice> kColors = {
     {"auto", ColorChoice::kAuto}, {"always", ColorChoice::kAlways}, {"never", ColorChoice::kNever}};
 
-// Breaks descriptions where the screen ends.
+// Wraps descriptions to the width of the screen.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(int columns) : columns_(columns) {}
@@ -65,7 +65,7 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
   return names;
 }
 
-// Returns what is wrong when the first word is no command.
+// Returns an error message if the first word is not the name of a command.
 std::optional<std::string> UnknownCommand(const CLI::App& app, int argc, const char* const* argv) {
   if (argc < 2 || absl::StartsWith(argv[1], "-")) return std::nullopt;
   const std::vector<std::string> names = CommandNames(app);
@@ -73,7 +73,7 @@ std::optional<std::string> UnknownCommand(const CLI::App& app, int argc, const c
   return absl::StrCat("there is no command \"", argv[1], "\"; ", SuggestName(argv[1], names));
 }
 
-// Returns what is wrong when a word that looks like an option is none of the command's.
+// Returns an error message if a word that looks like an option is not an option of the command.
 std::optional<std::string> UnknownOption(const CLI::App& app) {
   const std::vector<CLI::App*> parsed = app.get_subcommands();
   const CLI::App& command = parsed.empty() ? app : *parsed.front();
@@ -91,7 +91,7 @@ std::optional<std::string> UnknownOption(const CLI::App& app) {
   return std::nullopt;
 }
 
-// Prints one line about words that cannot be parsed.
+// Prints an error of the command line in one line and returns the exit status.
 int ReportUsage(const CLI::App& app, const CLI::ParseError& error, std::ostream& err) {
   const std::vector<CLI::App*> parsed = app.get_subcommands();
   const std::string command = parsed.empty() ? "" : parsed.front()->get_name();
@@ -123,7 +123,7 @@ std::variant<CommandLine, int> ParseArguments(int argc, const char* const* argv,
   CLI::App app("Estimates uncertain parameters of mechanical models from measurements.", "polyest");
   app.set_version_flag("--version", "polyest " POLYEST_VERSION);
   app.require_subcommand(1);
-  // The commands added below take it over.
+  // The commands added below inherit the formatter.
   app.formatter(
       std::make_shared<HelpFormatter>(ScreenOf(STDOUT_FILENO, ColorChoice::kNever).columns));
   app.footer(

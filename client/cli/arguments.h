@@ -1,6 +1,6 @@
 #pragma once
 
-// The command line, parsed: one struct a command.
+// Parses the command line into one struct for each command.
 
 #include <ostream>
 #include <string>
@@ -14,7 +14,7 @@ namespace polyest::internal {
 
 enum class Format { kTable, kJson, kJsonLines, kCsv };
 
-// Names how to get into a daemon; an empty field is not used.
+// Files and names for access to a daemon; an empty field is not used.
 struct ServerAccess {
   std::string ca_file;
   std::string certificate_file;
@@ -23,12 +23,12 @@ struct ServerAccess {
   std::string token_file;
 };
 
-// Says where a command runs.
+// Place where a command computes: a daemon or this process.
 struct Place {
   std::string server;     // HOST:PORT; empty: in this process
-  ServerAccess access;    // to the server
-  double deadline_s = 0;  // 0: none
-  int threads = 1;        // for computing in this process
+  ServerAccess access;    // access to the server
+  double deadline_s = 0;  // longest duration, s; 0: no limit
+  int threads = 1;        // threads for computing in this process
   std::string fmu_dir;    // folder of FMUs for this process; empty: none
 };
 
@@ -51,7 +51,7 @@ struct StreamArguments {
   std::string problem_file;
   std::string data_file;  // "-": standard input
   int batch_rows = 30;
-  double rate = 0;      // times as fast as the data's own time; 0: as fast as possible
+  double rate = 0;      // factor by which data are sent faster than measured; 0: at once
   std::string session;  // its id; empty: the daemon chooses
   Format format = Format::kTable;
 };
@@ -80,16 +80,16 @@ struct ModelsArguments {
 };
 
 struct CheckArguments {
-  Place place;  // this process
+  Place place;  // always this process
   std::string problem_file;
   std::string data_file;  // empty: none
   Format format = Format::kTable;
 };
 
 struct InitArguments {
-  Place place;              // this process
+  Place place;              // always this process
   std::string model;        // empty: list the models
-  bool equations = false;   // a model as text instead
+  bool equations = false;   // write a model given by its equations instead
   std::string output_file;  // empty: standard output
   bool force = false;       // overwrite the file
 };
@@ -124,7 +124,7 @@ struct PosteriorArguments {
   std::string session;  // its id, in place of the files; empty: none
   int samples = 0;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
-  std::vector<std::string> joints;    // of two parameters each, "k,c"
+  std::vector<std::string> joints;    // pairs of parameters, "k,c"
   Format format = Format::kTable;
 };
 
@@ -159,7 +159,7 @@ struct ExportArguments {
 struct ImportArguments {
   Place place;
   std::string file;
-  std::string session;  // its id here; empty: the one it had
+  std::string session;  // its id in this daemon; empty: the id that it had
 };
 
 struct DeleteArguments {

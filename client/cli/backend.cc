@@ -87,7 +87,7 @@ class LocalBackend : public Backend {
   absl::StatusOr<ModelLibrary> models_;
   Stop stop_;
   const std::shared_ptr<EstimationProgress> progress_ = std::make_shared<EstimationProgress>();
-  ProgressLine line_;  // the last, so that it ends first
+  ProgressLine line_;  // the last member, so that it is destroyed first
 };
 
 class RemoteBackend : public Backend {
@@ -99,7 +99,7 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
       const v1::ComputeEstimateRequest& request) override {
     auto response = client_.ComputeEstimate(request);
-    // gRPC itself refuses this, before the daemon sees it.
+    // Without details, gRPC itself has refused a message that is too large.
     if (absl::IsResourceExhausted(response.status()) && !RefusalOf(response.status())) {
       return absl::ResourceExhaustedError(
           absl::StrCat(response.status().message(),
@@ -161,7 +161,7 @@ ClientOptions ToClientOptions(const Place& place) {
         ClientTls{access.ca_file, access.certificate_file, access.key_file, access.server_name};
   }
   options.token_file = access.token_file;
-  // Not an option: every user of a machine sees the command lines of all.
+  // The token is no option, since all users of a machine can see each other's command lines.
   const char* const token = std::getenv("POLYEST_TOKEN");
   if (token != nullptr) options.token = token;
   return options;
@@ -170,7 +170,7 @@ ClientOptions ToClientOptions(const Place& place) {
 absl::StatusOr<ModelLibrary> OpenModels(const Place& place) {
   if (place.fmu_dir.empty()) return ModelLibrary();
   absl::StatusOr<FmuCatalogue> fmus = FmuCatalogue::Open(place.fmu_dir);
-  // A word of the command line is wrong, not a name of a request.
+  // The error is one of the command line, whatever its code: it becomes INVALID_ARGUMENT.
   if (!fmus.ok()) {
     return absl::InvalidArgumentError(absl::StrCat("--fmu-dir: ", fmus.status().message()));
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// The operations that need no session, in this process or by a daemon: the same answers.
+// Computes in this process or by a daemon, with the same responses.
 
 #include <absl/status/statusor.h>
 
@@ -14,6 +14,7 @@
 
 namespace polyest::internal {
 
+// Operations that need no stream of measurements.
 class Backend {
  public:
   virtual ~Backend() = default;
@@ -38,12 +39,15 @@ class Backend {
       const v1::ComputeRegularizationSweepRequest& request) = 0;
 };
 
+// Returns the options for the client of a place. The token comes from the environment variable
+// POLYEST_TOKEN or from the file of --token-file.
 ClientOptions ToClientOptions(const Place& place);
 
-// The models of this process: the built-in ones, and the FMUs of --fmu-dir. INVALID_ARGUMENT when
-// there is no such folder.
+// Returns the models of this process: the built-in ones and the FMUs of --fmu-dir. INVALID_ARGUMENT
+// if that folder cannot be used.
 absl::StatusOr<ModelLibrary> OpenModels(const Place& place);
 
+// Returns a backend that shows a line of progress on a terminal while it exists.
 std::unique_ptr<Backend> MakeBackend(const Place& place);
 
 }  // namespace polyest::internal

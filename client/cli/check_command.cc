@@ -26,13 +26,13 @@
 namespace polyest::internal {
 namespace {
 
-// Errors in the lines of one data file that are shown; the others are only counted.
+// Number of errors of a data file that are shown; the others are only counted.
 constexpr int kMaxLines = 20;
 
 struct Findings {
   std::vector<std::string> errors;
   std::vector<std::string> warnings;
-  std::string summary;  // if there is no error
+  std::string summary;  // empty if there are errors
 
   void AddError(const absl::Status& status, const std::string& file) {
     std::string message = absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}});
@@ -41,7 +41,7 @@ struct Findings {
   }
 };
 
-// Reads as much of the data as can be read.
+// Reads the rows that are valid and adds the errors of the others to the findings.
 std::optional<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
                                          Findings& findings) {
   int refused = 0;
@@ -58,7 +58,7 @@ std::optional<v1::Measurements> ReadData(const std::string& file, const DataColu
   return *std::move(data);
 }
 
-// The first is the model, each topic's name is said once.
+// Prints remarks as a table. The first remark, the model, is its header. Each topic is named once.
 void Print(const Remarks& remarks, std::ostream& out) {
   const auto& model = remarks.front();
   TextTable table({model.topic(), model.name(), model.description()});

@@ -1,6 +1,6 @@
 #pragma once
 
-// The commands with their options, as they are put together from several files.
+// Collects the commands and their options, which several files define.
 
 #include <CLI/CLI.hpp>
 #include <functional>
@@ -29,7 +29,7 @@ class CommandRegistry {
   // Starts the heading under which `polyest --help` lists the commands added next.
   void StartGroup(const std::string& title) { group_ = title; }
 
-  // Adds a command whose options are to be parsed into `arguments`.
+  // Adds a command whose options are parsed into `arguments`.
   template <typename Arguments>
   CLI::App& Add(const CommandText& text, const std::shared_ptr<Arguments>& arguments) {
     if constexpr (requires { arguments->place; }) arguments->place.threads = threads_;
@@ -40,7 +40,7 @@ class CommandRegistry {
 
   int threads() const { return threads_; }
 
-  // Returns what was parsed.
+  // Returns the parsed command line.
   CommandLine Result() const { return {results_.at(app_.get_subcommands().front())(), color_}; }
 
  private:
@@ -53,7 +53,7 @@ class CommandRegistry {
   std::map<const CLI::App*, std::function<Command()>> results_;
 };
 
-// Add the commands of one purpose each.
+// Each of the following functions adds the commands of one group.
 void AddEstimationCommands(CommandRegistry& registry);
 void AddPlanningCommands(CommandRegistry& registry);
 void AddSessionCommands(CommandRegistry& registry);

@@ -1,7 +1,7 @@
 #pragma once
 
-// The commands. Each prints its answer to `out`, errors in one line each to `err`, and returns the
-// exit status.
+// Runs the commands. Each function prints its results to `out` and errors, one line each, to `err`,
+// and returns the exit status.
 
 #include <ostream>
 

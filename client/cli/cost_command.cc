@@ -20,7 +20,7 @@ absl::StatusOr<v1::ComputeCostGridResponse> EvaluateCost(const CostArguments& ar
   return response;
 }
 
-// Prints one row a point of the grid: its coordinates and the three costs.
+// Prints one row per point of the grid: its coordinates and the three costs.
 void PrintCsv(const v1::ComputeCostGridResponse& cost, std::ostream& out) {
   for (const auto& axis : cost.axes()) out << axis.parameter() << ',';
   out << "mismatch,prior,total\n";

@@ -1,4 +1,4 @@
-// `polyest delete`: a session of a daemon, and all that was measured for it.
+// Runs `polyest delete`, which deletes a session of a daemon with all its measurements.
 
 #include <absl/strings/str_cat.h>
 

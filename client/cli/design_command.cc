@@ -27,7 +27,8 @@ bool HasStreamedInput(const v1::Problem& problem) {
                      [](const v1::Input& input) { return input.has_streamed(); });
 }
 
-// Adds the problem's own inputs, unless the data had to carry one, and those of further files.
+// Adds the candidates: the inputs of the problem itself, unless one of them is streamed, and those
+// of the candidate files. Without candidate files, the request needs none.
 absl::Status AddCandidates(const DesignArguments& arguments,
                            v1::ComputeExperimentDesignRequest& request) {
   if (arguments.candidate_files.empty()) return absl::OkStatus();
@@ -115,7 +116,7 @@ void PrintSamples(const Design& design, const Design::Candidate& candidate, std:
   table.Print(out);
 }
 
-// Returns the outputs that are sampled in any case.
+// Returns the names of the measured outputs; "all outputs" if none is measured.
 std::string Planned(const Design::Candidate& candidate) {
   std::vector<std::string> measured;
   for (const auto& output : candidate.outputs()) {

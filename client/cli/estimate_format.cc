@@ -12,7 +12,7 @@
 namespace polyest::internal {
 namespace {
 
-// Returns the unit to print: none for a plain number, whose unit is "1".
+// Returns the unit to print: an empty text for "1".
 std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
 
 std::string DiagnosticText(v1::Diagnostic::Code code) {
@@ -60,7 +60,7 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
   table.Print(out);
 }
 
-// Prints by how much α² ≠ 1 has moved the estimates.
+// Prints how far α² ≠ 1 has moved the estimates.
 void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.regularization() == 1) return;
   TextTable table({"parameter", "bias", "unit", "bias/sd"});
@@ -73,8 +73,8 @@ void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   table.Print(out);
 }
 
-// Prints each component of a posterior that is a mixture. What is printed above describes the
-// heaviest component or all of them together.
+// Prints each component of a posterior that is a mixture. The tables above it describe the
+// component of largest weight or all components together.
 void PrintComponents(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.components().empty()) return;
   TextTable table({"piece", "weight", "parameter", "estimate", "sd", "unit", "mean"});

@@ -1,6 +1,7 @@
 #pragma once
 
-// Prints an estimate for a person: as wide as the screen, and with its colours (screen.h).
+// Prints estimates as tables and sentences, in the width and with the colours of the screen
+// (screen.h).
 
 #include <absl/strings/string_view.h>
 
@@ -11,12 +12,13 @@
 
 namespace polyest::internal {
 
-// Prints everything: parameters, channels, directions, cost, expansion, diagnostics.
+// Prints a whole estimate: parameters, channels, directions, cost, expansion, diagnostics.
 void PrintEstimate(const v1::Estimate& estimate, std::ostream& out);
 
 // Returns one line: "t = 10 s  k = 40.661 ± 0.026 N/m  c = 0.203 ± 0.011 N s/m".
 std::string EstimateLine(const v1::Estimate& estimate);
 
+// Returns "identified", "weak", "not identified" or, for an unknown verdict, "-".
 std::string VerdictText(v1::Identifiability::Verdict verdict);
 
 // Returns the text in the colour of the verdict: green for IDENTIFIED, yellow for WEAK, red for
@@ -24,13 +26,15 @@ std::string VerdictText(v1::Identifiability::Verdict verdict);
 std::string PaintVerdict(std::ostream& out, v1::Identifiability::Verdict verdict,
                          absl::string_view text);
 
-// Returns "0.99 k − 0.10 c", in the order of the parameters, without what is too small to matter.
+// Returns a text like "0.99 k − 0.10 c", in the order of the parameters. Terms with a coefficient
+// below 0.05 are left out.
 std::string DirectionText(const v1::Direction& direction, const v1::Estimate& estimate);
 
-// Prints one sentence each: "k/m is known to 0.4 %, k and m separately only to 5 % and 5 %".
+// Prints a sentence for each trade-off: "k/m is known to 0.4 %, k and m separately only to 5 % and
+// 5 %".
 void PrintTradeOffs(const v1::Estimate& estimate, std::ostream& out);
 
-// Prints one sentence each: "note: <what the code means>: <message>".
+// Prints a sentence for each diagnostic: "note: <meaning of the code>: <message>".
 void PrintDiagnostics(const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics,
                       std::ostream& out);
 

@@ -1,4 +1,4 @@
-// The options of the commands that estimate from measurements, and of those that study an estimate.
+// Adds the commands that estimate from measurements and those that study an estimate.
 
 #include <memory>
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// Turns a status into what a script learns from a command: its exit status and one line on stderr.
+// Turns a status into the result of a command for scripts: its exit status and one line on the
+// standard error.
 
 #include <absl/status/status.h>
 #include <absl/strings/string_view.h>
@@ -14,17 +15,18 @@ enum ExitStatus : int {
   kExitOk = 0,
   kExitFailure = 1,   // anything else
   kExitBadInput = 2,  // bad usage or input
-  kExitServer = 3,    // server unreachable, or it refused
+  kExitServer = 3,    // the server cannot be reached, or it refused
 };
 
-// `server` is empty for what ran locally: then a limit that was passed is bad input.
+// Returns the exit status for an error. `server` is empty for a local computation, for which an
+// exceeded limit is bad input.
 ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 
-// Prints the error in one line and returns its exit status. Not for an OK status.
+// Prints an error in one line and returns its exit status. `status` must not be OK.
 int Report(const absl::Status& status, absl::string_view server, std::ostream& err);
 
-// Puts the name of the file in front of the refusal of a field of the problem or of the
-// measurements. Other errors, and those of reading a file, are left alone.
+// Returns the error with the name of the file in front, if it refuses a field of the problem or of
+// the measurements. Other errors, and those of reading a file, stay unchanged.
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file);
 

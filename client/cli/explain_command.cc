@@ -22,11 +22,11 @@ namespace {
 
 using Design = v1::ComputeExperimentDesignResponse;
 
-// A remedy counts when it is expected to leave less than this of the prior's standard deviation.
+// A remedy is proposed if the expected standard deviation is below this part of the prior's.
 constexpr double kHelps = 0.5;
 constexpr int kMaxTimes = 400;
 
-// Says in words what the data tell of one parameter.
+// Returns a sentence about the information that the data give about one parameter.
 std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
   const std::string unit = p.unit().empty() || p.unit() == "1" ? "" : " " + p.unit();
   const std::string value = FormatUncertain(p.map(), p.std_dev()) + unit;
@@ -48,8 +48,8 @@ std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
   }
 }
 
-// Returns the problem with each input that the data carry as a table of the first run: a design has
-// no data.
+// Returns the problem with each streamed input replaced by a table of its values in the first run,
+// because the request for a design carries no data.
 v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& measurements) {
   int rows = measurements.time_s_size();
   for (int k = 0; k < measurements.run_size() && k < rows; ++k) {
@@ -75,8 +75,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
   return problem;
 }
 
-// Asks about the same experiment with every output of the model measured, and driven by each input
-// alone.
+// Returns a request about the same experiment with each further output of the model measured, and
+// about the experiments with each input alone.
 v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem,
                                                 const v1::Estimate& estimate, int rows) {
   v1::ComputeExperimentDesignRequest request;
@@ -95,7 +95,8 @@ v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem,
   return request;
 }
 
-// Says what would tell the i-th parameter, or that nothing looked at would.
+// Returns a sentence that proposes how to identify the i-th parameter, or says that no alternative
+// considered would.
 std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) {
   const auto helps = [&](double sd) { return sd < kHelps * p.prior_std_dev(); };
   std::string best;
@@ -138,7 +139,7 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   const v1::Estimate& estimate = input.estimate;
   std::vector<int> open;
   for (int i = 0; i < estimate.parameters_size(); ++i) {
-    // What would help the first run would help the others.
+    // The parameters of further runs follow those of the first; the same remedies apply to them.
     if (i >= input.problem.uncertain_size()) break;
     if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
   }
@@ -149,7 +150,7 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     if (!answer.ok()) return InInput(answer.status(), arguments);
     design = *std::move(answer);
   }
-  backend.reset();  // with its progress line
+  backend.reset();  // erases its progress line
   for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
   PrintTradeOffs(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);

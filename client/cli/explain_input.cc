@@ -26,8 +26,8 @@ v1::Measurements::Channel& ChannelOf(v1::Measurements& measurements, const std::
   return added;
 }
 
-// Appends the rows of run 0 in a batch; returns false after its end. Batches may name their
-// channels in any order, but each has every streamed input.
+// Appends the rows of a batch that belong to run 0. Returns false if the batch has rows of a later
+// run. Batches may name their channels in any order, but each has all streamed inputs.
 bool AppendFirstRun(const v1::Problem& problem, const v1::Measurements& batch,
                     v1::Measurements& measurements) {
   int rows = 0;

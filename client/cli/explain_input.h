@@ -1,6 +1,6 @@
 #pragma once
 
-// Reads what `polyest explain` speaks of: the estimate from files, or that of a session.
+// Reads the input of `polyest explain`: it estimates from files or gets the estimate of a session.
 
 #include <absl/status/statusor.h>
 
@@ -15,12 +15,13 @@ namespace polyest::internal {
 struct ExplainInput {
   v1::Problem problem;
   v1::Estimate estimate;
-  // Has the first run at least, with time, run and streamed inputs. Empty for a session whose
-  // problem streams no input.
+  // The measurements of the files; for a session, times and streamed inputs of the first run only,
+  // or nothing if its problem has no streamed input.
   v1::Measurements measurements;
-  int rows = 0;  // that the record has, about
+  int rows = 0;  // number of rows of the record; approximate for a session
 };
 
+// Reads the input. `backend` computes the estimate from files; a session is read from its daemon.
 absl::StatusOr<ExplainInput> ReadExplainInput(const ExplainArguments& arguments, Backend& backend);
 
 }  // namespace polyest::internal

@@ -15,11 +15,12 @@
 namespace polyest::internal {
 namespace {
 
-// The signal handler writes a byte into this pipe, and nobody reads it: it stays readable.
+// Pipe into which the signal handler writes a byte. The byte is never read, so that the pipe stays
+// readable.
 int signal_pipe[2] = {-1, -1};
 
 void OnSignal(int) {
-  // A second signal ends the process before anybody else can.
+  // The terminal is restored here because a second signal ends the process at once.
   RestoreTerminal();
   const int saved = errno;
   const char byte = 0;
@@ -35,7 +36,7 @@ Interrupt::Interrupt() {
   POLYEST_CHECK(pipe2(signal_pipe, O_CLOEXEC | O_NONBLOCK) == 0);
   struct sigaction action = {};
   action.sa_handler = OnSignal;
-  // The first signal puts the default action back; reads under way go on.
+  // The first signal restores the default action; interrupted reads are restarted.
   action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
 }
@@ -81,7 +82,7 @@ InterruptibleInput::int_type InterruptibleInput::underflow() {
     setg(buffer_.data(), buffer_.data(), buffer_.data() + count);
     return traits_type::to_int_type(*gptr());
   }
-  // A stream turns this into its bad bit, which the end of the data is not.
+  // A stream turns the exception into its bad bit, which distinguishes it from the end of the data.
   throw std::runtime_error("read error");
 }
 

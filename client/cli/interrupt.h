@@ -6,9 +6,9 @@
 
 namespace polyest::internal {
 
-// Turns Ctrl-C into something to wait for. While it lives the first SIGINT asks for an orderly end
-// (and restores the terminal's mode, keyboard.h); a second one ends the process as usual. One at a
-// time.
+// Turns Ctrl-C into an event that can be waited for. While the object exists, the first SIGINT
+// requests an orderly end and restores the mode of the terminal (keyboard.h); a second one ends the
+// process as usual. Only one object may exist at a time.
 class Interrupt {
  public:
   Interrupt();
@@ -16,14 +16,15 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
+  // Returns whether SIGINT has been received.
   bool Requested() const;
-  // Returns a descriptor that is readable once the signal has come.
+  // Returns a descriptor that becomes readable when SIGINT is received.
   int descriptor() const;
-  // Waits until `time` or the signal.
+  // Waits until `time` or until SIGINT is received.
   void WaitUntil(std::chrono::steady_clock::time_point time) const;
 };
 
-// Reads a file descriptor; ends when interrupted, even in the midst of waiting for a pipe.
+// Reads a file descriptor. An interrupt ends the input, also while it waits for a pipe.
 class InterruptibleInput : public std::streambuf {
  public:
   // Does not own the descriptor.

@@ -15,7 +15,8 @@ namespace {
 
 constexpr char kUrlPrefix[] = "type.googleapis.com";
 
-// Maps in the order of their keys, so that the same message gives the same text.
+// Serializes a message with its maps in the order of their keys, so that equal messages give equal
+// texts.
 std::string Serialize(const google::protobuf::Message& message) {
   std::string bytes;
   {

@@ -6,8 +6,8 @@
 
 namespace polyest::internal {
 
-// Returns the canonical JSON of a message, fields with their default value included and maps in the
-// order of their keys, over several lines or in one; without a line end.
+// Returns the canonical JSON of a message in one line or several, without a line end. Fields with
+// their default value are included; maps are in the order of their keys.
 std::string ToJson(const google::protobuf::Message& message, bool several_lines);
 
 }  // namespace polyest::internal

@@ -14,13 +14,13 @@ namespace {
 
 constexpr std::array<int, 3> kEndingSignals = {SIGTERM, SIGHUP, SIGQUIT};
 
-// The signal handlers need these.
+// State that the signal handlers use.
 termios saved_mode;
 volatile sig_atomic_t mode_changed = 0;
 
 void OnEndingSignal(int signal_number) {
   RestoreTerminal();
-  // SA_RESETHAND has put the default action back.
+  // SA_RESETHAND has restored the default action.
   raise(signal_number);
 }
 
@@ -45,11 +45,11 @@ Keyboard::Keyboard() {
   action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_NODEFER;
   for (const int signal_number : kEndingSignals) sigaction(signal_number, &action, nullptr);
   termios keys = saved_mode;
-  // Ctrl-C and Ctrl-Z stay signals.
+  // ISIG stays set, so that Ctrl-C and Ctrl-Z still send signals.
   keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   keys.c_cc[VMIN] = 0;
   keys.c_cc[VTIME] = 0;
-  // First, so that a signal in between restores what is still there.
+  // Set before the change, so that a signal in between restores the mode.
   mode_changed = 1;
   active_ = tcsetattr(STDIN_FILENO, TCSANOW, &keys) == 0;
 }
@@ -64,7 +64,7 @@ bool Keyboard::ReadQuit() {
   std::array<char, 64> keys{};
   const ssize_t count = read(STDIN_FILENO, keys.data(), keys.size());
   if (count <= 0) {
-    // The terminal has gone: there will be no more keys.
+    // The end of the input means that the terminal is gone: there will be no more keys.
     active_ = count < 0 && (errno == EINTR || errno == EAGAIN);
     return false;
   }
@@ -78,7 +78,7 @@ bool Keyboard::WaitForQuit(std::chrono::steady_clock::time_point time, const Int
   while (true) {
     const auto left = std::chrono::ceil<milliseconds>(time - std::chrono::steady_clock::now());
     if (left <= milliseconds::zero()) return false;
-    // poll() passes over a negative descriptor.
+    // poll() ignores a negative descriptor.
     pollfd wanted[2] = {{interrupt.descriptor(), POLLIN, 0},
                         {active_ ? STDIN_FILENO : -1, POLLIN, 0}};
     const int ready = poll(wanted, 2, static_cast<int>(std::min(left, kMaxWait).count()));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Single keys from the terminal.
+// Reads single keys from the terminal.
 
 #include <chrono>
 
@@ -8,10 +8,10 @@
 
 namespace polyest::internal {
 
-// Lets keys be read one by one and unseen while it lives, if the standard input is a terminal and
-// the process is in its foreground; otherwise there are no keys. The terminal's mode is restored on
-// every way out: at the end, at the first Ctrl-C (Interrupt), and before SIGTERM, SIGHUP or SIGQUIT
-// end the process. One at a time.
+// Sets the terminal to deliver keys one by one, without echo, while the object exists. If the
+// standard input is no terminal or the process is not in its foreground, no keys are read. The
+// terminal's mode is restored by the destructor, at the first Ctrl-C (Interrupt), and before
+// SIGTERM, SIGHUP or SIGQUIT end the process. Only one object may exist at a time.
 class Keyboard {
  public:
   Keyboard();
@@ -19,10 +19,10 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
 
-  // Returns whether there are keys.
+  // Returns whether keys can be read.
   bool active() const { return active_; }
 
-  // Waits until `time`, a `q` or an interrupt. Returns true for a `q`.
+  // Waits until `time`, for `q` or for an interrupt. Returns whether `q` was pressed.
   bool WaitForQuit(std::chrono::steady_clock::time_point time, const Interrupt& interrupt);
 
  private:
@@ -31,7 +31,7 @@ class Keyboard {
   bool active_ = false;
 };
 
-// Restores the terminal's mode if a Keyboard has changed it. May be called by a signal handler.
+// Restores the terminal's mode if a Keyboard has changed it. A signal handler may call it.
 void RestoreTerminal();
 
 }  // namespace polyest::internal

@@ -1,4 +1,4 @@
-// `polyest list`: the sessions of a daemon.
+// Runs `polyest list`, which prints the sessions of a daemon.
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"

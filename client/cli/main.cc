@@ -32,7 +32,7 @@ int Run(const polyest::internal::Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // What matters of gRPC's own messages comes back as a status.
+  // gRPC's own messages are suppressed: errors that matter are returned as a status.
   gpr_set_log_function([](gpr_log_func_args*) {});
   try {
     const auto parsed = polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr);

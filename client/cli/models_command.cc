@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-// Returns all pages as one.
+// Returns the models of all pages.
 absl::StatusOr<v1::ListModelsResponse> ListAll(const Place& place) {
   const std::unique_ptr<Backend> backend = MakeBackend(place);
   v1::ListModelsResponse all;
@@ -68,7 +68,7 @@ void PrintModel(const v1::Model& model, std::ostream& out) {
   if (!model.source().empty()) out << "\nsource: " << model.source() << '\n';
 }
 
-// Prints an answer, or reports why there is none.
+// Prints a response or reports its error. Returns the exit status.
 template <typename Response, typename PrintTable>
 int Print(const absl::StatusOr<Response>& response, const ModelsArguments& arguments,
           PrintTable print_table, std::ostream& out, std::ostream& err) {

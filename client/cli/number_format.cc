@@ -20,7 +20,7 @@ int LeadingExponent(double value) {
   return exponent;
 }
 
-// Returns whether the value reads better without an exponent.
+// Returns whether a value with that many decimals is printed without an exponent.
 bool IsPlain(double value, int decimals) {
   return decimals >= -4 && decimals <= 8 && std::abs(value) < 1e7;
 }
@@ -40,7 +40,7 @@ std::string FormatValue(double value, double standard_deviation) {
 std::string FormatUncertain(double value, double standard_deviation) {
   const bool known = std::isfinite(standard_deviation) && standard_deviation > 0;
   const bool plain = known && IsPlain(value, 1 - LeadingExponent(standard_deviation));
-  // Both in the same notation.
+  // Value and standard deviation are printed in the same notation.
   return absl::StrCat(FormatValue(value, standard_deviation), " ± ",
                       known && !plain ? absl::StrFormat("%.1e", standard_deviation)
                                       : FormatValue(standard_deviation, standard_deviation));

@@ -1,22 +1,22 @@
 #pragma once
 
-// Numbers as a person wants to read them.
+// Formats numbers for readers.
 
 #include <string>
 
 namespace polyest::internal {
 
-// Returns a value with the decimals that its uncertainty leaves: two significant digits of
-// `standard_deviation`, as in 40.6612 beside 0.0052. Six significant digits when the uncertainty is
-// 0 or not finite.
+// Returns a value with as many decimals as two significant digits of `standard_deviation` have:
+// 40.6612 for 0.0052. Returns six significant digits when the standard deviation is not positive or
+// not finite.
 std::string FormatValue(double value, double standard_deviation);
-// Returns "40.6612 ± 0.0052".
+// Returns value and standard deviation as "40.6612 ± 0.0052".
 std::string FormatUncertain(double value, double standard_deviation);
-// Returns at most `digits` significant digits.
+// Returns a value with at most `digits` significant digits.
 std::string FormatNumber(double value, int digits = 4);
 // Returns a probability as "97.5 %".
 std::string FormatPercent(double probability);
-// Returns all digits that tell the value from its neighbours: what is read back is the same number.
+// Returns the shortest text that gives exactly the same number when read back.
 std::string FormatExact(double value);
 
 }  // namespace polyest::internal

@@ -1,4 +1,4 @@
-// The options of the commands for the time before anything is measured.
+// Adds the commands for the time before measurements, and the commands `schema` and `paper`.
 
 #include <memory>
 

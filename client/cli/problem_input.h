@@ -1,8 +1,8 @@
 #pragma once
 
-// Reads what the commands compute from: a problem and data from files, or a session of a daemon. A
-// problem is checked whole before any data are read or sent, so that what is wrong with the problem
-// is not blamed on the data.
+// Reads the input of the commands: a problem and data from files, or a session of a daemon. A
+// problem is checked before any data are read or sent, so that its errors are not reported as
+// errors of the data.
 
 #include <absl/status/statusor.h>
 #include <absl/strings/str_cat.h>
@@ -18,12 +18,12 @@
 
 namespace polyest::internal {
 
-// Reads a problem and checks it. INVALID_ARGUMENT, opening with the file's name, for all that is
-// wrong with the file or with the problem in it. Which FMUs a server has, only it knows: a problem
-// with one is then left to it.
+// Reads a problem and checks it. An error of the file or of the problem is INVALID_ARGUMENT, and
+// its message begins with the file's name. A problem with an FMU for a server is not checked: only
+// the server knows its FMUs.
 absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Place& place);
 
-// INVALID_ARGUMENT when the first file is CSV data and the second a problem.
+// Refuses two files with INVALID_ARGUMENT when the first is CSV data and the second a problem.
 absl::Status CheckFilesAreNotSwapped(const std::string& problem_file, const std::string& data_file);
 
 // Reads a checked problem and the data for it.
@@ -31,8 +31,8 @@ absl::Status ReadProblemAndData(const std::string& problem_file, const std::stri
                                 const Place& place, v1::Problem& problem,
                                 v1::Measurements& measurements);
 
-// Fills in what a request computes from: the session that the arguments name, if their command
-// takes one, or else their two files.
+// Fills in the subject of a request: the session that the arguments name, if their command takes
+// one, or else the problem and the data in their two files.
 template <typename Arguments, typename Request>
 absl::Status FillInput(const Arguments& arguments, Request& request) {
   if constexpr (requires { arguments.session; }) {
@@ -46,8 +46,8 @@ absl::Status FillInput(const Arguments& arguments, Request& request) {
                             *experiment.mutable_problem(), *experiment.mutable_measurements());
 }
 
-// Puts the name of the file in front of the refusal of one of its fields; leaves alone what a
-// daemon says of a session.
+// Returns the error with the name of the file in front, if it refuses a field of a file (InFile).
+// Errors about a session stay unchanged.
 template <typename Arguments>
 absl::Status InInput(const absl::Status& status, const Arguments& arguments) {
   if constexpr (requires { arguments.session; }) {

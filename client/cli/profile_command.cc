@@ -23,7 +23,7 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& 
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.points);
-  // A person reads fewer rows than a plot takes.
+  // A table needs fewer points than a plot.
   if (arguments.format == Format::kTable && arguments.points == 0)
     request.set_point_count(kTablePoints);
   auto response = MakeBackend(arguments.place)->ComputeCostProfiles(request);
@@ -31,13 +31,15 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& 
   return response;
 }
 
-// Returns the rise without the minus sign of a rounding error.
+// Returns the rise of the cost above its least value; 0 if it would be printed as 0, so that a
+// rounding error does not show as "-0.000".
 double Rise(double total, double least) {
   const double rise = total - least;
   return std::abs(rise) < 5e-4 ? 0 : rise;
 }
 
-// Prints one table a parameter: its values, the rise of the cost and where the others are then.
+// Prints one table per parameter: its values, the rise of the cost and the other parameters at the
+// minimum.
 void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& out) {
   const int columns = response.parameters_size();
   for (const auto& profile : response.profiles()) {
@@ -68,7 +70,7 @@ void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& 
   PrintDiagnostics(response.diagnostics(), out);
 }
 
-// Prints one row a value: the parameter profiled, its value, the costs and all parameters at the
+// Prints one row per value: the profiled parameter, its value, the costs and all parameters at the
 // minimum.
 void PrintCsv(const v1::ComputeCostProfilesResponse& response, std::ostream& out) {
   out << "parameter,value,total,mismatch,prior";

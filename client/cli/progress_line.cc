@@ -14,17 +14,17 @@
 namespace polyest::internal {
 namespace {
 
-// Shorter work needs no line.
+// Delay before the line is shown.
 constexpr std::chrono::milliseconds kFirstShown{500};
 constexpr std::chrono::milliseconds kInterval{200};
-// Back to the line's start, and clear it.
+// Returns to the start of the line and clears it.
 constexpr char kClear[] = "\r\x1b[K";
 
 void WriteToTerminal(const std::string& text) {
   [[maybe_unused]] const auto written = write(STDERR_FILENO, text.data(), text.size());
 }
 
-// Cuts UTF-8 text to that many places.
+// Returns the beginning of UTF-8 text that is at most `places` columns wide.
 std::string Cut(const std::string& text, int places) {
   size_t end = 0;
   for (size_t i = 0; i < text.size(); end = i) {
@@ -66,7 +66,7 @@ void ProgressLine::Draw() {
   const std::chrono::duration<double> elapsed = Clock::now() - start_;
   const Screen screen = ScreenOf(STDERR_FILENO, ColorChoice::kNever);
   const std::string text = absl::StrFormat("%s · %.0f s", describe_(), elapsed.count());
-  // The last place stays free: some terminals begin a new line after it.
+  // The last column stays free, since some terminals begin a new line after it.
   WriteToTerminal(absl::StrCat(kClear, Cut(text, screen.columns - 1)));
   shown_ = true;
 }

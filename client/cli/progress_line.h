@@ -1,6 +1,6 @@
 #pragma once
 
-// A line on the terminal that says what long work is doing.
+// Shows the progress of long work in a line on the terminal.
 
 #include <absl/functional/function_ref.h>
 
@@ -17,18 +17,18 @@
 
 namespace polyest::internal {
 
-// Shows "<what> · 12 s" at the end of the standard error once the work has taken half a second, and
-// takes it away at the end. Shows nothing where the standard error is no terminal, so that scripts
-// and logs never see it. For one thread, `Interject` apart.
+// Shows "<description> · 12 s" on the standard error once the work has taken half a second, and
+// erases it in the destructor. Shows nothing if the standard error is no terminal, so that scripts
+// and logs never contain it. All functions except Interject must be called from one thread.
 class ProgressLine {
  public:
-  // `describe` is called from a thread of the line's own until the line ends.
+  // `describe` returns the description. It is called from another thread until the destructor ends.
   explicit ProgressLine(std::function<std::string()> describe);
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  // Calls `print` while the line is away. Any thread may.
+  // Erases the line and calls `print`. Any thread may call it.
   void Interject(absl::FunctionRef<void()> print);
 
  private:
@@ -47,22 +47,23 @@ class ProgressLine {
   std::thread thread_;
 };
 
-// Keeps how far an estimator is with its record. The estimator's thread writes, others read.
+// Progress of an estimator through its record. The estimator's thread writes it, others read it.
 class EstimationProgress {
  public:
-  // "row 128 of 800", "re-expanding, row 64 of 800", "assessing the estimate".
+  // Returns a text like "row 128 of 800", "re-expanding, row 64 of 800" or "all 800 rows taken,
+  // assessing the posterior".
   std::string Describe() const;
 
  private:
   friend class WatchedStore;
 
-  std::atomic<int64_t> rows_{0};    // in the record
-  std::atomic<int64_t> taken_{0};   // read at least once
-  std::atomic<int64_t> latest_{0};  // up to where the last read went
+  std::atomic<int64_t> rows_{0};    // number of rows in the record
+  std::atomic<int64_t> taken_{0};   // number of rows read at least once
+  std::atomic<int64_t> latest_{0};  // row at which the last read ended
 };
 
-// A sample store in memory that notes which rows the estimator reads: rows past all read before are
-// being taken, earlier rows are propagated again on a moved expansion.
+// A sample store in memory that records which rows the estimator reads. Rows that it reads for the
+// first time are new; rows that it reads again are propagated again on a new expansion.
 class WatchedStore final : public SampleStore {
  public:
   explicit WatchedStore(std::shared_ptr<EstimationProgress> progress);

@@ -27,7 +27,7 @@ absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArgument
   return response;
 }
 
-// Prints one table an output.
+// Prints one table per output.
 void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   const int quantiles = propagation.probabilities_size();
   for (const auto& output : propagation.outputs()) {
@@ -58,7 +58,7 @@ void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream
   PrintDiagnostics(propagation.diagnostics(), out);
 }
 
-// Prints one row a time: x.mean, x.stdDev, x.q0.025 …, x.residual for each output.
+// Prints one row per time: x.mean, x.stdDev, x.q0.025 …, x.residual for each output x.
 void PrintCsv(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   out << 't';
   for (const auto& output : propagation.outputs()) {

@@ -27,7 +27,7 @@ absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& argumen
   request.set_lowest(arguments.lowest);
   request.set_highest(arguments.highest);
   request.set_point_count(arguments.points);
-  // A person reads fewer rows than a plot takes.
+  // A table needs fewer points than a plot.
   if (arguments.format == Format::kTable && arguments.points == 0 && arguments.plot_file.empty()) {
     request.set_point_count(kTablePoints);
   }
@@ -40,7 +40,7 @@ std::string WithUnit(const std::string& name, const std::string& unit) {
   return unit == "1" ? name : absl::StrCat(name, " (", unit, ")");
 }
 
-// Formats the evidence without the minus sign of a rounding error.
+// Formats the evidence relative to the greatest; a rounding error does not show as "-0.00".
 std::string FormatLogEvidence(double value) {
   return absl::StrFormat("%.2f", value > -5e-3 ? 0 : value);
 }
@@ -79,7 +79,8 @@ void PrintTable(const Sweep& sweep, std::ostream& out) {
   PrintDiagnostics(sweep.diagnostics(), out);
 }
 
-// Prints one row a weight; then the estimates and their standard deviations.
+// Prints one row per α²: the costs, the effective parameters, the evidence, and the estimates with
+// their standard deviations.
 void PrintCsv(const Sweep& sweep, std::ostream& out) {
   out << "regularization,mismatch,prior,effectiveParameters,logEvidence";
   for (const std::string& name : sweep.parameters()) out << ',' << name << ',' << name << "_stdDev";

@@ -14,7 +14,7 @@ using Sweep = v1::ComputeRegularizationSweepResponse;
 constexpr char kLineColor[] = "#1f4e9c", kLCurveColor[] = "#d95f02",
                kDiscrepancyColor[] = "#1b9e77", kEvidenceColor[] = "#c2185b";
 constexpr char kWeight[] = "log₁₀ α²";
-constexpr double kMinLogEvidence = -20;  // drawn; what is below is as good as impossible
+constexpr double kMinLogEvidence = -20;  // points with less evidence are not drawn
 
 struct Rule {
   const char* name;
@@ -32,7 +32,7 @@ std::vector<Rule> RulesThatChoose(const Sweep& sweep) {
   return rules;
 }
 
-// Returns a panel over log₁₀ α², with the rules' choices.
+// Returns an empty panel over log₁₀ α² with a vertical line at the choice of each rule.
 LinePanel PanelOverWeight(const Sweep& sweep, std::string title, std::string y_label) {
   LinePanel panel;
   panel.title = std::move(title);

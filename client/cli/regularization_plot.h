@@ -5,7 +5,8 @@
 
 namespace polyest::internal {
 
-// The L-curve, the evidence and each parameter's estimate over log₁₀ α², with the α² of the rules.
+// Returns a plot of the L-curve, and of the evidence and each parameter's estimate over log₁₀ α²,
+// with the α² that the rules choose.
 Plot MakePlot(const v1::ComputeRegularizationSweepResponse& response);
 
 }  // namespace polyest::internal

@@ -12,12 +12,13 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kDefaultColumns = 80;  // of a terminal that does not tell
+constexpr int kDefaultColumns = 80;  // of a terminal whose size is unknown
 constexpr int kDefaultRows = 24;
 constexpr int kMinColumns = 20;
 constexpr char kEscape = '\x1b';
 
-// The slots of a stream; what is 0 at first is the default of Screen.
+// The following functions return the indices of a stream's storage for a Screen. A stream's values
+// are 0 at first, which is the default of Screen.
 int ColumnsSlot() {
   static const int slot = std::ios_base::xalloc();
   return slot;
@@ -55,7 +56,7 @@ const char* CodeOf(Color color) {
   return "0";
 }
 
-// Skips an escape sequence that begins at `i`; returns where the text goes on.
+// Returns the position after the escape sequence that begins at `i`.
 size_t SkipSequence(absl::string_view text, size_t i) {
   const size_t end = text.find('m', i);
   return end == absl::string_view::npos ? text.size() : end + 1;
@@ -108,8 +109,8 @@ int DisplayWidth(absl::string_view text) {
       i = SkipSequence(text, i);
       continue;
     }
-    // UTF-8: every byte but those that continue a code point. A combining mark such as that of R̂,
-    // U+0300 to U+036F, takes no place.
+    // Only the first byte of a UTF-8 code point counts. A combining mark such as that of R̂, U+0300
+    // to U+036F, takes no column.
     const auto byte = static_cast<unsigned char>(text[i]);
     const bool combines = byte == 0xCC || (byte == 0xCD && i + 1 < text.size() &&
                                            static_cast<unsigned char>(text[i + 1]) < 0xB0);

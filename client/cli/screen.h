@@ -1,8 +1,8 @@
 #pragma once
 
-// What an output stream is shown on: the width that tables follow, and whether there are colours.
-// It is kept in the stream itself, so that whatever prints to the stream follows it; copyfmt()
-// takes it along to a stream that collects text first.
+// Describes the screen that shows an output stream: its width, to which tables are fitted, and
+// whether it has colours. The description is stored in the stream itself, so that all code that
+// prints to the stream follows it. copyfmt() copies it to a stream that collects text first.
 
 #include <absl/strings/string_view.h>
 
@@ -15,33 +15,34 @@ enum class ColorChoice { kAuto, kAlways, kNever };
 
 enum class Color { kGreen, kYellow, kRed, kFaint };
 
-// A stream's screen is this one until SetScreen: text of any width without colours.
+// Size and colours of a screen. Until SetScreen, a stream has the default: text of any width
+// without colours.
 struct Screen {
   int columns = 0;  // 0: no limit
   int rows = 0;     // 0: no limit
   bool color = false;
 };
 
-// Returns the screen behind a file descriptor: the size of its terminal, where COLUMNS in the
-// environment overrides the width; no limits without a terminal. `kAuto` means colours on a
+// Returns the screen of a file descriptor: the size of its terminal, whose width the environment
+// variable COLUMNS overrides, or no limits if it is no terminal. `kAuto` means colours on a
 // terminal that has them, unless NO_COLOR is set (https://no-color.org).
 Screen ScreenOf(int descriptor, ColorChoice color);
 
 void SetScreen(std::ios_base& stream, const Screen& screen);
 Screen GetScreen(std::ios_base& stream);
 
-// Returns the text in that colour if the stream's screen has colours; otherwise the text.
+// Returns the text in the colour if the stream's screen has colours; otherwise the plain text.
 std::string Paint(std::ios_base& stream, Color color, absl::string_view text);
 
-// Returns the number of places that UTF-8 text takes on a screen: one a code point, none for the
-// sequences that Paint adds.
+// Returns the number of columns that UTF-8 text takes on a screen: one per code point, none for
+// combining marks and for the sequences that Paint adds.
 int DisplayWidth(absl::string_view text);
 
-// Breaks text at blanks into lines of at most `columns` places, all but the first indented; a
-// longer word keeps a line of its own. 0 columns: one line.
+// Breaks text at blanks into lines of at most `columns` columns. All lines but the first are
+// indented. A longer word gets a line of its own. With 0 columns, the text stays one line.
 std::string WrapText(absl::string_view text, int columns, int indent = 0);
 
-// Prints a sentence and ends its line; it is broken where the screen ends.
+// Prints a sentence and a line end. The sentence is wrapped to the width of the screen.
 void PrintSentence(std::ostream& out, absl::string_view text);
 
 }  // namespace polyest::internal

@@ -19,7 +19,7 @@ namespace {
 
 using Analysis = v1::ComputeSensitivityResponse;
 
-constexpr int kMaxTableRows = 21;  // of an output; the other formats have all times
+constexpr int kMaxTableRows = 21;  // per output; the other formats have all times
 
 absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& arguments) {
   v1::ComputeSensitivityRequest request;
@@ -35,7 +35,8 @@ absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& argument
 
 std::string Share(double share) { return absl::StrFormat("%.3f", share); }
 
-// Returns the first-order and total index of each parameter; none where the output does not vary.
+// Returns time, mean, standard deviation, residual, and the first-order and total index of each
+// parameter, which are "-" where the output does not vary.
 std::vector<std::string> Row(const Analysis& analysis, const Analysis::Output& output, int k) {
   const int n = analysis.parameters_size();
   const auto totals = output.total().begin() + k * n;
@@ -86,8 +87,8 @@ void PrintTables(const Analysis& analysis, std::ostream& out) {
   PrintDiagnostics(analysis.diagnostics(), out);
 }
 
-// Prints one row a time: x.mean, x.stdDev, x.residual, x.noise, x.first.k, x.total.k … for each
-// output.
+// Prints one row per time: x.mean, x.stdDev, x.residual, x.noise, x.first.k, x.total.k … for each
+// output x and parameter k.
 void PrintCsv(const Analysis& analysis, std::ostream& out) {
   out << 't';
   for (const auto& output : analysis.outputs()) {

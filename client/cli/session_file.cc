@@ -50,7 +50,7 @@ absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     return absl::InvalidArgumentError(
         absl::StrFormat("%s: cannot be read: %s", file, std::strerror(errno)));
   }
-  // No more than the line would have.
+  // Reads no more bytes than the first line has.
   std::string line(sizeof(kFirstLine), '\0');
   reader->in_.read(line.data(), static_cast<std::streamsize>(line.size()));
   if (!reader->in_ || line != std::string(kFirstLine) + "\n") {

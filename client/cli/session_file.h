@@ -1,7 +1,8 @@
 #pragma once
 
-// A session in a file, as `polyest export` writes and `polyest import` reads it: a line that says
-// what it is, then polyest.v1.SessionRecord messages, each after its length as a varint.
+// Writes and reads session files, for `polyest export` and `polyest import`. A file has a first
+// line that identifies its kind and then polyest.v1.SessionRecord messages, each after its length
+// as a varint.
 
 #include <absl/status/statusor.h>
 #include <google/protobuf/io/zero_copy_stream_impl.h>
@@ -17,15 +18,16 @@ namespace polyest::internal {
 
 class SessionFileWriter {
  public:
-  // Writes beside the file first, so that an export that fails leaves what was there.
-  // INVALID_ARGUMENT when that cannot be written.
+  // Opens a draft beside the file, so that a failed export leaves an existing file unchanged.
+  // INVALID_ARGUMENT if the draft cannot be written.
   static absl::StatusOr<std::unique_ptr<SessionFileWriter>> Open(const std::string& file);
-  // Removes what was not finished.
+  // Removes the draft if Finish has not been called.
   ~SessionFileWriter();
   SessionFileWriter(const SessionFileWriter&) = delete;
   SessionFileWriter& operator=(const SessionFileWriter&) = delete;
 
   absl::Status Write(const v1::SessionRecord& record);
+  // Replaces the file by the draft.
   absl::Status Finish();
 
  private:
@@ -39,10 +41,11 @@ class SessionFileWriter {
 
 class SessionFileReader {
  public:
-  // INVALID_ARGUMENT when the file cannot be read or is something else.
+  // Opens a file. INVALID_ARGUMENT if it cannot be read or is not a session file.
   static absl::StatusOr<std::unique_ptr<SessionFileReader>> Open(const std::string& file);
 
-  // Returns none at the end of the file; INVALID_ARGUMENT where it breaks off.
+  // Returns the next record; none at the end of the file. INVALID_ARGUMENT if the file ends within
+  // a record.
   absl::StatusOr<std::optional<v1::SessionRecord>> Read();
 
  private:

@@ -1,4 +1,4 @@
-// `polyest export` and `polyest import`: a session, out of one daemon and into another.
+// Runs `polyest export` and `polyest import`, which copy a session from one daemon to another.
 
 #include <absl/strings/str_cat.h>
 

@@ -12,13 +12,13 @@
 namespace polyest::internal {
 namespace {
 
-// Says whether data are coming in, or else where the session is kept now.
+// Returns "streaming" if data are coming in; otherwise whether the session is in memory or stored.
 std::string State(const v1::Session::Activity& activity) {
   if (activity.has_writer()) return "streaming";
   return activity.loaded() ? "in memory" : "stored";
 }
 
-// Returns "2026-11-22 07:15:02Z".
+// Returns the time of creation as "2026-11-22 07:15:02Z".
 std::string CreateTime(const v1::Session& session) {
   google::protobuf::Timestamp whole_seconds;
   whole_seconds.set_seconds(session.create_time().seconds());

@@ -1,6 +1,6 @@
 #pragma once
 
-// The sessions of a daemon, for `polyest list` and `polyest top`.
+// Lists the sessions of a daemon, for `polyest list` and `polyest top`.
 
 #include <absl/status/statusor.h>
 
@@ -13,7 +13,8 @@ namespace polyest::internal {
 // Returns all sessions, following the daemon's pages.
 absl::StatusOr<v1::ListSessionsResponse> ListAllSessions(Client& client);
 
-// Prints one line a session: its name, what it holds, whether data are coming in, when it was made.
+// Prints one line per session: its name, the amount of data, its state, the time since its last use
+// and the time of its creation.
 void PrintSessions(const v1::ListSessionsResponse& list, std::ostream& out);
 
 }  // namespace polyest::internal

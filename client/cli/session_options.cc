@@ -1,4 +1,4 @@
-// The options of the commands for a daemon and its sessions.
+// Adds the commands for a daemon and its sessions.
 
 #include <memory>
 

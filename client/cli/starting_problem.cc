@@ -19,12 +19,12 @@
 namespace polyest::internal {
 namespace {
 
-// `polyest schema > problem.schema.json` puts the schema there, beside the problem.
+// File to which `polyest schema > problem.schema.json` writes the schema, beside the problem.
 constexpr char kSchema[] = "./problem.schema.json";
 constexpr size_t kMaxUnknowns = 2;
-constexpr double kPriorHalfWidth = 0.3;  // of the default
+constexpr double kPriorHalfWidth = 0.3;  // as a part of the default
 
-// Returns a JSON string: the names of an FMU may have anything in them.
+// Returns a name as a JSON string: the names of an FMU may contain any characters.
 std::string Quoted(const std::string& name) {
   google::protobuf::Value value;
   value.set_string_value(name);
@@ -37,7 +37,8 @@ bool IsInitialState(const Quantity& parameter) {
   return absl::StartsWith(parameter.meaning, "initial");
 }
 
-// Masses and lengths can be put on a scale; what else a model has is seldom known.
+// Returns whether a parameter is a mass, a length or an inertia, which are easily measured. Other
+// parameters are seldom known.
 bool IsEasilyMeasured(const Quantity& parameter) {
   static const std::set<std::string> units = {"kg", "m", "kg m^2"};
   return units.contains(parameter.unit);
@@ -56,7 +57,7 @@ std::vector<Quantity> ChooseUnknowns(const ModelDescription& model) {
   return unknowns;
 }
 
-// Four digits, and no exponent where a person would write none.
+// Returns a value rounded to four digits, in its shortest notation.
 std::string Rounded(double value) {
   return FormatExact(std::strtod(FormatNumber(value).c_str(), nullptr));
 }
@@ -69,7 +70,8 @@ std::string Uncertain(const Quantity& parameter) {
                       ", \"upper\": ", Rounded(parameter.default_value + half_width), "}}");
 }
 
-// Its default; where nothing else would move the model, its first initial state.
+// Returns the parameters that are fixed at their defaults. In a model without inputs, the first
+// initial state is not 0, so that the model moves.
 std::vector<std::string> Fixed(const ModelDescription& model,
                                const std::vector<Quantity>& unknowns) {
   std::vector<std::string> fixed;
@@ -89,7 +91,8 @@ std::vector<std::string> Fixed(const ModelDescription& model,
   return fixed;
 }
 
-// Returns a signal of the size usual for its unit; bumps come one after the other.
+// Returns an input with a signal of the size that is usual for its unit. The bumps of successive
+// inputs follow one another.
 std::string Input(const Quantity& input, int index) {
   std::string signal = R"("sinusoid": {"amplitude": 1, "frequencyHz": 1})";
   if (input.unit == "m") {

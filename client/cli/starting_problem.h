@@ -1,6 +1,6 @@
 #pragma once
 
-// Problem files to start from: valid as they are, with numbers that are there to be edited.
+// Writes problem files to start from. They are valid; their numbers are meant to be edited.
 
 #include <string>
 
@@ -9,11 +9,11 @@
 namespace polyest::internal {
 
 // Returns a problem for a model from `source`, "builtin" or "fmu": one or two unknowns within 30 %
-// of their defaults, all else fixed at its default, a signal for each input, every output measured.
-// Infinite defaults, which JSON cannot say plainly, are left out.
+// of their defaults, the other parameters fixed at their defaults, a signal for each input, and all
+// outputs measured. Infinite defaults are left out, since JSON has no plain number for them.
 std::string StartingProblem(const ModelDescription& model, const char* source = "builtin");
 
-// A problem with a model of the user's own as text: an oscillator.
+// A problem whose model, an oscillator, is given by its equations.
 extern const char kStartingEquations[];
 
 }  // namespace polyest::internal

@@ -35,12 +35,13 @@ namespace {
 constexpr std::chrono::milliseconds kFirstPause{500};
 constexpr std::chrono::milliseconds kMaxPause{5'000};
 
-// Says when a batch is due, by the data's own time.
+// Delays batches by the times of their rows.
 class Pace {
  public:
   Pace(double rate, const Interrupt& interrupt) : rate_(rate), interrupt_(interrupt) {}
 
-  // Waits until the batch's last row would have been measured. Runs follow upon one another.
+  // Waits until the time at which the last row of the batch would have been measured. Runs follow
+  // one another without a pause.
   void Wait(const v1::Measurements& batch) {
     if (rate_ == 0) return;
     for (int row = 0; row < batch.time_s_size(); ++row) {
@@ -72,7 +73,8 @@ class StreamCommand {
         err_(err),
         client_(arguments.place.server, ToClientOptions(arguments.place)) {}
 
-  // Returns the last estimate, none without samples.
+  // Returns the last estimate; none if the data have no samples or if an interrupt comes before the
+  // first batch is sent.
   absl::StatusOr<std::optional<v1::Estimate>> Run() {
     if (arguments_.data_file != "-") {
       POLYEST_RETURN_IF_ERROR(
@@ -105,7 +107,7 @@ class StreamCommand {
     auto reader = DataReader::Open(in, name, ColumnsOf(problem_));
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());
-    // Before anything is created, so that a file that is no good leaves nothing behind.
+    // The first batch is read before the session is created, so that an invalid file creates none.
     auto first = reader->Read(arguments_.batch_rows);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(first.status());
@@ -116,7 +118,7 @@ class StreamCommand {
     return last;
   }
 
-  // Opens the session, once the daemon has room for it if that is what it lacks.
+  // Opens the session. Waits and tries again while the daemon has no room for it.
   absl::StatusOr<StreamSession> WaitForSession() {
     auto session = OpenSession(client_, problem_, arguments_.session);
     for (std::chrono::milliseconds pause = kFirstPause; !session.ok();
@@ -157,7 +159,7 @@ class StreamCommand {
       }
       if (interrupted()) break;
       auto next = reader.Read(arguments_.batch_rows);
-      if (interrupted()) break;  // what was read may end in the midst of a row
+      if (interrupted()) break;  // the rows read may end within a row
       POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
     }
     if (session.resumed_after) {
@@ -173,8 +175,9 @@ class StreamCommand {
     return stream.Finish();
   }
 
-  // Returns whether the last rows would wait for rows that will not come. A session with a name of
-  // its own may be resumed, by data that go on.
+  // Returns whether the stream must end the run, because the last rows of a streamed input would
+  // wait for rows that do not come. A session that the user has named may be resumed with further
+  // rows of the run.
   bool EndsRun() const {
     if (!arguments_.session.empty()) return false;
     return std::any_of(problem_.inputs().begin(), problem_.inputs().end(),
@@ -207,7 +210,7 @@ class StreamCommand {
   Client client_;
   v1::Problem problem_;
   StreamProgress progress_;
-  ProgressLine* line_ = nullptr;  // as long as Run() runs
+  ProgressLine* line_ = nullptr;  // valid during Run()
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ void StreamProgress::CountRowsOf(int descriptor) {
   char last = '\n';
   off_t place = 0;
   ssize_t count = 0;
-  // pread() leaves the place where the data will be read from.
+  // pread() does not change the position from which the data will be read.
   while ((count = pread(descriptor, buffer.data(), buffer.size(), place)) > 0) {
     lines += std::count(buffer.begin(), buffer.begin() + count, '\n');
     last = buffer[static_cast<size_t>(count) - 1];
@@ -34,7 +34,7 @@ std::string StreamProgress::Describe() const {
   const int64_t total = rows_of_file_;
   if (rows == 0) return "waiting for data";
   std::string text = absl::StrCat("row ", rows);
-  // Blank lines count as rows before they are read.
+  // The total includes blank lines, which are not rows.
   if (total > 0) absl::StrAppend(&text, " of ", std::max(rows, total));
   absl::StrAppend(&text, " sent");
   if (estimated_)

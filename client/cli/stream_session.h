@@ -1,6 +1,6 @@
 #pragma once
 
-// The session that `polyest stream` writes to.
+// Opens the session that `polyest stream` writes to.
 
 #include <absl/status/statusor.h>
 
@@ -18,16 +18,16 @@ struct RowPlace {
 
 struct StreamSession {
   std::string name;  // `sessions/{id}`
-  // The last row that it has; none if it is new.
+  // The last row of the resumed session; none if the session has no rows.
   std::optional<RowPlace> resumed_after;
 };
 
-// Creates the session, or resumes the one of that name if its problem is the same. `id` empty: the
-// daemon chooses.
+// Creates the session `id`, or resumes it if it exists with the same problem. If `id` is empty, the
+// daemon chooses the name. ALREADY_EXISTS if the session has another problem.
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id);
 
-// Removes the leading rows up to and including `place`; returns how many.
+// Removes the leading rows up to and including `place` and returns their number.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
 
 }  // namespace polyest::internal

@@ -14,7 +14,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kGap = 2;
-// Numbers with their units and names are shorter; broken lines of text below this are hard to read.
+// Least width of a wrapped column. Cells with numbers, units or names are narrower; narrower text
+// is hard to read.
 constexpr int kMinProse = 32;
 
 int Total(const std::vector<int>& widths) {
@@ -54,7 +55,7 @@ void TextTable::Narrow(Widths& widths, int places) const {
   for (size_t i = 0; i < widths.size(); ++i) {
     if (IsProse(i)) prose.push_back(i);
   }
-  // The widest first.
+  // The widest column comes first.
   std::sort(prose.begin(), prose.end(), [&](size_t a, size_t b) { return widths[a] > widths[b]; });
   for (const size_t i : prose) {
     const int excess = Total(widths) - places;

@@ -21,8 +21,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Moves to the first place and clears what is below: a terminal that is cleared first would
-// flicker.
+// Moves the cursor to the top left and clears the screen from there. Clearing the whole screen
+// first would make it flicker.
 constexpr char kHome[] = "\x1b[H\x1b[J";
 
 absl::StatusOr<DaemonView> Look(Client& client) {
@@ -43,13 +43,13 @@ absl::Status Show(const TopArguments& arguments, const Interrupt& interrupt, std
   std::optional<DaemonView> before;
   while (!interrupt.Requested()) {
     POLYEST_ASSIGN_OR_RETURN(DaemonView now, Look(client));
-    // The window may have another size by now.
+    // The size of the window may have changed.
     if (redraw) {
       Screen screen = ScreenOf(STDOUT_FILENO, ColorChoice::kNever);
       screen.color = GetScreen(out).color;
       SetScreen(out, screen);
     }
-    // Printed in one piece, so that no half of it is ever seen.
+    // The text is printed at once, so that no incomplete table is visible.
     std::ostringstream text;
     text.copyfmt(out);
     PrintTop(now, before ? &*before : nullptr, redraw, text);

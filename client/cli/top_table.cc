@@ -16,7 +16,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr char kUnknown[] = "-";
-// The header of three lines, the table's own, the count of those left out, and the last line.
+// Three lines of the header, the header of the table, the number of sessions left out, and the last
+// line.
 constexpr int kRowsBesidesSessions = 6;
 
 std::string YesOrUnknown(bool yes) { return yes ? "yes" : kUnknown; }
@@ -42,7 +43,7 @@ std::string SampleRate(const v1::Session& session, const DaemonView& now,
                        const DaemonView* before) {
   if (before == nullptr || now.time_s <= before->time_s) return kUnknown;
   const v1::Session* const earlier = Find(*before, session.name());
-  // A smaller number belongs to another session that had the name.
+  // If the number has decreased, the earlier session was another one of the same name.
   if (earlier == nullptr || earlier->sample_count() > session.sample_count()) return kUnknown;
   const auto samples = static_cast<double>(session.sample_count() - earlier->sample_count());
   return FormatNumber(samples / (now.time_s - before->time_s), 3);
@@ -84,7 +85,8 @@ std::vector<Column> Columns(const DaemonView& now, const DaemonView* before) {
   };
 }
 
-// Returns a table of the first sessions whose first column is at most a third of the screen.
+// Returns a table of the first `sessions` sessions. Names longer than a third of the screen are
+// cut.
 TextTable MakeTable(const DaemonView& now, const std::vector<Column>& columns, size_t sessions,
                     int screen_columns) {
   std::vector<std::string> cells;

@@ -1,4 +1,4 @@
-// `polyest watch`: the estimates of a session, as they come.
+// Runs `polyest watch`, which prints the estimates of a session as they are made.
 
 #include <absl/strings/str_cat.h>
 #include <poll.h>
@@ -17,7 +17,7 @@
 namespace polyest::internal {
 namespace {
 
-// Cancels a call once Ctrl-C is pressed, for as long as it lives.
+// Cancels a call when Ctrl-C is pressed while the object exists.
 class CancelOnInterrupt {
  public:
   CancelOnInterrupt(const Interrupt& interrupt, grpc::ClientContext& call)
@@ -54,7 +54,7 @@ int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream&
     const CancelOnInterrupt cancel(interrupt, call);
     const auto print = [&](const v1::WatchSessionResponse& response) {
       last = response.estimate();
-      // The table below says it all.
+      // The table printed at the end contains the line.
       if (arguments.once && arguments.format == Format::kTable) return false;
       progress.Interject([&] {
         out << (arguments.format == Format::kJsonLines ? ToJson(*last, /*several_lines=*/false)
