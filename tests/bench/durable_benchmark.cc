@@ -1,10 +1,10 @@
-// Durable sessions under load: a hundred rigs at once, each with four channels of a thousand
-// samples a second, every batch on disk before it is acknowledged.
+// Measures durable sessions under load: a hundred rigs at once, each with four channels of a
+// thousand samples per second. Every batch is on disk before it is acknowledged.
 //
-// First as fast as it goes, beside a bare service that does no more than it must: gRPC's own
-// stream, and each message's bytes committed to SQLite by the same group commit. Then at the rigs'
-// own pace, where what counts is how long an acknowledgement takes and whether the estimators keep
-// up.
+// The first part sends as fast as possible and compares the daemon with a bare service that does
+// the minimum: gRPC's own stream, and each message's bytes committed to SQLite by the same group
+// commit. The second part sends at the rigs' own pace and measures the time to acknowledgements and
+// whether the estimators keep up.
 //
 //   build/bench/bin/durable_benchmark [SESSIONS [SECONDS]]
 
@@ -58,7 +58,7 @@ v1::Problem FourChannels() {
   return problem;
 }
 
-// A hundred rows of the closed solution, with a ripple in the place of noise.
+// Returns a batch of a hundred rows of the closed-form solution, with a ripple in place of noise.
 v1::StreamMeasurementsRequest Batch(int session, int index) {
   v1::StreamMeasurementsRequest request;
   request.set_session("sessions/rig-" + std::to_string(session));
@@ -83,7 +83,7 @@ v1::StreamMeasurementsRequest Batch(int session, int index) {
   return request;
 }
 
-// Commits every message, and does nothing else with it.
+// Commits every message and does nothing else with it.
 class BareService final : public v1::SessionService::Service {
  public:
   explicit BareService(const std::string& file) {
@@ -131,7 +131,8 @@ struct Streamed {
   Clock::time_point all_acknowledged;
 };
 
-// Streams one session. Paced: one batch whenever it is due; otherwise as fast as they are taken.
+// Streams one session: if `paced`, one batch whenever it is due; otherwise as fast as the daemon
+// takes them.
 Streamed Stream(Stub& stub, const std::vector<v1::StreamMeasurementsRequest>& batches,
                 std::optional<Clock::time_point> first_due) {
   std::vector<Clock::time_point> sent(batches.size());
@@ -166,8 +167,8 @@ Streamed Stream(Stub& stub, const std::vector<v1::StreamMeasurementsRequest>& ba
 }
 
 struct Outcome {
-  double acknowledged_s = 0;  // until all batches were
-  double computed_s = 0;      // until all estimates were there, too
+  double acknowledged_s = 0;  // time until all batches were acknowledged
+  double computed_s = 0;      // time until all estimates were computed, too
   std::vector<double> delays;
 };
 

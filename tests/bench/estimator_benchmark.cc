@@ -1,5 +1,5 @@
-// What an estimate and an update cost as the record grows: after 10³ and after 10⁶ samples the
-// estimate must take the same time and the estimator the same memory, beside the stored samples.
+// Measures an estimate and an update as the record grows. After 10³ and after 10⁶ samples, an
+// estimate must take the same time and the estimator the same memory, without the stored samples.
 
 #include <benchmark/benchmark.h>
 #include <malloc.h>
@@ -23,7 +23,7 @@ constexpr double kStep = 0.01;   // s
 constexpr double kNoise = 0.01;  // m
 constexpr size_t kBatchRows = 30;
 
-// A damped oscillator kept in motion by a force: a record that can go on for ever.
+// Returns a damped oscillator that a force keeps in motion, so that its record can have any length.
 Problem DrivenOscillator() {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -35,7 +35,8 @@ Problem DrivenOscillator() {
   return problem;
 }
 
-// Samples in memory whose size is known, so that it can be told from the estimator's own.
+// A store of samples in memory whose size is known, so that it can be subtracted from the memory of
+// the estimator.
 class CountedStore final : public SampleStore {
  public:
   int64_t rows() const override { return static_cast<int64_t>(time_s_.size()); }
@@ -60,7 +61,7 @@ class CountedStore final : public SampleStore {
   std::vector<double> value_;
 };
 
-// An estimator and the record that feeds it: the model itself at k = 40, c = 1, with noise.
+// An estimator with its record, which is simulated by the model at k = 40, c = 1, with noise.
 class Rig {
  public:
   Rig()
@@ -104,7 +105,7 @@ class Rig {
   }
 
  private:
-  // In use, of the heap and of what was mapped for large blocks.
+  // Returns the bytes in use on the heap and in blocks mapped separately.
   static double HeapBytes() {
     const struct mallinfo2 info = mallinfo2();
     return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
@@ -143,7 +144,7 @@ void UpdateOfABatch(benchmark::State& state) {
 }
 BENCHMARK(UpdateOfABatch)->Iterations(1000)->Unit(benchmark::kMicrosecond);
 
-// The table as usual, and then the long record against the short one.
+// Prints the usual table and then the ratios of the long record to the short one.
 class RatioReporter final : public benchmark::ConsoleReporter {
  public:
   void ReportRuns(const std::vector<Run>& runs) override {

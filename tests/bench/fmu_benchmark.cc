@@ -1,5 +1,5 @@
-// The same oscillator built in, as text, and as an FMU of either kind: time per trajectory, and how
-// many times the built-in model's that is.
+// Compares the same oscillator as a built-in model, as text, and as an FMU of either kind: time per
+// trajectory, and its ratio to that of the built-in model.
 //
 //   fmu_benchmark [POINTS] [SECONDS]
 
@@ -13,7 +13,7 @@
 namespace polyest::internal {
 namespace {
 
-// The best of some, in µs a trajectory; starting the workers is a part of it.
+// Returns the best time of several runs, µs per trajectory. It includes the start of the workers.
 double MicrosecondsPerTrajectory(const std::shared_ptr<const Model>& model, int points,
                                  double until_s) {
   FmuEnsemble ensemble(model, points, {"x", "v"});

@@ -1,7 +1,7 @@
 #pragma once
 
-// The half-car of the benchmarks: eight states, a bar on two corners with wheels and tyres
-// (roll_plane_4dof of the models' documentation, road input in place).
+// Defines the half car of the benchmarks, a model of eight states: a bar on two corners with wheels
+// and tyres (roll_plane_4dof of the models' documentation, with the road as an input).
 
 #include <algorithm>
 #include <array>
@@ -79,10 +79,11 @@ struct HalfCar {
 inline constexpr double kBumpHeight = 0.05;
 inline constexpr double kBumpStart[2] = {0.5, 1.1};
 inline constexpr double kBumpDuration = 0.2;
-// Where an input has a kink.
+// Times at which an input has a kink.
 inline constexpr double kBreaks[] = {0.5, 0.7, 1.1, 1.3};
 
-// A half sine between begin and end; the side of a kink that a step is on decides by its middle.
+// Returns the road under a side: a half sine during the bump. The middle of the integration step
+// decides on which side of a kink the step is.
 inline double Road(int side, double time_s, double step_middle_s) {
   const double start = kBumpStart[side];
   if (step_middle_s < start || step_middle_s > start + kBumpDuration) return 0;

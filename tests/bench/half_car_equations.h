@@ -1,6 +1,6 @@
 #pragma once
 
-// half_car.h as a user would write it.
+// Gives the model of half_car.h by its equations, as a user would write them.
 
 #include "polyest/equation_model.h"
 

@@ -1,7 +1,6 @@
-// Thirty days of measurements from a rig that repeats a test every minute, a sample a second or as
-// many as the argument says: what memory and estimates cost as the record grows. The store keeps
-// no rows but makes them again when they are asked for, so that what is measured is the estimator
-// alone.
+// Measures memory and the time of estimates as a record grows over thirty days. A rig repeats a
+// test every minute, with one sample per second or as many as the argument says. The store keeps no
+// rows but computes them again when they are read, so that only the estimator is measured.
 //
 //   month_benchmark [SAMPLES A SECOND]
 
@@ -23,8 +22,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kStiffness = 41.3, kDamping = 0.23;  // of 1 kg that starts 1 m off, at rest
-constexpr double kNoise = 0.01;                       // m
+// N/m and N s/m, for a mass of 1 kg that starts at 1 m, at rest.
+constexpr double kStiffness = 41.3, kDamping = 0.23;
+constexpr double kNoise = 0.01;  // m
 constexpr int kRunSeconds = 60, kRunsADay = 24 * 60;
 
 using Clock = std::chrono::steady_clock;
@@ -33,7 +33,7 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Uniform in (0, 1), a function of the index alone.
+// Returns a number uniform in (0, 1) that depends on the index alone.
 double Uniform(uint64_t index) {
   index += 0x9e3779b97f4a7c15;
   index = (index ^ (index >> 30)) * 0xbf58476d1ce4e5b9;
@@ -41,14 +41,14 @@ double Uniform(uint64_t index) {
   return (static_cast<double>((index ^ (index >> 31)) >> 11) + 0.5) * 0x1p-53;
 }
 
-// Box and Muller's.
+// Returns a standard normal number by the method of Box and Muller.
 double Normal(int64_t row) {
   const auto index = static_cast<uint64_t>(2 * row);
   return std::sqrt(-2 * std::log(Uniform(index))) *
          std::cos(2 * std::numbers::pi * Uniform(index + 1));
 }
 
-// x of m x'' + c x' + k x = 0.
+// Returns x(t) of m x'' + c x' + k x = 0.
 double Displacement(double time_s) {
   const double decay = 0.5 * kDamping, frequency = std::sqrt(kStiffness - decay * decay);
   return std::exp(-decay * time_s) *
@@ -119,7 +119,7 @@ double EstimateMilliseconds(const Estimator& estimator, Estimate& estimate) {
   return times[2];
 }
 
-// A day's rows, a run at a time.
+// Appends and processes the rows of a day, one run at a time.
 void TakeDay(const Rig& rig, Estimator& estimator) {
   const int64_t end = rig.rows() + rig.rows_a_day();
   Samples samples;

@@ -17,7 +17,7 @@ namespace {
 
 struct Trajectory {
   std::array<double, HalfCar::kParameters> parameters;
-  double middle_s;  // of the stretch between two kinks of the road
+  double middle_s;  // middle of the interval between two kinks of the road
 };
 
 int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* data) {
@@ -50,7 +50,7 @@ void Run(void* memory, N_Vector states, int point, int samples, Trajectory& traj
   for (int piece = 0; piece <= 4; ++piece) {
     const double piece_end_s = piece < 4 ? kBreaks[piece] : end_s;
     trajectory.middle_s = (begin_s + piece_end_s) / 2;
-    // Begun anew at each kink, with a step short enough to see the bump.
+    // The integration restarts at each kink, with a step short enough not to miss the bump.
     CVodeReInit(memory, begin_s, states);
     CVodeSetInitStep(memory, 1e-3);
     POLYEST_CHECK(CVodeSetStopTime(memory, piece_end_s) == CV_SUCCESS);
@@ -74,7 +74,7 @@ void PropagatePointByPoint(Formula formula, double relative_tolerance, const Mat
     N_VConst(0, states);
     void* memory = CVodeCreate(formula == Formula::kAdams ? CV_ADAMS : CV_BDF, context);
     CVodeInit(memory, RightHandSide, 0, states);
-    // Displacements reach some 0.05 m and velocities 1 m/s; what a user would pass.
+    // Displacements reach about 0.05 m and velocities 1 m/s. A user would choose these tolerances.
     CVodeSStolerances(memory, relative_tolerance, 0.05 * relative_tolerance);
     CVodeSetUserData(memory, &trajectory);
     CVodeSetMaxNumSteps(memory, 100'000);

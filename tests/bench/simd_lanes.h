@@ -1,9 +1,9 @@
 #pragma once
 
-// The practical limit: Dormand–Prince written out by hand for this one model, eight trajectories in
-// the lanes of SIMD registers, equal steps from sample to sample (and so from kink to kink), as
-// many as the error of the worst lane asks for. Nothing general: the scales of the states are
-// known.
+// Propagates the half car at the practical limit of speed: by a Dormand–Prince method that is
+// written by hand for this model, with eight trajectories in the lanes of SIMD registers. The steps
+// between two samples (and so between kinks) are equal, and as many as the error of the worst lane
+// requires. The code is not general: it knows the scales of the states.
 
 #include <algorithm>
 #include <array>
@@ -58,7 +58,7 @@ class SimdLanes {
                          rates);
   }
 
-  // x + h Σ a_j k_j
+  // Returns x + h Σ a_j k_j.
   template <size_t kStages>
   State Moved(double h, const std::array<double, kStages>& a) const {
     State moved;
@@ -69,7 +69,7 @@ class SimdLanes {
     return moved;
   }
 
-  // Returns the largest local error, relative to 0.05 m or 1 m/s.
+  // Makes one step. Returns the largest local error, relative to 0.05 m or 1 m/s.
   double Step(double t, double h) {
     const double middle = t + h / 2;
     Rates(t, middle, x_, k_[0]);

@@ -1,6 +1,7 @@
-// Throughput of StreamMeasurements through the daemon, against a bare service that answers the same
-// messages with the same acknowledgements and does nothing else: what the queues, the strand and
-// the numerics cost beside gRPC itself. Both in this process, over loopback.
+// Compares the throughput of StreamMeasurements in the daemon with that of a bare service, which
+// returns the same acknowledgements for the same messages and does nothing else. The difference is
+// the cost of the queues, the strand and the numerics beside gRPC. Both services run in this
+// process, over loopback.
 
 #include <grpcpp/grpcpp.h>
 
@@ -68,7 +69,7 @@ v1::StreamMeasurementsRequest Batch(int index, int rows) {
   return request;
 }
 
-// Batches acknowledged a second.
+// Returns the number of batches acknowledged per second.
 double Throughput(v1::SessionService::Stub& stub, int batches, int rows) {
   std::vector<v1::StreamMeasurementsRequest> requests;
   for (int index = 0; index < batches; ++index) requests.push_back(Batch(index, rows));

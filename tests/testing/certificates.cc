@@ -39,7 +39,7 @@ void Extend(X509* certificate, int kind, const char* value) {
   X509_EXTENSION_free(extension);
 }
 
-// Valid from two days ago for the days given, and not signed.
+// Returns an unsigned certificate that is valid for `days` days from two days ago.
 std::shared_ptr<X509> NewCertificate(const std::string& common_name, EVP_PKEY* key, long days) {
   std::shared_ptr<X509> certificate(X509_new(), &X509_free);
   uint64_t serial = 0;

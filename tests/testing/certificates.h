@@ -1,6 +1,6 @@
 #pragma once
 
-// Certificates made while a test runs.
+// Issues certificates while a test runs.
 
 #include <openssl/types.h>
 
@@ -9,7 +9,7 @@
 
 namespace polyest::internal {
 
-// PEM texts.
+// A certificate and its key as PEM texts.
 struct IssuedCertificate {
   std::string certificate;
   std::string key;
@@ -19,11 +19,11 @@ class CertificateAuthority {
  public:
   explicit CertificateAuthority(const std::string& name);
 
-  // PEM text.
+  // Returns the authority's own certificate as PEM text.
   const std::string& certificate() const { return certificate_pem_; }
 
   enum class Validity { kNow, kExpired };
-  // For localhost and 127.0.0.1 as a server, and for clients.
+  // Issues a certificate that is valid for a server on localhost and 127.0.0.1 and for clients.
   IssuedCertificate Issue(const std::string& common_name, Validity validity = Validity::kNow) const;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// A journal whose disk can be made slow, full or broken.
+// A session journal that can behave as if its disk were slow, full or broken.
 
 #include <deque>
 #include <memory>
@@ -13,12 +13,12 @@ namespace polyest::internal {
 
 class FaultyJournal final : public SessionJournal {
  public:
-  // Batches from here on wait for Release.
+  // Lets all further batches wait for Release.
   void Hold() {
     const std::lock_guard lock(mutex_);
     holding_ = true;
   }
-  // All that wait are kept, in order, and those to come at once.
+  // Stores the waiting batches in order, and further ones at once.
   void Release() {
     std::deque<std::pair<JournalEntry, Done>> held;
     {
@@ -28,7 +28,8 @@ class FaultyJournal final : public SessionJournal {
     }
     for (auto& [entry, done] : held) Append(std::move(entry), std::move(done));
   }
-  // Batches and sessions from here on cannot be kept, for this reason; OK: they can again.
+  // Lets the storing of batches and the creating and deleting of sessions fail with `status` from
+  // now on; OK ends the failures.
   void Fail(const absl::Status& status) {
     const std::lock_guard lock(mutex_);
     failure_ = status;

@@ -15,9 +15,9 @@ namespace polyest::internal {
 namespace {
 
 constexpr size_t kBuffer = 16'384;
-// Longest that a connection is held back when no other one comes.
+// Longest delay of a connection when no other one is made.
 constexpr std::chrono::milliseconds kLongestHold{500};
-// Of a repeated one: how long the daemon may be silent before it is over.
+// Silence of the daemon after which a repeated connection is closed.
 constexpr int kSilenceMs = 200;
 
 sockaddr_in Loopback(int port) {
@@ -38,7 +38,7 @@ bool WriteAll(int socket, const char* data, size_t size) {
   return true;
 }
 
-// Of what has arrived; 0: the end.
+// Reads bytes that have arrived. Returns their number; 0 at the end of the connection.
 ssize_t ReadSome(int socket, char* buffer) { return recv(socket, buffer, kBuffer, 0); }
 
 }  // namespace
@@ -146,7 +146,7 @@ void HostileProxy::Serve(int client, Plan plan, int64_t number) {
   if (plan.repeat) Repeat(sent);
 }
 
-// The same bytes on a connection of their own; what is answered goes nowhere.
+// Sends the bytes again on a separate connection and discards the response.
 void HostileProxy::Repeat(const std::string& bytes) {
   const int server = Connect();
   if (server < 0) return;

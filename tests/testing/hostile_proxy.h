@@ -1,8 +1,8 @@
 #pragma once
 
-// A TCP proxy on a port of this machine that treats connections as a bad network does: it cuts
-// them in the midst of a message, holds them back until a later one has passed them, and delivers
-// what a client has sent once more, later, on a connection of its own.
+// A TCP proxy on a port of this machine that treats connections like a bad network: it cuts them
+// within a message, delays them until a later connection has been made, and delivers the bytes of a
+// client a second time, later, on a separate connection.
 
 #include <atomic>
 #include <condition_variable>
@@ -17,26 +17,28 @@ namespace polyest::internal {
 
 class HostileProxy {
  public:
-  // In front of HOST:PORT. Peaceful at first.
+  // Starts the proxy in front of `server`, HOST:PORT. It forwards connections unharmed at first.
   HostileProxy(const std::string& server, uint64_t seed);
   ~HostileProxy();
   HostileProxy(const HostileProxy&) = delete;
   HostileProxy& operator=(const HostileProxy&) = delete;
 
+  // Returns the address of the proxy, HOST:PORT.
   const std::string& address() const { return address_; }
-  // Whether connections from here on are harmed.
+  // Sets whether further connections are harmed.
   void SetHostile(bool hostile) { hostile_ = hostile; }
 
+  // Numbers of connections that were harmed.
   struct Harm {
     int cut = 0, held = 0, repeated = 0;
   };
   Harm harm() const;
 
  private:
-  // What will be done to a connection.
+  // The harm planned for a connection.
   struct Plan {
-    int64_t cut_after = -1;  // bytes from the client; negative: not cut
-    bool hold = false;       // until another connection has come
+    int64_t cut_after = -1;  // number of bytes from the client; negative: not cut
+    bool hold = false;       // delay it until another connection is made
     bool repeat = false;
   };
 

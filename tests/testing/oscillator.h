@@ -1,19 +1,20 @@
 #pragma once
 
-// The damped 1 Hz oscillator, m = 1 kg, x(0) = 1 m at rest, k and c unknown, x measured: a problem
-// whose exact answer is at hand.
+// Provides a test problem with a known exact solution: the damped 1 Hz oscillator, m = 1 kg,
+// x(0) = 1 m at rest, with k and c unknown and x measured.
 
 #include "polyest/estimator.h"
 
 namespace polyest::internal::testing {
 
 inline constexpr double kOscillatorNoise = 0.01;  // m
-inline constexpr double kOscillatorRate = 20;     // samples a second
+inline constexpr double kOscillatorRate = 20;     // samples per second
 
-// x(t) of m ẍ + c ẋ + k x = 0 in closed form.
+// Returns x(t) of m ẍ + c ẋ + k x = 0 in closed form.
 double OscillatorDisplacement(double k, double c, double time_s);
 
-// k ± 20 % and c ± 50 %, both uniform, about (2π)² N/m and 0.2 N s/m.
+// Returns the problem. The priors are uniform: k within 20 % of (2π)² N/m and c within 50 % of
+// 0.2 N s/m.
 Problem OscillatorProblem(int order, bool adaptive = true);
 
 struct OscillatorTruth {
@@ -21,11 +22,12 @@ struct OscillatorTruth {
   double c = 0;
 };
 
-// Truth drawn within 90 % of the prior, white noise added; a function of the seed alone.
+// Draws the true values within 90 % of the prior's range and returns their record with white noise.
+// Both depend on `duration_s` and `seed` alone.
 Samples OscillatorRecord(double duration_s, uint64_t seed, OscillatorTruth& truth);
 
-// Least squares on the closed form by Gauss–Newton from the truth: what an estimate with uniform
-// priors must find. Standard deviations from the inverse of JᵀJ/σ².
+// Least-squares estimate of the closed form, by Gauss–Newton from the true values. An estimate with
+// uniform priors must agree with it. The standard deviations are from the inverse of JᵀJ/σ².
 struct LeastSquares {
   double k = 0;
   double c = 0;

@@ -9,14 +9,14 @@
 
 namespace polyest::internal {
 
-// A problem as its file would have it.
+// Returns the problem given by the JSON text of a problem file.
 inline v1::Problem ProblemFromJson(const std::string& json) {
   v1::Problem problem;
   POLYEST_CHECK(google::protobuf::util::JsonStringToMessage(json, &problem).ok());
   return problem;
 }
 
-// One unknown, a quarter of a second of work at most.
+// Returns a problem with one unknown that takes at most a quarter of a second.
 inline v1::Problem SmallProblem() {
   return ProblemFromJson(R"({
     "model": {"builtin": "mass_spring_damper"},

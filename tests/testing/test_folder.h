@@ -1,6 +1,6 @@
 #pragma once
 
-// A folder that is there as long as the object.
+// A temporary folder that exists as long as the object.
 
 #include <stdlib.h>
 

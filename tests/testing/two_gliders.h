@@ -1,6 +1,7 @@
 #pragma once
 
-// Two gliders between three springs on an air track, displacements about rest positions o1, o2:
+// Models two gliders between three springs on an air track, displacements about rest positions o1,
+// o2:
 //   x1″ = −(a + b)(x1 − o1) + b (x2 − o2) − c1 x1′
 //   x2″ =  g (x1 − o1) − (g + h)(x2 − o2) − c2 x2′
 // with a = k1/m1, b = k2/m1, g = k2/m2, h = k3/m2: twelve unknowns with the initial states.
@@ -47,7 +48,8 @@ struct TwoGliders {
   }
 };
 
-// Broad uniform priors, both displacements measured with 0.62 pixel noise.
+// Returns the problem: broad uniform priors, both displacements measured with a noise of 0.62
+// pixels.
 Problem TwoGlidersProblem(int order);
 
 }  // namespace polyest::internal::testing

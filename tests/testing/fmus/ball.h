@@ -1,5 +1,5 @@
-/* A ball over a floor, h'' = -g; at the floor its velocity turns round and shrinks to the part e;
-   below rest_speed it stays there. */
+/* A ball above a floor, h'' = -g. At the floor its velocity is reversed and multiplied by e. If the
+   velocity is then below rest_speed, the ball stays on the floor. */
 enum { kG, kE, kRestSpeed, kH0, kH, kV, kA, kHRate, kResting, REALS };
 #define STATES 2
 #define INDICATORS 1

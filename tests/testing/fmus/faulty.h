@@ -1,4 +1,5 @@
-/* x = x0 + rate t, and from the time of a fault on, something worse. */
+/* x = x0 + rate t, with a fault from a given time on: an error, a discarded step, NaN, a crash, a
+   hang, a memory leak or an exit. */
 #include <signal.h>
 #include <unistd.h>
 
@@ -49,7 +50,7 @@ static int Evaluate(Fmu* fmu) {
   while (t >= r[kHangAt]) sleep(1000);
   while (t >= r[kLeakAt]) {
     const size_t size = (size_t)4 << 20;
-    memset(malloc(size), 1, size); /* crashes when there is no more */
+    memset(malloc(size), 1, size); /* crashes when there is no more memory */
   }
   return kOk;
 }

@@ -1,16 +1,16 @@
-/* What a model of the tests' FMUs consists of. A model's file is included by fmu2.c and fmu3.c,
-   which give it the functions of FMI 2.0 and 3.0, of both kinds; it defines
+/* Defines the parts of a model of the tests' FMUs. fmu2.c and fmu3.c include the model's file and
+   add the functions of FMI 2.0 and 3.0, of both kinds. The file defines
 
-     REALS, STATES, INDICATORS   how many variables, continuous states and event indicators there
-                                 are; a variable's number is its value reference
+     REALS, STATES, INDICATORS   the numbers of variables, continuous states and event indicators;
+                                 the index of a variable is its value reference
      kStart[REALS]               start values
-     kStates[], kDerivatives[]   the numbers of the states and of their derivatives
+     kStates[], kDerivatives[]   the indices of the states and of their derivatives
      Initialize(fmu)             sets the states from the parameters
-     Evaluate(fmu)               sets all that follows from states, inputs and time
-     Indicate(fmu, z)            the event indicators
+     Evaluate(fmu)               computes the variables that depend on states, inputs and time
+     Indicate(fmu, z)            computes the event indicators
      HandleEvent(fmu)            changes states, or sets next_event_s
 
-   Initialize, Evaluate and HandleEvent answer an FMI status. */
+   Initialize, Evaluate and HandleEvent return an FMI status. */
 #ifndef POLYEST_TESTS_FMU_H
 #define POLYEST_TESTS_FMU_H
 

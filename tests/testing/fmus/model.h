@@ -1,11 +1,11 @@
-/* The chosen model, and what can be said of any. */
+/* Includes the chosen model and defines the functions that all models share. */
 #ifndef POLYEST_TESTS_MODEL_H
 #define POLYEST_TESTS_MODEL_H
 
 #include "fmu.h"
 #include MODEL_FILE
 
-/* At most this long is a step of the Co-Simulation solver, classical Runge-Kutta. */
+/* Longest step of the Co-Simulation solver, classical Runge-Kutta, s. */
 #define INTERNAL_STEP 1e-3
 
 static Fmu* NewFmu(void* environment, void* log) {
@@ -48,7 +48,7 @@ static void GetStates(const Fmu* fmu, double* states) {
   for (int s = 0; s < STATES; ++s) states[s] = fmu->real[kStates[s]];
 }
 
-/* One step of classical Runge-Kutta with constant inputs. */
+/* Makes one step of classical Runge-Kutta with constant inputs. */
 static int RungeKutta(Fmu* fmu, double h) {
   double x[STATES + 1], moved[STATES + 1], k[4][STATES + 1];
   const double at[4] = {0, 0.5, 0.5, 1};

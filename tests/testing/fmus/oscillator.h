@@ -1,4 +1,4 @@
-/* m x'' + c x' + k x = force, as the built-in mass_spring_damper. */
+/* An oscillator m x'' + c x' + k x = force, like the built-in mass_spring_damper. */
 enum { kM, kC, kK, kX0, kV0, kForce, kX, kV, kA, kXRate, REALS };
 #define STATES 2
 #define INDICATORS 0
