@@ -44,7 +44,9 @@ while [[ $# -gt 0 ]]; do
   esac
 done
 
-"$root/deploy/install-packages.sh" --tests
+packages=(--tests)
+[[ "$preset" != asan-ubsan ]] || packages+=(--sanitizers)
+"$root/deploy/install-packages.sh" "${packages[@]}"
 cd "$root"
 # Said outright, since a build folder remembers what it was last configured with.
 cmake --preset "$preset" -DPOLYEST_BUILD_TESTS=ON -DPOLYEST_WARNINGS_AS_ERRORS="$werror"

@@ -2,7 +2,7 @@
 # Runs the fuzzers, each from the corpus beside this file:
 #   tests/fuzz/run.sh [SECONDS] [FUZZER]... [-- OPTION-OF-LIBFUZZER...]
 # SECONDS: of all together, 60 unless given. FUZZER: equation, rpc; both unless given.
-# What makes one fail is written to build/fuzz as FUZZER-crash-…, -timeout-…, -oom-… or -leak-….
+# What makes one fail is written to build/asan-ubsan/fuzz as FUZZER-crash-…, -timeout-…, -oom-… or -leak-….
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 seconds=${1:-60}
@@ -16,8 +16,9 @@ done
 [[ ${#fuzzers[@]} -gt 0 ]] || fuzzers=(equation rpc)
 
 deploy/install-packages.sh --tests --sanitizers
-cmake --preset fuzz >/dev/null
-cmake --build --preset fuzz --parallel "$(nproc)" --target "${fuzzers[@]/%/_fuzzer}"
+cmake --preset asan-ubsan >/dev/null
+cmake --build --preset asan-ubsan --parallel "$(nproc)" --target "${fuzzers[@]/%/_fuzzer}"
+results=build/asan-ubsan/fuzz
 for fuzzer in "${fuzzers[@]}"; do
   case "$fuzzer" in
     equation) options=(-max_len=4096 -rss_limit_mb=512 -timeout=5 -dict=tests/fuzz/equation.dict) ;;
@@ -26,10 +27,10 @@ for fuzzer in "${fuzzers[@]}"; do
     # is different after each input.
     rpc) options=(-max_len=16384 -rss_limit_mb=2048 -timeout=20 -entropic=0 -detect_leaks=0) ;;
   esac
-  corpus="build/fuzz/${fuzzer}_corpus"
+  corpus="$results/${fuzzer}_corpus"
   mkdir -p "$corpus"
   echo "==> $fuzzer fuzzer"
-  "build/fuzz/bin/${fuzzer}_fuzzer" -max_total_time=$((seconds / ${#fuzzers[@]})) \
-    -artifact_prefix="build/fuzz/$fuzzer-" -print_final_stats=1 "${options[@]}" "$@" \
+  "build/asan-ubsan/bin/${fuzzer}_fuzzer" -max_total_time=$((seconds / ${#fuzzers[@]})) \
+    -artifact_prefix="$results/$fuzzer-" -print_final_stats=1 "${options[@]}" "$@" \
     "$corpus" "tests/fuzz/${fuzzer}_corpus"
 done
