@@ -120,7 +120,7 @@ void PrintDirections(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.directions().empty()) return;
   TextTable table({"direction (in prior sd)", "data/prior information", "verdict"});
   for (const v1::Direction& d : estimate.directions()) {
-    table.AddRow({DirectionText(d, estimate), FormatNumber(d.information(), 2),
+    table.AddRow({DirectionText(d), FormatNumber(d.information(), 2),
                   PaintVerdict(out, d.verdict(), VerdictText(d.verdict()))});
   }
   out << '\n';
@@ -169,17 +169,15 @@ std::string PaintVerdict(std::ostream& out, v1::Identifiability::Verdict verdict
   }
 }
 
-std::string DirectionText(const v1::Direction& direction, const v1::Estimate& estimate) {
+std::string DirectionText(const v1::Direction& direction) {
   constexpr double kTooSmall = 0.05;
   std::string text;
-  for (const v1::ParameterEstimate& parameter : estimate.parameters()) {
-    const auto found = direction.coefficients().find(parameter.name());
-    if (found == direction.coefficients().end()) continue;
-    const double coefficient = found->second;
-    if (std::abs(coefficient) < kTooSmall) continue;
-    const bool negative = coefficient < 0;
+  for (const v1::Direction::Coefficient& coefficient : direction.coefficients()) {
+    const double value = coefficient.value();
+    if (std::abs(value) < kTooSmall) continue;
+    const bool negative = value < 0;
     absl::StrAppend(&text, text.empty() ? (negative ? "−" : "") : (negative ? " − " : " + "),
-                    absl::StrFormat("%.2f ", std::abs(coefficient)), parameter.name());
+                    absl::StrFormat("%.2f ", std::abs(value)), coefficient.parameter());
   }
   return text;
 }

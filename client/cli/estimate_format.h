@@ -28,7 +28,7 @@ std::string PaintVerdict(std::ostream& out, v1::Identifiability::Verdict verdict
 
 // Returns a text like "0.99 k − 0.10 c", in the order of the parameters. Terms with a coefficient
 // below 0.05 are left out.
-std::string DirectionText(const v1::Direction& direction, const v1::Estimate& estimate);
+std::string DirectionText(const v1::Direction& direction);
 
 // Prints a sentence for each trade-off: "k/m is known to 0.4 %, k and m separately only to 5 % and
 // 5 %".

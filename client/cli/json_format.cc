@@ -1,12 +1,15 @@
 #include "client/cli/json_format.h"
 
 #include <absl/strings/ascii.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/util/json_util.h>
 #include <google/protobuf/util/type_resolver_util.h>
 
 #include <memory>
+#include <mutex>
 
 #include "core/common/check.h"
 
@@ -28,6 +31,49 @@ std::string Serialize(const google::protobuf::Message& message) {
   return bytes;
 }
 
+// Turns the coefficients of a direction into a map from the parameters' names to values, which has
+// the same bytes.
+void MakeCoefficientsAMap(google::protobuf::DescriptorProto& direction) {
+  google::protobuf::DescriptorProto& entry = *direction.mutable_nested_type(0);
+  POLYEST_CHECK(entry.name() == "Coefficient" && entry.field_size() == 2);
+  entry.set_name("CoefficientsEntry");
+  entry.mutable_options()->set_map_entry(true);
+  const char* const names[] = {"key", "value"};
+  for (int i = 0; i < 2; ++i) {
+    entry.mutable_field(i)->set_name(names[i]);
+    entry.mutable_field(i)->set_json_name(names[i]);
+  }
+  for (google::protobuf::FieldDescriptorProto& field : *direction.mutable_field()) {
+    if (field.name() == "coefficients") {
+      field.set_type_name(".polyest.v1.Direction.CoefficientsEntry");
+    }
+  }
+}
+
+// Adds the file and those that it imports to the pool, as JSON has them: the coefficients of a
+// direction are {"k": 0.99, "c": 0.1} there. In the contract they are messages, since some
+// importers of protocol files know no maps in the messages of a stream.
+void AddFile(const google::protobuf::FileDescriptor& file, google::protobuf::DescriptorPool& pool) {
+  if (pool.FindFileByName(file.name()) != nullptr) return;
+  for (int i = 0; i < file.dependency_count(); ++i) AddFile(*file.dependency(i), pool);
+  google::protobuf::FileDescriptorProto copy;
+  file.CopyTo(&copy);
+  file.CopyJsonNameTo(&copy);
+  for (google::protobuf::DescriptorProto& message : *copy.mutable_message_type()) {
+    if (message.name() == "Direction") MakeCoefficientsAMap(message);
+  }
+  POLYEST_CHECK(pool.BuildFile(copy) != nullptr);
+}
+
+// Returns the types of the file's messages, and of those that it imports, for JSON.
+const google::protobuf::DescriptorPool& JsonTypes(const google::protobuf::FileDescriptor& file) {
+  static std::mutex mutex;
+  static google::protobuf::DescriptorPool pool;
+  const std::lock_guard lock(mutex);
+  AddFile(file, pool);
+  return pool;
+}
+
 }  // namespace
 
 std::string ToJson(const google::protobuf::Message& message, bool several_lines) {
@@ -37,7 +83,7 @@ std::string ToJson(const google::protobuf::Message& message, bool several_lines)
   options.always_print_primitive_fields = true;
   const auto* const descriptor = message.GetDescriptor();
   const std::unique_ptr<util::TypeResolver> types(
-      util::NewTypeResolverForDescriptorPool(kUrlPrefix, descriptor->file()->pool()));
+      util::NewTypeResolverForDescriptorPool(kUrlPrefix, &JsonTypes(*descriptor->file())));
   std::string json;
   POLYEST_CHECK(util::BinaryToJsonString(types.get(),
                                          std::string(kUrlPrefix) + "/" + descriptor->full_name(),

@@ -50,7 +50,9 @@ void PrintQuantities(const std::string& title,
   TextTable table(std::move(header));
   for (const auto& quantity : quantities) {
     std::vector<std::string> row = {quantity.name(), quantity.unit()};
-    if (defaults) row.push_back(FormatNumber(quantity.default_value(), 6));
+    if (defaults) {
+      row.push_back(quantity.has_default_value() ? FormatNumber(quantity.default_value(), 6) : "");
+    }
     row.push_back(quantity.meaning());
     table.AddRow(std::move(row));
   }

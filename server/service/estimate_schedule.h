@@ -24,16 +24,14 @@ class EstimateSchedule {
       return InvalidField("estimates.batchCount",
                           absl::StrFormat("%d must not be negative", policy.batch_count()));
     }
-    // Before the conversion to nanoseconds, which would overflow.
-    const int64_t seconds = policy.min_interval().seconds();
-    const int32_t nanos = policy.min_interval().nanos();
-    if (seconds < 0 || seconds > kLongestIntervalSeconds || nanos < 0 || nanos >= 1'000'000'000) {
-      return InvalidField("estimates.minInterval",
-                          absl::StrFormat("must lie between 0 and %d s", kLongestIntervalSeconds));
+    const double interval_s = policy.min_interval_s();
+    if (!(interval_s >= 0 && interval_s <= kMaxIntervalS)) {
+      return InvalidField("estimates.minIntervalS",
+                          absl::StrFormat("%g must be from 0 to %g", interval_s, kMaxIntervalS));
     }
-    const auto interval = std::chrono::seconds(seconds) + std::chrono::nanoseconds(nanos);
     every_batches_ = std::max(1, policy.batch_count());
-    min_interval_ = interval;
+    min_interval_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
+        std::chrono::duration<double>(interval_s));
     only_last_ = policy.only_last();
     return absl::OkStatus();
   }
@@ -49,7 +47,7 @@ class EstimateSchedule {
   }
 
  private:
-  static constexpr int64_t kLongestIntervalSeconds = 86'400;
+  static constexpr double kMaxIntervalS = 86'400;
 
   int every_batches_ = 1;
   std::chrono::nanoseconds min_interval_{0};

@@ -1,3 +1,6 @@
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+
 #include "core/common/status.h"
 #include "polyest/v1/operation_service.grpc.pb.h"
 #include "proto/wire/operations/names.h"
@@ -13,15 +16,18 @@ absl::StatusOr<v1::ListOperationsResponse> ListPage(OperationStore& operations,
                                                     const std::string& tenant,
                                                     const v1::ListOperationsRequest& request) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
-  // One more than asked for tells whether there is another page.
-  auto page = operations.List(tenant, request.page_token(), page_size + 1);
-  if (!page.ok()) return UnknownPageToken(request.page_token());
-  v1::ListOperationsResponse response;
-  if (page->size() > page_size) {
-    page->pop_back();
-    response.set_next_page_token(page->back().name());
+  // A number, so that the next page can be asked for when the operation is there no more.
+  int64_t after = 0;
+  if (!request.page_token().empty() &&
+      !(absl::SimpleAtoi(request.page_token(), &after) && after > 0)) {
+    return UnknownPageToken(request.page_token());
   }
-  for (v1::Operation& operation : *page) *response.add_operations() = std::move(operation);
+  OperationStore::Page page = operations.List(tenant, after, page_size);
+  v1::ListOperationsResponse response;
+  for (v1::Operation& operation : page.operations) {
+    *response.add_operations() = std::move(operation);
+  }
+  if (page.more) response.set_next_page_token(absl::StrCat(page.last));
   return response;
 }
 

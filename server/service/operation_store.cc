@@ -197,19 +197,16 @@ absl::StatusOr<v1::Operation> OperationStore::Get(const std::string& tenant,
   return found->second->Describe(/*with_result=*/true, now_());
 }
 
-absl::StatusOr<std::vector<v1::Operation>> OperationStore::List(const std::string& tenant,
-                                                                const std::string& after,
-                                                                size_t count) {
+OperationStore::Page OperationStore::List(const std::string& tenant, int64_t after, size_t count) {
   const std::lock_guard lock(mutex_);
   ForgetOld();
-  auto [one, last] = OfTenant(tenant);
-  if (!after.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(one, Find(tenant, after));
-    ++one;
-  }
-  std::vector<v1::Operation> page;
-  for (; one != last && page.size() < count; ++one) {
-    page.push_back(one->second->Describe(/*with_result=*/false, now_()));
+  const auto last = OfTenant(tenant).second;
+  Page page;
+  for (auto one = entries_.upper_bound({tenant, after}); one != last; ++one) {
+    page.more = page.operations.size() == count;
+    if (page.more) break;
+    page.operations.push_back(one->second->Describe(/*with_result=*/false, now_()));
+    page.last = one->first.second;
   }
   return page;
 }

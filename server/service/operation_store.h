@@ -48,10 +48,14 @@ class OperationStore {
                                       const MakeJob& make_job);
   // Returns an operation, with its result if it has ended.
   absl::StatusOr<v1::Operation> Get(const std::string& tenant, const std::string& name);
-  // Returns at most `count` operations, without results, in the order in which they were started,
-  // after the one named; after = "": from the first. NOT_FOUND when that one is not there.
-  absl::StatusOr<std::vector<v1::Operation>> List(const std::string& tenant,
-                                                  const std::string& after, size_t count);
+  struct Page {
+    std::vector<v1::Operation>
+        operations;     // without results, in the order in which they were started
+    int64_t last = 0;   // number of the last one
+    bool more = false;  // whether others follow
+  };
+  // Returns at most `count` ≥ 1 operations, those whose number is above `after`. Numbers are ≥ 1.
+  Page List(const std::string& tenant, int64_t after, size_t count);
   // Asks an operation to end early, and returns it; one that has ended stays as it is.
   absl::StatusOr<v1::Operation> Cancel(const std::string& tenant, const std::string& name);
   // Forgets an operation, and cancels it if it is under way.

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "server/digest/digest.h"
 
 namespace polyest::internal {
 namespace {
@@ -20,7 +21,7 @@ v1::SessionRecord SessionExport::Head(const v1::Problem& problem) const {
   v1::SessionRecord record;
   v1::SessionRecord::Head& head = *record.mutable_head();
   head.set_name(described_.name());
-  *head.mutable_problem() = problem;
+  head.set_problem(DeterministicBytes(problem));
   *head.mutable_create_time() = described_.create_time();
   head.set_batch_count(described_.last_sequence());
   return record;

@@ -53,11 +53,14 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
   head_.create_time = head.create_time();
   promised_ = head.batch_count();
+  v1::Problem problem;
+  if (!problem.ParseFromString(head.problem())) {
+    return InvalidField("record.head.problem", "must be a serialized Problem");
+  }
   const SessionServices& services = registry_.services();
-  POLYEST_ASSIGN_OR_RETURN(
-      auto loaded, LoadedSession::Make(head.problem(), services.models, services.limits.problem));
-  POLYEST_ASSIGN_OR_RETURN(head_.number,
-                           services.journal.Create(head_, head.problem(), /*hidden=*/true));
+  POLYEST_ASSIGN_OR_RETURN(auto loaded,
+                           LoadedSession::Make(problem, services.models, services.limits.problem));
+  POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
   loaded_ = std::move(loaded);
   return absl::OkStatus();
 }

@@ -61,8 +61,9 @@ TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   const auto records = Exported();
   ASSERT_EQ(records.size(), 4u);
   EXPECT_EQ(records[0].head().batch_count(), 3);
-  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(records[0].head().problem(),
-                                                                 Oscillator()));
+  v1::Problem problem;
+  ASSERT_TRUE(problem.ParseFromString(records[0].head().problem()));
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(problem, Oscillator()));
   EXPECT_EQ(records[3].batch().sequence(), 3);
   v1::Session imported;
   const grpc::Status status = Import("copy", records, &imported);

@@ -103,15 +103,15 @@ void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
   }
 }
 
-// Adds the directions. Their coefficients are keyed by the names of the estimate's parameters.
 void AddDirections(const Estimate& estimate, v1::Estimate& proto) {
   for (const Direction& direction : estimate.directions) {
     v1::Direction& added = *proto.add_directions();
     added.set_information(direction.information);
     added.set_verdict(ToProto(direction.verdict));
     for (size_t i = 0; i < estimate.parameters.size(); ++i) {
-      (*added.mutable_coefficients())[estimate.parameters[i].name] =
-          direction.coefficients[static_cast<Eigen::Index>(i)];
+      v1::Direction::Coefficient& coefficient = *added.add_coefficients();
+      coefficient.set_parameter(estimate.parameters[i].name);
+      coefficient.set_value(direction.coefficients[static_cast<Eigen::Index>(i)]);
     }
   }
 }

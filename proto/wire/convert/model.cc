@@ -14,7 +14,15 @@ void AddQuantities(const std::vector<Quantity>& quantities,
     proto.set_name(quantity.name);
     proto.set_unit(quantity.unit);
     proto.set_meaning(quantity.meaning);
-    proto.set_default_value(quantity.default_value);
+  }
+}
+
+void AddParameters(const std::vector<Quantity>& parameters,
+                   google::protobuf::RepeatedPtrField<v1::Model::Quantity>& added) {
+  AddQuantities(parameters, added);
+  for (size_t i = 0; i < parameters.size(); ++i) {
+    if (!parameters[i].has_default) continue;
+    added[static_cast<int>(i)].set_default_value(parameters[i].default_value);
   }
 }
 
@@ -30,7 +38,7 @@ v1::Model ToProto(const Model& model) {
   proto.set_equations(description.equations);
   proto.set_source(description.source);
   AddQuantities(description.states, *proto.mutable_states());
-  AddQuantities(description.parameters, *proto.mutable_parameters());
+  AddParameters(description.parameters, *proto.mutable_parameters());
   AddQuantities(description.inputs, *proto.mutable_inputs());
   AddQuantities(description.outputs, *proto.mutable_outputs());
   return proto;

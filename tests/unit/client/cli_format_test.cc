@@ -17,6 +17,12 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+void AddCoefficient(v1::Direction& direction, const char* parameter, double value) {
+  v1::Direction::Coefficient& added = *direction.add_coefficients();
+  added.set_parameter(parameter);
+  added.set_value(value);
+}
+
 v1::Estimate ExampleEstimate() {
   v1::Estimate estimate;
   auto& k = *estimate.add_parameters();
@@ -43,8 +49,8 @@ v1::Estimate ExampleEstimate() {
   x.set_noise_std_dev(0.01);
   auto& direction = *estimate.add_directions();
   direction.set_information(7.7e5);
-  (*direction.mutable_coefficients())["mu"] = -0.1;
-  (*direction.mutable_coefficients())["k"] = 0.99;
+  AddCoefficient(direction, "k", 0.99);
+  AddCoefficient(direction, "mu", -0.1);
   direction.set_verdict(v1::Identifiability::IDENTIFIED);
   estimate.mutable_cost()->set_total(101.2);
   auto& diagnostic = *estimate.add_diagnostics();
@@ -123,11 +129,10 @@ TEST(EstimateLine, ShowsTimeAndEveryParameter) {
 }
 
 TEST(DirectionText, LeavesOutWhatIsTooSmallToMatter) {
-  v1::Estimate estimate = ExampleEstimate();
   v1::Direction direction;
-  (*direction.mutable_coefficients())["k"] = -1;
-  (*direction.mutable_coefficients())["mu"] = 0.01;
-  EXPECT_EQ(DirectionText(direction, estimate), "−1.00 k");
+  AddCoefficient(direction, "k", -1);
+  AddCoefficient(direction, "mu", 0.01);
+  EXPECT_EQ(DirectionText(direction), "−1.00 k");
 }
 
 TEST(ToJson, HasTheContractsNames) {
@@ -139,14 +144,15 @@ TEST(ToJson, HasTheContractsNames) {
                               R"("contraction":0.00114,"verdict":"IDENTIFIED")"));
   EXPECT_THAT(json, HasSubstr(R"("chiSquared":198.4,"noiseStdDev":0.01)"));
   EXPECT_THAT(json, HasSubstr(R"("diagnostics":[{"code":"UNDERSAMPLED")"));
+  EXPECT_THAT(json, HasSubstr(R"("coefficients":{"k":0.99,"mu":-0.1})"));
   EXPECT_THAT(json, HasSubstr(R"("time":10,"samples":"200","sequence":"7")"));
 }
 
 TEST(ToJson, IsTheSameForTheSameMessage) {
-  v1::Direction first;
-  v1::Direction second;
-  for (int i = 0; i < 20; ++i) (*first.mutable_coefficients())[std::to_string(i)] = i;
-  for (int i = 19; i >= 0; --i) (*second.mutable_coefficients())[std::to_string(i)] = i;
+  v1::Problem first;
+  v1::Problem second;
+  for (int i = 0; i < 20; ++i) (*first.mutable_fixed())[std::to_string(i)] = i;
+  for (int i = 19; i >= 0; --i) (*second.mutable_fixed())[std::to_string(i)] = i;
   EXPECT_EQ(ToJson(first, /*several_lines=*/true), ToJson(second, /*several_lines=*/true));
 }
 

@@ -28,13 +28,7 @@ const ContractStyle::Exceptions& NamesThatScriptsRelyOn() {
       "ExpansionSummary.terms", "ExpansionSummary.points", "ExpansionSummary.reexpansions",
       "ExpansionSummary.trajectories",
       // "maxSteps" of a problem.
-      "IntegrationOptions.max_steps",
-      // {"coefficients": {"k": 0.99, "c": 0.1}} of an estimate.
-      "Direction.coefficients",
-      // {"fixed": {"m": 1}} and the like of a problem. Only ExportSession and ImportSession stream
-      // problems.
-      "Problem.fixed", "Problem.derived", "Equations.states", "Equations.outputs",
-      "Equations.parameters", "Equations.units", "Equations.intermediates", "Equations.tables"};
+      "IntegrationOptions.max_steps"};
   return names;
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace polyest::internal {
 namespace {
 
@@ -29,7 +31,7 @@ TEST(EstimateSchedule, CountsBatches) {
 TEST(EstimateSchedule, WaitsForTheIntervalAndThenForTheNextBatch) {
   EstimateSchedule schedule;
   Policy policy;
-  policy.mutable_min_interval()->set_nanos(100'000'000);
+  policy.set_min_interval_s(0.1);
   ASSERT_TRUE(schedule.Set(policy).ok());
   EXPECT_TRUE(schedule.Due(kStart));
   EXPECT_FALSE(schedule.Due(kStart + milliseconds(99)));
@@ -52,10 +54,10 @@ TEST(EstimateSchedule, RefusesNegativeNumbersAndKeepsWhatItHad) {
   policy.set_batch_count(-2);
   EXPECT_EQ(schedule.Set(policy).message(), "estimates.batchCount: -2 must not be negative");
   policy.set_batch_count(5);
-  policy.mutable_min_interval()->set_seconds(-1);
-  EXPECT_EQ(schedule.Set(policy).code(), absl::StatusCode::kInvalidArgument);
-  policy.mutable_min_interval()->set_seconds(INT64_MAX);
-  EXPECT_EQ(schedule.Set(policy).code(), absl::StatusCode::kInvalidArgument);
+  for (const double interval_s : {-1.0, 86'401.0, std::nan(""), HUGE_VAL}) {
+    policy.set_min_interval_s(interval_s);
+    EXPECT_EQ(schedule.Set(policy).code(), absl::StatusCode::kInvalidArgument) << interval_s;
+  }
   EXPECT_TRUE(schedule.Due(kStart));
 }
 

@@ -56,9 +56,23 @@ TEST_F(OperationStoreTest, HidesOperationsFromOtherTenants) {
   EXPECT_TRUE(absl::IsNotFound(store_.Get("b", started->name()).status()));
   EXPECT_TRUE(absl::IsNotFound(store_.Cancel("b", started->name()).status()));
   EXPECT_TRUE(absl::IsNotFound(store_.Delete("b", started->name())));
-  EXPECT_TRUE(store_.List("b", "", 10)->empty());
+  EXPECT_TRUE(store_.List("b", 0, 10).operations.empty());
   RunAll();
   EXPECT_EQ(StateOf(started->name()), v1::Operation::SUCCEEDED);
+}
+
+TEST_F(OperationStoreTest, ListsTheNextPageAlsoWhenTheLastOfOneIsDeleted) {
+  const std::string first = Start()->name();
+  const std::string second = Start()->name();
+  const OperationStore::Page page = store_.List("a", 0, 1);
+  ASSERT_EQ(page.operations.size(), 1u);
+  EXPECT_EQ(page.operations[0].name(), first);
+  EXPECT_TRUE(page.more);
+  ASSERT_TRUE(store_.Delete("a", first).ok());
+  const OperationStore::Page next = store_.List("a", page.last, 1);
+  ASSERT_EQ(next.operations.size(), 1u);
+  EXPECT_EQ(next.operations[0].name(), second);
+  EXPECT_FALSE(next.more);
 }
 
 TEST_F(OperationStoreTest, CancelsWhatWaits) {
@@ -106,7 +120,7 @@ TEST_F(OperationStoreTest, ForgetsAnHourAfterTheEnd) {
 TEST_F(OperationStoreTest, KeepsNothingOfWhatFindsNoRoom) {
   full_ = true;
   EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
-  EXPECT_TRUE(store_.List("a", "", 10)->empty());
+  EXPECT_TRUE(store_.List("a", 0, 10).operations.empty());
 }
 
 }  // namespace

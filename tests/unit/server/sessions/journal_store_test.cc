@@ -57,16 +57,16 @@ class JournalStoreTest : public testing::Test {
 
   void Append(int rows, int run = 0, bool end_of_run = false) {
     v1::Measurements batch;
-    v1::Channel& x = *batch.add_channels();
+    v1::Measurements::Channel& x = *batch.add_channels();
     x.set_name("x");
-    v1::Channel& force = *batch.add_channels();
+    v1::Measurements::Channel& force = *batch.add_channels();
     force.set_name("force");
     for (int i = 0; i < rows; ++i, ++row_) {
       batch.add_time_s(0.01 * row_);
       batch.add_run(run);
       // Grows, so that the noise of a row tells which rows went before.
       x.add_values((row_ + 1) * std::sin(row_));
-      x.add_missing(row_ % 7 == 3);
+      if (row_ % 7 == 3) x.add_missing(i);
       force.add_values(row_);
     }
     batch.set_end_of_run(end_of_run);

@@ -89,8 +89,11 @@ TEST(EstimateToProto, CarriesEverythingElse) {
   EXPECT_EQ(proto.channels(0).noise_std_dev(), 0.1);
   ASSERT_EQ(proto.directions_size(), 1);
   EXPECT_EQ(proto.directions(0).information(), 11);
-  EXPECT_EQ(proto.directions(0).coefficients().at("k"), 0.6);
-  EXPECT_EQ(proto.directions(0).coefficients().at("c"), 0.8);
+  ASSERT_EQ(proto.directions(0).coefficients_size(), 2);
+  EXPECT_EQ(proto.directions(0).coefficients(0).parameter(), "k");
+  EXPECT_EQ(proto.directions(0).coefficients(0).value(), 0.6);
+  EXPECT_EQ(proto.directions(0).coefficients(1).parameter(), "c");
+  EXPECT_EQ(proto.directions(0).coefficients(1).value(), 0.8);
   EXPECT_EQ(proto.directions(0).verdict(), v1::Identifiability::NOT_IDENTIFIED);
   EXPECT_EQ(proto.expansion().order(), 3);
   EXPECT_EQ(proto.expansion().terms(), 10);
