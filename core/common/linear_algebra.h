@@ -6,7 +6,6 @@
 // say so.
 
 #include <Eigen/LU>
-#include <optional>
 
 #include "core/common/types.h"
 
@@ -23,8 +22,6 @@ struct SymmetricEigen {
 SymmetricEigen DecomposeSymmetric(const Matrix& matrix);
 // Decomposes the symmetric tridiagonal matrix with `diagonal` (n ≥ 1) and `off_diagonal` (n − 1).
 SymmetricEigen DecomposeTridiagonal(const Vector& diagonal, const Vector& off_diagonal);
-// Returns its eigenvalues alone, ascending; nothing when the iteration does not converge.
-std::optional<Vector> TridiagonalEigenvalues(const Vector& diagonal, const Vector& off_diagonal);
 // Returns the eigenvalues alone, ascending; reads the lower triangle of `matrix` only.
 Vector SymmetricEigenvalues(const Matrix& matrix);
 

@@ -1,5 +1,4 @@
 #include <Eigen/Eigenvalues>
-#include <optional>
 
 #include "core/common/linear_algebra.h"
 
@@ -20,13 +19,6 @@ SymmetricEigen DecomposeTridiagonal(const Vector& diagonal, const Vector& off_di
   Eigen::SelfAdjointEigenSolver<Matrix> solver;
   solver.computeFromTridiagonal(diagonal, off_diagonal);
   return ResultOf(solver);
-}
-
-std::optional<Vector> TridiagonalEigenvalues(const Vector& diagonal, const Vector& off_diagonal) {
-  Eigen::SelfAdjointEigenSolver<Matrix> solver;
-  solver.computeFromTridiagonal(diagonal, off_diagonal, Eigen::EigenvaluesOnly);
-  if (solver.info() != Eigen::Success) return std::nullopt;
-  return solver.eigenvalues();
 }
 
 Vector SymmetricEigenvalues(const Matrix& matrix) {

@@ -136,6 +136,7 @@ TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
   // The smallest value is rounded by some ε of the largest.
   EXPECT_NEAR(conditioning.number, 1e6, 1e6 * 1e6 * kRounding);
   EXPECT_EQ(ConditioningOf(Matrix::Constant(1, 1, -3)).number, 1);
+  EXPECT_NEAR(ConditioningOf(left).number, 1, kRounding);  // many equal ones
   EXPECT_EQ(ConditioningOf(Matrix::Zero(3, 3)).rank, 0);
 }
 
