@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/estimator/snapshot.h"
+#include "tests/testing/records.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
 namespace polyest::internal {
@@ -154,9 +155,9 @@ TEST_F(BadSnapshot, IsOneOfOtherRows) {
 
 TEST_F(BadSnapshot, IsOneForWhichTheRowsAreNotThereOrTaken) {
   const auto estimator = MakeEstimator(problem_);
-  ASSERT_TRUE(estimator->Append(Rows(samples_, 0, 20)).ok());
+  ASSERT_TRUE(estimator->Append(testing::Rows(samples_, 0, 20)).ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
-  ASSERT_TRUE(estimator->Append(Rows(samples_, 20, 40)).ok());
+  ASSERT_TRUE(estimator->Append(testing::Rows(samples_, 20, 20)).ok());
   ASSERT_TRUE(estimator->Process().ok());
   EXPECT_TRUE(absl::IsFailedPrecondition(estimator->Restore(good_)));
 }

@@ -20,21 +20,6 @@ namespace polyest::internal {
 inline constexpr double kStep = 0.05;
 inline constexpr int kInterval = 32;
 
-inline Samples Rows(const Samples& all, size_t first, size_t end) {
-  const auto cut = [&](const auto& values) {
-    using Values = std::decay_t<decltype(values)>;
-    return Values(values.begin() + static_cast<std::ptrdiff_t>(first),
-                  values.begin() + static_cast<std::ptrdiff_t>(end));
-  };
-  Samples some;
-  some.time_s = cut(all.time_s);
-  if (!all.run.empty()) some.run = cut(all.run);
-  for (const SampleColumn& column : all.columns) {
-    some.columns.push_back({column.name, cut(column.value), {}});
-  }
-  return some;
-}
-
 // Equally spaced rows from t = 0 of so many runs, an output with white noise.
 inline Samples Record(const std::string& output, const std::function<double(double t)>& y,
                       double noise, int rows, int runs = 1) {
@@ -66,7 +51,8 @@ struct Session {
   Session(const Session&) = delete;
 
   void Take(const Samples& samples) {
-    ASSERT_TRUE(estimator->Append(samples).ok());
+    const absl::Status appended = estimator->Append(samples);
+    ASSERT_TRUE(appended.ok()) << appended;
     const absl::Status status = estimator->Process();
     ASSERT_TRUE(status.ok()) << status;
   }

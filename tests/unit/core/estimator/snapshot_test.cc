@@ -10,6 +10,7 @@
 
 #include "core/estimator/record/checkpoints.h"
 #include "core/model/equations/equation_model.h"
+#include "tests/testing/records.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
 namespace polyest::internal {
@@ -47,10 +48,10 @@ Outcome ExpectSameBitsThroughRestarts(Problem problem, const Samples& samples, s
   EstimatorSnapshot latest;
   for (size_t first = 0; first < samples.rows(); first += batch) {
     const size_t end = std::min(first + batch, samples.rows());
-    undisturbed.Take(Rows(samples, first, end));
+    undisturbed.Take(testing::Rows(samples, first, batch));
     outcome.estimates.push_back(undisturbed.Current());
     Session session(problem, 1 + outcome.restored % 2);
-    EXPECT_TRUE(session.estimator->Append(Rows(samples, 0, end)).ok());
+    EXPECT_TRUE(session.estimator->Append(testing::Rows(samples, 0, end)).ok());
     if (!latest.state.empty()) {
       const absl::Status restored = session.estimator->Restore(latest);
       EXPECT_TRUE(restored.ok()) << restored;

@@ -14,11 +14,14 @@
 #include "core/model/equations/equation_model.h"
 #include "polyest/estimator.h"
 #include "tests/testing/oscillator.h"
+#include "tests/testing/records.h"
 #include "tests/unit/core/estimator/estimation.h"
 #include "tests/unit/core/estimator/stopping_store.h"
 
 namespace polyest::internal {
 namespace {
+
+using testing::Rows;
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -47,16 +50,6 @@ Samples Record(const std::function<double(double)>& y, double step_s, int count,
     samples.columns[0].value.push_back(y(i * step_s) + normal(generator));
   }
   return samples;
-}
-
-Samples Rows(const Samples& all, size_t first, size_t count) {
-  const auto from = static_cast<std::ptrdiff_t>(first);
-  const auto to = from + static_cast<std::ptrdiff_t>(count);
-  Samples some;
-  some.time_s = {all.time_s.begin() + from, all.time_s.begin() + to};
-  const std::vector<double>& value = all.columns[0].value;
-  some.columns = {{"y", {value.begin() + from, value.begin() + to}, {}}};
-  return some;
 }
 
 using Output = std::function<double(const Vector& theta, double t)>;
