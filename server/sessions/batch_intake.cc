@@ -35,7 +35,8 @@ absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimit
   return absl::OkStatus();
 }
 
-// Where runs bring parameters of their own the problem must bear them.
+// Checks that the problem stays valid and within the limits when new runs add parameters of their
+// own.
 absl::Status BatchIntake::CheckRuns(int runs, const ProblemLimits& limits) {
   if (!problem_.per_run() || runs <= runs_) return absl::OkStatus();
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem_.WithRuns(runs));
@@ -64,7 +65,7 @@ void BatchIntake::Advance(const Samples& samples) {
   }
 }
 
-// Values of measured outputs that are there: what an estimate counts as its samples.
+// Counts the values of measured outputs that are not missing, as an estimate counts its samples.
 int64_t BatchIntake::CountValues(const Samples& samples) const {
   int64_t values = 0;
   for (const SampleColumn& column : samples.columns) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where the batches of a session come in: checked at once, so that they can be acknowledged, and
-// held until the estimator, which may be busy for a while, takes them.
+// Takes in the batches of a session. Each batch is checked at once, so that it can be acknowledged,
+// and held until the estimator, which may be busy for a while, takes it.
 
 #include <absl/status/status.h>
 
@@ -21,29 +21,32 @@
 
 namespace polyest::internal {
 
+// A batch that has been checked and waits for the estimator.
 struct TakenBatch {
   Samples samples;
-  SessionPlace place;     // after it
-  double measured_s = 0;  // after it, s of measurements over all runs
+  SessionPlace place;     // of the session after this batch
+  double measured_s = 0;  // seconds of measurements up to its end, over all runs
 };
 
-// Threads may share it.
+// Thread-safe.
 class BatchIntake {
  public:
   explicit BatchIntake(ResolvedProblem problem);
 
-  // Without parameters for runs other than the first.
+  // Returns the problem without parameters for runs other than the first.
   const ResolvedProblem& problem() const { return problem_; }
-  // After the last batch taken.
+  // Return the place of the session after the last batch taken, and the seconds of measurements up
+  // to there, over all runs.
   SessionPlace place() const;
   double measured_s() const;
 
-  // Takes the next batch, all of it or nothing; INVALID_ARGUMENT when it is no good,
-  // RESOURCE_EXHAUSTED when its runs bring more parameters than the limits allow. What passes here
-  // an estimator of the problem takes, too. Cheap.
+  // Checks the next batch and takes all of it or nothing; cheap. Refuses a bad batch with
+  // INVALID_ARGUMENT, and one whose runs bring more parameters than the limits allow with
+  // RESOURCE_EXHAUSTED. An estimator of the problem accepts every batch that is taken here.
   absl::Status Take(const v1::Measurements& batch, const ProblemLimits& limits = {});
 
-  // The first batch not handed on yet, if its number is not above `sequence`.
+  // Removes and returns the oldest batch that has not been handed on yet. Returns nothing when
+  // there is none or its number is above `sequence`.
   std::optional<TakenBatch> Next(int64_t sequence);
 
  private:
@@ -56,7 +59,7 @@ class BatchIntake {
 
   mutable std::mutex mutex_;
   SampleChecks checks_;
-  int runs_;  // for which the problem is known to be good
+  int runs_;  // number of runs for which the problem is known to be valid
   SessionPlace place_;
   double measured_s_ = 0;
   std::deque<TakenBatch> waiting_;

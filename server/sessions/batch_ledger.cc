@@ -73,7 +73,7 @@ void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& 
   std::multimap<int64_t, Done> settled;
   {
     const std::lock_guard lock(mutex_);
-    if (losses != losses_) return;  // lost with one before it
+    if (losses != losses_) return;  // the batch is lost already, with one before it
     POLYEST_CHECK(!under_way_.empty() && under_way_.front().place.sequence == sequence);
     if (kept.ok()) {
       kept_ = under_way_.front().place;

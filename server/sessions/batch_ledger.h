@@ -1,11 +1,12 @@
 #pragma once
 
-// The rule that makes a stream safe to resume: batches are numbered 1, 2, 3 …, each is acknowledged
-// once the journal keeps it, and any of them may be sent again and counts once.
+// Records which batches of a session are taken and which are kept, so that a stream can be resumed
+// safely: batches are numbered 1, 2, 3 …, each is acknowledged once the journal keeps it, and any
+// of them may be sent again and counts once.
 //
 // A batch is first taken (checked and handed to the estimator and to the journal), then kept. When
-// the journal cannot keep one, that one and all taken after it are as if they had never come; what
-// the estimator holds is then void, until it is made anew from what is kept.
+// the journal cannot keep a batch, this batch and all taken after it are lost: they count as never
+// received. The estimator's state is then invalid until it is rebuilt from the kept batches.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -21,7 +22,7 @@
 
 namespace polyest::internal {
 
-// Threads may share it.
+// Thread-safe.
 class BatchLedger {
  public:
   using Done = std::function<void(const absl::Status&)>;
@@ -29,31 +30,35 @@ class BatchLedger {
 
   explicit BatchLedger(const SessionPlace& kept) : kept_(kept), taken_(kept) {}
 
+  // Return the place of the session after the last batch kept, and after the last batch taken.
   SessionPlace kept() const;
   SessionPlace taken() const;
   bool all_kept() const;
-  // Counts the times that taken batches were not kept.
+  // Returns how often batches that were taken could not be kept.
   uint64_t losses() const;
 
-  // Says what a batch is to who has seen `losses` of them. When taken batches were lost since, the
-  // answer is why: the number may then follow one of those and says nothing. Otherwise
-  // FAILED_PRECONDITION, naming the number expected, for a number further ahead than the next;
-  // INVALID_ARGUMENT for one below 1; ALREADY_EXISTS for the number of another batch.
-  // `kept_digest` looks up that of a batch that is kept.
+  // Tells whether a batch is the next one or a repeat, for a caller that has seen `losses` losses.
+  // If there were more losses since, returns the reason of the last one, because `sequence` may
+  // follow a lost batch and then says nothing. Otherwise refuses with FAILED_PRECONDITION, naming
+  // the number expected, a number further ahead than the next; with INVALID_ARGUMENT a number below
+  // 1; and with ALREADY_EXISTS the number of a batch with other content. `kept_digest` looks up the
+  // digest of a kept batch; its errors are returned.
   absl::StatusOr<Kind> Check(
       int64_t sequence, const std::string& digest, uint64_t losses,
       const std::function<absl::StatusOr<std::string>(int64_t)>& kept_digest) const;
 
-  // Takes the next batch, which leads to `place`. When taken batches were lost since `losses` of
-  // them were seen, takes nothing and answers why they were lost.
+  // Takes the next batch, after which the session is at `place`. If there were more losses since
+  // the caller saw `losses` of them, takes nothing and returns the reason of the last one.
   absl::Status Take(const SessionPlace& place, std::string digest, uint64_t losses);
-  // What became of a batch taken after that many losses.
+  // Records whether the journal kept a batch that was taken after `losses` losses, and calls those
+  // who wait for it. If it was not kept, it is lost with all batches taken after it. Does nothing
+  // for a batch that is lost already.
   void Settle(uint64_t losses, int64_t sequence, const absl::Status& kept);
-  // Calls `done` when every batch up to this one is kept, at once if they are; with the reason when
-  // one of them is not.
+  // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
+  // when one of them is lost.
   void WhenKept(int64_t sequence, Done done);
-  // The same of everything taken, for who has seen `losses` before: with the reason when there were
-  // more since.
+  // Calls `done` when everything taken so far is kept, for a caller that has seen `losses` losses;
+  // with the reason of the last loss if there were more since.
   void WhenAllKept(uint64_t losses, Done done);
 
  private:
@@ -66,7 +71,7 @@ class BatchLedger {
   SessionPlace kept_;
   SessionPlace taken_;
   std::deque<Taken> under_way_;
-  std::multimap<int64_t, Done> waiting_;  // by the sequence waited for
+  std::multimap<int64_t, Done> waiting_;  // by the number of the batch waited for
   uint64_t losses_ = 0;
   absl::Status last_loss_;
 };

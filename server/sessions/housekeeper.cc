@@ -11,13 +11,13 @@
 namespace polyest::internal {
 namespace {
 
-// How often it looks, as a part of the time after which a session is idle.
+// Number of looks within the time after which a session is idle.
 constexpr int kLooks = 4;
 constexpr std::chrono::milliseconds kShortestPause{10};
-// Of the idle sessions in memory, how many leave it at a look that finds it full: one in so many.
+// A look that finds the memory full unloads one in so many of the idle sessions in memory.
 constexpr size_t kLeaving = 4;
 
-// Refused when the daemon is busy: then the next look does it.
+// Unloads a session on its strand. A busy daemon refuses the task; the next look then tries again.
 void Unload(const std::shared_ptr<Session>& session) {
   session->strand().Submit([session] { session->Unload(); }).IgnoreError();
 }
@@ -56,7 +56,8 @@ void Housekeeper::MakeRoom() {
   std::sort(idle.begin(), idle.end(), std::greater<>());
   idle.resize((idle.size() + kLeaving - 1) / kLeaving);
   for (const auto& [time, session] : idle) Unload(session);
-  // What was unloaded since the last look, and otherwise stays with the allocator.
+  // Returns the memory of sessions that were unloaded since the last look, and which the allocator
+  // would otherwise keep, to the operating system.
   malloc_trim(0);
 }
 

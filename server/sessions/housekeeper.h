@@ -1,7 +1,7 @@
 #pragma once
 
-// Takes the estimators of idle sessions out of memory: after a time, and while the daemon has more
-// memory than it may have those first that were idle longest.
+// Unloads the estimators of idle sessions: after a time, and, while the daemon uses more memory
+// than it may, those first that have been idle longest.
 
 #include <chrono>
 #include <condition_variable>
@@ -14,15 +14,15 @@
 namespace polyest::internal {
 
 struct HousekeepingOptions {
-  // An estimator that was not used for so long is unloaded.
+  // Idle time after which an estimator is unloaded.
   std::chrono::milliseconds idle{std::chrono::minutes(10)};
-  // How often it looks at the memory, if that is limited.
+  // Longest time between two looks at the memory, if that is limited.
   std::chrono::milliseconds memory_pause{std::chrono::seconds(1)};
 };
 
 class Housekeeper {
  public:
-  // Looks after the registry, which must outlive it, from a thread of its own.
+  // Starts a thread that looks after the registry, which must outlive the housekeeper.
   Housekeeper(SessionRegistry& registry, const HousekeepingOptions& options);
 
  private:

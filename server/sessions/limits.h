@@ -1,7 +1,7 @@
 #pragma once
 
-// How much of the machine sessions may take; past a limit the answer is RESOURCE_EXHAUSTED and
-// names it.
+// Limits how much of the machine sessions may use. Past a limit the answer is RESOURCE_EXHAUSTED
+// and names the limit.
 
 #include <cstdint>
 
@@ -16,8 +16,8 @@ struct SessionLimits {
   int64_t rows = 100'000'000;               // --max-session-rows: of one session
   int64_t rows_per_tenant = 1'000'000'000;  // --max-tenant-rows: of all sessions of a tenant
   int64_t total_rows = 10'000'000'000;      // --max-total-rows: of all sessions of all tenants
-  // Of a problem that comes with a request, for a session or without one. Sessions that are there
-  // stay, whatever the limits are now.
+  // Limits of a problem that comes with a request, for a session or without one. Sessions that
+  // exist already stay, whatever the limits are now.
   ProblemLimits problem{.parameters = 64, .states = 1'000};
 };
 

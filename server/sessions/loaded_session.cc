@@ -32,7 +32,8 @@ void LoadedSession::Attach(SessionJournal& journal, int64_t session) {
   };
 }
 
-// A snapshot only saves time: one that is of no use is not missed.
+// Restores the estimator from the journal's snapshot, if there is a usable one. A snapshot only
+// saves time, so all errors are ignored.
 void LoadedSession::Restore(const SessionJournal& journal, int64_t session) {
   auto snapshot = journal.ReadSnapshot(session);
   if (!snapshot.ok() || !snapshot->has_value()) return;

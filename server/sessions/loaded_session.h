@@ -1,6 +1,7 @@
 #pragma once
 
-// What of a session is in memory only while it is used: its problem and its estimator.
+// Holds the part of a session that is in memory only while it is used: its problem and its
+// estimator.
 
 #include <absl/status/statusor.h>
 
@@ -22,44 +23,46 @@
 
 namespace polyest::internal {
 
-// Batches come in from any thread; the estimator is for one thread at a time.
+// Any thread may give it batches; the estimator is for one thread at a time.
 class LoadedSession {
  public:
-  // INVALID_ARGUMENT or RESOURCE_EXHAUSTED as the problem deserves.
+  // Makes a session without batches. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one
+  // beyond the limits; other errors are those of Estimator::Make.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
                                                              const ModelLibrary& models,
                                                              const ProblemLimits& limits = {});
-  // As it was after the batches that the journal keeps, from its latest snapshot on if that is of
-  // use. DATA_LOSS when they do not lead to `place`.
+  // Rebuilds a session from the batches that the journal keeps. The latest snapshot in the journal,
+  // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
                                                              int64_t session,
                                                              const SessionPlace& place,
                                                              const ModelLibrary& models,
                                                              const Stop& stop);
 
-  // From here on the journal is given the estimator's snapshots of this session, and rows that are
-  // no longer in memory are read from it. The journal must outlive this.
+  // From here on, gives the estimator's snapshots to the journal, as those of this session, and reads
+  // rows that are no longer in memory from it. The journal must outlive this.
   void Attach(SessionJournal& journal, int64_t session);
-  // Rows of batches up to `sequence`, which the journal keeps, need not stay in memory.
+  // Lets go of the rows of batches up to `sequence`, which the journal must keep.
   void Release(int64_t sequence) { store_->Release(sequence); }
 
   const v1::Problem& problem() const { return problem_; }
-  // Where batches are taken: not yet by the estimator.
+  // Returns the intake, which takes batches before the estimator gets them.
   BatchIntake& intake() { return intake_; }
   const BatchIntake& intake() const { return intake_; }
 
-  // The following each of one thread at a time.
+  // The following are for one thread at a time.
 
-  // Seconds of measurements processed, over all runs.
+  // Returns the seconds of measurements that the estimator has, over all runs.
   double measured_s() const { return measured_s_; }
-  // The last batch that the estimator has.
+  // Returns the number of the last batch that the estimator has.
   int64_t sequence() const { return sequence_; }
-  // Brings the estimator up to batch `sequence`, or as far as the batches taken go.
+  // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes
+  // them.
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
-  // From everything processed, and made only once for it.
+  // Returns the estimate from everything processed. Computes it only once for the same last batch.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
-  // Calls `work` with the estimator, to which everything taken is appended, and with the last batch
-  // taken.
+  // Gives the estimator every batch taken, without processing it, and calls `work` with the
+  // estimator and the number of the last batch. Returns what `work` returns.
   using Work = std::function<absl::Status(Estimator& estimator, int64_t sequence)>;
   absl::Status WithEstimator(const Work& work);
 

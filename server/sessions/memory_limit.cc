@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-// In which idle sessions are unloaded.
+// Time in which idle sessions are unloaded.
 constexpr std::chrono::seconds kRetryDelay{2};
 
 }  // namespace

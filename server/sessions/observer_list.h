@@ -1,6 +1,6 @@
 #pragma once
 
-// The observers of a session.
+// Keeps the observers of a session.
 
 #include <absl/status/status.h>
 
@@ -14,7 +14,7 @@
 
 namespace polyest::internal {
 
-// Threads may share it.
+// Thread-safe.
 class ObserverList {
  public:
   // `session` is the name of the session, for messages.
@@ -27,7 +27,8 @@ class ObserverList {
 
   // Passes the estimate to all observers, one after the other, without holding the lock.
   void OnEstimate(const SharedEstimate& estimate) const;
-  // Refuses new observers from here on. Returns those it had, whom the caller tells of the end.
+  // Refuses new observers from here on. Returns the observers it had, for the caller to tell them
+  // of the end.
   std::vector<std::shared_ptr<SessionObserver>> Close();
 
  private:

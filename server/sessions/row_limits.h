@@ -8,8 +8,8 @@
 
 namespace polyest::internal {
 
-// RESOURCE_EXHAUSTED, naming the limit, for a batch with too many rows, or too many beside those of
-// the session so far.
+// Refuses with RESOURCE_EXHAUSTED, naming the limit, a batch with too many rows, or with too many
+// beside those that the session has so far.
 absl::Status CheckRows(const SessionLimits& limits, const SessionPlace& place,
                        const v1::Measurements& batch);
 

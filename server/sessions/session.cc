@@ -98,7 +98,8 @@ Session::InMemory Session::Present() const {
   return in_memory_;
 }
 
-// What was in memory before is destroyed after the lock.
+// Exchanges what is in memory. The parameter then holds what was there before, and destroys it
+// after the lock is released.
 void Session::Replace(InMemory in_memory) {
   if (in_memory.loaded != nullptr) {
     activity_.OnLoaded(in_memory.loaded->sequence(), in_memory.loaded->measured_s());
@@ -119,7 +120,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   }
   POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   Replace({nullptr, present.losses});
-  // Until it is replaced below, no batch is taken.
+  // No batch is taken until the session is loaded again below.
   POLYEST_ASSIGN_OR_RETURN(
       std::shared_ptr<LoadedSession> loaded,
       LoadedSession::Load(services_.journal, number(), ledger_.kept(), services_.models, stop));

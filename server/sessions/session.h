@@ -1,7 +1,8 @@
 #pragma once
 
-// A session: batches into the journal and the estimator, estimates to those who watch. Its
-// estimator is in memory while it is used, and otherwise made anew from the journal.
+// Implements a session: batches go into the journal and into the estimator, estimates go to the
+// observers. The estimator is in memory while it is used; otherwise it is rebuilt from the journal
+// when it is needed.
 
 #include <absl/status/statusor.h>
 
@@ -31,15 +32,15 @@ namespace polyest::internal {
 
 class Metrics;
 
-// What all sessions need; outlives them.
+// Holds references to what all sessions need, which must outlive them.
 struct SessionServices {
   Executor& executor;
   SessionJournal& journal;
   const ModelLibrary& models;
   SessionLimits limits = {};
-  Metrics* metrics = nullptr;  // null: nothing is counted
+  Metrics* metrics = nullptr;  // null: no metrics are counted
   MemoryLimit memory = MemoryLimit();
-  // Null: rows are not counted; the registry does.
+  // Counts the stored rows; null: they are not counted. The registry sets it.
   std::shared_ptr<StoredRows> rows = nullptr;
 };
 
@@ -47,7 +48,8 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   using Clock = SessionActivity::Clock;
 
-  // One that the journal keeps; `loaded` when it has just been made.
+  // Makes a session that the journal keeps; `loaded` is given when the session has just been
+  // created or imported.
   Session(const SessionServices& services, SessionHead head,
           std::unique_ptr<LoadedSession> loaded = nullptr);
 
@@ -56,9 +58,12 @@ class Session : public std::enable_shared_from_this<Session> {
   int64_t number() const { return head_.number; }
   Strand& strand() { return *strand_; }
 
-  // From any thread.
-  // All fields but the problem.
+  // The following, down to Add, may be called from any thread.
+  //
+  // Returns all fields but the problem.
   v1::Session Describe() const;
+  // Read the problem and the batches from the journal, as SessionJournal does. They wait for the
+  // disk.
   absl::StatusOr<v1::Problem> ReadProblem() const {
     return services_.journal.ReadProblem(number());
   }
@@ -66,82 +71,94 @@ class Session : public std::enable_shared_from_this<Session> {
                            const std::function<absl::Status(const JournalBatch&)>& take) const {
     return services_.journal.ReadBatches(number(), after, take);
   }
-  // Batches acknowledged.
+  // Returns the place of the session after the last batch acknowledged.
   SessionPlace place() const { return ledger_.kept(); }
-  // Batches taken, acknowledged or about to be.
+  // Returns the place of the session after the last batch taken, acknowledged or not yet.
   SessionPlace taken() const { return ledger_.taken(); }
   bool loaded() const { return activity_.loaded(); }
-  // Since it was last used; none while it is in use.
+  // Returns the time since the session was last used; nothing while it is in use.
   std::optional<Clock::duration> IdleTime() const;
 
-  // As WriterLease::Claim.
+  // Claims the lease of the session's writer, as WriterLease::Claim does.
   absl::Status ClaimWriter(std::shared_ptr<SessionObserver> writer, const std::string& id) {
     return writer_.Claim(std::move(writer), id);
   }
+  // Takes the lease back from a writer, if it holds the lease.
   void ReleaseWriter(const SessionObserver* writer);
 
-  // Ends the session for everybody: calls on it are NOT_FOUND from here on.
+  // Ends the session for everybody: tells its observers and its writer. Calls on it are NOT_FOUND
+  // from here on.
   void Close();
 
-  // Calls `done` when every batch up to this one is kept, at once if it is; or will not be, and
-  // why.
+  // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
+  // when one of them is lost.
   void WhenKept(int64_t sequence, BatchLedger::Done done) {
     ledger_.WhenKept(sequence, std::move(done));
   }
-  // The same of everything taken, where `losses` were seen before it was looked at.
+  // Calls `done` when everything taken is kept, for a caller that has seen `losses` losses; with
+  // the reason of the last loss if there were more since.
   void WhenAllKept(uint64_t losses, BatchLedger::Done done) {
     ledger_.WhenAllKept(losses, std::move(done));
   }
-  // How often batches were taken and then not kept.
+  // Returns how often batches that were taken could not be kept.
   uint64_t losses() const { return ledger_.losses(); }
 
-  // Takes the batch, all of it or nothing. It may be acknowledged as the answer says WhenKept its
-  // sequence. No numerics: ProcessUpTo does them. UNAVAILABLE when the session is not loaded.
-  // After batches were lost, refuses with the reason of the loss: until the session is loaded
-  // again, or for good where `losses` (those seen when a stream began) is given, because what the
-  // stream sends next follows a batch that is lost.
+  // Takes the batch, all of it or nothing, and gives it to the journal. The acknowledgement
+  // returned may be sent once WhenKept reports its batch as kept. Computes no numerics: ProcessUpTo
+  // does that. UNAVAILABLE when the session is not loaded. After batches were lost, refuses with
+  // the reason of the loss until the session is loaded again. If `losses` is given, the number of
+  // losses seen when a stream began, refuses for good, because what the stream sends next follows a
+  // lost batch. Other refusals are those of BatchLedger::Check, BatchIntake::Take and the limits of
+  // rows.
   absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch,
                                           std::optional<uint64_t> losses = std::nullopt);
 
-  // The following only on the strand. Each brings the estimator back into memory if it is not
-  // there.
+  // The following, down to Observe, may be called on the strand only. They bring the estimator back
+  // into memory if they need it and it is not there.
+  //
+  // Loads the estimator, which stays in memory at least as long as there is a writer.
 
   // As it stays at least as long as there is a writer.
   absl::Status Load(const Stop& stop) { return Loaded(stop).status(); }
-  // Everything added, or what of it was added up to batch `sequence`.
+  // Process everything added, or everything added up to batch `sequence`.
   absl::Status Process(const Stop& stop);
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
-  // The estimate from everything processed; it may be told WhenKept its sequence. A new one is
-  // passed on to the observers then.
+  // Returns the estimate from everything processed. It may be shown once WhenKept reports its last
+  // batch as kept; a new estimate is then passed on to the observers.
   absl::StatusOr<SharedEstimate> LatestEstimate(const Stop& stop);
-  // The same from everything added.
+  // Processes everything added, then returns the estimate as LatestEstimate does.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
-  // Calls `work` with the estimator, which has everything added and has yet to process it, and with
-  // the last batch added. Returns what `work` returns.
+  // Calls `work` with the estimator, which has everything added and may have yet to process it, and
+  // with the number of the last batch added. Returns what `work` returns.
   absl::Status WithEstimator(const LoadedSession::Work& work, const Stop& stop);
-  // Passes on the present estimate, if there are samples, and every new one from here on.
+  // Passes on to `observer` the present estimate, if there are samples, and every new one from here
+  // on. NOT_FOUND when the session is closed.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
+  // Removes an observer. May be called from any thread, as may the next.
   void Unobserve(const SessionObserver* observer);
   bool observed() const { return observers_.size() > 0; }
-  // Takes the estimator out of memory if the session is not in use.
+  // Takes the estimator out of memory if the session is not in use. May be called on the strand
+  // only.
   void Unload();
 
  private:
-  // Times what is computed.
+  // Measures the time of a computation.
   class Computing;
-  // What is in memory of it, and the losses of batches that this knows of.
+  // Holds what is in memory of the session, and the number of losses that it takes into account.
   struct InMemory {
-    std::shared_ptr<LoadedSession> loaded;  // null: nothing
+    std::shared_ptr<LoadedSession> loaded;  // null: the session is not loaded
     uint64_t losses = 0;
   };
 
   absl::Status CheckOpen() const;
-  // Whether the next batch keeps to the limits; its rows are taken then.
+  // Checks that the next batch keeps to the limits, and takes room for its rows.
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const;
   void ReleaseRoom(int64_t rows) const;
-  // What is in memory, brought there if need be; batches taken may wait in it for the numerics.
+  // Returns the loaded session; loads it first if need be. Batches taken may wait in it for the
+  // numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);
-  // In the journal, with what is to be counted once it is there.
+  // Appends a batch to the journal. Once it is kept, counts its rows, its values and its seconds of
+  // measurements.
   void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
   InMemory Present() const;
   void Replace(InMemory in_memory);
@@ -152,7 +169,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::shared_ptr<Strand> strand_;
   BatchLedger ledger_;
 
-  SharedEstimate passed_on_;  // the strand's own
+  SharedEstimate passed_on_;  // the last estimate given to the observers; used on the strand only
 
   std::atomic<bool> closed_ = false;
   WriterLease writer_;

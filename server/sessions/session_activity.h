@@ -1,6 +1,6 @@
 #pragma once
 
-// What a session has done since the daemon started, for those who run the daemon.
+// Counts what a session has done since the daemon started, for those who run the daemon.
 
 #include <chrono>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace polyest::internal {
 
-// Threads may share it.
+// Thread-safe.
 class SessionActivity {
  public:
   using Clock = std::chrono::steady_clock;
@@ -49,11 +49,11 @@ class SessionActivity {
   int64_t estimates_ = 0;
   int64_t reexpansions_ = 0;
   double compute_s_ = 0;
-  int64_t processed_ = 0;  // the last batch
+  int64_t processed_ = 0;  // number of the last batch processed
   // Seconds of measurements processed, and computed for them, since the estimator is in memory.
   double measured_s_ = 0;
   double computed_s_ = 0;
-  double measured_before_s_ = 0;  // and before that
+  double measured_before_s_ = 0;  // seconds of measurements processed before that
   Clock::time_point last_use_ = Clock::now();
 };
 

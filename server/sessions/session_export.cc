@@ -8,8 +8,8 @@
 namespace polyest::internal {
 namespace {
 
-// Of one answer, so that a long session is not all in memory: it ends with the batch that passes
-// this.
+// Size of one answer in bytes, so that a long session is not in memory all at once. An answer ends
+// with the batch that passes this size.
 constexpr size_t kBytes = 1 << 20;
 
 }  // namespace

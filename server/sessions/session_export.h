@@ -1,6 +1,6 @@
 #pragma once
 
-// The records of a session, a few at a time.
+// Reads the records of a session, a few at a time.
 
 #include <absl/status/statusor.h>
 
@@ -11,13 +11,13 @@
 
 namespace polyest::internal {
 
-// For one thread at a time.
+// For use by one thread at a time.
 class SessionExport {
  public:
-  // What the session has now; batches that come meanwhile are left to the next export.
+  // Exports what the session has now; batches that come later are left to the next export.
   explicit SessionExport(std::shared_ptr<const Session> session);
 
-  // The next records, in order; none after the last. Waits for the journal.
+  // Returns the next records, in order; none after the last. Waits for the journal.
   absl::StatusOr<std::vector<v1::SessionRecord>> Next();
 
  private:
@@ -26,7 +26,7 @@ class SessionExport {
   const std::shared_ptr<const Session> session_;
   const v1::Session described_;
   bool begun_ = false;
-  int64_t given_ = 0;  // batches
+  int64_t given_ = 0;  // number of batches returned so far
 };
 
 }  // namespace polyest::internal

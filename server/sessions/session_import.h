@@ -1,6 +1,6 @@
 #pragma once
 
-// A session out of the records of another: all of them or none.
+// Makes a session out of the records of another: out of all of them, or no session at all.
 
 #include <absl/status/statusor.h>
 
@@ -11,20 +11,21 @@
 
 namespace polyest::internal {
 
-// For one thread at a time.
+// For use by one thread at a time.
 class SessionImport {
  public:
   SessionImport(SessionRegistry& registry, std::string tenant);
-  // What was not finished is forgotten.
+  // Deletes the session if the import has not been finished.
   ~SessionImport();
   SessionImport(const SessionImport&) = delete;
   SessionImport& operator=(const SessionImport&) = delete;
 
-  // The head, then batch after batch. INVALID_ARGUMENT for a record that does not follow the one
-  // before; otherwise as SessionRegistry::Create and as for a batch that is streamed. No more
-  // records are taken after one has failed.
+  // Takes the head, then batch after batch; waits for the journal. INVALID_ARGUMENT for a record
+  // that does not follow the one before; other errors are those of SessionRegistry::Create and of a
+  // batch that is streamed. Must not be called again after an error.
   absl::Status Take(const v1::ImportSessionRequest& request);
-  // INVALID_ARGUMENT when the head, or batches of those it promises, are missing.
+  // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
+  // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile.
   absl::StatusOr<std::shared_ptr<Session>> Finish();
 
  private:
@@ -33,7 +34,7 @@ class SessionImport {
 
   SessionRegistry& registry_;
   SessionHead head_;
-  int64_t promised_ = 0;  // batches
+  int64_t promised_ = 0;  // number of batches that the head promises
   std::unique_ptr<LoadedSession> loaded_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Who hears of a session: those who watch it, and its writer.
+// Receives the news of a session. Implemented by those who watch it and by its writer.
 
 #include <memory>
 
@@ -10,15 +10,15 @@ namespace polyest::internal {
 
 using SharedEstimate = std::shared_ptr<const v1::Estimate>;
 
-// Called from the session's strand, from the journal, or from whoever closes the session; must not
-// wait.
+// The methods are called from the session's strand, from the journal, or by the thread that closes
+// the session; they must not wait.
 class SessionObserver {
  public:
   virtual ~SessionObserver() = default;
   virtual void OnEstimate(const SharedEstimate& estimate) = 0;
-  // The session is deleted. The last call.
+  // The session has been deleted. An estimate that is just being passed on may still follow.
   virtual void OnClosed() = 0;
-  // The writer goes on with another connection. The last call, and to a writer only.
+  // The writer goes on with another connection. Called for a writer only; no other call follows.
   virtual void OnReplaced() {}
 };
 

@@ -64,8 +64,8 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
     head.name = id.empty() ? ChooseName(tenant) : absl::StrCat("sessions/", id);
     POLYEST_RETURN_IF_ERROR(CheckFree({tenant, head.name}));
   }
-  // Not under the mutex: a large problem takes its time, and so does the journal, which looks again
-  // whether the name is free.
+  // The mutex is not held here, because a large problem takes its time, and so does the journal.
+  // The journal checks again whether the name is free.
   POLYEST_ASSIGN_OR_RETURN(
       auto loaded, LoadedSession::Make(problem, services_.models, services_.limits.problem));
   head.create_time = clock_();
@@ -146,7 +146,7 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
 
 absl::Status SessionRegistry::Delete(const std::string& tenant, const std::string& name) {
   POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, Get(tenant, name));
-  // The journal first: what cannot be deleted goes on as it was.
+  // The journal comes first, so that a session that cannot be deleted goes on as it was.
   const absl::Status deleted = services_.journal.Delete(session->number());
   if (absl::IsNotFound(deleted)) return NotFound(name);
   POLYEST_RETURN_IF_ERROR(deleted);

@@ -20,7 +20,7 @@ absl::Status StoredRows::Take(int64_t session, const std::string& tenant, int64_
                         rows, present, max_per_tenant_));
   }
   if (in_all_ + rows > max_in_all_) {
-    // How much the others have is not told.
+    // The message does not tell how many rows the other tenants have.
     return LimitExceeded(
         "--max-total-rows",
         absl::StrFormat(

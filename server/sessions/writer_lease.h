@@ -1,6 +1,6 @@
 #pragma once
 
-// The lease of a session's single writer.
+// Holds the lease of a session's single writer.
 
 #include <absl/status/status.h>
 
@@ -12,7 +12,7 @@
 
 namespace polyest::internal {
 
-// Threads may share it.
+// Thread-safe.
 class WriterLease {
  public:
   // `session` is the name of the session, for messages.
@@ -26,8 +26,8 @@ class WriterLease {
   bool Release(const SessionObserver* writer);
   bool is_held() const;
 
-  // Refuses every claim from here on. Returns the writer, whom the caller tells of the end; null if
-  // there is none.
+  // Refuses every claim from here on. Returns the writer, for the caller to tell it of the end;
+  // null if there is none.
   std::shared_ptr<SessionObserver> Close();
 
  private:
