@@ -1,6 +1,6 @@
 #pragma once
 
-// SHA-256 of bytes and of messages: batches and tokens are known again by it.
+// Computes SHA-256, by which batches and tokens are recognized.
 
 #include <google/protobuf/message.h>
 
@@ -14,8 +14,8 @@ using Sha256Digest = std::array<unsigned char, 32>;
 
 Sha256Digest Sha256(std::string_view bytes);
 
-// Returns the digest as a text of 32 bytes, as the journal keeps it: two batches with the same one
-// are the same batch.
+// Returns the SHA-256 as a string of 32 bytes, as the journal keeps it. Batches with the same
+// digest are the same batch.
 std::string Digest(std::string_view bytes);
 
 // Returns bytes that are the same for equal messages, in this and any later run of the program.

@@ -13,7 +13,7 @@
 namespace polyest::internal {
 namespace {
 
-// What a full queue takes to have room again, or more.
+// Time after which a full queue may have room again.
 constexpr std::chrono::seconds kBusyDelay{1};
 
 }  // namespace
@@ -92,18 +92,18 @@ void Executor::GiveTurn(const std::string& name, Lane& lane) {
 }
 
 void Executor::Run() {
-  // On Linux a priority is a thread's own, and 0 the thread that calls.
+  // On Linux each thread has a priority of its own, and 0 names the calling thread.
   if (options_.niceness > 0) {
     setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + options_.niceness);
   }
   std::unique_lock lock(mutex_);
   while (true) {
-    // A strand's running task may bring its next one, so the end waits for all that was accepted.
+    // A strand's running task may enqueue the next one, so the end waits for every task accepted.
     ready_.wait(lock, [this] { return !turns_.empty() || (ending_ && accepted_ == 0); });
     if (turns_.empty()) return;
     const std::string name = std::move(turns_.front());
     turns_.pop_front();
-    Lane& lane = lanes_[name];  // stays while it has a task
+    Lane& lane = lanes_[name];  // the entry stays while the lane has a task
     lane.in_turn = false;
     Task task = std::move(lane.queue.front());
     lane.queue.pop_front();
@@ -145,7 +145,8 @@ void Strand::RunOne() {
     tasks_.pop_front();
     more = !tasks_.empty();
   }
-  // Back to the end of the queue: one busy strand does not keep others from their turn.
+  // The next task goes to the end of the queue, so that a busy strand does not keep others from
+  // their turn.
   if (more) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
   executor_.Release(lane_);
 }

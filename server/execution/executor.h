@@ -1,7 +1,7 @@
 #pragma once
 
-// Where work runs, numerics above all: threads behind a bounded queue, shared fairly, and strands,
-// which run their own tasks in order and one at a time whatever the number of threads.
+// Runs work, numerics above all: on threads behind a bounded queue that is shared fairly, and on
+// strands, which run their own tasks in order and one at a time, whatever the number of threads.
 
 #include <absl/status/status.h>
 
@@ -21,28 +21,28 @@ using Task = std::function<void()>;
 
 struct ExecutorOptions {
   int threads_per_lane = 1;   // ≥ 1
-  int threads = 1;            // in all, ≥ threads_per_lane
-  int capacity = 1;           // tasks that wait or run, those of strands among them, ≥ 1
-  int capacity_per_lane = 1;  // of these, one lane's, ≥ 1
-  int niceness = 0;           // of its threads, ≥ 0: how much they give way to others
+  int threads = 1;            // of all lanes together, ≥ threads_per_lane
+  int capacity = 1;           // most tasks that wait or run, those of strands included, ≥ 1
+  int capacity_per_lane = 1;  // most of these in one lane, ≥ 1
+  int niceness = 0;           // nice value added to the threads, ≥ 0
 };
 
-// Every task belongs to a lane. Lanes take turns, and no lane runs on more than threads_per_lane
-// threads at a time: long tasks of one do not keep another from its turn, and the operating system
-// shares the cores between those that run.
+// Runs tasks in lanes. Lanes take turns, and no lane runs on more than threads_per_lane threads at
+// a time: long tasks of one lane do not keep another from its turn, and the operating system shares
+// the cores between the tasks that run. Thread-safe.
 class Executor {
  public:
   explicit Executor(const ExecutorOptions& options);
-  // Runs everything accepted, then joins.
+  // Runs every task accepted, then joins the threads.
   ~Executor();
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
-  // RESOURCE_EXHAUSTED when full; the task is then not run.
+  // Submits a task to a lane. RESOURCE_EXHAUSTED when the queue is full; the task is then not run.
   absl::Status Submit(const std::string& lane, Task task);
-  // Tasks that wait or run.
+  // Returns the number of tasks that wait or run.
   int accepted() const;
-  // Of these, those that wait.
+  // Returns the number of tasks that wait.
   int waiting() const;
 
  private:
@@ -55,31 +55,34 @@ class Executor {
     bool in_turn = false;
   };
 
-  // Room for one task, or RESOURCE_EXHAUSTED.
+  // Takes room for one task; RESOURCE_EXHAUSTED when there is none.
   absl::Status Reserve(const std::string& lane);
+  // Gives the room of one task back.
   void Release(const std::string& lane);
-  // A task that has its room already.
+  // Queues a task whose room has been taken.
   void Enqueue(const std::string& lane, Task task);
   void Run();
-  // With the mutex held: puts the lane among those that take turns, if it may run a task.
+  // Puts the lane among those that take turns, if it may run a task. Called with the mutex held.
   void GiveTurn(const std::string& name, Lane& lane);
 
   const ExecutorOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable ready_;
-  std::map<std::string, Lane> lanes_;  // those with tasks
+  std::map<std::string, Lane> lanes_;  // lanes that have tasks
   std::deque<std::string> turns_;
   int accepted_ = 0;
   bool ending_ = false;
   std::vector<std::jthread> threads_;
 };
 
-// Owned by a shared_ptr: its tasks keep it alive. The executor must outlive it.
+// Runs its tasks in order and one at a time. Owned by a shared_ptr, because its tasks keep it
+// alive. The executor must outlive it. Thread-safe.
 class Strand : public std::enable_shared_from_this<Strand> {
  public:
   Strand(Executor& executor, std::string lane) : executor_(executor), lane_(std::move(lane)) {}
 
-  // As Executor::Submit, after every task submitted to this strand before.
+  // Submits a task that runs after every task submitted to this strand before. RESOURCE_EXHAUSTED
+  // when the executor's queue is full; the task is then not run.
   absl::Status Submit(Task task);
 
  private:
@@ -88,7 +91,7 @@ class Strand : public std::enable_shared_from_this<Strand> {
   Executor& executor_;
   const std::string lane_;
   std::mutex mutex_;
-  std::deque<Task> tasks_;  // the first is running, or next
+  std::deque<Task> tasks_;  // the first one is running or is the next
 };
 
 }  // namespace polyest::internal

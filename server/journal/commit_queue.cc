@@ -8,7 +8,8 @@
 namespace polyest::internal {
 namespace {
 
-// Of one commit: what has to be written again when it fails, and how long others wait for it.
+// Most writes of one commit. This bounds what has to be written again when the commit fails, and
+// how long others wait for it.
 constexpr size_t kMaxWrites = 512;
 
 bool ConcernsOnlyItself(const absl::Status& status) {
@@ -46,7 +47,7 @@ void CommitQueue::Serve() {
   for (auto items = Take(); !items.empty(); items = Take()) Commit(std::move(items));
 }
 
-// Waits for some; none: the end.
+// Waits for writes and returns them; returns none at the end.
 std::vector<CommitQueue::Item> CommitQueue::Take() {
   std::vector<Item> items;
   std::unique_lock lock(mutex_);

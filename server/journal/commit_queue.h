@@ -1,7 +1,7 @@
 #pragma once
 
-// One thread that writes: what has come while it was committing goes into its next commit, so that
-// one wait for the disk serves many.
+// Writes to the journal's database from one thread. Writes that arrive during a commit go into the
+// next one, so that one wait for the disk serves many.
 
 #include <absl/status/status.h>
 
@@ -18,6 +18,7 @@
 
 namespace polyest::internal {
 
+// Describes a commit, successful or not.
 struct CommitReport {
   size_t writes = 0;
   std::chrono::duration<double> duration{0};
@@ -26,24 +27,24 @@ struct CommitReport {
 
 class CommitQueue {
  public:
-  // NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that it has changed nothing and others
-  // may be committed; anything else undoes the whole commit.
+  // Changes the database. NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that the write has
+  // changed nothing and that others may be committed; any other error undoes the whole commit.
   using Write = std::function<absl::Status(SqliteDatabase&)>;
-  // Once, from the writing thread: OK when it is on disk.
+  // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  // After each commit, before those who wait for it hear of it; must not wait.
+  // Called after each commit, before those who wait for it are told; must not wait.
   using OnCommit = std::function<void(const CommitReport&)>;
 
   explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {});
-  // Writes what was submitted.
+  // Writes everything submitted, then ends.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
   CommitQueue& operator=(const CommitQueue&) = delete;
 
-  // In the order of the calls.
+  // Queues a write. Writes run in the order of the calls; any thread may call this.
   void Submit(Write write, Done done);
-  // Submits and waits.
+  // Submits a write and waits for its outcome.
   absl::Status Run(Write write);
 
  private:

@@ -31,10 +31,11 @@ constexpr mode_t kPermissions = 07777;
 
 std::string ErrnoText() { return std::strerror(errno); }
 
-// A journal's own file: its lock, SQLite's file, and those that SQLite puts beside it.
+// Returns whether a file is the journal's own: its lock, SQLite's file, or one that SQLite puts
+// beside it.
 bool IsOwn(const std::string& name) { return name == kLock || absl::StartsWith(name, kJournal); }
 
-// The permissions of a file or folder.
+// Returns the permissions of a file or folder.
 absl::StatusOr<mode_t> ModeOf(const std::string& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0) return status.st_mode & kPermissions;
@@ -77,7 +78,7 @@ absl::Status MakeFolder(const std::string& folder) {
 absl::Status MakeFolderPrivate(const std::string& folder) {
   POLYEST_ASSIGN_OR_RETURN(const mode_t mode, ModeOf(folder));
   if ((mode & kOthers) == 0) return absl::OkStatus();
-  // Something else may be there for others to use: /tmp, say.
+  // The folder may hold something for others to use, as /tmp does.
   std::error_code error;
   for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
        entry.increment(error)) {
@@ -91,7 +92,7 @@ absl::Status MakeFolderPrivate(const std::string& folder) {
   return ClosePath(folder, mode, kFolderMode);
 }
 
-// What is in the folder already is from a version that left its files to the umask.
+// Makes the files private that an earlier version, which left their mode to the umask, has made.
 absl::Status MakeFilesPrivate(const std::string& folder) {
   for (const char* name : {kLock, kJournal, "journal.db-wal", "journal.db-shm"}) {
     const std::string file = absl::StrCat(folder, "/", name);
@@ -103,7 +104,7 @@ absl::Status MakeFilesPrivate(const std::string& folder) {
   return absl::OkStatus();
 }
 
-// Before SQLite, which would leave the mode to the umask, makes the file.
+// Makes the journal's file. SQLite would do it later, but leave the mode to the umask.
 absl::Status MakeJournalFile(const std::string& file) {
   const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kFileMode);
   if (descriptor >= 0) {
@@ -115,7 +116,7 @@ absl::Status MakeJournalFile(const std::string& file) {
   return absl::OkStatus();
 }
 
-// The descriptor of the locked file.
+// Locks the folder for this process and returns the descriptor of the locked file.
 absl::StatusOr<int> Lock(const std::string& folder) {
   const std::string file = absl::StrCat(folder, "/", kLock);
   const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kFileMode);

@@ -1,7 +1,8 @@
 #pragma once
 
-// The folder in which a journal is kept. Measurements are their owner's business: only the user the
-// daemon runs as may read the folder and the files in it, and only one daemon at a time uses it.
+// Manages the folder in which a journal is kept. Measurements are their owner's business: only the
+// user that the daemon runs as may read the folder and the files in it, and only one daemon at a
+// time may use it.
 
 #include <absl/status/statusor.h>
 
@@ -24,14 +25,15 @@ class DataFolder {
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
 
-  // The file of the journal; SQLite gives those that it puts beside it the same mode.
+  // Returns the path of the journal's file. SQLite gives the files that it puts beside it the same
+  // mode.
   const std::string& journal_file() const { return journal_file_; }
 
  private:
   DataFolder(const std::string& folder, int lock);
 
   const std::string journal_file_;
-  const int lock_;  // the descriptor of the file that is locked
+  const int lock_;  // descriptor of the locked file
 };
 
 }  // namespace polyest::internal

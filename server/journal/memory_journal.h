@@ -1,6 +1,6 @@
 #pragma once
 
-// Sessions that end with the process.
+// Keeps sessions in memory; they end with the process.
 
 #include <map>
 #include <mutex>
@@ -36,7 +36,7 @@ class MemoryJournal final : public SessionJournal {
     std::optional<JournalSnapshot> snapshot;
   };
 
-  // With the mutex held.
+  // The following are called with the mutex held.
   absl::StatusOr<const Kept*> Find(int64_t session) const;
   absl::Status CheckFree(const SessionHead& head) const;
   absl::Status Keep(JournalEntry entry);

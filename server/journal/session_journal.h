@@ -1,10 +1,11 @@
 #pragma once
 
-// Where sessions are kept: their problems and, batch by batch, what was measured. A batch is
-// acknowledged once it is here; an estimator can be made anew from what is here, to the same bits.
+// Keeps sessions: their problems and, batch by batch, what was measured. A batch is acknowledged
+// once it is in the journal. An estimator that is rebuilt from the journal gives the same estimates
+// to the last bit.
 //
-// A journal is written in order: what is appended later is never kept without what was appended to
-// the same session before. Every implementation passes
+// A journal is written in order: a batch is never kept without the batches that were appended to
+// the same session before it. Every implementation passes
 // tests/unit/server/journal/journal_contract_test.cc.
 
 #include <absl/status/status.h>
@@ -23,18 +24,19 @@
 
 namespace polyest::internal {
 
-// How far a session has come.
+// Describes how far a session has come.
 struct SessionPlace {
-  int64_t sequence = 0;  // of the last batch; 0: none yet
+  int64_t sequence = 0;  // number of the last batch; 0: none yet
   int64_t samples = 0;   // values of measured outputs
   int64_t rows = 0;
   SampleRow last_row;
 };
 
+// Describes a session without its problem and its batches.
 struct SessionHead {
-  int64_t number = 0;  // the journal's own, never used twice
+  int64_t number = 0;  // given by the journal, never used twice
   std::string tenant;
-  std::string name;  // `sessions/{id}`; of a tenant's sessions only one has it
+  std::string name;  // `sessions/{id}`; unique among the tenant's visible sessions
   google::protobuf::Timestamp create_time;
   SessionPlace place;
 };
@@ -44,16 +46,16 @@ struct JournalBatch {
   v1::Measurements measurements;
 };
 
-// Of a batch that is appended: what it says, and where the session is after it.
+// Holds a batch that is appended, and the place of the session after it.
 struct JournalEntry {
-  int64_t session = 0;       // number
-  std::string measurements;  // as DeterministicBytes
-  std::string digest;        // of these
+  int64_t session = 0;       // number of the session
+  std::string measurements;  // serialized by DeterministicBytes
+  std::string digest;        // of `measurements`
   SessionPlace place;
 };
 
-// The state of a session's estimator after its first `rows` rows, which ended in batch `sequence`
-// or an earlier one.
+// Holds the state of a session's estimator after its first `rows` rows, which ended in batch
+// `sequence` or an earlier one.
 struct JournalSnapshot {
   bool operator==(const JournalSnapshot&) const = default;
 
@@ -62,8 +64,8 @@ struct JournalSnapshot {
   std::string state;
 };
 
-// Threads may share a journal. Errors: NOT_FOUND a session that is not there; RESOURCE_EXHAUSTED a
-// full disk; UNAVAILABLE a disk that fails; DATA_LOSS what was kept and cannot be read.
+// Thread-safe. Errors: NOT_FOUND for a session that does not exist, RESOURCE_EXHAUSTED for a full
+// disk, UNAVAILABLE for a disk that fails, DATA_LOSS for data that was kept and cannot be read.
 class SessionJournal {
  public:
   // Called once, from any thread; must not wait.
@@ -71,35 +73,41 @@ class SessionJournal {
 
   virtual ~SessionJournal() = default;
 
-  // Whether what is here outlives the process.
+  // Returns whether what the journal keeps outlives the process.
   virtual bool durable() const = 0;
-  // Tries to keep something, and forgets it again. Waits.
+  // Checks that the journal can be written: writes something and removes it again. Waits for the
+  // disk.
   virtual absl::Status CheckWritable() { return absl::OkStatus(); }
 
-  // All sessions, in the order of tenants and names. Those that are hidden are not among them.
+  // Returns all sessions that are not hidden, in the order of tenants and names.
   virtual absl::StatusOr<std::vector<SessionHead>> Heads() const = 0;
-  // A new session, kept when this returns; the head's number and place are ignored. A hidden one is
-  // forgotten when the journal is opened again, unless it was shown. ALREADY_EXISTS.
+  // Creates a session, which is kept when this returns, and returns its number; the head's number
+  // and place are ignored. A hidden session is deleted when the journal is opened again, unless it
+  // has been shown. ALREADY_EXISTS when the session is not hidden and its name is taken.
   virtual absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
                                          bool hidden) = 0;
-  // ALREADY_EXISTS when the name has been taken meanwhile.
+  // Makes a hidden session visible. ALREADY_EXISTS when its name has been taken meanwhile.
   virtual absl::Status Show(int64_t session) = 0;
   virtual absl::Status Delete(int64_t session) = 0;
 
-  // Keeps a batch and calls `done` once it is kept, or is not going to be: FAILED_PRECONDITION when
-  // it does not follow the session's last one.
+  // Appends a batch and calls `done` once the batch is kept or cannot be kept. FAILED_PRECONDITION
+  // when it does not follow the session's last one.
   virtual void Append(JournalEntry entry, Done done) = 0;
-  // Keeps the latest snapshot of a session, some time; dropped without a word when the session or
-  // the snapshot's batch is not there, or the disk fails: snapshots only save time.
+  // Saves the latest snapshot of a session, now or later. Drops it silently when the session or the
+  // snapshot's batch does not exist or the disk fails, because snapshots only save time.
   virtual void SaveSnapshot(int64_t session, JournalSnapshot snapshot) = 0;
 
+  // Returns the problem of a session. Waits for the disk, as do the following.
   virtual absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const = 0;
-  // Batches after batch `after`, in order, until `take` is not OK: its status is then the answer.
+  // Calls `take` with the batches after batch `after`, in order, until it returns an error, which
+  // is then returned. A session that does not exist may count as one without batches.
   virtual absl::Status ReadBatches(
       int64_t session, int64_t after,
       const std::function<absl::Status(const JournalBatch&)>& take) const = 0;
-  // NOT_FOUND when there is no such batch.
+  // Returns the digest of a batch; NOT_FOUND when there is no such batch.
   virtual absl::StatusOr<std::string> ReadDigest(int64_t session, int64_t sequence) const = 0;
+  // Returns the latest snapshot of a session, if one was saved. A session that does not exist may
+  // count as one without a snapshot.
   virtual absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const = 0;
 };
 

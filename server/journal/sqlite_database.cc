@@ -12,9 +12,9 @@
 namespace polyest::internal {
 namespace {
 
-// For a lock that another connection of this process holds for a moment.
+// Longest wait for a lock that another connection of this process holds for a moment.
 constexpr int kBusyTimeoutMs = 10'000;
-// Until somebody may have made room on a full disk.
+// Time after which somebody may have made room on a full disk.
 constexpr std::chrono::seconds kFullDiskDelay{1};
 
 absl::StatusCode CodeOf(int code) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// SQLite, wrapped once: connections and statements that clean up after themselves, and its codes as
-// absl::Status. Messages say what happened and never where the file is: clients see them.
+// Wraps SQLite: connections and statements that clean up after themselves, and its codes as
+// absl::Status. Messages say what happened but never where the file is, because clients see them.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -17,25 +17,26 @@ struct sqlite3_stmt;
 
 namespace polyest::internal {
 
-// RESOURCE_EXHAUSTED: full; DATA_LOSS: damaged; ALREADY_EXISTS: not unique; UNAVAILABLE: the disk
-// or a lock.
+// Returns the status of an SQLite code: RESOURCE_EXHAUSTED when the disk or the memory is full,
+// DATA_LOSS when the file is damaged, ALREADY_EXISTS when a constraint fails, UNAVAILABLE when the
+// disk or a lock fails, INTERNAL otherwise. `doing` says in the message what was tried.
 absl::Status FromSqlite(int code, std::string_view doing);
 
-// One connection, for one thread at a time.
+// Owns one connection, for use by one thread at a time.
 class SqliteDatabase {
  public:
-  // Makes the file if there is none.
+  // Opens a file; makes it if there is none.
   static absl::StatusOr<std::unique_ptr<SqliteDatabase>> Open(const std::string& file);
   ~SqliteDatabase();
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
-  // One or more statements without results.
+  // Runs one or more statements without results.
   absl::Status Execute(const std::string& sql);
-  // The number that a statement such as `PRAGMA user_version` gives.
+  // Returns the number that a statement such as `PRAGMA user_version` gives.
   absl::StatusOr<int64_t> Number(const std::string& sql);
   int64_t last_insert_rowid() const;
-  // Rows that the last statement has inserted, changed or deleted.
+  // Returns how many rows the last statement has inserted, changed or deleted.
   int changes() const;
   sqlite3* handle() { return database_; }
 
@@ -43,15 +44,15 @@ class SqliteDatabase {
   friend class SqliteQuery;
 
   explicit SqliteDatabase(sqlite3* database) : database_(database) {}
-  // Prepared once for each text, which must outlive the connection.
+  // Returns the statement for `sql`, which is prepared once for each text. The text must outlive
+  // the connection.
   absl::StatusOr<sqlite3_stmt*> Prepare(const char* sql);
 
   sqlite3* database_;
   std::map<std::string_view, sqlite3_stmt*> statements_;
 };
 
-// One use of a statement. Parameters are bound in order; a failure along the way is what Step
-// answers.
+// Uses a statement once. Parameters are bound in order; Step returns an error in binding them.
 class SqliteQuery {
  public:
   SqliteQuery(SqliteDatabase& database, const char* sql);
@@ -61,13 +62,14 @@ class SqliteQuery {
 
   SqliteQuery& Bind(int64_t value);
   SqliteQuery& Bind(double value);
-  // `bytes` must stay until the last Step.
+  // The text or bytes bound must stay valid until the last Step.
   SqliteQuery& BindText(std::string_view text);
   SqliteQuery& BindBlob(std::string_view bytes);
 
-  // True: there is a row, whose columns can be read until the next Step. False: no more rows.
+  // Goes to the next row. Returns true when there is one, whose columns can be read until the next
+  // Step, and false when there are no more rows.
   absl::StatusOr<bool> Step();
-  // All steps of a statement without results.
+  // Runs a statement without results.
   absl::Status Run() { return Step().status(); }
 
   int64_t Integer(int column) const;

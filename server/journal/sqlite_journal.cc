@@ -13,10 +13,10 @@
 namespace polyest::internal {
 namespace {
 
-// Pages in the write-ahead log from which on they are copied into the file.
+// Number of pages in the write-ahead log from which on they are copied into the file.
 constexpr int kCheckpointPages = 4'000;
 constexpr int64_t kPageBytes = 4'096;
-// Of a deleted session, in one commit.
+// Most batches of a deleted session that one commit removes.
 constexpr int64_t kRemovedBatches = 256;
 
 absl::Status NotThere() { return absl::NotFoundError("the journal has no such session"); }
@@ -55,7 +55,7 @@ absl::Status RunFor(SqliteDatabase& database, const char* sql, int64_t session) 
   return query.Run();
 }
 
-// A session that was never shown, from an import that did not come to its end, is forgotten.
+// Deletes the sessions that were never shown: those of imports that did not come to their end.
 absl::Status DeleteHidden(SqliteDatabase& database) {
   return database.Execute(
       "BEGIN IMMEDIATE; INSERT INTO deleted SELECT number FROM session WHERE hidden = 1;"
@@ -124,7 +124,8 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
                              std::unique_ptr<SqliteDatabase> maintainer,
                              CommitQueue::OnCommit on_commit)
     : folder_(std::move(folder)), maintainer_(std::move(maintainer)) {
-  // In place of SQLite's own checkpoint, which would delay the commit that it follows.
+  // This hook takes the place of SQLite's own checkpoint, which would delay the commit that it
+  // follows.
   sqlite3_wal_hook(
       writer->handle(),
       [](void* self, sqlite3*, const char*, int pages) {
@@ -145,7 +146,7 @@ SqliteJournal::~SqliteJournal() {
 }
 
 absl::Status SqliteJournal::CheckWritable() {
-  // As large as a batch may well be, for a disk that is full still takes a little.
+  // This writes as much as a batch may well have, because a full disk still takes a little.
   return queue_->Run([](SqliteDatabase& database) {
     return database.Execute(
         "CREATE TABLE room (bytes BLOB); INSERT INTO room VALUES (zeroblob(65536)); "
@@ -313,13 +314,14 @@ void SqliteJournal::Maintain(std::stop_token stop) {
       removing = std::exchange(deleted_, false) || removing;
     }
     if (log_pages_ >= kCheckpointPages) Checkpoint();
-    // A disk that fails: what is left is tried again when the journal is opened.
+    // If the disk fails, what is left is removed after the journal is opened again.
     if (removing) removing = RemoveSomeDeleted().value_or(false);
   }
 }
 
-// Most of it while batches go on being written, by another thread so that they do not wait; then
-// the rest with the writer held up for that moment, for the log could otherwise grow without end.
+// Copies the write-ahead log into the file. The first pass copies most of it while another thread
+// goes on writing batches, so that they do not wait. The second one holds up the writer and copies
+// the rest, because the log could otherwise grow without end.
 void SqliteJournal::Checkpoint() {
   for (const int mode : {SQLITE_CHECKPOINT_PASSIVE, SQLITE_CHECKPOINT_TRUNCATE}) {
     sqlite3_wal_checkpoint_v2(maintainer_->handle(), nullptr, mode, nullptr, nullptr);
@@ -327,7 +329,7 @@ void SqliteJournal::Checkpoint() {
   log_pages_ = 0;
 }
 
-// Whether there is more.
+// Removes some batches of a deleted session. Returns whether there may be more to remove.
 absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
   int64_t session = 0;
   {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Sessions on disk: one SQLite file in WAL mode, synced at every commit.
+// Keeps sessions on disk: in one SQLite file in WAL mode, synced at every commit.
 
 #include <atomic>
 #include <condition_variable>
@@ -19,17 +19,19 @@ namespace polyest::internal {
 struct SqliteJournalOptions {
   // The journal is `folder`/journal.db. The folder is made if there is none, for its owner only.
   std::string folder;
-  // Largest size of that file, MiB; 0: as large as the disk. Past it: RESOURCE_EXHAUSTED.
+  // Largest size of that file, MiB; 0: as large as the disk. Past it, writes are
+  // RESOURCE_EXHAUSTED.
   int64_t max_mb = 0;
   CommitQueue::OnCommit on_commit{};
 };
 
 class SqliteJournal final : public SessionJournal {
  public:
-  // FAILED_PRECONDITION: what DataFolder::Take says of the folder, or the file is no journal or one
-  // of a later version; DATA_LOSS: the file is damaged. It is then as it was.
+  // Opens the journal; makes it if there is none. FAILED_PRECONDITION for what DataFolder::Take
+  // refuses, and when the file is no journal or one of a later version; DATA_LOSS when the file is
+  // damaged. The file is then as it was.
   static absl::StatusOr<std::unique_ptr<SqliteJournal>> Open(const SqliteJournalOptions& options);
-  // Writes what was appended.
+  // Writes everything appended, then ends.
   ~SqliteJournal() override;
 
   bool durable() const override { return true; }
@@ -49,7 +51,7 @@ class SqliteJournal final : public SessionJournal {
   absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const override;
 
  private:
-  // A connection to read with; given back when it goes.
+  // Borrows a connection to read with, and gives it back when destroyed.
   class Reader;
 
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
@@ -63,11 +65,11 @@ class SqliteJournal final : public SessionJournal {
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
 
-  std::unique_ptr<SqliteDatabase> maintainer_;  // the maintenance thread's
+  std::unique_ptr<SqliteDatabase> maintainer_;  // connection of the maintenance thread
   std::mutex maintenance_mutex_;
   std::condition_variable_any maintenance_;
-  std::atomic<int> log_pages_ = 0;  // of the write-ahead log
-  bool deleted_ = true;             // whether there may be batches to remove
+  std::atomic<int> log_pages_ = 0;  // pages in the write-ahead log
+  bool deleted_ = true;             // whether there may be batches of deleted sessions
 
   std::unique_ptr<CommitQueue> queue_;
   std::jthread maintenance_thread_;

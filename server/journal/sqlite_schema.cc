@@ -10,14 +10,15 @@
 namespace polyest::internal {
 namespace {
 
-// "poly", in the file's header, by which it is known as ours.
+// "poly" in the file's header, which identifies the file as a journal.
 constexpr int64_t kApplicationId = 0x706f6c79;
 
-// Number i makes version i + 1 out of version i. What is here was released: it is never changed,
-// only added to.
+// Migration i turns version i into version i + 1. Migrations that were released are never changed;
+// new ones are added behind them.
 constexpr const char* kMigrations[] = {
-    // place_* are those after the batch. A rowid table with the batches in the order of their
-    // coming and a small index writes less than half of what one sorted by session would.
+    // The columns place_* hold the place of the session after the batch. A rowid table with the
+    // batches in the order of their arrival and a small index writes less than half of what a table
+    // sorted by session would.
     R"(CREATE TABLE session (
          number INTEGER PRIMARY KEY AUTOINCREMENT,
          tenant TEXT NOT NULL,
@@ -37,7 +38,8 @@ constexpr const char* kMigrations[] = {
          place_run INTEGER NOT NULL,
          place_time_s REAL NOT NULL);
        CREATE UNIQUE INDEX batch_by_sequence ON batch (session, sequence);)",
-    // Sessions deleted whose batches are still to be removed, a few at a time.
+    // The table `deleted` holds deleted sessions whose batches are still to be removed, a few at a
+    // time.
     R"(CREATE TABLE snapshot (
          session INTEGER PRIMARY KEY,
          sequence INTEGER NOT NULL,

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the journal's file looks like, and how a file of an earlier version becomes one of this.
+// Defines the tables of the journal's file, and upgrades a file of an earlier version.
 
 #include <absl/status/status.h>
 
@@ -10,12 +10,12 @@
 
 namespace polyest::internal {
 
-// The newest there is.
+// Returns the newest version.
 int JournalSchemaVersion();
 
-// Makes the tables in an empty file, or brings those of an earlier version up to `version`, all of
-// it or nothing. FAILED_PRECONDITION, with the file as it was, when it belongs to another program
-// or to a later version; DATA_LOSS when it is no database or a damaged one.
+// Makes the tables in an empty file, or upgrades those of an earlier version to `version`,
+// completely or not at all. FAILED_PRECONDITION, with the file as it was, when it belongs to
+// another program or to a later version; DATA_LOSS when it is no database or a damaged one.
 absl::Status PrepareSchema(SqliteDatabase& database, int version = JournalSchemaVersion());
 
 }  // namespace polyest::internal
