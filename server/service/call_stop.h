@@ -16,14 +16,14 @@
 
 namespace polyest::internal {
 
-// When the work of a call stops: at its cancellation, at its deadline, or when a piece of it has
-// been computed for as long as one may.
+// Decides when the work of a call stops: at its cancellation, at its deadline, or when a piece of
+// the work has been computed for as long as is allowed.
 class CallStop {
  public:
   CallStop(const grpc::CallbackServerContext& context, std::stop_token token,
            std::chrono::seconds max_computing)
       : token_(std::move(token)), max_computing_(max_computing) {
-    // Not by the clock on the wall, which may be set meanwhile.
+    // The deadline is kept by the monotonic clock, because the wall clock may be set meanwhile.
     const gpr_timespec deadline =
         gpr_convert_clock_type(context.raw_deadline(), GPR_CLOCK_MONOTONIC);
     if (gpr_time_cmp(deadline, gpr_inf_future(GPR_CLOCK_MONOTONIC)) == 0) return;
@@ -32,17 +32,19 @@ class CallStop {
                 std::chrono::nanoseconds(remaining.tv_nsec);
   }
 
-  // Without a call, and so without a deadline.
+  // Makes a stop for work without a call, and so without a deadline.
   CallStop(std::stop_token token, std::chrono::seconds max_computing)
       : token_(std::move(token)), max_computing_(max_computing) {}
 
-  // For a piece of work that begins now.
+  // Returns the stop of a piece of work that begins now.
   Stop Begin() const {
     const Stop::Clock::time_point limit = Stop::Clock::now() + max_computing_;
     return Stop(token_, deadline_ ? std::min(*deadline_, limit) : limit);
   }
 
-  // What such work answers, in the call's words.
+  // Returns the status of such work as the call shall report it: RESOURCE_EXHAUSTED, naming
+  // --max-compute-s, for work that was computed too long though the call's deadline has not passed;
+  // any other status as it is.
   absl::Status Name(absl::Status status) const {
     const bool in_time = !deadline_ || Stop::Clock::now() < *deadline_;
     if (!absl::IsDeadlineExceeded(status) || !in_time) return status;

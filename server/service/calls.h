@@ -1,7 +1,7 @@
 #pragma once
 
-// How the unary calls of all services run: each finds what it works on, hands the work to the
-// executor, or to a session's strand, and is finished with the outcome.
+// Runs the unary calls of all services. Each call finds what it works on, hands the work to the
+// executor or to a session's strand, and is finished with the outcome.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -14,7 +14,7 @@
 
 namespace polyest::internal {
 
-// Where work runs, and what it is.
+// Describes work and where it runs.
 struct Job {
   UnaryCall::Submit submit;
   UnaryCall::Work work;
@@ -23,16 +23,19 @@ struct Job {
 using CallerWork = std::function<absl::Status(const Caller&, const Stop&)>;
 using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
 
-// NOT_FOUND; INVALID_ARGUMENT, naming `field`, when it is no name of a session.
+// Returns the caller's session of this name. NOT_FOUND when there is none; INVALID_ARGUMENT, naming
+// `field`, when `name` is no name of a session.
 absl::StatusOr<std::shared_ptr<Session>> FindSession(const ServiceContext& context,
                                                      const Caller& caller, const std::string& field,
                                                      const std::string& name);
 
-// What may take long, in the lane of the caller's requests.
+// Returns a job for work that may take long, in the lane of the caller's requests.
 Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
-// What is soon done, in the lane of the caller's sessions: it does not wait for long requests.
+// Returns a job for work that is soon done, in the lane of the caller's sessions, where it does not
+// wait for long requests.
 Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
-// On the session's strand; finished when everything is kept that the work may have seen.
+// Returns a job that runs on the session's strand. The call is finished when everything is kept
+// that the work may have seen.
 Job JobOfSession(std::shared_ptr<Session> session, SessionWork work);
 
 // Starts a unary call with the job that is made for its caller. A caller who may not call the

@@ -7,7 +7,7 @@
 
 namespace polyest::internal {
 
-// How the daemon is, for a caller of that tenant.
+// Returns the daemon's status, for a caller of the tenant.
 v1::DaemonStatus DescribeDaemon(const ServiceContext& context, const std::string& tenant);
 
 }  // namespace polyest::internal

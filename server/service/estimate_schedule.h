@@ -1,6 +1,6 @@
 #pragma once
 
-// When a stream's client wants an estimate.
+// Decides after which batches a stream's client gets an estimate.
 
 #include <absl/status/status.h>
 #include <absl/strings/str_format.h>
@@ -19,6 +19,7 @@ class EstimateSchedule {
   using Clock = std::chrono::steady_clock;
   using Policy = v1::StreamMeasurementsRequest::EstimatePolicy;
 
+  // Sets the client's wishes; INVALID_ARGUMENT for a number out of range.
   absl::Status Set(const Policy& policy) {
     if (policy.batch_count() < 0) {
       return InvalidField("estimates.batchCount",
@@ -36,7 +37,7 @@ class EstimateSchedule {
     return absl::OkStatus();
   }
 
-  // Whether the batch that has just been taken is to be followed by an estimate.
+  // Counts the batch that has just been taken. Returns whether an estimate is to follow it.
   bool Due(Clock::time_point now) {
     ++batches_;
     if (only_last_ || batches_ < every_batches_) return false;

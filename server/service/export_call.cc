@@ -81,7 +81,8 @@ void ExportFlow::Drain() {
   Advance();
 }
 
-// What is being written is gRPC's until OnWritten; an end in good order writes the rest first.
+// Sets how the export ends. After an error, records that wait are dropped; the one being written
+// belongs to gRPC until OnWritten. An end in good order writes the rest first.
 void ExportFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
   if (status.ok()) return;

@@ -1,6 +1,7 @@
 #pragma once
 
-// ExportSession: the records of a session, read from the journal as fast as the client takes them.
+// Serves ExportSession: sends the records of a session, read from the journal as fast as the client
+// takes them.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -16,7 +17,7 @@ namespace polyest::internal {
 
 using ExportReactor = grpc::ServerWriteReactor<v1::SessionRecord>;
 
-// The state of one export; outlives its reactor, for the executor may still hold it.
+// Holds the state of one export. It outlives its reactor, because the executor may still hold it.
 class ExportFlow final : public Drainable, public std::enable_shared_from_this<ExportFlow> {
  public:
   explicit ExportFlow(ServiceContext& context) : context_(context) {}
@@ -29,13 +30,13 @@ class ExportFlow final : public Drainable, public std::enable_shared_from_this<E
   void Drain() override;
 
  private:
-  // With the mutex held.
+  // The following are called with the mutex held.
   absl::Status Begin(const grpc::CallbackServerContext& call, const std::string& session);
   void End(const absl::Status& status);
   void Advance();
   absl::Status StartReading();
 
-  // On the executor.
+  // Reads the next records; runs on the executor.
   void Read();
 
   ServiceContext& context_;
@@ -44,11 +45,11 @@ class ExportFlow final : public Drainable, public std::enable_shared_from_this<E
 
   std::mutex mutex_;
   ExportReactor* reactor_ = nullptr;
-  std::deque<v1::SessionRecord> records_;  // the first is being written, or next
+  std::deque<v1::SessionRecord> records_;  // the first one is being written or is the next
   bool reading_ = false;
   bool writing_ = false;
   bool finished_ = false;
-  std::optional<absl::Status> end_;  // once there are no more records
+  std::optional<absl::Status> end_;  // how the export ends, once no more records are read
 };
 
 class ExportCall final : public ExportReactor {

@@ -9,8 +9,8 @@
 
 namespace polyest::internal {
 
-// A request may be within every limit and still need more memory than there is: then it fails, and
-// not the daemon.
+// Runs `work`, and turns a lack of memory into RESOURCE_EXHAUSTED. A request may be within every
+// limit and still need more memory than there is; then the request fails, not the daemon.
 template <typename Work>
 absl::Status Guarded(Work&& work) {
   try {

@@ -44,7 +44,7 @@ void ImportFlow::Take() {
   const absl::Status taken =
       Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
   const bool over = !taken.ok() || half_closed_;
-  // Before the call ends, for the daemon may then go at any moment.
+  // The import must go before the call ends, because the daemon may then go at any moment.
   if (over) import_ = nullptr;
   const std::lock_guard lock(mutex_);
   working_ = false;
@@ -56,7 +56,8 @@ absl::Status ImportFlow::TakeRequest() { return import_->Take(request_); }
 
 absl::Status ImportFlow::FinishImport() {
   {
-    // A client that went away, or a daemon that shuts down, has not said that this is all.
+    // The end of the stream does not mean that all records have come if the client went away or the
+    // daemon shuts down.
     const std::lock_guard lock(mutex_);
     if (end_) return *end_;
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// ImportSession: the records of a session, taken one at a time.
+// Serves ImportSession: takes the records of a session, one at a time.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -15,7 +15,7 @@ namespace polyest::internal {
 
 using ImportReactor = grpc::ServerReadReactor<v1::ImportSessionRequest>;
 
-// The state of one import; outlives its reactor, for the executor may still hold it.
+// Holds the state of one import. It outlives its reactor, because the executor may still hold it.
 class ImportFlow final : public Drainable, public std::enable_shared_from_this<ImportFlow> {
  public:
   ImportFlow(ServiceContext& context, v1::Session* response)
@@ -29,20 +29,20 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
   void Drain() override;
 
  private:
-  // With the mutex held.
+  // The following are called with the mutex held.
   void End(const absl::Status& status);
   void Advance();
 
-  // On the executor.
+  // The following run on the executor.
   void Take();
   absl::Status TakeRequest();
   absl::Status FinishImport();
 
   ServiceContext& context_;
-  v1::Session* const response_;  // gRPC's, until the end
+  v1::Session* const response_;  // owned by gRPC; valid until the call is finished
   std::unique_ptr<SessionImport> import_;
   std::string lane_;
-  v1::ImportSessionRequest request_;  // of whoever reads or works, in turns
+  v1::ImportSessionRequest request_;  // used in turns by gRPC, which reads, and by the executor
 
   std::mutex mutex_;
   ImportReactor* reactor_ = nullptr;

@@ -108,7 +108,7 @@ void MeasurementFlow::Drain() {
   Advance();
 }
 
-// What was received and not taken is left to the client to send again.
+// Sets how the stream ends. The client has to send again what was received and not taken.
 void MeasurementFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
   inbox_.clear();
@@ -116,7 +116,7 @@ void MeasurementFlow::End(const absl::Status& status) {
   uncomputed_.clear();
 }
 
-// As End, when nothing can be sent any more.
+// Ends the stream when nothing can be sent any more: stops the work and empties the outbox.
 void MeasurementFlow::Break(const absl::Status& status) {
   stop_source_.request_stop();
   End(status);
@@ -183,7 +183,8 @@ void MeasurementFlow::FinishIfIdle() {
   const bool working = taking_ || computing_ || stage_ == Stage::kLoading;
   if (!end_ || working || writing_ || !outbox_.empty()) return;
   finished_ = true;
-  // Before the client hears of the end: it may come back at once.
+  // The lease is released before the client hears of the end, because the client may come back at
+  // once.
   if (session_ != nullptr) session_->ReleaseWriter(this);
   if (left_uncomputed_ || !uncomputed_.empty()) CatchUp(session_, context_.stop);
   reactor_->Finish(ToGrpc(*end_));
@@ -204,7 +205,7 @@ void MeasurementFlow::Load() {
 
 void MeasurementFlow::Take() {
   std::unique_lock lock(mutex_);
-  // A turn takes what is there, and no more: other streams wait for theirs.
+  // A turn takes what fits into the inbox, and no more, because other streams wait for their turns.
   for (size_t turn = 0; turn < kInbox && !end_ && !inbox_.empty() && HasRoom(); ++turn) {
     const v1::StreamMeasurementsRequest request = std::move(inbox_.front());
     inbox_.pop_front();
@@ -238,8 +239,8 @@ absl::StatusOr<std::optional<MeasurementFlow::Uncomputed>> MeasurementFlow::Answ
   return Uncomputed{request.sequence(), schedule_.Due(EstimateSchedule::Clock::now())};
 }
 
-// What is computed at once: up to the next estimate, for which no later batch may have been taken
-// into account.
+// Returns what is computed in one turn: the batches up to the next estimate, which must not depend
+// on later batches of the stream.
 std::vector<MeasurementFlow::Uncomputed> MeasurementFlow::NextTurn() {
   std::vector<Uncomputed> turn;
   while (!uncomputed_.empty() && turn.size() < kTurn && (turn.empty() || !turn.back().estimate)) {
@@ -298,7 +299,7 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
     kept_ = std::max(kept_, sequence);
   } else {
     End(kept);
-    // What stands on batches that are lost is not to be told.
+    // Responses that depend on lost batches must not be sent.
     outbox_.remove_if([this](const Answered& answered) { return answered.sequence > kept_; });
   }
   Advance();

@@ -1,13 +1,13 @@
 #pragma once
 
-// StreamMeasurements: batches in, acknowledgements and estimates out.
+// Serves StreamMeasurements: takes batches, sends acknowledgements and estimates.
 //
-// A message goes through two stages, each of one thread at a time. Its batch is taken: checked, and
-// handed to the journal; it is acknowledged when it is kept. Then its numerics are computed on the
-// session's strand, which never delays an acknowledgement. Reactions only move messages between
-// gRPC and bounded queues. The next message is read only while all have room, so that HTTP/2's flow
-// control holds back a client that is too fast for the disk, far too fast for the numerics, or too
-// slow to read.
+// A message passes two stages, each of which runs on one thread at a time. First its batch is
+// taken: it is checked and handed to the journal, and acknowledged when it is kept. Then its
+// numerics are computed on the session's strand, which never delays an acknowledgement. Reactions
+// only move messages between gRPC and bounded queues. The next message is read only while all
+// queues have room, so that HTTP/2's flow control holds back a client that is too fast for the
+// disk, far too fast for the numerics, or too slow to read.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -30,93 +30,98 @@ namespace polyest::internal {
 using MeasurementReactor =
     grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>;
 
-// The state of one stream; outlives its reactor, for the strand may still hold it.
+// Holds the state of one stream. It outlives its reactor, because the strand may still hold it.
 class MeasurementFlow final : public SessionObserver,
                               public Drainable,
                               public std::enable_shared_from_this<MeasurementFlow> {
  public:
   MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
-  // Again for each message: a token may be taken back while the stream is open.
+  // Checks that the caller may stream to the session. This is asked again for each message, because
+  // a token may be revoked while the stream is open.
   absl::StatusOr<Caller> Authorize() const;
 
-  // The reactions, in the reactor's words.
+  // The following handle the reactor's events.
   void OnStart(MeasurementReactor* reactor, const absl::Status& admitted);
   void OnRead(bool ok);
   void OnWritten(bool ok);
   void OnCancelled();
   void OnDone();
 
-  // The session was deleted.
+  // Ends the stream NOT_FOUND, because the session was deleted.
   void OnClosed() override;
+  // Ends the stream ABORTED, because the writer goes on with another connection.
   void OnReplaced() override;
   void OnEstimate(const SharedEstimate&) override {}
-  // The daemon shuts down.
+  // Ends the stream UNAVAILABLE after a last estimate, because the daemon shuts down.
   void Drain() override;
 
  private:
   static constexpr size_t kLongestWriter = 64;
   static constexpr size_t kInbox = 8;
   static constexpr size_t kOutbox = 64;
-  // Batches acknowledged before they are computed: enough for the pauses in which an expansion
-  // moves, at the pace of a rig.
+  // Most batches that are acknowledged before they are computed. They bridge the pauses in which an
+  // expansion moves, at the pace of a rig.
   static constexpr size_t kMaxUncomputed = 256;
-  // Of one turn on the strand: other sessions wait for theirs.
+  // Most batches computed in one turn on the strand, because other sessions wait for theirs.
   static constexpr size_t kTurn = 8;
 
-  // A batch taken and to be computed.
+  // A batch that was taken and is still to be computed.
   struct Uncomputed {
     int64_t sequence = 0;
     bool estimate = false;  // whether one is due after it
   };
+  // A response, and the batch that must be kept before it is sent.
   struct Answered {
     v1::StreamMeasurementsResponse response;
-    int64_t sequence = 0;  // of the batch that must be kept before
+    int64_t sequence = 0;  // number of that batch
   };
   enum class Stage { kNone, kLoading, kReady };
 
-  // All with the mutex held.
+  // The following are called with the mutex held.
   void Accept(v1::StreamMeasurementsRequest request);
   absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
   void End(const absl::Status& status);
   void Break(const absl::Status& status);
-  // Starts whatever can be started: a write, a read, work, the end.
+  // Starts whatever can be started: a write, a read, work, or the end of the call.
   void Advance();
   void StartLoading();
   void StartTaking();
   void StartComputing();
   void FinishIfIdle();
   bool HasRoom() const;
-  // Nothing is left to be taken, and nothing will come.
+  // Returns whether nothing is left to be taken and nothing will come.
   bool AllTaken() const;
   std::vector<Uncomputed> NextTurn();
 
-  // Without the mutex: on the strand, on the intake's threads, on the strand.
+  // The following are called without the mutex: Load and Compute on the strand, Take on a thread of
+  // the intake.
   void Load();
   void Take();
   void Compute();
-  // One message; the acknowledgement goes to the outbox, what it leaves to compute is returned.
+  // Takes the batch of one message. Puts the acknowledgement into the outbox and returns what is
+  // left to compute.
   absl::StatusOr<std::optional<Uncomputed>> Answer(const v1::StreamMeasurementsRequest& request);
   absl::Status ComputeTurn(const std::vector<Uncomputed>& turn, bool last);
   absl::Status SendEstimate(const Stop& stop);
-  // Once everything up to batch `sequence` is kept.
+  // Sends a response once everything up to batch `sequence` is kept.
   void Send(v1::StreamMeasurementsResponse response, int64_t sequence);
   void OnKept(int64_t sequence, const absl::Status& kept);
 
   ServiceContext& context_;
-  grpc::CallbackServerContext& call_;  // until OnDone
+  grpc::CallbackServerContext& call_;  // valid until OnDone
   std::stop_source stop_source_;
   const CallStop stop_;
-  EstimateSchedule schedule_;  // of the taking
+  EstimateSchedule schedule_;  // used while batches are taken
 
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;  // set once, before any work
-  uint64_t losses_ = 0;               // of the session, when the stream began
+  uint64_t losses_ = 0;               // losses of the session when the stream began
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;
-  std::list<Answered> outbox_;  // the first is being written, or next
+  std::list<Answered> outbox_;  // the first one is being written or is the next
   int64_t kept_ = 0;
   Stage stage_ = Stage::kNone;
   bool reading_ = false;

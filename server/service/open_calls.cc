@@ -11,7 +11,7 @@ namespace polyest::internal {
 
 namespace {
 
-// Until another stream may have ended; until another daemon may serve.
+// Time after which another stream may have ended, or another daemon may serve.
 constexpr std::chrono::seconds kRetryDelay{1};
 
 }  // namespace
@@ -32,7 +32,7 @@ absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
                     {.reason = kBusy, .retry_delay = kRetryDelay});
     }
     auto& streams = streams_[static_cast<int>(kind)];
-    // Those that ended are swept out when they outnumber the rest.
+    // Streams that ended are removed when they outnumber the others.
     if (streams.size() > 2 * static_cast<size_t>(open(kind)) + 8) {
       std::erase_if(streams, [](const auto& one) { return one.expired(); });
     }
@@ -71,7 +71,7 @@ void OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
   }
   DrainKind(Kind::kWriter);
   {
-    // Watchers end after them, so that they see the writers' last estimates.
+    // The watchers end after the writers, so that they see the writers' last estimates.
     std::unique_lock lock(mutex_);
     left_.wait_until(lock, deadline,
                      [this] { return open(Kind::kUnary) + open(Kind::kWriter) == 0; });

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which calls are open, so that the daemon can end them in order: first no new ones, then the
-// writers' last estimates, then the watchers.
+// Keeps track of the open calls, so that the daemon can end them in order: first it refuses new
+// ones, then the writers get their last estimates and end, then the watchers.
 
 #include <absl/status/statusor.h>
 
@@ -13,7 +13,7 @@
 
 namespace polyest::internal {
 
-// A stream that can be asked to come to its end. Called from any thread; must not wait.
+// Is a stream that can be asked to end. Drain is called from any thread and must not wait.
 class Drainable {
  public:
   virtual ~Drainable() = default;
@@ -24,7 +24,7 @@ class OpenCalls {
  public:
   enum class Kind { kUnary, kWriter, kWatcher };
 
-  // Holding it keeps a call open.
+  // Keeps a call open as long as it exists.
   class Ticket {
    public:
     Ticket(OpenCalls& calls, Kind kind) : calls_(calls), kind_(kind) {}
@@ -37,13 +37,15 @@ class OpenCalls {
     const Kind kind_;
   };
 
-  // UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED past kMaxStreams of a kind.
+  // Lets a call in. UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED while kMaxStreams
+  // streams of the kind are open.
   absl::StatusOr<std::unique_ptr<Ticket>> Enter(Kind kind, std::weak_ptr<Drainable> stream = {});
 
   // Refuses new calls from here on, asks the streams to end and waits until all calls have left, or
   // until the deadline.
   void Drain(std::chrono::steady_clock::time_point deadline);
 
+  // Returns the number of open calls of a kind.
   int Count(Kind kind) const;
 
   static constexpr int kMaxStreams = 10'000;
@@ -62,6 +64,8 @@ class OpenCalls {
   std::vector<std::weak_ptr<Drainable>> streams_[kKinds];
 };
 
+// Returns the refusal of a daemon that shuts down: UNAVAILABLE, with the time after which to try
+// again.
 absl::Status ShuttingDown();
 
 }  // namespace polyest::internal

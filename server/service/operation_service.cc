@@ -16,7 +16,7 @@ absl::StatusOr<v1::ListOperationsResponse> ListPage(OperationStore& operations,
                                                     const std::string& tenant,
                                                     const v1::ListOperationsRequest& request) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
-  // A number, so that the next page can be asked for when the operation is there no more.
+  // The token is a number, so that it outlives the operation.
   int64_t after = 0;
   if (!request.page_token().empty() &&
       !(absl::SimpleAtoi(request.page_token(), &after) && after > 0)) {
@@ -88,7 +88,7 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   absl::StatusOr<v1::Operation> Start(const Caller& caller,
                                       const v1::StartComputationRequest& given) {
-    // The call's own request goes with the call.
+    // The operation needs a copy, because the call's own request is destroyed with the call.
     const auto request = std::make_shared<v1::StartComputationRequest>(given);
     return operations_.Start(caller.tenant, MethodOf(*request),
                              [&](v1::ComputationResult* result) -> absl::StatusOr<Job> {
@@ -103,7 +103,7 @@ class OperationService final : public v1::OperationService::CallbackService {
                              });
   }
 
-  // A call whose answer is at hand.
+  // Starts a call whose answer needs no computation.
   template <typename Response, typename Answer>
   Unary* Soon(Context* call, Method method, Response* response, const Answer& answer) {
     return StartCall(context_, call, method, [&](const Caller& caller) {

@@ -15,12 +15,13 @@
 namespace polyest::internal {
 namespace {
 
-// Until an operation may have ended.
+// Time after which an operation may have ended.
 constexpr std::chrono::seconds kRetryLater{1};
 
 }  // namespace
 
-// One operation. What is under way holds it, too, so that it may be forgotten meanwhile.
+// Holds one operation. The work shares its ownership, so that an operation may be forgotten while
+// it is under way.
 class OperationStore::Entry {
  public:
   Entry(std::string name, std::string method, google::protobuf::Timestamp created,
@@ -33,7 +34,7 @@ class OperationStore::Entry {
   }
 
   const std::string& name() const { return operation_.name(); }
-  // The job's own until its end.
+  // Returns the result, which only the job may use before its end.
   v1::ComputationResult* result() { return &result_; }
   std::stop_token token() const { return stop_.get_token(); }
   void RequestStop() { stop_.request_stop(); }
@@ -43,7 +44,7 @@ class OperationStore::Entry {
     operation_.set_state(v1::Operation::RUNNING);
   }
 
-  // Whether this was its end: the first one counts.
+  // Ends the operation and returns true; returns false if it has ended already.
   bool End(const absl::Status& status, const google::protobuf::Timestamp& time,
            Clock::time_point now) {
     const std::lock_guard lock(mutex_);
@@ -73,7 +74,7 @@ class OperationStore::Entry {
     return operation;
   }
 
-  // None while it is under way.
+  // Returns the time of the end; nothing while the operation is under way.
   std::optional<Clock::time_point> end() const {
     const std::lock_guard lock(mutex_);
     return end_;

@@ -1,6 +1,7 @@
 #pragma once
 
-// Computations that no call waits for: started, asked for, and fetched when they are done.
+// Runs computations that no call waits for: they are started, asked for, and fetched when they are
+// done.
 
 #include <absl/status/statusor.h>
 
@@ -21,19 +22,19 @@
 namespace polyest::internal {
 
 struct OperationLimits {
-  size_t per_tenant = 64;                // operations, done or under way
+  size_t per_tenant = 64;                // most operations, done or under way
   std::chrono::seconds kept_for{3'600};  // after their end
-  std::chrono::seconds max_computing;    // of one
+  std::chrono::seconds max_computing;    // longest computing time of one
 };
 
 // Keeps the operations of all tenants in memory, while they run and for an hour after their end.
-// Any thread may call it. An operation of another tenant is NOT_FOUND.
+// Thread-safe. An operation of another tenant is NOT_FOUND.
 class OperationStore {
  public:
   using Clock = std::chrono::steady_clock;
   using WallClock = std::function<google::protobuf::Timestamp()>;
   using Now = std::function<Clock::time_point()>;
-  // Makes the job that writes into the result given.
+  // Makes the job that writes its answer into the result given.
   using MakeJob = std::function<absl::StatusOr<Job>(v1::ComputationResult*)>;
 
   OperationStore(const OperationLimits& limits, WallClock wall_clock, Now now = Clock::now);
@@ -42,8 +43,9 @@ class OperationStore {
   OperationStore(const OperationStore&) = delete;
   OperationStore& operator=(const OperationStore&) = delete;
 
-  // Starts the job. The answer is make_job's when that fails; RESOURCE_EXHAUSTED when all of the
-  // tenant's operations are under way, or the job finds no room in its queue.
+  // Starts the job and returns its operation. Returns make_job's error if that fails;
+  // RESOURCE_EXHAUSTED when all of the tenant's operations are under way, or the job finds no room
+  // in its queue.
   absl::StatusOr<v1::Operation> Start(const std::string& tenant, const std::string& method,
                                       const MakeJob& make_job);
   // Returns an operation, with its result if it has ended.
@@ -68,7 +70,7 @@ class OperationStore {
   using Key = std::pair<std::string, int64_t>;  // tenant, number
   using Entries = std::map<Key, std::shared_ptr<Entry>>;
 
-  // The caller holds the mutex.
+  // The following are called with the mutex held.
   void ForgetOld();
   absl::Status MakeRoom(const std::string& tenant);
   std::pair<Entries::iterator, Entries::iterator> OfTenant(const std::string& tenant);

@@ -14,19 +14,19 @@
 
 namespace polyest::internal {
 
-// What the service's calls share; outlives them all.
+// Refers to what the calls of all services share, which outlives them all.
 struct ServiceContext {
-  Executor& executor;  // numerics, and whatever may take long
-  Executor& intake;    // the taking of batches
+  Executor& executor;  // runs numerics, and whatever may take long
+  Executor& intake;    // takes batches
   SessionRegistry& sessions;
   OpenCalls& calls;
   const AccessControl& access;
-  // Asked for when the drain's time is over: ends work that no call waits for.
+  // Is stopped when the time of the drain is over, to end work that no call waits for.
   std::stop_token stop;
   const ModelLibrary& models;
-  // Of one unary call, or of one batch of a stream.
+  // Longest computing time of one unary call, or of one batch of a stream.
   std::chrono::seconds max_computing;
-  // For what is shown.
+  // Returns the time of day, to be shown only.
   std::function<google::protobuf::Timestamp()> wall_clock;
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 };

@@ -22,7 +22,7 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
       !ResourceId("pageToken", "sessions", request.page_token()).ok()) {
     return UnknownPageToken(request.page_token());
   }
-  // One more than asked for tells whether there is another page.
+  // One session more than asked for tells whether there is another page.
   auto page = sessions.List(tenant, request.page_token(), page_size + 1);
   v1::ListSessionsResponse response;
   if (page.size() > page_size) {
@@ -72,7 +72,7 @@ class SessionService final : public v1::SessionService::CallbackService {
   }
 
  private:
-  // What is soon done.
+  // Starts a call that is soon done.
   Unary* ForCaller(Context* call, Method method, CallerWork work) {
     return StartCall(context_, call, method, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, std::move(work));

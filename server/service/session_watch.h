@@ -1,8 +1,8 @@
 #pragma once
 
-// WatchSession: every new estimate of a session, to any number of observers. Between the session
-// and an observer there is room for one estimate; a newer one takes its place, so that a slow
-// observer misses those between but never the last.
+// Serves WatchSession: sends every new estimate of a session to any number of observers. Between
+// the session and an observer there is room for one estimate; a newer one replaces it, so that a
+// slow observer misses those between but never the last.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -19,14 +19,15 @@ namespace polyest::internal {
 
 using WatchReactor = grpc::ServerWriteReactor<v1::WatchSessionResponse>;
 
-// The state of one watch; outlives its reactor, for the session may still hold it.
+// Holds the state of one watch. It outlives its reactor, because the session may still hold it.
 class WatchFlow final : public SessionObserver,
                         public Drainable,
                         public std::enable_shared_from_this<WatchFlow> {
  public:
   WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
-  // Again for each estimate: a token may be taken back while the watch is open.
+  // Checks that the caller may watch the session. This is asked again for each estimate, because a
+  // token may be revoked while the watch is open.
   absl::StatusOr<Caller> Authorize() const;
 
   void OnStart(WatchReactor* reactor, const absl::Status& admitted, const std::string& session);
@@ -39,16 +40,16 @@ class WatchFlow final : public SessionObserver,
   void Drain() override;
 
  private:
-  // With the mutex held.
+  // The following are called with the mutex held.
   absl::Status Attach(const std::string& session);
   void End(const absl::Status& status);
   void Advance();
 
-  // On the strand.
+  // Makes the watch an observer of the session; runs on the strand.
   void Register();
 
   ServiceContext& context_;
-  grpc::CallbackServerContext& call_;  // until OnDone
+  grpc::CallbackServerContext& call_;  // valid until OnDone
   std::stop_source stop_source_;
   const CallStop stop_;
 
@@ -56,7 +57,7 @@ class WatchFlow final : public SessionObserver,
   WatchReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;
   SharedEstimate pending_, last_;
-  v1::WatchSessionResponse written_;  // gRPC's while writing_
+  v1::WatchSessionResponse written_;  // belongs to gRPC while writing_
   bool writing_ = false;
   bool registering_ = false;
   bool finished_ = false;

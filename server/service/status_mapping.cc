@@ -60,14 +60,14 @@ grpc::StatusCode ToGrpc(absl::StatusCode code) {
   return grpc::StatusCode::UNKNOWN;
 }
 
-// The trailers of a call have room for 8 KiB. There a byte of the message takes three at the most,
-// and again one and a third in the details.
+// The trailers of a call have room for 8 KiB. A byte of the message takes at most three bytes
+// there, and again one and a third in the details.
 constexpr size_t kLongestMessage = 1'400;
 constexpr size_t kLongestDescription = 200;
 
 std::string Shortened(absl::string_view text, size_t longest) {
   if (text.size() <= longest) return std::string(text);
-  // Not within a character of UTF-8.
+  // The cut must not fall within a character of UTF-8.
   while ((text[longest] & 0xC0) == 0x80) --longest;
   return absl::StrCat(text.substr(0, longest), "…");
 }

@@ -7,12 +7,12 @@
 
 namespace polyest::internal {
 
-// The one place where the core's status becomes gRPC's, with what it says to programs
-// (polyest/rpc/error_details.proto). A message that would not fit into the trailers of a call is
-// cut and ends with "…".
+// Returns the core's status as gRPC's, with its details for programs
+// (polyest/rpc/error_details.proto). This is the only place that converts it. A message that would
+// not fit into the trailers of a call is cut and ends with "…".
 grpc::Status ToGrpc(const absl::Status& status);
 
-// The same as a message: the code, the message and the details.
+// Returns the status as a message: its code, its text, cut likewise, and its details.
 rpc::Status ToRpcStatus(const absl::Status& status);
 
 }  // namespace polyest::internal

@@ -12,10 +12,11 @@
 namespace polyest::internal {
 namespace {
 
-// Propagations of one call run on the call's own thread: the executor's threads serve the calls.
+// Each call runs its propagations on one thread, because the executor's threads serve many calls.
 constexpr int kThreadsPerCall = 1;
 
-// One name for all studies; what follows the request says what of.
+// The overloads of Run give all studies one name. The arguments after the request select a study of
+// an experiment or of an estimator.
 auto Run(const v1::ComputeEstimateRequest& request, auto&&... of) {
   return ComputeEstimate(request, of...);
 }
@@ -41,13 +42,14 @@ auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
   return ComputeRegularizationSweep(request, of...);
 }
 
-// Studies of a session's problem and rows, which run the model themselves and need no estimator.
+// Selects the studies of a session that run the model themselves, from its problem and its rows,
+// and need no estimator.
 template <typename Request>
 concept RunsTheModel = std::same_as<Request, v1::ComputePropagationRequest> ||
     std::same_as<Request, v1::ComputeCostGridRequest> ||
     std::same_as<Request, v1::ComputeSensitivityRequest>;
 
-// The answers about a session from its estimator, on its strand.
+// The overloads of OnStrand answer a study of a session from its estimator, on its strand.
 
 absl::Status OnStrand(const v1::ComputeEstimateRequest&, Session& session, const ServiceContext&,
                       const Stop& stop, v1::ComputeEstimateResponse& response) {
@@ -86,7 +88,7 @@ absl::Status OnStrand(const Request& request, Session& session, const ServiceCon
   return session.WithEstimator(answer, stop);
 }
 
-// Adds the session's rows to the experiment; returns the last batch.
+// Adds the session's rows to `measurements`; returns the number of the last batch.
 absl::StatusOr<int64_t> ReadRows(const Session& session, const Stop& stop,
                                  v1::Measurements& measurements) {
   int64_t sequence = 0;
@@ -100,8 +102,8 @@ absl::StatusOr<int64_t> ReadRows(const Session& session, const Stop& stop,
   return sequence;
 }
 
-// The study of the experiment that the session is. A session that is there stays within the limits,
-// whatever they are now.
+// Runs a study on the problem and the rows of a session. The limits of a problem do not apply,
+// because a session that exists stays, whatever the limits are now.
 template <RunsTheModel Request, typename Response>
 absl::Status OfStoredExperiment(Request request, const Session& session,
                                 const ServiceContext& context, const Stop& stop,

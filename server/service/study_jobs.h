@@ -1,6 +1,6 @@
 #pragma once
 
-// The computations of StudyService, for a unary call or for an operation.
+// Makes the jobs that compute what StudyService answers, for a unary call or for an operation.
 
 #include <absl/status/statusor.h>
 
@@ -11,8 +11,9 @@
 namespace polyest::internal {
 
 // Returns the job that writes the answer of a study into `response`, for each pair of a request and
-// a response of StudyService. Both must live until the job has finished. INVALID_ARGUMENT without a
-// subject, NOT_FOUND for a session that the caller does not have.
+// a response of StudyService. Both must live until the job has finished. NOT_FOUND for a session
+// that the caller does not have, INVALID_ARGUMENT for a bad name of one. Without a subject it is
+// the job that fails with INVALID_ARGUMENT.
 template <typename Request, typename Response>
 absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller,
                              const Request* request, Response* response);
@@ -22,8 +23,8 @@ absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& 
                                    const v1::StartComputationRequest* request,
                                    v1::ComputationResult* result);
 
-// Returns the name of the StudyService method that computes the same; empty if the request names no
-// computation.
+// Returns the name of the method of StudyService that computes what the request names; empty if it
+// names no computation.
 std::string MethodOf(const v1::StartComputationRequest& request);
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// A unary call whose work runs on the executor or on a session's strand.
+// Runs the work of a unary call on the executor or on a session's strand.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/support/server_callback.h>
@@ -18,16 +18,17 @@
 
 namespace polyest::internal {
 
-// Only the work finishes the call (or Start, when the work is refused), once; until then the
+// The call is finished once: by its work, or by Start when the work is refused. Until then the
 // request and the response of the call live, and the work may use them.
 class UnaryCall final : public grpc::ServerUnaryReactor {
  public:
   using Finisher = std::function<void(const absl::Status&)>;
-  // The call is finished with the answer when that is not OK; otherwise by the finisher, then or
-  // later, from any thread.
+  // Does the work. An error that it returns finishes the call; after OK the finisher does, which
+  // the work calls before it returns or later, from any thread.
   using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
 
+  // Starts a call whose work is handed to `submit`. Refuses it once the daemon shuts down.
   static grpc::ServerUnaryReactor* Start(const ServiceContext& service,
                                          grpc::CallbackServerContext* context, const Submit& submit,
                                          Work work);
@@ -36,7 +37,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   void OnDone() override;
 
  private:
-  // What outlives the reactor: the work may still be returning from Finish when OnDone comes.
+  // Holds what outlives the reactor: the work may still be returning from Finish when OnDone comes.
   struct State {
     std::mutex mutex;
     UnaryCall* reactor = nullptr;
@@ -50,11 +51,11 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 
-// A call that needs no work is finished at once.
+// Finishes a call that needs no work.
 grpc::ServerUnaryReactor* FinishAtOnce(grpc::CallbackServerContext* context,
                                        const absl::Status& status);
 
-// Puts the answer, if there is one, where the call wants it.
+// Puts the answer into `response` and returns OK, or returns the error that came instead of it.
 template <typename Response>
 absl::Status Deliver(absl::StatusOr<Response> answer, Response* response) {
   if (!answer.ok()) return std::move(answer).status();
