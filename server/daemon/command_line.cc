@@ -31,7 +31,7 @@ CommandLine Refuse(const std::string& message) {
 
 constexpr int64_t kMaxOfAnything = int64_t{1} << 60;
 
-// From 1 to `highest`, what the method itself can bear.
+// Adds an option for a limit from 1 to `highest`, which is what the method itself can bear.
 void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std::string& meaning,
               int64_t highest = kMaxOfAnything) {
   app.add_option(name, limit, meaning)
@@ -89,7 +89,8 @@ void AddOperations(CLI::App& app, CommandLine& command_line, std::string& metric
       "--data-dir), or in the file of --config; the first of these that says something holds.");
 }
 
-// Numeric, as the endpoint takes it.
+// Parses the address of the metrics' endpoint. The endpoint takes numeric hosts only, so
+// "localhost" is replaced.
 absl::StatusOr<ListenAddress> MetricsAddress(const std::string& text, bool insecure) {
   auto address = ListenAddress::Parse(text, "--metrics");
   if (!address.ok()) return address;
@@ -101,7 +102,8 @@ absl::StatusOr<ListenAddress> MetricsAddress(const std::string& text, bool insec
   return address;
 }
 
-// Where a service of the user's keeps its state; systemd gives a service of the system its own.
+// Returns the folder in which a service of the user's keeps its state, or the one that systemd
+// gives to a service of the system; empty when the environment names none.
 std::string DefaultDataDir() {
   const auto variable = [](const char* name) -> std::string {
     const char* value = std::getenv(name);
@@ -113,7 +115,7 @@ std::string DefaultDataDir() {
   return home.empty() ? "" : home + "/.local/state/polyest";
 }
 
-// The secret goes to stdout and its line for the file of tokens to stderr, each alone.
+// Prints the secret to stdout and its line for the file of tokens to stderr, each alone.
 CommandLine PrintNewToken(const std::string& words) {
   const auto token = MakeTokenFor(words);
   if (!token.ok()) return Refuse("--new-token: " + std::string(token.status().message()));
@@ -145,7 +147,7 @@ void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::stri
       "token: polyestd --new-token rig1:chassis:writer > rig1.token 2>> tokens");
 }
 
-// Sets where the daemon listens, each address as exposed as is allowed.
+// Sets where the daemon listens; refuses addresses that are more exposed than is allowed.
 absl::Status Listen(const std::vector<std::string>& addresses, bool insecure,
                     DaemonOptions& daemon) {
   daemon.listen.clear();

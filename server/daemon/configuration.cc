@@ -23,7 +23,8 @@ std::string OneLine(std::string text) {
   return text;
 }
 
-// A file whose keys are options, less those that the environment sets: CLI11 would prefer the file.
+// Reads a file whose keys are options. Leaves out those that the environment sets, because CLI11
+// would prefer the file.
 class File final : public CLI::ConfigBase {
  public:
   explicit File(const CLI::App& app) : app_(app) {}
@@ -31,7 +32,8 @@ class File final : public CLI::ConfigBase {
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override {
     std::vector<CLI::ConfigItem> kept;
     for (CLI::ConfigItem& item : ConfigBase::from_config(in)) {
-      if (item.name == "++" || item.name == "--") continue;  // of a section, whose keys follow
+      // This item marks a section, whose keys follow.
+      if (item.name == "++" || item.name == "--") continue;
       const CLI::Option* option = app_.get_option_no_throw("--" + item.name);
       if (!item.parents.empty() || option == nullptr || !option->get_configurable()) {
         throw CLI::ConfigError("there is no key \"" + item.fullname() + "\"",
@@ -46,7 +48,7 @@ class File final : public CLI::ConfigBase {
   const CLI::App& app_;
 };
 
-// Whether Kubernetes makes a variable of this name for a service that is called polyestd.
+// Returns whether Kubernetes makes a variable of this name for a service that is called polyestd.
 bool IsOfKubernetes(const std::string& variable) {
   return variable == "POLYESTD_PORT" || variable.rfind("POLYESTD_PORT_", 0) == 0 ||
          variable.rfind("POLYESTD_SERVICE_", 0) == 0;
@@ -80,7 +82,7 @@ std::string CheckEnvironment(const CLI::App& app, const char* const* environment
         std::find(known.begin(), known.end(), name) != known.end()) {
       continue;
     }
-    // The prefix that all have would make any two of them near.
+    // The prefix is left out, because it would make any two names similar.
     std::vector<std::string> names;
     for (const std::string& one : known) names.push_back(one.substr(kVariablePrefix.size()));
     const std::string nearest = NearestName(name.substr(kVariablePrefix.size()), names);
@@ -120,7 +122,7 @@ std::string DescribeError(const CLI::App& app, const CLI::ParseError& error, int
   }
   if (error.get_name() == "FileError") return file + ": cannot be read";
   if (error.get_name() == "ConfigError") return file + ": " + what;
-  // Of a bad value CLI11 says "--name: what is wrong".
+  // For a bad value CLI11 says "--name: what is wrong".
   const std::string option = what.substr(0, what.find(':'));
   if (option.rfind("--", 0) != 0 || app.get_option_no_throw(option) == nullptr ||
       IsGiven(option, argc, argv)) {

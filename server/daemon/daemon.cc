@@ -27,23 +27,24 @@ namespace {
 constexpr int kShortestPingIntervalMs = 10'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
-// Streams of one connection.
+// Most streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
-// Tasks that may wait for a thread.
+// Most tasks of an executor that may wait or run.
 constexpr int kWaitingTasks = 20'000;
-// Lanes of the executor that may be busy with long tasks before another lane has to wait: a tenant
-// has two, one for the streams of its sessions and one for all other calls.
+// Number of the executor's lanes that may be busy with long tasks before another lane has to wait.
+// A tenant has two lanes: one for the streams of its sessions and one for all other calls.
 constexpr int kBusyLanes = 8;
-// What is computed gives way to what is acknowledged where both want a core: to a third of its
-// share, not more, for other processes gain by it, too.
+// Numerics give way to acknowledgements where both want a core: to a third of their share, not
+// more, because other processes gain by it, too.
 constexpr int kNiceness = 5;
-// Threads that take batches: they wait for nothing but, now and then, the journal.
+// Number of threads that take batches. They wait for nothing but, now and then, the journal.
 constexpr int kIntakeThreads = 4;
-// From a change of tokens or certificates to its notice, twice that until it is settled.
+// Time between two looks at the files of tokens and certificates. A change is noticed after this
+// time and has settled after twice of it.
 constexpr std::chrono::seconds kWatchInterval{1};
-// In the place of the port of an address that is not listened on.
+// Stands in the place of the port of an address that is not listened on.
 constexpr int kNotListening = -1;
-// What the last bytes of calls already ended may take.
+// Longest time that the last bytes of ended calls may take.
 constexpr int kFlushTimeS = 1;
 
 int Threads(int requested) {
@@ -51,8 +52,8 @@ int Threads(int requested) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-// The only use of the clock on the wall, which may be set at any moment: it is shown, and decides
-// nothing.
+// Returns the time of day. This is the only use of the wall clock, which may be set at any moment:
+// its time is shown, and decides nothing.
 google::protobuf::Timestamp Now() {
   const auto since = std::chrono::system_clock::now().time_since_epoch();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(since);
@@ -175,7 +176,8 @@ absl::Status Daemon::Listen() {
   for (size_t i = 0; i < addresses_.size(); ++i) {
     builder.AddListeningPort(addresses_[i].ToString(), credentials, &ports[i]);
   }
-  // Otherwise a second daemon on the same port would silently take half of the connections.
+  // If ports could be shared, a second daemon on the same port would silently take half of the
+  // connections.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
   builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
@@ -187,7 +189,7 @@ absl::Status Daemon::Listen() {
   });
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) {
-    // They are taken in their order, up to the first that cannot be had.
+    // gRPC takes the addresses in their order, up to the first that it cannot listen on.
     const auto failed = std::find(ports.begin(), ports.end(), kNotListening) - ports.begin();
     return absl::UnavailableError(absl::StrFormat(
         "cannot listen on %s: the port is in use or the address is not this machine's",

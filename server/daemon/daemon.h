@@ -1,6 +1,6 @@
 #pragma once
 
-// The daemon's life: everything that serves, from the sockets to the sessions, and its orderly end.
+// Runs the daemon: everything that serves, from the sockets to the sessions, and its orderly end.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/impl/service_type.h>
@@ -34,45 +34,45 @@ namespace polyest::internal {
 
 struct DaemonOptions {
   std::vector<ListenAddress> listen{{"127.0.0.1", 50051}};  // one or more
-  int threads = 0;                                          // of the numerics; 0: one a core
-  // Where sessions are kept; empty: in memory, and they end with the daemon.
+  int threads = 0;  // threads of the numerics; 0: one a core
+  // Folder in which sessions are kept; empty: sessions are in memory and end with the daemon.
   std::string data_dir{};
-  int64_t max_disk_mb = 0;  // of the data folder; 0: as large as the disk
+  int64_t max_disk_mb = 0;  // size of the journal's file, MiB; 0: as large as the disk
   SessionLimits limits{};
-  int64_t max_memory_mb = 0;  // resident, of the process; 0: no limit
+  int64_t max_memory_mb = 0;  // resident memory of the process, MiB; 0: no limit
   std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
   int max_message_mb = 64;
-  int64_t max_computing_s = 3'600;  // of one call, or one batch of a stream
-  std::string fmu_dir{};            // of FMUs that problems may name; empty: none
+  int64_t max_computing_s = 3'600;  // computing time of one call, or of one batch of a stream
+  std::string fmu_dir{};            // folder of the FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
   std::string token_file{};                // empty: no tokens are asked for
   TlsFiles tls{};                          // without a certificate: no TLS
-  std::optional<ListenAddress> metrics{};  // where they are told; none: nowhere
+  std::optional<ListenAddress> metrics{};  // address of the metrics' endpoint; none: no endpoint
 };
 
 class Daemon {
  public:
-  // UNAVAILABLE when an address cannot be listened on, NOT_FOUND when there is no folder of FMUs;
-  // what SqliteJournal::Open says of the data folder; as TokenTable and ReadTlsMaterial for what is
-  // wrong with tokens, certificates and keys.
+  // Starts the daemon. UNAVAILABLE when an address cannot be listened on, NOT_FOUND when there is
+  // no folder of FMUs. Other errors are those of SqliteJournal::Open for the data folder, and of
+  // TokenTable and ReadTlsMaterial for tokens, certificates and keys.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
-  // Drains first.
+  // Stops the daemon first, as Stop does.
   ~Daemon();
 
-  // Where it listens, in the order of the options, with the ports chosen.
+  // Returns the addresses that it listens on, in the order of the options, with the ports chosen.
   const std::vector<ListenAddress>& addresses() const { return addresses_; }
-  // Where its metrics are, if anywhere, with the port chosen.
+  // Returns the address of its metrics, if there is one, with the port chosen.
   const std::optional<ListenAddress>& metrics_address() const { return metrics_address_; }
 
-  // Reads the tokens and the certificates again, as happens by itself when their files change. What
-  // cannot be used is logged, and the old ones stay.
+  // Reads the tokens and the certificates again, as happens by itself when their files change. If
+  // they cannot be used, logs that and keeps the old ones.
   void Reload();
 
-  // Whether it answers calls; not to be called by two threads at once, nor during Stop.
+  // Returns whether it answers calls. Must not be called by two threads at once, nor during Stop.
   bool IsAlive(std::chrono::milliseconds timeout) const { return self_check_->Answers(timeout); }
 
   // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
-  // sockets: at most the drain time-out, past which what is left is cancelled.
+  // sockets. Calls that have not ended within the drain time-out are cancelled.
   void Stop();
 
  private:
@@ -82,7 +82,7 @@ class Daemon {
   absl::Status Secure();
   absl::Status Listen();
   absl::Status TellMetrics();
-  // What the log says of it once it is ready.
+  // Returns what the log says about the daemon once it is ready.
   LogFields Described() const;
 
   const DaemonOptions options_;
@@ -90,13 +90,13 @@ class Daemon {
   const ModelLibrary models_;
   std::mutex reloading_;
   std::unique_ptr<AccessControl> access_;
-  std::unique_ptr<ServerTls> tls_;  // null without
+  std::unique_ptr<ServerTls> tls_;  // null without TLS
   std::stop_source stop_;
   OpenCalls calls_;
   Metrics metrics_;
   Readiness readiness_;
-  // In the order in which they need each other: the executors finish their tasks, which use the
-  // journal, before the journal goes.
+  // The following are in the order in which they need each other: the executors finish their tasks,
+  // which use the journal, before the journal goes.
   std::unique_ptr<SessionJournal> journal_;
   Executor executor_;
   Executor intake_;

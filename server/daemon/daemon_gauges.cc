@@ -21,7 +21,7 @@ void Add(Families& families, const char* name, const char* help, double value) {
   families.push_back(std::move(family));
 }
 
-// 0 for one that is not there.
+// Returns the size of a file in bytes; 0 when there is no such file.
 double FileBytes(const std::filesystem::path& file) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
@@ -60,7 +60,7 @@ void DaemonGauges::CollectSessions(Families& families) const {
     ++sessions;
     if (activity.loaded()) ++loaded;
     rows += session->place().rows;
-    // A factor of 0: nothing measured yet.
+    // A factor of 0 says that nothing has been measured yet.
     const double factor = activity.real_time_factor();
     if (activity.has_writer() && factor > 0 && factor < 1) ++behind;
     unprocessed += activity.unprocessed_batch_count();

@@ -1,6 +1,7 @@
 #pragma once
 
-// What Prometheus is told of the present: looked up at each scrape, and counted nowhere.
+// Tells Prometheus the present state of the daemon, which is looked up at each scrape and counted
+// nowhere.
 
 #include <prometheus/collectable.h>
 
@@ -16,7 +17,8 @@ namespace polyest::internal {
 
 class DaemonGauges final : public prometheus::Collectable {
  public:
-  // All outlive it. `data_dir`: of the journal; empty without one on disk.
+  // Refers to objects that must outlive it. `data_dir` is the journal's folder; empty when the
+  // journal is not on disk.
   DaemonGauges(const SessionRegistry& sessions, const Executor& executor, const OpenCalls& calls,
                std::string data_dir, const std::atomic<bool>& ready)
       : sessions_(sessions),

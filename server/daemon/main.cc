@@ -1,4 +1,4 @@
-// polyestd: the daemon as a process.
+// Runs polyestd, the daemon as a process.
 
 #include <signal.h>
 #include <spdlog/spdlog.h>
@@ -23,7 +23,8 @@ void StartLog(const polyest::internal::CommandLine& command_line) {
   polyest::internal::StartGrpcLog();
 }
 
-// Blocked here, before there are threads, and so in all of them: only sigwait takes these signals.
+// Blocks the signals that only sigwait takes. Called before there are threads, so that the signals
+// are blocked in all of them.
 sigset_t BlockSignals() {
   signal(SIGPIPE, SIG_IGN);
   sigset_t signals;
@@ -35,7 +36,8 @@ sigset_t BlockSignals() {
   return signals;
 }
 
-// Says on stdout, a line each, where the daemon listens; and to the service manager that it does.
+// Prints on stdout, a line each, where the daemon listens, and tells the service manager that it
+// serves.
 void Announce(const polyest::internal::Daemon& daemon) {
   std::string addresses;
   for (const polyest::internal::ListenAddress& address : daemon.addresses()) {

@@ -10,11 +10,11 @@ SelfCheck::SelfCheck(grpc::Server& server) : channel_(server.InProcessChannel({}
 bool SelfCheck::Answers(std::chrono::milliseconds timeout) const {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
-  // Of the clock that nobody sets.
+  // The deadline is kept by the monotonic clock, which nobody sets.
   context.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
                                     gpr_time_from_millis(timeout.count(), GPR_TIMESPAN)));
   grpc::CompletionQueue queue;
-  // HealthCheckRequest without a service: of the whole server.
+  // An empty HealthCheckRequest names no service and so asks for the whole server.
   const grpc::Slice empty;
   const grpc::ByteBuffer request(&empty, 1);
   const auto call =

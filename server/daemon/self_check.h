@@ -1,6 +1,6 @@
 #pragma once
 
-// Whether the daemon answers calls, found out by calling its own health service from within.
+// Finds out whether the daemon answers calls, by calling its own health service from within.
 
 #include <grpcpp/channel.h>
 #include <grpcpp/server.h>
@@ -12,11 +12,11 @@ namespace polyest::internal {
 
 class SelfCheck {
  public:
-  // Takes no port: the channel leads straight into the server.
+  // Makes a channel that leads straight into the server, without a port.
   explicit SelfCheck(grpc::Server& server);
 
-  // Whether any answer comes within `timeout`, also one that says NOT_SERVING: a daemon that drains
-  // or cannot write its journal is alive. Not to be called by two threads at once.
+  // Returns whether any answer comes within `timeout`, also one that says NOT_SERVING: a daemon
+  // that drains or cannot write its journal is alive. Must not be called by two threads at once.
   bool Answers(std::chrono::milliseconds timeout) const;
 
  private:

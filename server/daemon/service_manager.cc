@@ -12,10 +12,11 @@
 namespace polyest::internal {
 namespace {
 
-// So that two reports in a row may come late before the manager acts.
+// Number of reports within the manager's time-out, so that two in a row may come late before it
+// acts.
 constexpr int kReportsPerTimeout = 3;
 
-// The time-out that the manager asks for; zero without a watchdog.
+// Returns the time-out that the manager asks for; zero without a watchdog.
 std::chrono::microseconds WatchdogTimeout() {
   uint64_t timeout_us = 0;
   if (sd_watchdog_enabled(/*unset_environment=*/0, &timeout_us) <= 0) return {};

@@ -10,19 +10,19 @@
 
 namespace polyest::internal {
 
-// Says that the daemon serves. `status` is one line that `systemctl status` shows.
+// Reports that the daemon serves. `status` is one line that `systemctl status` shows.
 void ReportReady(const std::string& status);
 
-// Says that the daemon is shutting down in order. The manager waits TimeoutStopSec from here on,
+// Reports that the daemon is shutting down in order. The manager waits TimeoutStopSec from here on,
 // and its watchdog sleeps.
 void ReportStopping();
 
-// Feeds the manager's watchdog as long as the daemon is alive; a daemon that is not is killed and
-// started again after WatchdogSec. Runs a thread of its own, and none when no watchdog is asked
-// for.
+// Feeds the manager's watchdog as long as the daemon is alive; the manager kills a daemon that is
+// not, and starts it again, after WatchdogSec. Runs a thread of its own, and none when no watchdog
+// is asked for.
 class Watchdog {
  public:
-  // Whether the daemon works, found out within the given time.
+  // Returns whether the daemon works; answers within the given time.
   using IsAlive = std::function<bool(std::chrono::milliseconds)>;
 
   explicit Watchdog(IsAlive is_alive);

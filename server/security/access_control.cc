@@ -28,7 +28,8 @@ Identification IdentificationOf(const grpc::ServerContextBase& call) {
   if (transport != nullptr) {
     const auto names = transport->FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME);
     if (!names.empty()) {
-      // It goes into logs, and whoever signed it may not have looked at it closely.
+      // The name is escaped because it goes into logs, and its signer may not have looked at it
+      // closely.
       identification.certificate_name =
           absl::CEscape(absl::string_view(names.front().data(), names.front().size()));
     }

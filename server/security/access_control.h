@@ -1,6 +1,6 @@
 #pragma once
 
-// Who calls, and whether they may.
+// Identifies callers and decides which methods they may call.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -19,10 +19,10 @@ namespace polyest::internal {
 
 struct AccessOptions {
   std::string token_file{};          // empty: no tokens are asked for
-  bool client_certificates = false;  // the transport lets in only who has one
+  bool client_certificates = false;  // the transport lets in only clients that have one
 };
 
-// What a call says of who calls.
+// Holds what a call says about its caller.
 struct Identification {
   std::optional<std::string> authorization{};     // the header; none unless there is exactly one
   std::optional<std::string> certificate_name{};  // the common name of the client's certificate
@@ -31,12 +31,12 @@ struct Identification {
 // Thread-safe.
 class AccessControl {
  public:
-  // As TokenTable::Read.
+  // Reads the tokens, if there is a file of them; errors are those of TokenTable::Read.
   static absl::StatusOr<std::unique_ptr<AccessControl>> Open(AccessOptions options);
 
-  // UNAUTHENTICATED without a token that is known, where one is asked for; PERMISSION_DENIED when
-  // its role may not call the method. With client certificates alone, their holders are admins of
-  // the tenant "default"; without authentication everybody is.
+  // Returns the caller. UNAUTHENTICATED without a known token, where tokens are asked for;
+  // PERMISSION_DENIED when the caller's role may not call the method. With client certificates
+  // alone, their holders are admins of the tenant "default"; without authentication everybody is.
   absl::StatusOr<Caller> Authorize(const grpc::ServerContextBase& call, Method method) const;
   absl::StatusOr<Caller> Authorize(const Identification& identification, Method method) const;
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where one may listen, and where a secret may be sent, without encryption.
+// Decides on which addresses the daemon may listen without encryption or authentication.
 
 #include <absl/status/status.h>
 
@@ -12,10 +12,11 @@ struct Exposure {
   std::string host;  // to listen on
   bool tls = false;
   bool authentication = false;  // by tokens or certificates
-  bool insecure = false;        // the user's express wish
+  bool insecure = false;        // whether the user wants to do without (--insecure)
 };
 
-// FAILED_PRECONDITION, naming what is missing, beyond loopback without both, unless it is wished.
+// Refuses with FAILED_PRECONDITION, naming what is missing, a host beyond loopback without both TLS
+// and authentication, unless `insecure` is set.
 absl::Status CheckExposure(const Exposure& exposure);
 
 }  // namespace polyest::internal

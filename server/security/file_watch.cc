@@ -13,7 +13,7 @@ std::vector<FileChanges::Stamp> FileChanges::Look() const {
     Stamp stamp;
     struct stat status;
     if (stat(file.c_str(), &status) == 0) {
-      // The time of change, which nobody can set back as that of modification.
+      // This is the time of change, which nobody can set back, unlike that of modification.
       stamp = {status.st_dev, status.st_ino, status.st_size, status.st_ctim.tv_sec,
                status.st_ctim.tv_nsec};
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Whether files change.
+// Notices when files change.
 
 #include <sys/stat.h>
 
@@ -15,14 +15,15 @@
 
 namespace polyest::internal {
 
-// By time, size and inode, so that files replaced by others of the same time are noticed too.
+// Compares files by time, size and inode, so that files replaced by others of the same time are
+// noticed, too.
 class FileChanges {
  public:
   explicit FileChanges(std::vector<std::string> files);
 
-  // Whether any has changed since the last time that this said so, and none since the last call: a
-  // change is told when it has settled, so that one file is not read before another that belongs to
-  // it has come.
+  // Returns whether any file has changed since the last time that this returned true, and none
+  // since the last call. A change is thus reported when it has settled, so that one file is not
+  // read before another that belongs to it has come.
   bool Poll();
 
  private:
@@ -42,11 +43,11 @@ class FileChanges {
   std::vector<Stamp> seen_;
 };
 
-// Polls from a thread of its own.
+// Polls files from a thread of its own.
 class FileWatch {
  public:
-  // Calls `changed` from that thread, until this is destroyed. Make `changes` before the files are
-  // read for the first time, so that no change slips between.
+  // Calls `changed` from that thread until the watch is destroyed. `changes` must be made before
+  // the files are read for the first time, so that no change is missed.
   FileWatch(FileChanges changes, std::chrono::milliseconds interval, std::function<void()> changed);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which role a call needs.
+// Says which role each method needs.
 
 #include <google/protobuf/descriptor.h>
 
@@ -11,12 +11,12 @@
 
 namespace polyest::internal {
 
-// The one table of the services' methods, whose names no two services share. A method that is not
-// in it cannot be served: naming it does not compile, and the daemon does not start while one is
-// missing.
+// Is an entry of the table of the services' methods, whose names no two services share. A method
+// that is not in the table cannot be served: naming it does not compile, and the daemon does not
+// start while one is missing.
 //
-// Operations need no more than the computations that they are: who may start them may end them, or
-// could not make room for others.
+// The methods of operations need no higher role than the computations that operations are. Whoever
+// may start operations may end them, and could otherwise not make room for others.
 struct MethodRole {
   std::string_view method;
   Role needed;
@@ -53,7 +53,7 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"GetStatus", Role::kReader},
 };
 
-// Null when there is no such method.
+// Returns the entry of a method; null when there is none.
 constexpr const MethodRole* FindMethodRole(std::string_view name) {
   for (const MethodRole& entry : kMethodRoles) {
     if (entry.method == name) return &entry;
@@ -61,7 +61,7 @@ constexpr const MethodRole* FindMethodRole(std::string_view name) {
   return nullptr;
 }
 
-// A method by its name in the contract, looked up while compiling.
+// Names a method of the contract, which is looked up while compiling.
 class Method {
  public:
   // NOLINTNEXTLINE: implicit, so that a call reads Authorize(context, "GetModel").
@@ -76,10 +76,10 @@ class Method {
 
 using ServiceDescriptors = std::vector<const google::protobuf::ServiceDescriptor*>;
 
-// The services of polyest.v1.
+// Returns the services of polyest.v1.
 ServiceDescriptors Services();
 
-// Whether the table has one entry for every method of the services, and no others.
+// Returns whether the table has one entry for every method of the services, and no others.
 bool CoversAllMethods(const ServiceDescriptors& services);
 
 }  // namespace polyest::internal

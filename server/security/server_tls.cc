@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr unsigned kPollInterval_s = 1;  // the least that gRPC takes
+constexpr unsigned kPollInterval_s = 1;  // the shortest interval that gRPC takes
 
 absl::Status Failed(const char* what) {
   return absl::InternalError(absl::StrCat(what, ": ", std::strerror(errno)));
@@ -46,7 +46,7 @@ absl::Status ServerTls::MemoryFile::Replace(const std::string& text) {
     descriptor_ = next;
     return status;
   }
-  // Who opens the path finds the old file or the new one, never a part.
+  // Whoever opens the path finds the old file or the new one, never a part.
   if (status.ok() && dup3(next, descriptor_, O_CLOEXEC) < 0) status = Failed("dup3");
   close(next);
   return status;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The daemon's side of TLS, with certificates that may be exchanged while it serves.
+// Provides the daemon's side of TLS, with certificates that may be exchanged while it serves.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/security/server_credentials.h>
@@ -12,24 +12,25 @@
 
 namespace polyest::internal {
 
-// gRPC reads the files anew every second and takes whatever it finds: with half a file, or a
-// certificate before its key, no client would get in. So it is given files in memory instead, into
-// which only what has been checked gets.
+// Gives gRPC its certificates in files in memory, into which only checked certificates get. gRPC
+// reads its files every second and takes whatever it finds: with half a file, or a certificate
+// before its key, no client would get in.
 class ServerTls {
  public:
-  // As ReadTlsMaterial.
+  // Reads the files; errors are those of ReadTlsMaterial.
   static absl::StatusOr<std::unique_ptr<ServerTls>> Open(TlsFiles files);
 
-  // With a client CA, only clients with a certificate of it get in.
+  // Returns the server's credentials. With a client CA, only clients with a certificate of it get
+  // in.
   std::shared_ptr<grpc::ServerCredentials> Credentials() const;
 
-  // Reads the files again, for the connections to come, within a second or two; keeps what it has
-  // if that fails. Connections that are open go on.
+  // Reads the files again; keeps what it has if that fails. New connections use them within a
+  // second or two; open connections go on.
   absl::Status Reload();
   const TlsFiles& files() const { return files_; }
 
  private:
-  // A file in memory that is replaced at once.
+  // Holds a file in memory that is replaced at once.
   class MemoryFile {
    public:
     MemoryFile() = default;

@@ -26,14 +26,14 @@ using Certificate = std::unique_ptr<X509, Freer<&X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Freer<&EVP_PKEY_free>>;
 using Context = std::unique_ptr<SSL_CTX, Freer<&SSL_CTX_free>>;
 
-// OpenSSL would ask the terminal for the passphrase.
+// Gives OpenSSL no passphrase, for which it would otherwise ask the terminal.
 int NoPassphrase(char*, int, int, void*) { return -1; }
 
 Bio Reader(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
-// OpenSSL's reason for the last failure; clears it.
+// Returns OpenSSL's reason for the last failure, and clears it.
 std::string Reason() {
   const char* const reason = ERR_reason_error_string(ERR_peek_last_error());
   ERR_clear_error();
@@ -70,7 +70,8 @@ absl::Status Refuse(const std::string& option, const std::string& file, absl::st
   return absl::InvalidArgumentError(absl::StrCat(option, ": ", file, " ", why));
 }
 
-// As gRPC will use them, which also finds keys that are too short for OpenSSL.
+// Checks the certificate and the key as gRPC will use them, which also finds keys that are too
+// short for OpenSSL.
 absl::Status CheckPair(X509* certificate, EVP_PKEY* key, const TlsFiles& files) {
   const Context context(SSL_CTX_new(TLS_server_method()));
   if (SSL_CTX_use_certificate(context.get(), certificate) != 1) {

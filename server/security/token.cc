@@ -21,7 +21,7 @@ absl::string_view Bytes(const TokenDigest& digest) {
 
 std::string MakeToken() {
   TokenDigest secret;
-  // Without randomness there is no token.
+  // Without random numbers there can be no token.
   POLYEST_CHECK(RAND_bytes(secret.data(), static_cast<int>(secret.size())) == 1);
   return absl::StrCat("polyest_", absl::BytesToHexString(Bytes(secret)));
 }

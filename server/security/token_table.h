@@ -1,8 +1,8 @@
 #pragma once
 
-// The file of tokens: one a line, as NAME TENANT ROLE SHA256, with spaces or tabs between. A '#'
-// starts a comment; empty lines count for nothing. Several tokens may have the same name, so that
-// an old one stays good until its successor is everywhere.
+// Reads the file of tokens: one a line, as NAME TENANT ROLE SHA256, with spaces or tabs between. A
+// '#' starts a comment; empty lines are ignored. Several tokens may have the same name, so that an
+// old one stays valid until its successor is everywhere.
 
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
@@ -20,14 +20,14 @@ class TokenTable {
  public:
   static constexpr size_t kMaxTokens = 10'000;
 
-  // INVALID_ARGUMENT names file, line and rule, and quotes nothing: what stands in a wrong place
-  // may be a secret. A file without a token is INVALID_ARGUMENT, too. NOT_FOUND when the file
-  // cannot be read.
+  // Reads the tokens from a file, or from its text. INVALID_ARGUMENT names file, line and rule, and
+  // quotes nothing, because what stands in a wrong place may be a secret. A file without a token is
+  // INVALID_ARGUMENT, too. NOT_FOUND when the file cannot be read.
   static absl::StatusOr<TokenTable> Read(const std::string& file);
   static absl::StatusOr<TokenTable> Parse(absl::string_view text, const std::string& file);
 
-  // None for a token that is not in the file. Looks at all of them, in the same time whichever it
-  // is.
+  // Returns the caller who has the token; nothing when the token is not in the file. Compares it
+  // with all tokens, so that the time does not depend on it.
   std::optional<Caller> Find(absl::string_view token) const;
   size_t size() const { return tokens_.size(); }
 
@@ -42,12 +42,12 @@ class TokenTable {
   std::vector<Token> tokens_;
 };
 
-// A new token and its line for the file, without an end of line. `words` is NAME:TENANT:ROLE;
-// INVALID_ARGUMENT for anything else.
+// Holds a new token and its line for the file, without an end of line.
 struct NewToken {
   std::string secret;
   std::string line;
 };
+// Makes a token for `words`, which are NAME:TENANT:ROLE; INVALID_ARGUMENT for anything else.
 absl::StatusOr<NewToken> MakeTokenFor(absl::string_view words);
 
 }  // namespace polyest::internal

@@ -26,16 +26,16 @@ using grpc::experimental::ServerRpcInfo;
 constexpr char kPrefix[] = "/polyest.v1.";
 
 std::string CodeName(const grpc::Status& status) {
-  // The codes of both are the same numbers.
+  // Both libraries number the codes alike.
   return absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code()));
 }
 
-// Without its service: no two services share a name.
+// Returns the name of the method without its service, because no two services share a name.
 std::string MethodName(absl::string_view path) {
   return std::string(path.substr(path.rfind('/') + 1));
 }
 
-// The session that a message names, if it does: of a request or a response.
+// Returns the session that a request or a response names; empty if it names none.
 std::string SessionNamed(const google::protobuf::Message& message) {
   for (const char* name : {"session", "name"}) {
     const auto* field = message.GetDescriptor()->FindFieldByName(name);
@@ -71,7 +71,8 @@ spdlog::level::level_enum LevelOf(grpc::StatusCode code, bool changes_sessions) 
   }
 }
 
-// What a refusal says of the daemon. What others say repeats the request.
+// Returns whether the reason of a refusal may be logged. Reasons with these codes speak of the
+// daemon; others repeat the request.
 bool MayTellReason(grpc::StatusCode code) {
   return code == grpc::StatusCode::RESOURCE_EXHAUSTED || code == grpc::StatusCode::UNAVAILABLE ||
          code == grpc::StatusCode::INTERNAL || code == grpc::StatusCode::DATA_LOSS ||
@@ -93,7 +94,7 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
       methods->GetSendInitialMetadata()->emplace(kRequestIdKey, id_);
     }
-    // Only where a response is the end of the call, for a stream writes while it reads.
+    // The response is read only where it ends the call, because a stream writes while it reads.
     if (one_response_ &&
         methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
       NoteSession(methods->GetSendMessage());
@@ -113,7 +114,8 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
     if (!IsRequestId(id_)) id_ = MakeRequestId();
   }
 
-  // Every message of the service is a protobuf message; none when the stream has ended.
+  // Notes the session that a message names. Every message of the services is a protobuf message; it
+  // is null when the stream has ended.
   void NoteSession(const void* message) {
     if (message == nullptr || !session_.empty()) return;
     session_ = SessionNamed(*static_cast<const google::protobuf::Message*>(message));
@@ -156,7 +158,7 @@ class CallInterceptors final : public grpc::experimental::ServerInterceptorFacto
   CallInterceptors(Metrics& metrics, CallerOf caller_of)
       : metrics_(metrics), caller_of_(std::move(caller_of)) {}
 
-  // None for calls of health and reflection, whose messages are of other kinds.
+  // Returns null for calls of health and reflection, whose messages are of other kinds.
   grpc::experimental::Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     if (!absl::StartsWith(call->method(), kPrefix)) return nullptr;
     return new CallInterceptor(*call, metrics_, caller_of_);

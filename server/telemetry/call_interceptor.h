@@ -1,7 +1,7 @@
 #pragma once
 
-// Every call of polyest's services passes here once, whatever its kind: it gets its request id, is
-// counted when it ends, and leaves a line in the log.
+// Observes every call of polyest's services once, whatever its kind: gives the call its request id,
+// counts it when it ends, and logs it.
 
 #include <grpcpp/server_builder.h>
 #include <grpcpp/server_context.h>
@@ -13,14 +13,15 @@
 
 namespace polyest::internal {
 
-// Who calls, for the log; empty for a caller who is not let in.
+// Names the caller in the log; empty for a caller who is not let in.
 struct LoggedCaller {
   std::string tenant{};
   std::string name{};  // of the token, or of the client's certificate
 };
 using CallerOf = std::function<LoggedCaller(const grpc::ServerContextBase&)>;
 
-// Before the server is built; `metrics` outlives the server.
+// Makes the server observe its calls. Must be called before the server is built; `metrics` must
+// outlive the server.
 void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, CallerOf caller_of);
 
 }  // namespace polyest::internal

@@ -14,10 +14,11 @@
 namespace polyest::internal {
 namespace {
 
-// What gRPC 1.51 begins the message with, and where in it the details for its developers begin.
+// gRPC 1.51 begins the message with the first of these, and its details for developers with the
+// second.
 constexpr char kHandshakeFailed[] = "Handshaking failed: ";
 constexpr char kDetails[] = " {";
-// Peers may try again as often as they like.
+// Shortest time between two warnings, because peers may try again as often as they like.
 constexpr std::chrono::seconds kBetweenWarnings{1};
 
 void WarnOfHandshake(const std::string& why) {
@@ -56,7 +57,7 @@ std::string FailedHandshake(absl::string_view message) {
 void StartGrpcLog() {
   gpr_set_log_function(OnMessage);
   verbose = std::getenv("GRPC_VERBOSITY") != nullptr;
-  // What it says of handshakes it says at this level only.
+  // gRPC reports handshakes at this level only.
   gpr_set_log_verbosity(GPR_LOG_SEVERITY_DEBUG);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// gRPC's own messages in the daemon's log.
+// Puts gRPC's own messages into the daemon's log.
 
 #include <absl/strings/string_view.h>
 

@@ -15,13 +15,13 @@ using prometheus::Family;
 using prometheus::Histogram;
 using prometheus::Registry;
 
-// 100 µs … 100 s.
+// Upper ends of the buckets of durations: 100 µs … 100 s.
 const Histogram::BucketBoundaries kSeconds = {1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3,
                                               0.01, 0.025,  0.05, 0.1,  0.25,   0.5,
                                               1,    2.5,    5,    10,   30,     100};
 const Histogram::BucketBoundaries kWrites = {1, 2, 4, 8, 16, 32, 64, 128, 256, 512};
 
-// Codes that say the daemon would not, not that the request was wrong.
+// These codes say that the daemon would not serve a call, not that the request was wrong.
 constexpr const char* kRefusals[] = {"PERMISSION_DENIED", "RESOURCE_EXHAUSTED", "UNAUTHENTICATED",
                                      "UNAVAILABLE"};
 
@@ -33,7 +33,7 @@ Family<Histogram>& MakeHistogram(Registry& registry, const char* name, const cha
   return prometheus::BuildHistogram().Name(name).Help(help).Register(registry);
 }
 
-// Prometheus' counters cannot go down, nor may they be asked to.
+// Increments a counter. Prometheus' counters cannot go down, nor may they be asked to.
 void Increment(Counter& counter, double by) { counter.Increment(std::max(0.0, by)); }
 
 }  // namespace
@@ -97,7 +97,8 @@ Metrics::Families::Families(Registry& registry)
       commit_failures(MakeCounter(registry, "polyest_journal_commit_failures_total",
                                   "Commits of the journal that failed.")
                           .Add({})) {
-  // A rate over a series that begins with its first refusal would miss that one.
+  // The series exist from the start, because a rate over a series that begins with its first
+  // refusal would miss that one.
   for (const char* code : kRefusals) refusals.Add({{"code", code}});
 }
 

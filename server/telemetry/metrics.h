@@ -1,7 +1,7 @@
 #pragma once
 
-// What is counted for Prometheus: one function for each kind of event. None of them waits; no label
-// grows with sessions, tenants or clients.
+// Counts events for Prometheus, with one function for each kind of event. None of them waits; no
+// label grows with sessions, tenants or clients.
 
 #include <cstdint>
 #include <memory>
@@ -14,7 +14,7 @@ class Registry;
 
 namespace polyest::internal {
 
-// From any thread.
+// Thread-safe.
 class Metrics {
  public:
   explicit Metrics(const std::string& version);
@@ -22,10 +22,11 @@ class Metrics {
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
 
+  // A call that has ended.
   struct Call {
-    std::string method;  // of the service's own: "GetEstimate"
+    std::string method;  // without its service: "GetEstimate"
     std::string code;    // "OK", "NOT_FOUND" …
-    bool unary = true;   // of streams the duration says nothing
+    bool unary = true;   // false: a stream, of which the duration says nothing
     double duration_s = 0;
   };
   void Count(const Call& call);
@@ -34,20 +35,22 @@ class Metrics {
   struct Batch {
     int64_t rows = 0;
     int64_t values = 0;            // of measured outputs
-    double measured_s = 0;         // by the rig's time
+    double measured_s = 0;         // seconds of measurements, by the rig's time
     double acknowledgement_s = 0;  // from its arrival at the session until it was kept
   };
   void Count(const Batch& batch);
 
+  // An estimate that was made for a session.
   struct NewEstimate {
     double duration_s = 0;
-    int64_t reexpansions = 0;  // since the one before
+    int64_t reexpansions = 0;  // re-expansions since the estimate before
   };
   void Count(const NewEstimate& estimate);
 
-  // Numerics of a session, of whatever kind.
+  // Counts the time of a session's numerics, of whatever kind.
   void CountComputing(double duration_s);
 
+  // A commit of the journal.
   struct Commit {
     int64_t writes = 0;
     bool failed = false;
@@ -55,7 +58,7 @@ class Metrics {
   };
   void Count(const Commit& commit);
 
-  // What is scraped.
+  // Returns what Prometheus scrapes.
   std::shared_ptr<prometheus::Collectable> collectable() const;
 
  private:

@@ -11,7 +11,7 @@ namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
                                                                         Collectables collectables) {
-  // The library tells of a port in use by an exception, and has no other word for it.
+  // The library reports a port in use by an exception only.
   try {
     auto exposer = std::make_unique<prometheus::Exposer>(address, /*num_threads=*/1);
     return std::unique_ptr<MetricsEndpoint>(

@@ -1,6 +1,6 @@
 #pragma once
 
-// The metrics over plain HTTP, for Prometheus to scrape at /metrics.
+// Serves the metrics over plain HTTP at /metrics, for Prometheus to scrape.
 
 #include <absl/status/statusor.h>
 
@@ -19,8 +19,8 @@ class MetricsEndpoint {
  public:
   using Collectables = std::vector<std::shared_ptr<prometheus::Collectable>>;
 
-  // `address` is HOST:PORT, HOST a numeric address; port 0 picks a free one. UNAVAILABLE when it
-  // cannot be listened on.
+  // Starts to serve. `address` is HOST:PORT with a numeric HOST; port 0 picks a free one.
+  // UNAVAILABLE when it cannot be listened on.
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& address,
                                                                 Collectables collectables);
   // Waits for scrapes under way.

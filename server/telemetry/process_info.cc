@@ -9,7 +9,8 @@ namespace polyest::internal {
 std::string Version() { return POLYEST_VERSION; }
 
 int64_t ResidentMemoryBytes() {
-  // Pages: of the address space, then resident.
+  // The file begins with two numbers of pages: those of the address space, and those that are
+  // resident.
   std::ifstream statm("/proc/self/statm");
   int64_t all = 0;
   int64_t resident = 0;

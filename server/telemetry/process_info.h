@@ -5,10 +5,10 @@
 
 namespace polyest::internal {
 
-// Of polyest.
+// Returns the version of polyest.
 std::string Version();
 
-// Of this process, resident; 0 where the operating system does not say.
+// Returns the resident memory of this process, bytes; 0 where the operating system does not say.
 int64_t ResidentMemoryBytes();
 
 }  // namespace polyest::internal

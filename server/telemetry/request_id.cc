@@ -19,7 +19,7 @@ bool IsRequestId(std::string_view text) {
 }
 
 std::string MakeRequestId() {
-  // The process by chance, its calls by number.
+  // A random number identifies the process, and a counter its calls.
   static const uint32_t process = std::random_device()();
   static std::atomic<uint64_t> calls = 0;
   return absl::StrFormat("%08x-%d", process, ++calls);

@@ -5,13 +5,13 @@
 
 namespace polyest::internal {
 
-// Of metadata, both ways.
+// Names the request id in the metadata of requests and responses.
 inline constexpr char kRequestIdKey[] = "x-request-id";
 
-// 1 to 64 of A-Z a-z 0-9 . _ -
+// Returns whether a text may be a request id: 1 to 64 of A-Z a-z 0-9 . _ -
 bool IsRequestId(std::string_view text);
 
-// One that no other call of any daemon is likely to have.
+// Returns an id that no other call of any daemon is likely to have.
 std::string MakeRequestId();
 
 }  // namespace polyest::internal

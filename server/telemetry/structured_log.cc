@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-// Those of the line that this thread is logging: spdlog's own messages have no room for them.
+// Fields of the line that this thread is logging. spdlog's own messages have no room for them.
 thread_local const LogFields* current_fields = nullptr;
 
 const LogFields& CurrentFields() {
@@ -27,7 +27,7 @@ void Append(const std::string& text, spdlog::memory_buf_t& line) {
   line.append(text.data(), text.data() + text.size());
 }
 
-// A piece of spdlog's pattern.
+// Formats a piece of spdlog's pattern.
 template <std::string (*Text)(const spdlog::details::log_msg&)>
 class Piece final : public spdlog::custom_flag_formatter {
  public:
@@ -54,13 +54,13 @@ bool IsPlainWord(const std::string& text) {
   });
 }
 
-// What a client wrote may be long.
+// Returns the beginning of a text, because what a client wrote may be long.
 std::string Shortened(const std::string& text) {
   constexpr size_t kLongest = 200;
   return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
 }
 
-// Bytes that do not continue what is begun, or begin nothing, become '?'.
+// Replaces by '?' the bytes that do not continue a character of UTF-8, or begin none.
 std::string ValidUtf8(std::string text) {
   size_t i = 0;
   while (i < text.size()) {

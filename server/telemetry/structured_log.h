@@ -1,7 +1,7 @@
 #pragma once
 
-// Lines on stderr, as text or as JSON, that carry fields beside their message. Never a token, a
-// measurement, or a message of the kind that repeats what a client has sent.
+// Writes log lines to stderr, as text or as JSON, that carry fields beside their message. They
+// never contain a token, a measurement, or a message that repeats what a client has sent.
 
 #include <spdlog/common.h>
 
@@ -19,14 +19,14 @@ void StartLog(LogFormat format, spdlog::level::level_enum level);
 using LogFields = std::vector<std::pair<std::string, std::string>>;
 
 bool IsLogged(spdlog::level::level_enum level);
-// Fields without a value are left out.
+// Logs a message with its fields; leaves out fields without a value.
 void Log(spdlog::level::level_enum level, const std::string& message, const LogFields& fields);
 
-// The pieces of which lines are made. As text: ` name=value`, quoted where it is not one plain
-// word. As JSON: `,"name":"value"`.
+// Return the fields as they stand in a line. As text: ` name=value`, quoted where it is not one
+// plain word. As JSON: `,"name":"value"`.
 std::string FieldsAsText(const LogFields& fields);
 std::string FieldsAsJson(const LogFields& fields);
-// With its quotes; bytes that are no UTF-8 are replaced.
+// Returns the text as a JSON string, with its quotes; bytes that are not UTF-8 are replaced.
 std::string JsonString(const std::string& text);
 
 }  // namespace polyest::internal
