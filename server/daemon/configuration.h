@@ -13,8 +13,8 @@ namespace polyest::internal {
 std::string EnvironmentVariable(const std::string& option);
 
 // Gives each option its variable, and adds --config, whose own variable is POLYESTD_CONFIG. Must be
-// called when the app has all its options. In a file, options stand without their dashes: `data-dir
-// = "/srv/polyest"`. Options named in `flags_only` are flags and nothing else.
+// called when the app has all its options. A line of a file names an option without its dashes,
+// such as `data-dir = "/srv/polyest"`. Options named in `flags_only` are flags and nothing else.
 void AddConfiguration(CLI::App& app, const std::vector<std::string>& flags_only);
 
 // Returns what is wrong with the environment, in one line; empty: nothing. Every variable

@@ -27,9 +27,9 @@ namespace {
 constexpr int kShortestPingIntervalMs = 10'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
-// Most streams of one connection.
+// Largest number of streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
-// Most tasks of an executor that may wait or run.
+// Largest number of tasks of an executor that wait or run.
 constexpr int kWaitingTasks = 20'000;
 // Number of the executor's lanes that may be busy with long tasks before another lane has to wait.
 // A tenant has two lanes: one for the streams of its sessions and one for all other calls.
@@ -39,8 +39,8 @@ constexpr int kBusyLanes = 8;
 constexpr int kNiceness = 5;
 // Number of threads that take batches. They wait for nothing but, now and then, the journal.
 constexpr int kIntakeThreads = 4;
-// Time between two looks at the files of tokens and certificates. A change is noticed after this
-// time and has settled after twice of it.
+// Time between two looks at the files of tokens and certificates. A change is acted on when a
+// second look finds that it has settled.
 constexpr std::chrono::seconds kWatchInterval{1};
 // Stands in the place of the port of an address that is not listened on.
 constexpr int kNotListening = -1;

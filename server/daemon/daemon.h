@@ -95,8 +95,8 @@ class Daemon {
   OpenCalls calls_;
   Metrics metrics_;
   Readiness readiness_;
-  // The following are in the order in which they need each other: the executors finish their tasks,
-  // which use the journal, before the journal goes.
+  // The following members are declared in the order in which they need each other: the executors
+  // finish their tasks, which use the journal, before the journal is destroyed.
   std::unique_ptr<SessionJournal> journal_;
   Executor executor_;
   Executor intake_;

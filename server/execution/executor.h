@@ -22,8 +22,8 @@ using Task = std::function<void()>;
 struct ExecutorOptions {
   int threads_per_lane = 1;   // ≥ 1
   int threads = 1;            // of all lanes together, ≥ threads_per_lane
-  int capacity = 1;           // most tasks that wait or run, those of strands included, ≥ 1
-  int capacity_per_lane = 1;  // most of these in one lane, ≥ 1
+  int capacity = 1;           // largest number of tasks that wait or run, on strands or not, ≥ 1
+  int capacity_per_lane = 1;  // largest number of these in one lane, ≥ 1
   int niceness = 0;           // nice value added to the threads, ≥ 0
 };
 

@@ -8,8 +8,8 @@
 namespace polyest::internal {
 namespace {
 
-// Most writes of one commit. This bounds what has to be written again when the commit fails, and
-// how long others wait for it.
+// Largest number of writes in one commit. It bounds what has to be written again when the commit
+// fails, and how long others wait for it.
 constexpr size_t kMaxWrites = 512;
 
 bool ConcernsOnlyItself(const absl::Status& status) {

@@ -17,9 +17,10 @@ struct sqlite3_stmt;
 
 namespace polyest::internal {
 
-// Returns the status of an SQLite code: RESOURCE_EXHAUSTED when the disk or the memory is full,
-// DATA_LOSS when the file is damaged, ALREADY_EXISTS when a constraint fails, UNAVAILABLE when the
-// disk or a lock fails, INTERNAL otherwise. `doing` says in the message what was tried.
+// Returns the status of an SQLite code: RESOURCE_EXHAUSTED when the disk or the memory is full or a
+// value is too large, DATA_LOSS when the file is damaged, ALREADY_EXISTS when a constraint fails,
+// UNAVAILABLE when the disk or a lock fails, INTERNAL otherwise. `doing` says in the message what
+// was tried.
 absl::Status FromSqlite(int code, std::string_view doing);
 
 // Owns one connection, for use by one thread at a time.
@@ -72,6 +73,7 @@ class SqliteQuery {
   // Runs a statement without results.
   absl::Status Run() { return Step().status(); }
 
+  // Return a column of the present row.
   int64_t Integer(int column) const;
   double Real(int column) const;
   std::string Bytes(int column) const;

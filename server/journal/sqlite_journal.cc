@@ -16,7 +16,7 @@ namespace {
 // Number of pages in the write-ahead log from which on they are copied into the file.
 constexpr int kCheckpointPages = 4'000;
 constexpr int64_t kPageBytes = 4'096;
-// Most batches of a deleted session that one commit removes.
+// Largest number of batches of a deleted session that one commit removes.
 constexpr int64_t kRemovedBatches = 256;
 
 absl::Status NotThere() { return absl::NotFoundError("the journal has no such session"); }

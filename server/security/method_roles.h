@@ -11,12 +11,12 @@
 
 namespace polyest::internal {
 
-// Is an entry of the table of the services' methods, whose names no two services share. A method
-// that is not in the table cannot be served: naming it does not compile, and the daemon does not
-// start while one is missing.
+// Is an entry of the one table of the services' methods, whose names no two services share. A
+// method that is not in the table cannot be served: naming it does not compile, and the daemon does
+// not start while one is missing.
 //
 // The methods of operations need no higher role than the computations that operations are. Whoever
-// may start operations may end them, and could otherwise not make room for others.
+// may start operations may also end them, because they could otherwise not make room for new ones.
 struct MethodRole {
   std::string_view method;
   Role needed;

@@ -30,7 +30,7 @@ class ServerTls {
   const TlsFiles& files() const { return files_; }
 
  private:
-  // Holds a file in memory that is replaced at once.
+  // Holds a file in memory whose content is replaced all at once.
   class MemoryFile {
    public:
     MemoryFile() = default;

@@ -10,7 +10,7 @@ void CatchUp(const std::shared_ptr<Session>& session, const std::stop_token& sto
     POLYEST_RETURN_IF_ERROR(session->Process(Stop(stop)));
     return session->observed() ? session->LatestEstimate(Stop(stop)).status() : absl::OkStatus();
   };
-  // What was refused or has failed is computed for whoever asks next.
+  // If the task is refused or fails, the work is left to whoever asks next.
   session->strand().Submit([compute] { Guarded(compute).IgnoreError(); }).IgnoreError();
 }
 

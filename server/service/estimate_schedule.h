@@ -19,7 +19,7 @@ class EstimateSchedule {
   using Clock = std::chrono::steady_clock;
   using Policy = v1::StreamMeasurementsRequest::EstimatePolicy;
 
-  // Sets the client's wishes; INVALID_ARGUMENT for a number out of range.
+  // Sets the policy that the client asks for; INVALID_ARGUMENT for a number out of range.
   absl::Status Set(const Policy& policy) {
     if (policy.batch_count() < 0) {
       return InvalidField("estimates.batchCount",

@@ -44,7 +44,8 @@ void ImportFlow::Take() {
   const absl::Status taken =
       Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
   const bool over = !taken.ok() || half_closed_;
-  // The import must go before the call ends, because the daemon may then go at any moment.
+  // The import is destroyed before the call ends, because the daemon may be destroyed at any moment
+  // after that.
   if (over) import_ = nullptr;
   const std::lock_guard lock(mutex_);
   working_ = false;
@@ -56,8 +57,8 @@ absl::Status ImportFlow::TakeRequest() { return import_->Take(request_); }
 
 absl::Status ImportFlow::FinishImport() {
   {
-    // The end of the stream does not mean that all records have come if the client went away or the
-    // daemon shuts down.
+    // If the client went away or the daemon shuts down, the end of the stream does not mean that
+    // all records have come.
     const std::lock_guard lock(mutex_);
     if (end_) return *end_;
   }

@@ -60,10 +60,11 @@ class MeasurementFlow final : public SessionObserver,
   static constexpr size_t kLongestWriter = 64;
   static constexpr size_t kInbox = 8;
   static constexpr size_t kOutbox = 64;
-  // Most batches that are acknowledged before they are computed. They bridge the pauses in which an
-  // expansion moves, at the pace of a rig.
+  // Largest number of batches that are acknowledged before they are computed. It is enough for the
+  // pauses in which an expansion moves, at the pace of a rig.
   static constexpr size_t kMaxUncomputed = 256;
-  // Most batches computed in one turn on the strand, because other sessions wait for theirs.
+  // Largest number of batches computed in one turn on the strand, because other sessions wait for
+  // theirs.
   static constexpr size_t kTurn = 8;
 
   // A batch that was taken and is still to be computed.

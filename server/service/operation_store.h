@@ -22,8 +22,8 @@
 namespace polyest::internal {
 
 struct OperationLimits {
-  size_t per_tenant = 64;                // most operations, done or under way
-  std::chrono::seconds kept_for{3'600};  // after their end
+  size_t per_tenant = 64;                // largest number of operations, done or under way
+  std::chrono::seconds kept_for{3'600};  // time that they are kept after their end
   std::chrono::seconds max_computing;    // longest computing time of one
 };
 

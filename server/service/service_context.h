@@ -21,7 +21,7 @@ struct ServiceContext {
   SessionRegistry& sessions;
   OpenCalls& calls;
   const AccessControl& access;
-  // Is stopped when the time of the drain is over, to end work that no call waits for.
+  // Signals a stop when the time of the drain is over, to end work that no call waits for.
   std::stop_token stop;
   const ModelLibrary& models;
   // Longest computing time of one unary call, or of one batch of a stream.

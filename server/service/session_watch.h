@@ -57,7 +57,7 @@ class WatchFlow final : public SessionObserver,
   WatchReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;
   SharedEstimate pending_, last_;
-  v1::WatchSessionResponse written_;  // belongs to gRPC while writing_
+  v1::WatchSessionResponse written_;  // belongs to gRPC while writing_ is set
   bool writing_ = false;
   bool registering_ = false;
   bool finished_ = false;

@@ -23,8 +23,8 @@ namespace polyest::internal {
 class UnaryCall final : public grpc::ServerUnaryReactor {
  public:
   using Finisher = std::function<void(const absl::Status&)>;
-  // Does the work. An error that it returns finishes the call; after OK the finisher does, which
-  // the work calls before it returns or later, from any thread.
+  // Does the work. If it returns an error, the call is finished with that. Otherwise the work calls
+  // the finisher, before it returns or later, from any thread.
   using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
 

@@ -14,7 +14,7 @@ namespace {
 // Number of looks within the time after which a session is idle.
 constexpr int kLooks = 4;
 constexpr std::chrono::milliseconds kShortestPause{10};
-// A look that finds the memory full unloads one in so many of the idle sessions in memory.
+// A look that finds the memory full unloads one in this many of the idle sessions in memory.
 constexpr size_t kLeaving = 4;
 
 // Unloads a session on its strand. A busy daemon refuses the task; the next look then tries again.

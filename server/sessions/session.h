@@ -59,7 +59,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Strand& strand() { return *strand_; }
 
   // The following, down to Add, may be called from any thread.
-  //
+
   // Returns all fields but the problem.
   v1::Session Describe() const;
   // Read the problem and the batches from the journal, as SessionJournal does. They wait for the
@@ -115,10 +115,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // The following, down to Observe, may be called on the strand only. They bring the estimator back
   // into memory if they need it and it is not there.
-  //
-  // Loads the estimator, which stays in memory at least as long as there is a writer.
 
-  // As it stays at least as long as there is a writer.
+  // Loads the estimator, which stays in memory at least as long as there is a writer.
   absl::Status Load(const Stop& stop) { return Loaded(stop).status(); }
   // Process everything added, or everything added up to batch `sequence`.
   absl::Status Process(const Stop& stop);

@@ -14,15 +14,15 @@ class SessionActivity {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Notes that the estimator came into memory with the batches up to `sequence`, which span so many
-  // seconds of measurements, or that it left memory.
+  // Notes that the estimator came into memory with the batches up to `sequence`, which span
+  // `measured_s` seconds of measurements, or that it left memory.
   void OnLoaded(int64_t sequence, double measured_s);
   void OnUnloaded();
   // Notes a computation of this duration, after which the estimator has processed the batches and
   // the seconds of measurements given.
   void OnComputed(Clock::duration spent, int64_t sequence, double measured_s);
-  // Notes an estimate after so many re-expansions of the session in all. Returns how many of them
-  // are new since the estimate before.
+  // Notes an estimate after `reexpansions` re-expansions of the session in all. Returns how many of
+  // them are new since the estimate before.
   int64_t OnEstimate(int64_t reexpansions);
   // Notes that a user of the session has left, so that its idle time starts again.
   void OnUsed();

@@ -18,6 +18,7 @@ void StartLog(LogFormat format, spdlog::level::level_enum level);
 
 using LogFields = std::vector<std::pair<std::string, std::string>>;
 
+// Returns whether messages of this level are logged.
 bool IsLogged(spdlog::level::level_enum level);
 // Logs a message with its fields; leaves out fields without a value.
 void Log(spdlog::level::level_enum level, const std::string& message, const LogFields& fields);
