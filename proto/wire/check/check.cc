@@ -52,7 +52,10 @@ absl::Status CheckResolved(const v1::CheckProblemRequest& request, const ModelLi
   POLYEST_ASSIGN_OR_RETURN(const Remarks remarks, SummarizeProblem(request.problem(), problem));
   response.mutable_summary()->Add(remarks.begin(), remarks.end());
   if (request.problem().measured().empty()) {
-    AddWarning("nothing is measured: the problem can be propagated, but not estimated", response);
+    AddWarning(
+        "the problem has no measured outputs: it can be propagated, but its parameters cannot be "
+        "estimated",
+        response);
   }
   if (!request.has_measurements()) return absl::OkStatus();
   return CheckMeasurements(problem, request.measurements(), limits, response);

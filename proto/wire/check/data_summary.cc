@@ -131,7 +131,7 @@ class Summarizer {
       }
     }
     if (measured_ < static_cast<size_t>(problem_.dimension())) {
-      Warn("there are %d samples for %d unknowns: what they leave open, the prior decides",
+      Warn("there are only %d samples for %d unknowns: the prior determines what they leave open",
            measured_, problem_.dimension());
     }
     return std::move(summary_);

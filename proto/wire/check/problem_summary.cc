@@ -43,7 +43,7 @@ std::string DescribeInput(const v1::Problem& problem, const Quantity& input) {
   for (const v1::Input& given : problem.inputs()) {
     if (given.name() == input.name) return DescribeSignal(given, input.unit);
   }
-  return "not given: 0";
+  return "not given; taken as 0";
 }
 
 void Add(const char* topic, const std::string& name, const std::string& description,

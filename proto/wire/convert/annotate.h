@@ -12,7 +12,7 @@ namespace polyest::internal {
 // Returns the error for an enumeration field with a number that is none of its values. proto3
 // accepts any number there.
 inline absl::Status UnknownEnumerator(const FieldPath& field, int value) {
-  return InvalidField(field, absl::StrCat(value, " is not one of its values"));
+  return InvalidField(field, absl::StrCat(value, " is not a valid value"));
 }
 
 }  // namespace polyest::internal

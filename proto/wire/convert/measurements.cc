@@ -21,7 +21,7 @@ absl::Status CheckTime(const v1::Measurements& measurements) {
   }
   if (measurements.run_size() != 0 && measurements.run_size() != measurements.time_s_size()) {
     return InvalidField("measurements.run",
-                        absl::StrFormat("%d entries for %d rows; must be one a row, or none",
+                        absl::StrFormat("%d entries for %d rows; must be one per row, or none",
                                         measurements.run_size(), measurements.time_s_size()));
   }
   return absl::OkStatus();
@@ -51,7 +51,7 @@ absl::StatusOr<SampleColumn> ToColumn(const v1::Measurements::Channel& channel, 
   if (channel.name().empty()) return InvalidField(path + ".name", "must not be empty");
   if (channel.values_size() != rows) {
     return InvalidField(path + ".values",
-                        absl::StrFormat("%d values of %s for %d rows; must be one a row",
+                        absl::StrFormat("%d values of %s for %d rows; must be one per row",
                                         channel.values_size(), channel.name(), rows));
   }
   SampleColumn column;

@@ -123,7 +123,7 @@ absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& paramet
   }
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s needs a prior: uniform, normal, beta, gamma, lognormal or truncatedNormal",
-      name.empty() ? "it" : name));
+      name.empty() ? "the parameter" : name));
 }
 
 std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals& refusals) {
@@ -218,7 +218,7 @@ absl::StatusOr<InputSpecification> ToSignal(const v1::Input& input) {
   }
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s needs a signal: constant, step, sinusoid, chirp, halfSineBump, table or streamed",
-      input.name().empty() ? "it" : input.name()));
+      input.name().empty() ? "the input" : input.name()));
 }
 
 std::vector<NamedInput> ToInputs(const v1::Problem& problem, Refusals& refusals) {

@@ -61,7 +61,7 @@ std::string SuggestName(absl::string_view word, const std::vector<std::string>& 
   if (known.empty()) return "";
   const std::string nearest = NearestName(word, known);
   if (!nearest.empty()) return absl::StrCat("did you mean \"", nearest, "\"?");
-  return absl::StrCat("there are ", absl::StrJoin(known, ", "));
+  return absl::StrCat("known names: ", absl::StrJoin(known, ", "));
 }
 
 }  // namespace polyest::internal

@@ -16,7 +16,7 @@ namespace polyest::internal {
 std::string NearestName(absl::string_view word, const std::vector<std::string>& known);
 
 // Returns a hint for a message about the unknown name `word`: `did you mean "uniform"?`, or, when
-// no name is near, `there are lower, upper`. Returns an empty string when `known` is empty.
+// no name is near, `known names: lower, upper`. Returns an empty string when `known` is empty.
 std::string SuggestName(absl::string_view word, const std::vector<std::string>& known);
 
 }  // namespace polyest::internal

@@ -53,14 +53,14 @@ TEST(ToSamples, RefusesRunsOfAnotherLength) {
   v1::Measurements measurements = ThreeRows();
   measurements.add_run(1);
   EXPECT_EQ(MessageOf(measurements),
-            "measurements.run: 4 entries for 3 rows; must be one a row, or none");
+            "measurements.run: 4 entries for 3 rows; must be one per row, or none");
 }
 
 TEST(ToSamples, RefusesColumnsOfAnotherLength) {
   v1::Measurements measurements = ThreeRows();
   measurements.mutable_channels(0)->add_values(9);
   EXPECT_EQ(MessageOf(measurements),
-            "measurements.channels[0].values: 4 values of x for 3 rows; must be one a row");
+            "measurements.channels[0].values: 4 values of x for 3 rows; must be one per row");
 }
 
 TEST(ToSamples, RefusesAValueThatIsNotFiniteAndNotMissing) {

@@ -278,13 +278,13 @@ TEST(ToProblem, KnowsEveryRuleOfRegularization) {
 TEST(ToProblem, RefusesNumbersThatAreNoEnumerators) {
   v1::Problem problem = SmallProblem();
   problem.mutable_expansion()->set_points(static_cast<v1::ExpansionOptions::Points>(17));
-  EXPECT_EQ(MessageOf(problem), "expansion.points: 17 is not one of its values");
+  EXPECT_EQ(MessageOf(problem), "expansion.points: 17 is not a valid value");
   problem = SmallProblem();
   problem.mutable_integration()->set_method(static_cast<v1::IntegrationOptions::Method>(9));
-  EXPECT_EQ(MessageOf(problem), "integration.method: 9 is not one of its values");
+  EXPECT_EQ(MessageOf(problem), "integration.method: 9 is not a valid value");
   problem = SmallProblem();
   problem.set_regularization_mode(static_cast<v1::Problem::RegularizationMode>(5));
-  EXPECT_EQ(MessageOf(problem), "regularizationMode: 5 is not one of its values");
+  EXPECT_EQ(MessageOf(problem), "regularizationMode: 5 is not a valid value");
 }
 
 TEST(ToProblem, RefusesAnExpansionThatIsTooLarge) {

@@ -1,4 +1,4 @@
-#include "client/cpp/nearest_name.h"
+#include "proto/wire/transport/nearest_name.h"
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ TEST(NearestName, FindsNothingForAnotherWord) {
 
 TEST(SuggestName, ListsWhatThereIsWhenNothingIsNear) {
   EXPECT_EQ(SuggestName("uper", {"lower", "upper"}), "did you mean \"upper\"?");
-  EXPECT_EQ(SuggestName("from", {"lower", "upper"}), "there are lower, upper");
+  EXPECT_EQ(SuggestName("from", {"lower", "upper"}), "known names: lower, upper");
   EXPECT_EQ(SuggestName("from", {}), "");
 }
 
