@@ -2,6 +2,7 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
 #include <unistd.h>
 
@@ -14,7 +15,7 @@
 
 #include "client/cli/command_registry.h"
 #include "client/cli/exit_status.h"
-#include "client/cpp/nearest_name.h"
+#include "proto/wire/transport/nearest_name.h"
 
 namespace polyest::internal {
 namespace {
@@ -70,7 +71,11 @@ std::optional<std::string> UnknownCommand(const CLI::App& app, int argc, const c
   if (argc < 2 || absl::StartsWith(argv[1], "-")) return std::nullopt;
   const std::vector<std::string> names = CommandNames(app);
   if (std::find(names.begin(), names.end(), argv[1]) != names.end()) return std::nullopt;
-  return absl::StrCat("there is no command \"", argv[1], "\"; ", SuggestName(argv[1], names));
+  const std::string nearest = NearestName(argv[1], names);
+  const std::string hint =
+      nearest.empty() ? absl::StrCat("the commands are ", absl::StrJoin(names, ", "), "; see")
+                      : absl::StrCat("did you mean \"", nearest, "\"? See");
+  return absl::StrCat("there is no command \"", argv[1], "\"; ", hint, " polyest --help");
 }
 
 // Returns an error message if a word that looks like an option is not an option of the command.
@@ -128,7 +133,8 @@ std::variant<CommandLine, int> ParseArguments(int argc, const char* const* argv,
       std::make_shared<HelpFormatter>(ScreenOf(STDOUT_FILENO, ColorChoice::kNever).columns));
   app.footer(
       "polyest COMMAND --help describes a command and has examples.\n"
-      "Exit status: 0 success, 2 bad usage or input, 3 server unreachable or refused, 1 else.");
+      "Exit status: 0 success, 1 other error, 2 invalid usage or input, 3 server unreachable or\n"
+      "request refused.");
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   CommandRegistry registry(app, std::clamp(cores, 1, kMaxThreads));
   AddEstimationCommands(registry);
@@ -137,7 +143,7 @@ std::variant<CommandLine, int> ParseArguments(int argc, const char* const* argv,
   AddDaemonCommands(registry);
   AddOtherCommands(registry);
   if (const auto unknown = UnknownCommand(app, argc, argv)) {
-    err << "polyest: " << *unknown << " See polyest --help" << std::endl;
+    err << "polyest: " << *unknown << std::endl;
     return static_cast<int>(kExitBadInput);
   }
   try {

@@ -103,7 +103,7 @@ class RemoteBackend : public Backend {
     if (absl::IsResourceExhausted(response.status()) && !RefusalOf(response.status())) {
       return absl::ResourceExhaustedError(
           absl::StrCat(response.status().message(),
-                       " (--max-message-mb; data too long for one message can be streamed)"));
+                       "; raise the daemon's --max-message-mb, or use polyest stream"));
     }
     return response;
   }

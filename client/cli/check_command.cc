@@ -117,7 +117,8 @@ Findings Check(const CheckArguments& arguments, std::ostream& out) {
   }
   if (problem->measured().empty()) {
     findings.warnings.emplace_back(
-        "nothing is measured: the problem can be propagated, but not estimated");
+        "the problem has no measured outputs: it can be propagated, but its parameters cannot be "
+        "estimated");
   }
   if (data) {
     const absl::Status checked = CheckRecord(*resolved, *data, findings, summary);

@@ -82,7 +82,7 @@ std::vector<std::string> Header(const Design& design, std::vector<std::string> f
 
 void PrintCandidates(const Design& design, std::ostream& out) {
   TextTable table(Header(design, {"inputs"}));
-  std::vector<std::string> now = {"(known beforehand)", "0"};
+  std::vector<std::string> now = {"(before the experiment)", "0"};
   for (const auto& p : design.parameters()) now.push_back(FormatNumber(p.std_dev(), 2));
   table.AddRow(std::move(now));
   for (const auto& candidate : design.candidates()) {
@@ -136,7 +136,7 @@ void PrintTables(const Design& design, std::ostream& out) {
       << ", alone, and together with all that is measured:\n\n";
   PrintOutputs(design, best, out);
   out << "\nThe best times for samples of " << Planned(best) << of_best
-      << ", each beside those above it:\n\n";
+      << ", each in addition to those above it:\n\n";
   PrintSamples(design, best, out);
   out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", best.expansion().order(),
                          best.expansion().term_count(), best.expansion().point_count());

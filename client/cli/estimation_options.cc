@@ -26,7 +26,8 @@ void AddExplain(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ExplainArguments>();
   CLI::App& command = registry.Add(
       {.name = "explain",
-       .summary = "Say in words what the data tell, what they do not, and what would help",
+       .summary =
+           "Explain which parameters the data identify, which they do not, and what would help",
        .examples = {"explain problem.json data.csv", "explain --session rig-1 --server rig:50051"}},
       arguments);
   AddStudyInput(command, *arguments);
@@ -65,8 +66,9 @@ void AddProfile(CommandRegistry& registry) {
        .summary = "The cost over each parameter, minimized over all the others",
        .examples = {"profile problem.json data.csv --parameter k",
                     "profile --session rig-1 --server rig:50051 --format csv"},
-       .notes = "On the expansion, over four posterior standard deviations to each side of the\n"
-                "minimum as far as the prior and the region go in which the expansion is trusted."},
+       .notes = "Computed on the expansion, up to four posterior standard deviations to each side\n"
+                "of the minimum, within the prior and the region in which the expansion is\n"
+                "accurate."},
       arguments);
   AddStudyInput(command, *arguments);
   command
@@ -94,7 +96,8 @@ void AddCost(CommandRegistry& registry) {
       ->expected(1)
       ->take_all();
   command
-      .add_option("--grid", arguments->grid_points, "Points an axis; 0: 201 for one, 41 for two")
+      .add_option("--grid", arguments->grid_points,
+                  "Points per axis (default: 201 for one parameter, 41 for two)")
       ->check(CLI::Range(0, 1001));
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"json", "csv"});
@@ -107,9 +110,10 @@ void AddRegularization(CommandRegistry& registry) {
        .summary = "The estimate over the weight α² of the prior, and which α² to choose",
        .examples = {"regularization problem.json data.csv --plot sweep.svg",
                     "regularization --session rig-1 --server rig:50051"},
-       .notes = "On the expansion where the posterior of α² = 1 is: an α² that pulls the estimate\n"
-                "out of the region in which it is trusted is left out. The rules choose from\n"
-                "1e-4 … 1e4."},
+       .notes =
+           "Computed on the expansion around the posterior for α² = 1. Values of α² that move\n"
+           "the estimate out of the region in which the expansion is accurate are left out.\n"
+           "The rules choose α² from 1e-4 … 1e4."},
       arguments);
   AddStudyInput(command, *arguments);
   command.add_option("--lowest", arguments->lowest, "The least α² (default 1e-4)")

@@ -38,13 +38,13 @@ std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
       return absl::StrFormat("%s is %s: %s, %.*f times narrower than your prior.", p.name(),
                              verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
     case v1::Identifiability::WEAK:
-      return absl::StrFormat("%s is %s: %s; the data say little more than your prior, %s%s.",
-                             p.name(), verdict, value,
-                             FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+      return absl::StrFormat("%s is %s: %s; the data add little to your prior, %s%s.", p.name(),
+                             verdict, value, FormatUncertain(p.prior_mean(), p.prior_std_dev()),
+                             unit);
     default:
       return absl::StrFormat(
-          "%s is %s: the data say less than your prior, %s%s, which is what stands.", p.name(),
-          verdict, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+          "%s is %s: the data add almost nothing; the estimate is essentially your prior, %s%s.",
+          p.name(), verdict, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
   }
 }
 
@@ -104,13 +104,13 @@ std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) 
   const auto consider = [&](double sd, const std::string& what) {
     if (sd >= least) return;
     least = sd;
-    best = absl::StrFormat("%s would know %s to ±%s", what, p.name(), FormatNumber(sd, 2));
+    best = absl::StrFormat("%s would determine %s to ±%s", what, p.name(), FormatNumber(sd, 2));
   };
   for (const Design::Candidate& candidate : design.candidates()) {
     if (!candidate.name().empty()) continue;
     if (helps(candidate.gain().std_dev(i))) {
-      return absl::StrCat("The experiment should tell ", p.name(),
-                          " by the prior; look at the noise and at the model.");
+      return absl::StrCat("According to the prior, this experiment should identify ", p.name(),
+                          "; check the noise and the model.");
     }
     for (const Design::Output& output : candidate.outputs()) {
       if (output.measured()) continue;
@@ -127,7 +127,7 @@ std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) 
   }
   if (!best.empty()) return best + ".";
   return absl::StrCat(
-      "No other output of the model would tell ", p.name(), " from this experiment",
+      "No other output of the model would identify ", p.name(), " in this experiment",
       design.candidates_size() > 1 ? ", nor would any of its inputs alone" : "",
       ". Try another excitation: an input that is 0 now, other frequencies; or fix ", p.name(),
       ", or tie it to others by \"derived\".");

@@ -30,7 +30,7 @@ absl::Status WriteFile(const InitArguments& arguments, const std::string& text) 
   std::error_code error;
   if (!arguments.force && std::filesystem::exists(path, error)) {
     return absl::AlreadyExistsError(
-        absl::StrCat(path, ": is there already; --force overwrites it"));
+        absl::StrCat(path, ": already exists; use --force to overwrite it"));
   }
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   out << text;

@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
     const int status = Run(line.command);
     std::cout.flush();
     if (status == polyest::internal::kExitOk && !std::cout) {
-      std::cerr << "polyest: the answer could not be written to the standard output" << std::endl;
+      std::cerr << "polyest: the output could not be written" << std::endl;
       return polyest::internal::kExitFailure;
     }
     return status;

@@ -11,7 +11,7 @@ namespace {
 void AddModels(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ModelsArguments>();
   CLI::App& command = registry.Add({.name = "models",
-                                    .summary = "List the models there are, or describe one",
+                                    .summary = "List the available models or describe one",
                                     .examples = {"models", "models quarter_car"}},
                                    arguments);
   command.add_option("name", arguments->name, "A model's name");
@@ -23,7 +23,7 @@ void AddInit(CommandRegistry& registry) {
   const auto arguments = std::make_shared<InitArguments>();
   CLI::App& command = registry.Add(
       {.name = "init",
-       .summary = "Write a problem file to start from; list the models",
+       .summary = "Write an example problem file for a model; without a model, list the models",
        .examples = {"init quarter_car -o problem.json", "init --equations -o problem.json"}},
       arguments);
   CLI::Option* const model = command.add_option("model", arguments->model, "A model's name");
@@ -36,12 +36,11 @@ void AddInit(CommandRegistry& registry) {
 
 void AddCheck(CommandRegistry& registry) {
   const auto arguments = std::make_shared<CheckArguments>();
-  CLI::App& command = registry.Add(
-      {.name = "check",
-       .summary =
-           "Say all that is wrong with a problem, and with data for it, before anything runs",
-       .examples = {"check problem.json", "check problem.json data.csv"}},
-      arguments);
+  CLI::App& command =
+      registry.Add({.name = "check",
+                    .summary = "Check a problem, and data for it, and list all errors",
+                    .examples = {"check problem.json", "check problem.json data.csv"}},
+                   arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "The measurements, a CSV file");
   AddFmuFolder(command, arguments->place);
@@ -58,7 +57,7 @@ void AddPropagate(CommandRegistry& registry) {
       arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("--until", arguments->until_s, "The last time, s")->required();
-  command.add_option("--step", arguments->step_s, "From one time to the next, s")->required();
+  command.add_option("--step", arguments->step_s, "Time step, s")->required();
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
@@ -72,8 +71,7 @@ void AddSensitivity(CommandRegistry& registry) {
                    arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("--until", arguments->until_s, "The last time, s")->required();
-  command.add_option("--step", arguments->step_s,
-                     "From one time to the next, s (default: a hundredth of the last)");
+  command.add_option("--step", arguments->step_s, "Time step, s (default: a hundredth of --until)");
   AddOutputs(command, arguments->outputs, "The outputs, comma-separated (default: measured)");
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json", "csv"});
@@ -83,16 +81,15 @@ void AddDesign(CommandRegistry& registry) {
   const auto arguments = std::make_shared<DesignArguments>();
   CLI::App& command =
       registry.Add({.name = "design",
-                    .summary = "Say which samples of a next experiment would tell most",
+                    .summary = "Find the most informative measurements for the next experiment",
                     .examples = {"design problem.json --until 10 --samples 20",
                                  "design problem.json data.csv --until 10 --candidate chirp.json"}},
                    arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "What has been measured so far, a CSV file");
   command.add_option("--until", arguments->until_s, "The last possible sample time, s")->required();
-  command.add_option(
-      "--step", arguments->step_s,
-      "From one possible sample time to the next, s (default: a hundredth of the last)");
+  command.add_option("--step", arguments->step_s,
+                     "Step between possible sample times, s (default: a hundredth of --until)");
   command.add_option("--samples", arguments->samples, "Sample times to choose (default: 10)")
       ->check(CLI::Range(1, 1000));
   command

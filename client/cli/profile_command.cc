@@ -66,7 +66,8 @@ void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& 
     table.Print(out);
     out << '\n';
   }
-  out << "0.5 above the least is one standard deviation of a Gaussian posterior, 2 are two\n";
+  out << "A rise of 0.5 above the least cost corresponds to one standard deviation of a Gaussian "
+         "posterior, a rise of 2 to two.\n";
   PrintDiagnostics(response.diagnostics(), out);
 }
 

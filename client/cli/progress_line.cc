@@ -85,7 +85,7 @@ std::string EstimationProgress::Describe() const {
   const int64_t rows = rows_;
   const int64_t latest = latest_;
   const int64_t taken = taken_;
-  if (latest == 0) return "preparing";
+  if (latest == 0) return "computing";
   if (latest < taken) return absl::StrCat("re-expanding, row ", latest, " of ", taken);
   if (taken < rows) return absl::StrCat("row ", taken, " of ", rows);
   return absl::StrCat("all ", rows, " rows taken, assessing the posterior");

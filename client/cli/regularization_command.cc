@@ -50,7 +50,7 @@ void PrintChoice(const char* rule, const Sweep::Choice& choice, std::ostream& ou
   if (choice.determined()) {
     out << "α² = " << FormatNumber(choice.regularization(), 3) << '\n';
   } else {
-    out << "does not choose: " << choice.reason() << '\n';
+    out << "no choice: " << choice.reason() << '\n';
   }
 }
 

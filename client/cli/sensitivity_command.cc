@@ -78,7 +78,8 @@ void PrintActivity(const Analysis& analysis, std::ostream& out) {
 }
 
 void PrintTables(const Analysis& analysis, std::ostream& out) {
-  out << "Shares of the variance that each parameter has alone, and in all (total)\n\n";
+  out << "Share of the variance due to each parameter alone, and including its interactions "
+         "(total)\n\n";
   for (const auto& output : analysis.outputs()) PrintOutput(analysis, output, out);
   PrintActivity(analysis, out);
   out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n",

@@ -55,7 +55,7 @@ absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
   reader->in_.read(line.data(), static_cast<std::streamsize>(line.size()));
   if (!reader->in_ || line != std::string(kFirstLine) + "\n") {
     return absl::InvalidArgumentError(
-        absl::StrFormat("%s: is not a session that polyest has exported", file));
+        absl::StrFormat("%s: is not a session file written by polyest export", file));
   }
   reader->input_ = std::make_unique<google::protobuf::io::IstreamInputStream>(&reader->in_);
   return reader;
@@ -69,7 +69,7 @@ absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::Read() {
   }
   if (end) return std::nullopt;
   return absl::InvalidArgumentError(
-      absl::StrFormat("%s: breaks off in the midst of a record", file_));
+      absl::StrFormat("%s: ends in the middle of a record (incomplete file)", file_));
 }
 
 }  // namespace polyest::internal

@@ -24,17 +24,17 @@ void AddStream(CommandRegistry& registry) {
   command.add_option("data", arguments->data_file, "The measurements, a CSV file, or -")
       ->required();
   AddServer(command, arguments->place)->required();
-  command.add_option("--batch", arguments->batch_rows, "Rows a message")
+  command.add_option("--batch", arguments->batch_rows, "Rows per message")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
   command
       .add_option("--rate", arguments->rate,
-                  "Send this many times as fast as the data's time; 0: at once")
+                  "Speed relative to the data's own time (1: real time; 0: as fast as possible)")
       ->check(CLI::Range(0.0, 1e9));
   command.add_option(
       "--session", arguments->session,
-      "The session to create, or to resume: then with rows after its last, in the same run "
-      "too, so that the last few rows of a smooth streamed input wait for them");
+      "Name of the session to create, or to resume with rows after its last one. Its run stays "
+      "open, so that the last rows of a smooth streamed input wait for further rows.");
   AddFormat(command, arguments->format, {"table", "jsonl"});
 }
 
@@ -79,11 +79,12 @@ void AddImport(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ImportArguments>();
   CLI::App& command = registry.Add(
       {.name = "import",
-       .summary = "Make a session of a daemon out of a file: the same estimate to the last bit",
+       .summary = "Import a session file into a daemon; the estimate is bit-for-bit the same",
        .examples = {"import rig-1.session --server lab:50051 --session rig-1-copy"}},
       arguments);
   command.add_option("file", arguments->file, "What `polyest export` has written")->required();
-  command.add_option("--session", arguments->session, "Its name there (default the one it had)");
+  command.add_option("--session", arguments->session,
+                     "Name of the session in the daemon (default: its original name)");
   AddServer(command, arguments->place)->required();
 }
 
@@ -115,18 +116,18 @@ void AddDaemonCommands(CommandRegistry& registry) {
   const auto arguments = std::make_shared<TopArguments>();
   CLI::App& command = registry.Add(
       {.name = "top",
-       .summary = "Show how a daemon and its sessions are, until q or Ctrl-C",
+       .summary = "Show the state of a daemon and its sessions until q or Ctrl-C",
        .examples = {"top --server rig:50051", "top --server rig:50051 --once"},
        .notes =
-           "For each session: the batches acknowledged, estimates made and re-expansions since\n"
-           "the daemon was started, values of measured outputs in all and a second, seconds\n"
-           "of measurements over seconds computed for them (below 1 it falls behind),\n"
-           "whether a stream is open and how many watch, whether it is in memory, the time\n"
-           "since its last use. A narrow terminal shows fewer columns."},
+           "Columns, for each session: batches acknowledged, estimates and re-expansions since\n"
+           "the daemon started, measured values in total and per second, seconds of\n"
+           "measurements over seconds computed for them (below 1 it falls behind), whether a\n"
+           "stream is open and how many watch, whether it is in memory, the time since its\n"
+           "last use. A narrow terminal shows fewer columns."},
       arguments);
   AddServer(command, arguments->place)->required();
-  command.add_flag("--once", arguments->once, "Once, and end");
-  command.add_option("--interval", arguments->interval_s, "From one look to the next, s")
+  command.add_flag("--once", arguments->once, "Print once and exit");
+  command.add_option("--interval", arguments->interval_s, "Refresh interval, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
 }

@@ -33,9 +33,10 @@ void AddAccess(CLI::App& command, ServerAccess& access) {
                       "PEM file of the client's own certificate, where the daemon asks for one")
           ->envname("POLYEST_TLS_CERTIFICATE")
           ->group(group);
-  CLI::Option* const key = command.add_option("--tls-key", access.key_file, "PEM file of its key")
-                               ->envname("POLYEST_TLS_KEY")
-                               ->group(group);
+  CLI::Option* const key =
+      command.add_option("--tls-key", access.key_file, "PEM file of the key of --tls-certificate")
+          ->envname("POLYEST_TLS_KEY")
+          ->group(group);
   certificate->needs(key);
   key->needs(certificate);
   command
@@ -60,8 +61,7 @@ CLI::Option* AddServer(CLI::App& command, Place& place) {
 }
 
 CLI::Option* AddFmuFolder(CLI::App& command, Place& place) {
-  return command.add_option("--fmu-dir", place.fmu_dir,
-                            "Folder of the FMUs that problems may name here");
+  return command.add_option("--fmu-dir", place.fmu_dir, "Folder with FMUs for local computations");
 }
 
 void AddThreads(CLI::App& command, int& threads) {

@@ -126,7 +126,7 @@ class StreamCommand {
       const auto refusal = RefusalOf(session.status());
       if (!absl::IsResourceExhausted(session.status()) || !refusal || !refusal->retry_delay) break;
       pause = std::max(pause, *refusal->retry_delay);
-      Tell(absl::StrFormat("the daemon takes no session now (%s); trying again in %g s",
+      Tell(absl::StrFormat("the daemon cannot create a session now (%s); trying again in %g s",
                            session.status().message(), static_cast<double>(pause.count()) / 1000));
       interrupt_.WaitUntil(std::chrono::steady_clock::now() + pause);
       if (interrupted()) break;

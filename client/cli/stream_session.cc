@@ -21,8 +21,8 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
   POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client.GetSession(get));
   if (!google::protobuf::util::MessageDifferencer::Equals(session.problem(), problem)) {
     return absl::AlreadyExistsError(absl::StrCat("session ", id,
-                                                 " exists and has another problem; resuming it "
-                                                 "needs the same one, or choose another name"));
+                                                 " already exists with a different problem; resume "
+                                                 "it with its own problem or choose another name"));
   }
   StreamSession resumed{session.name(), std::nullopt};
   if (session.sample_count() > 0) {

@@ -142,7 +142,7 @@ void PrintTop(const DaemonView& now, const DaemonView* before, bool fit_rows, st
   }
   table.Print(out);
   if (shown < sessions) out << "… and " << sessions - shown << " more\n";
-  if (fit_rows) out << Paint(out, Color::kFaint, "q ends");
+  if (fit_rows) out << Paint(out, Color::kFaint, "press q to quit");
 }
 
 }  // namespace polyest::internal

@@ -91,12 +91,12 @@ std::string ConnectionHint(absl::string_view message, const std::optional<Client
   const bool closed =
       says("Socket closed") || says("Connection reset by peer") || says("Broken pipe");
   if (!tls) {
-    return closed ? "what listens there closed the connection unanswered, as a daemon does that "
-                    "serves TLS only: name its CA with --tls-ca; the daemon's log says more"
+    return closed ? "the server closed the connection without a response; if it serves TLS only, "
+                    "give its CA with --tls-ca; see the daemon's log"
                   : "";
   }
   if (says("wrong version number") || says("WRONG_VERSION_NUMBER")) {
-    return "what listens there does not speak TLS: leave out --tls-ca, or start the daemon with "
+    return "the server does not use TLS: omit --tls-ca, or start the daemon with "
            "--tls-certificate and --tls-key";
   }
   if (says("certificate verify failed") || says("CERTIFICATE_VERIFY_FAILED")) {
@@ -104,15 +104,16 @@ std::string ConnectionHint(absl::string_view message, const std::optional<Client
            "file with the daemon's --tls-certificate";
   }
   if (says("is not in peer certificate")) {
-    return "the daemon's certificate is for another name: connect by that, or give it with "
+    return "the daemon's certificate is for another name: connect by that name, or give it with "
            "--tls-server-name";
   }
   if (!closed) return "";
   return tls->certificate_file.empty()
-             ? "the daemon broke off after the TLS handshake, as one does that asks for a client's "
-               "certificate: give yours with --tls-certificate and --tls-key; its log says more"
-             : "the daemon broke off after the TLS handshake, as one does that does not know the "
-               "CA of the client's certificate (its --tls-client-ca); its log says more";
+             ? "the daemon closed the connection after the TLS handshake; it probably requires a "
+               "client certificate: give yours with --tls-certificate and --tls-key; see the "
+               "daemon's log"
+             : "the daemon closed the connection after the TLS handshake; it probably does not "
+               "trust the CA of your certificate (the daemon's --tls-client-ca); see its log";
 }
 
 }  // namespace
@@ -162,8 +163,9 @@ absl::StatusOr<DaemonConnection> DaemonConnection::Open(const std::string& serve
     }
   } else if (!token.empty()) {
     if (!IsLoopback(server.substr(0, server.rfind(':')))) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "token: ", server, " is beyond loopback, where a token goes over TLS only (--tls-ca)"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("token: ", server,
+                       " is not a loopback address; tokens are sent only over TLS (--tls-ca)"));
     }
     // An HTTP proxy would see the token.
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);

@@ -146,7 +146,7 @@ absl::Status DataReader::CheckStreamed(const DataColumns& known, RefusedLine ref
                                    [&](const Column& column) { return column.name == name; });
     if (!found) {
       POLYEST_RETURN_IF_ERROR(refused(LineError(absl::StrCat(
-          "the column ", Quoted(name), " of the streamed input of that name is missing"))));
+          "the column ", Quoted(name), " for the streamed input of that name is missing"))));
     }
   }
   return absl::OkStatus();
@@ -264,8 +264,9 @@ absl::Status DataReader::CheckTime(int64_t previous_run) const {
 absl::StatusOr<double> DataReader::ParseNumber(const Column& column, absl::string_view cell) const {
   if (cell.empty()) {
     return LineError(absl::StrCat("column ", column.name, ": a value is missing; ",
-                                  column.role == Role::kTime ? "every row needs its time"
-                                                             : "a streamed input needs every row"));
+                                  column.role == Role::kTime
+                                      ? "every row needs its time"
+                                      : "a streamed input needs a value in every row"));
   }
   absl::string_view digits = cell;
   if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-') digits.remove_prefix(1);

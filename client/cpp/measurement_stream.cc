@@ -138,12 +138,12 @@ bool MeasurementStream::Wait(std::chrono::milliseconds delay) const {
   return true;
 }
 
-// Reports that the daemon takes batches again, once one is acknowledged after a refusal. The lock
+// Reports that the daemon accepts batches again, once one is acknowledged after a refusal. The lock
 // is held on entry and exit.
 void MeasurementStream::TellOfRoom(Lock& lock) {
   if (refusals_ > 0 || !std::exchange(told_of_refusal_, false)) return;
   lock.unlock();
-  Tell("the daemon takes batches again");
+  Tell("the daemon accepts batches again");
   lock.lock();
 }
 
@@ -246,10 +246,11 @@ std::string MeasurementStream::CountAttempt(const absl::Status& status) {
     ++refusals_;
     attempts_ = 0;
     told_of_refusal_ = true;
-    return "the daemon takes no batches now";
+    return "the daemon cannot accept batches now";
   }
   ++attempts_;
-  if (absl::IsUnauthenticated(status)) return "the token is good no more, there is a new one";
+  if (absl::IsUnauthenticated(status))
+    return "the token is no longer valid; a new one is available";
   return connection_ ? "connection lost" : "no connection";
 }
 
@@ -279,7 +280,8 @@ absl::Status MeasurementStream::ConnectAgain(Lock& lock, absl::Status status) {
 // lock is held on entry and exit.
 absl::Status MeasurementStream::Recover(Lock& lock) {
   const absl::Status lost = connection_->status();
-  if (lost.ok()) return absl::InternalError("the daemon ended the stream before its end");
+  if (lost.ok())
+    return absl::InternalError("the daemon closed the stream before all batches were sent");
   const absl::Status status = ConnectAgain(lock, lost);
   if (absl::IsNotFound(status)) {
     return absl::DataLossError(absl::StrCat(

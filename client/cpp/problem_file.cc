@@ -73,15 +73,14 @@ absl::Status UnknownFieldsError(absl::string_view name, const std::vector<Unknow
     return field.suggestion.empty() ? "" : absl::StrCat(before, field.suggestion, after);
   };
   if (fields.size() == 1) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        name, ": ", fields[0].path, ": there is no field of this name", note(fields[0], "; ", "")));
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": ", fields[0].path, ": unknown field", note(fields[0], "; ", "")));
   }
   const auto append = [&](std::string* out, const UnknownField& field) {
     absl::StrAppend(out, field.path, note(field, " (", ")"));
   };
-  return absl::InvalidArgumentError(absl::StrCat(name, ": there are no fields of these ",
-                                                 fields.size(),
-                                                 " names: ", absl::StrJoin(fields, ", ", append)));
+  return absl::InvalidArgumentError(absl::StrCat(
+      name, ": ", fields.size(), " unknown fields: ", absl::StrJoin(fields, ", ", append)));
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 #include <map>
 
-#include "client/cpp/nearest_name.h"
+#include "proto/wire/transport/nearest_name.h"
 
 namespace polyest::internal {
 namespace {

@@ -12,8 +12,9 @@
 namespace polyest::internal {
 
 struct UnknownField {
-  std::string path;        // "uncertain[0].unifrom", "model.equations.tables.f.vlaue"
-  std::string suggestion;  // `did you mean "uniform"?`, or "there are lower, upper"; may be empty
+  std::string path;  // "uncertain[0].unifrom", "model.equations.tables.f.vlaue"
+  // `did you mean "uniform"?`, or "known names: lower, upper"; may be empty.
+  std::string suggestion;
 };
 
 // Returns the fields in the order of their paths; none if the text is not one JSON object. Skips

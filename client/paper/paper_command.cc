@@ -47,7 +47,7 @@ int RunPaper(const PaperOptions& options, std::ostream& out, std::ostream& err) 
   }
   if (!options.plot_file.empty()) {
     return Fail(absl::InvalidArgumentError(absl::StrCat(
-                    "--plot: ", options.plot_file, " needs a figure to plot; give one of them")),
+                    "--plot requires a figure: polyest paper FIGURE --plot ", options.plot_file)),
                 err);
   }
   const char* separator = "";

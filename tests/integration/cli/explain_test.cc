@@ -53,7 +53,7 @@ TEST_F(ExplainTest, NamesTheRatioThatFreeVibrationTells) {
   })",
                       {"x"}),
               AllOf(HasSubstr("k is weakly identified"), HasSubstr("k/m is known to "),
-                    HasSubstr("No other output of the model would tell m from this experiment")));
+                    HasSubstr("No other output of the model would identify m in this experiment")));
 }
 
 TEST_F(ExplainTest, NamesTheOutputToAdd) {
@@ -65,7 +65,7 @@ TEST_F(ExplainTest, NamesTheOutputToAdd) {
   })",
                       {"x1_minus_x2"}),
               AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
-                    HasSubstr(" would know theta to ±")));
+                    HasSubstr(" would determine theta to ±")));
 }
 
 TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
@@ -77,7 +77,7 @@ TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
   EXPECT_THAT(Explain(before + R"("step": {"amplitude": 1}}]})", {"x1_minus_x2"},
                       before + R"("streamed": {"hold": true}}]})", "u1"),
               AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
-                    HasSubstr(" would know theta to ±")));
+                    HasSubstr(" would determine theta to ±")));
 }
 
 TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
@@ -91,7 +91,7 @@ TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
   ASSERT_EQ(run.exit_status, 0) << run.err;
   EXPECT_THAT(run.out,
               AllOf(HasSubstr("v0[0] is not identified"), HasSubstr("v0[1] is not identified"),
-                    HasSubstr("would know v0[0] to ±")));
+                    HasSubstr("would determine v0[0] to ±")));
 }
 
 TEST_F(ExplainTest, NamesTheExcitationToChange) {
@@ -107,7 +107,7 @@ TEST_F(ExplainTest, NamesTheExcitationToChange) {
   })",
                       {"x1", "x2"}),
               AllOf(HasSubstr("M is identified"), HasSubstr("I is not identified"),
-                    HasSubstr("Another excitation, only u"), HasSubstr(" would know I to ±")));
+                    HasSubstr("Another excitation, only u"), HasSubstr(" would determine I to ±")));
 }
 
 TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {

@@ -70,12 +70,14 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
            Case{{"export", "tuesday", File("x", "")}, 2, "there is no session"},
            Case{{"export", "monday", "/nowhere/x"}, 2, "/nowhere/x.part: cannot be written"},
            Case{{"import", "/nowhere/x"}, 2, "/nowhere/x: cannot be read"},
-           Case{{"import", File("csv", "t,x\n0,1\n")}, 2, "is not a session"},
+           Case{{"import", File("csv", "t,x\n0,1\n")},
+                2,
+                "is not a session file written by polyest export"},
            Case{{"import", file}, 2, "there is a session \"sessions/monday\" already"},
            Case{{"import", file, "--session", "A"}, 2, "must be 1 to 63 of a-z"},
            Case{{"import", File("cut", whole.substr(0, whole.size() - 9)), "--session", "b"},
                 2,
-                "breaks off in the midst of a record"},
+                "ends in the middle of a record (incomplete file)"},
        }) {
     const Finished run = OfDaemon(one.arguments);
     EXPECT_EQ(run.exit_status, one.exit_status) << one.words;

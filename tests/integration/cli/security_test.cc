@@ -84,7 +84,7 @@ TEST_F(SecurityTest, GoesOnWithATokenThatWasRotatedUnderAStream) {
   process.CloseInput();
   EXPECT_THAT(process.ReadAll(), HasSubstr("\"sequence\":\"2\""));
   EXPECT_EQ(process.Wait(), 0) << process.Errors();
-  EXPECT_THAT(process.Errors(), HasSubstr("the token is good no more, there is a new one"));
+  EXPECT_THAT(process.Errors(), HasSubstr("the token is no longer valid; a new one is available"));
 }
 
 TEST_F(SecurityTest, TakesTheTokenFromTheEnvironment) {
@@ -114,8 +114,8 @@ TEST_F(SecurityTest, SendsNoTokenOverANetworkWithoutTls) {
   EXPECT_EQ(
       OneLine(Run({"models", "--server", "rig.example.org:50051", "--token-file", reader_file_}),
               2),
-      "polyest: token: rig.example.org:50051 is beyond loopback, where a token goes over TLS "
-      "only (--tls-ca)\n");
+      "polyest: token: rig.example.org:50051 is not a loopback address; tokens are sent only "
+      "over TLS (--tls-ca)\n");
 }
 
 TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {

@@ -121,7 +121,7 @@ TEST_F(StreamTest, DoesNotMixProblemsInASession) {
   const Finished run =
       Run({"stream", other, data, "--server", daemon_.address(), "--session", "rig-1"});
   EXPECT_EQ(run.exit_status, 2);
-  EXPECT_THAT(run.err, HasSubstr("session rig-1 exists and has another problem"));
+  EXPECT_THAT(run.err, HasSubstr("session rig-1 already exists with a different problem"));
 }
 
 TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
@@ -218,13 +218,13 @@ TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
   process.Write(DemoRows(90).substr(DemoRows(30).size()));
   process.CloseInput();
   // Asking the daemon is what the test does meanwhile.
-  while (process.Errors().find("takes no batches now") == std::string::npos) {
+  while (process.Errors().find("cannot accept batches now") == std::string::npos) {
     ASSERT_TRUE(client.GetStatus({}).ok());
   }
   ASSERT_EQ(Run({"delete", "ballast", "--server", daemon.address()}).exit_status, 0);
   const std::vector<std::string> estimates = Lines(process.ReadAll());
   EXPECT_EQ(process.Wait(), 0) << process.Errors();
-  EXPECT_THAT(process.Errors(), HasSubstr("the daemon takes batches again"));
+  EXPECT_THAT(process.Errors(), HasSubstr("the daemon accepts batches again"));
   const Finished undisturbed =
       Run(Command("-", {"--batch", "30", "--format", "jsonl"}), DemoRows(90));
   EXPECT_EQ(estimates.back(), Lines(undisturbed.out).back());
@@ -236,7 +236,7 @@ TEST_F(StreamTest, WaitsForRoomForItsSessionUntilItIsInterrupted) {
       {POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server", daemon.address()});
   process.Write(DemoRows(30));
   Client client(daemon.address());
-  while (process.Errors().find("takes no session now") == std::string::npos) {
+  while (process.Errors().find("cannot create a session now") == std::string::npos) {
     ASSERT_TRUE(client.GetStatus({}).ok());
   }
   process.Signal(SIGINT);

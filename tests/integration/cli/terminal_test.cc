@@ -114,7 +114,7 @@ class TopTerminalTest : public TerminalTest {
         std::vector<std::string>{POLYEST_PROGRAM, "top", "--server", daemon_.address(),
                                  "--interval", "0.1"},
         TerminalProcess::Size{.columns = 80, .rows = 24});
-    EXPECT_THAT(top->ReadUntil("q ends"), HasSubstr(kClearScreen));
+    EXPECT_THAT(top->ReadUntil("press q to quit"), HasSubstr(kClearScreen));
     EXPECT_FALSE(top->InLineMode());
     return top;
   }

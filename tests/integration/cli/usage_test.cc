@@ -26,7 +26,8 @@ TEST_F(UsageTest, ProposesTheNearestCommand) {
   EXPECT_EQ(Refused({"estimat", "p.json", "d.csv"}),
             "polyest: there is no command \"estimat\"; did you mean \"estimate\"? See polyest "
             "--help\n");
-  EXPECT_THAT(Refused({"banana"}), HasSubstr("there are estimate, explain, "));
+  EXPECT_THAT(Refused({"banana"}), AllOf(HasSubstr("the commands are estimate, explain, "),
+                                         HasSubstr("; see polyest --help")));
 }
 
 TEST_F(UsageTest, ProposesTheNearestOption) {

@@ -27,7 +27,7 @@ TEST(DaemonConnection, SendsNoTokenOverANetworkWithoutTls) {
   for (const char* server : {"rig.example.org:1", "192.0.2.7:1", "[2001:db8::1]:1",
                              "localhost.example.org:1", "rig.example.org/localhost:1"}) {
     const std::string refusal = Refusal(server, {.token = "secret"});
-    EXPECT_THAT(refusal, HasSubstr("where a token goes over TLS only"));
+    EXPECT_THAT(refusal, HasSubstr("tokens are sent only over TLS"));
     EXPECT_THAT(refusal, testing::Not(HasSubstr("secret")));
     EXPECT_TRUE(DaemonConnection::Open(server, {.tls = ClientTls{}, .token = "secret"}).ok());
     EXPECT_TRUE(DaemonConnection::Open(server, {}).ok());
@@ -62,11 +62,11 @@ TEST(ConnectionHint, SaysWhatToLookAtWhereTheTwoEndsDifferInTls) {
   const ClientTls tls{.ca_file = "ca.pem"};
   const ClientTls own{.ca_file = "ca.pem", .certificate_file = "a.pem", .key_file = "a.key"};
   const std::string ssl = "Ssl handshake failed: SSL_ERROR_SSL: error:0A000086:SSL routines::";
-  EXPECT_THAT(Hinted("Socket closed", std::nullopt), HasSubstr("name its CA with --tls-ca"));
-  EXPECT_THAT(Hinted(ssl + "wrong version number", tls), HasSubstr("does not speak TLS"));
+  EXPECT_THAT(Hinted("Socket closed", std::nullopt), HasSubstr("give its CA with --tls-ca"));
+  EXPECT_THAT(Hinted(ssl + "wrong version number", tls), HasSubstr("does not use TLS"));
   EXPECT_THAT(Hinted(ssl + "certificate verify failed", tls), HasSubstr("not of the CA in"));
   EXPECT_THAT(Hinted("Socket closed", tls), HasSubstr("give yours with --tls-certificate"));
-  EXPECT_THAT(Hinted("Socket closed", own), HasSubstr("its --tls-client-ca"));
+  EXPECT_THAT(Hinted("Socket closed", own), HasSubstr("the daemon's --tls-client-ca"));
 }
 
 TEST(ConnectionHint, IsNotGivenWhereTlsIsNotTheReason) {

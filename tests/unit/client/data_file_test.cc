@@ -160,9 +160,10 @@ TEST(DataReader, RefusesUnknownAndRepeatedColumnsAndNamesTheKnown) {
 
 TEST(DataReader, RefusesAStreamedInputThatIsNotThereOrHasGaps) {
   EXPECT_EQ(ErrorOf("t,x\n0,1\n", kColumns),
-            "data.csv:1: the column \"force\" of the streamed input of that name is missing");
-  EXPECT_EQ(ErrorOf("t,x,force\n0,1,\n", kColumns),
-            "data.csv:2: column force: a value is missing; a streamed input needs every row");
+            "data.csv:1: the column \"force\" for the streamed input of that name is missing");
+  EXPECT_EQ(
+      ErrorOf("t,x,force\n0,1,\n", kColumns),
+      "data.csv:2: column force: a value is missing; a streamed input needs a value in every row");
 }
 
 TEST(DataReader, RefusesRaggedRows) {

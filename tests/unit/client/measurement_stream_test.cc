@@ -273,8 +273,8 @@ TEST_F(MeasurementStreamTest, HoldsOutWhileTheDaemonHasNoRoomAndSaysSo) {
   EXPECT_THAT(daemon_.times, ElementsAreArray(Times(10)));
   ASSERT_EQ(told_.size(), 26u);
   EXPECT_EQ(told_.front(),
-            "the daemon takes no batches now (the disk is full); trying again in 0.002 s");
-  EXPECT_EQ(told_.back(), "the daemon takes batches again");
+            "the daemon cannot accept batches now (the disk is full); trying again in 0.002 s");
+  EXPECT_EQ(told_.back(), "the daemon accepts batches again");
   // Never before the daemon has asked for it, ever longer, up to the longest.
   EXPECT_EQ(delays.front(), std::chrono::milliseconds(2));
   EXPECT_EQ(delays.back(), options_.max_delay);

@@ -45,16 +45,15 @@ TEST(ParseProblem, ReadsTheContractsExample) {
 
 TEST(ParseProblem, NamesAFieldThatThereIsNot) {
   EXPECT_EQ(ErrorOf(R"({"modle": {}})"),
-            "problem.json: modle: there is no field of this name; did you mean \"model\"?");
+            "problem.json: modle: unknown field; did you mean \"model\"?");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "unifrom": {"lower": 1}}]})"),
-            "problem.json: uncertain[0].unifrom: there is no field of this name; did you mean "
-            "\"uniform\"?");
+            "problem.json: uncertain[0].unifrom: unknown field; did you mean \"uniform\"?");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "uniform": {"from": 1}}]})"),
-            "problem.json: uncertain[0].uniform.from: there is no field of this name; there are "
-            "lower, upper");
+            "problem.json: uncertain[0].uniform.from: unknown field; known names: lower, "
+            "upper");
   EXPECT_EQ(ErrorOf(R"({"model": {"equations": {"tables": {"f": {"vlaue": [1]}}}}})"),
-            "problem.json: model.equations.tables.f.vlaue: there is no field of this name; did you "
-            "mean \"value\"?");
+            "problem.json: model.equations.tables.f.vlaue: unknown field; did you mean "
+            "\"value\"?");
 }
 
 TEST(ParseProblem, NamesAllFieldsThatThereAreNotAtOnce) {
@@ -62,8 +61,8 @@ TEST(ParseProblem, NamesAllFieldsThatThereAreNotAtOnce) {
       ErrorOf(
           R"({"modle": {}, "uncertain": [{"name": "k"}, {"unifrom": {}, "uniform": {"from": 1}}],
                         "fixed": {"anything": 1}, "expansion": {"order": "three"}})"),
-      "problem.json: there are no fields of these 3 names: modle (did you mean \"model\"?), "
-      "uncertain[1].uniform.from (there are lower, upper), uncertain[1].unifrom (did you mean "
+      "problem.json: 3 unknown fields: modle (did you mean \"model\"?), "
+      "uncertain[1].uniform.from (known names: lower, upper), uncertain[1].unifrom (did you mean "
       "\"uniform\"?)");
 }
 

@@ -23,9 +23,9 @@ RowBlock Rows(int count) {
 TEST(EstimationProgress, TellsTakingFromReExpanding) {
   const auto progress = std::make_shared<EstimationProgress>();
   WatchedStore store(progress);
-  EXPECT_EQ(progress->Describe(), "preparing");
+  EXPECT_EQ(progress->Describe(), "computing");
   ASSERT_TRUE(store.Append(Rows(100)).ok());
-  EXPECT_EQ(progress->Describe(), "preparing");
+  EXPECT_EQ(progress->Describe(), "computing");
   RowBlock block;
   ASSERT_TRUE(store.Read(0, 64, block).ok());
   EXPECT_EQ(block.count(), 64);

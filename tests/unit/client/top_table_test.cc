@@ -117,7 +117,7 @@ TEST(TopTableTest, CountsTheSessionsThatTheScreenHasNoRoomFor) {
   const std::vector<std::string> lines = PrintOn(80, 24, view);
   EXPECT_EQ(lines.size(), 24u);
   EXPECT_EQ(lines[22], "… and 12 more");
-  EXPECT_EQ(lines[23], "q ends");
+  EXPECT_EQ(lines[23], "press q to quit");
 }
 
 TEST(TopTableTest, HasUnitsThatFitTheSize) {
