@@ -44,10 +44,6 @@ int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream&
   request.set_session(absl::StrCat("sessions/", arguments.session));
   std::optional<v1::Estimate> last;
   grpc::ClientContext call;
-  if (arguments.place.deadline_s > 0) {
-    call.set_deadline(gpr_time_from_millis(static_cast<int64_t>(1000 * arguments.place.deadline_s),
-                                           GPR_TIMESPAN));
-  }
   absl::Status status;
   {
     ProgressLine progress([&] { return absl::StrCat("watching ", request.session()); });

@@ -84,20 +84,26 @@ Client::Client(const std::string& server, ClientOptions options)
   statuses_ = v1::StatusService::NewStub(channel);
 }
 
+void Client::Prepare(grpc::ClientContext& call) const {
+  connection_->Identify(call);
+  if (!options_.deadline) return;
+  call.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                                 gpr_time_from_millis(options_.deadline->count(), GPR_TIMESPAN)));
+}
+
+absl::Status Client::StatusOf(const grpc::Status& status) const {
+  return WithConnectionHint(FromGrpc(status), options_.tls);
+}
+
 template <typename Stub, typename Response, typename Request>
 absl::StatusOr<Response> Client::Call(Stub* stub, Method<Stub, Response, Request> method,
                                       const Request& request) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
-  connection_->Identify(context);
-  if (options_.deadline) {
-    context.set_deadline(
-        gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
-                     gpr_time_from_millis(options_.deadline->count(), GPR_TIMESPAN)));
-  }
+  Prepare(context);
   Response response;
   const grpc::Status status = (stub->*method)(&context, request, &response);
-  if (!status.ok()) return WithConnectionHint(FromGrpc(status), options_.tls);
+  if (!status.ok()) return StatusOf(status);
   return response;
 }
 
@@ -217,7 +223,7 @@ absl::Status Client::WatchSession(
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext own;
   grpc::ClientContext& context = call != nullptr ? *call : own;
-  connection_->Identify(context);
+  Prepare(context);
   const auto reader = sessions_->WatchSession(&context, request);
   v1::WatchSessionResponse response;
   while (reader->Read(&response)) {
@@ -226,7 +232,7 @@ absl::Status Client::WatchSession(
     reader->Finish();
     return absl::OkStatus();
   }
-  return FromGrpc(reader->Finish());
+  return StatusOf(reader->Finish());
 }
 
 absl::Status Client::ExportSession(
@@ -234,7 +240,7 @@ absl::Status Client::ExportSession(
     const std::function<absl::Status(const v1::SessionRecord&)>& take) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
-  connection_->Identify(context);
+  Prepare(context);
   const auto reader = sessions_->ExportSession(&context, request);
   v1::SessionRecord record;
   while (reader->Read(&record)) {
@@ -244,7 +250,7 @@ absl::Status Client::ExportSession(
     reader->Finish();
     return taken;
   }
-  return FromGrpc(reader->Finish());
+  return StatusOf(reader->Finish());
 }
 
 absl::StatusOr<v1::Session> Client::ImportSession(
@@ -252,7 +258,7 @@ absl::StatusOr<v1::Session> Client::ImportSession(
     const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
-  connection_->Identify(context);
+  Prepare(context);
   v1::Session session;
   const auto writer = sessions_->ImportSession(&context, &session);
   v1::ImportSessionRequest request;
@@ -270,7 +276,7 @@ absl::StatusOr<v1::Session> Client::ImportSession(
   }
   writer->WritesDone();
   const grpc::Status status = writer->Finish();
-  if (!status.ok()) return WithConnectionHint(FromGrpc(status), options_.tls);
+  if (!status.ok()) return StatusOf(status);
   return session;
 }
 

@@ -132,6 +132,21 @@ TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {
               StartsWith("polyest: server " + daemon.address() + ": "));
 }
 
+TEST_F(SecurityTest, SaysInEveryKindOfCallThatTheDaemonMayServeTlsOnly) {
+  DaemonProcess daemon(WithTls());
+  const std::string session = File("rig.session", "polyest session 1\n");
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"models"},
+                                                  {"watch", "rig"},
+                                                  {"export", "rig", folder_ / "exported"},
+                                                  {"import", session}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--server", daemon.address()});
+    EXPECT_THAT(OneLine(Run(arguments), 3),
+                HasSubstr("if it serves TLS only, give its CA with --tls-ca"))
+        << command[0];
+  }
+}
+
 TEST_F(SecurityTest, NamesFilesThatAreNoGoodAndNothingOfThem) {
   const std::string bad = File("bad", "secret words");
   const auto models = [](const std::vector<std::string>& options) {

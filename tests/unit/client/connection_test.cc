@@ -1,8 +1,16 @@
 #include "polyest/connection.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <optional>
+
+#include "core/common/check.h"
 #include "polyest/client.h"
 #include "tests/testing/test_folder.h"
 
@@ -83,6 +91,45 @@ TEST(Client, FailsEveryCallWithWhatIsWrongWithItsOptions) {
   EXPECT_EQ(client.ListModels({}).status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(client.WatchSession({}, [](const v1::WatchSessionResponse&) { return true; }).code(),
             absl::StatusCode::kInvalidArgument);
+}
+
+// Accepts connections and never answers.
+class SilentServer {
+ public:
+  SilentServer() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(place);
+    auto* const address = reinterpret_cast<sockaddr*>(&place);
+    POLYEST_CHECK(bind(socket_, address, size) == 0);
+    POLYEST_CHECK(listen(socket_, 8) == 0);
+    POLYEST_CHECK(getsockname(socket_, address, &size) == 0);
+    address_ = absl::StrCat("127.0.0.1:", ntohs(place.sin_port));
+  }
+  ~SilentServer() { close(socket_); }
+  SilentServer(const SilentServer&) = delete;
+  SilentServer& operator=(const SilentServer&) = delete;
+
+  const std::string& address() const { return address_; }
+
+ private:
+  const int socket_;
+  std::string address_;
+};
+
+TEST(Client, GivesUpEveryKindOfCallAtTheDeadline) {
+  const SilentServer server;
+  Client client(server.address(), {.deadline = std::chrono::milliseconds(1)});
+  const auto records = []() -> absl::StatusOr<std::optional<v1::SessionRecord>> {
+    return v1::SessionRecord();
+  };
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.ListModels({}).status()));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(
+      client.WatchSession({}, [](const v1::WatchSessionResponse&) { return true; })));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(
+      client.ExportSession({}, [](const v1::SessionRecord&) { return absl::OkStatus(); })));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.ImportSession("rig", records).status()));
 }
 
 }  // namespace

@@ -120,6 +120,10 @@ class Client {
  private:
   template <typename Stub, typename Response, typename Request>
   using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
+  // Adds the token and the deadline of the options to a call.
+  void Prepare(grpc::ClientContext& call) const;
+  // Returns the status of a call, with a hint if no connection could be made.
+  absl::Status StatusOf(const grpc::Status& status) const;
   template <typename Stub, typename Response, typename Request>
   absl::StatusOr<Response> Call(Stub* stub, Method<Stub, Response, Request> method,
                                 const Request& request);
