@@ -90,6 +90,18 @@ class LocalBackend : public Backend {
   ProgressLine line_;  // the last member, so that it is destroyed first
 };
 
+// Returns the response to a request with measurements. If a message was too large, the error says
+// what to do about it.
+template <typename Response>
+absl::StatusOr<Response> WithSizeHint(absl::StatusOr<Response> response) {
+  // Without details, gRPC itself has refused a message that is too large.
+  if (!absl::IsResourceExhausted(response.status()) || RefusalOf(response.status())) {
+    return response;
+  }
+  return absl::ResourceExhaustedError(absl::StrCat(
+      response.status().message(), "; raise the daemon's --max-message-mb, or use polyest stream"));
+}
+
 class RemoteBackend : public Backend {
  public:
   explicit RemoteBackend(const Place& place)
@@ -98,14 +110,7 @@ class RemoteBackend : public Backend {
 
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
       const v1::ComputeEstimateRequest& request) override {
-    auto response = client_.ComputeEstimate(request);
-    // Without details, gRPC itself has refused a message that is too large.
-    if (absl::IsResourceExhausted(response.status()) && !RefusalOf(response.status())) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat(response.status().message(),
-                       "; raise the daemon's --max-message-mb, or use polyest stream"));
-    }
-    return response;
+    return WithSizeHint(client_.ComputeEstimate(request));
   }
   absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
       const v1::ComputePropagationRequest& request) override {
@@ -113,7 +118,7 @@ class RemoteBackend : public Backend {
   }
   absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
       const v1::ComputeCostGridRequest& request) override {
-    return client_.ComputeCostGrid(request);
+    return WithSizeHint(client_.ComputeCostGrid(request));
   }
   absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
       const v1::ComputeSensitivityRequest& request) override {
@@ -121,7 +126,7 @@ class RemoteBackend : public Backend {
   }
   absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
       const v1::ComputeExperimentDesignRequest& request) override {
-    return client_.ComputeExperimentDesign(request);
+    return WithSizeHint(client_.ComputeExperimentDesign(request));
   }
   absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request) override {
     return client_.ListModels(request);
@@ -131,15 +136,15 @@ class RemoteBackend : public Backend {
   }
   absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
       const v1::ComputePosteriorRequest& request) override {
-    return client_.ComputePosterior(request);
+    return WithSizeHint(client_.ComputePosterior(request));
   }
   absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
       const v1::ComputeCostProfilesRequest& request) override {
-    return client_.ComputeCostProfiles(request);
+    return WithSizeHint(client_.ComputeCostProfiles(request));
   }
   absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request) override {
-    return client_.ComputeRegularizationSweep(request);
+    return WithSizeHint(client_.ComputeRegularizationSweep(request));
   }
 
  private:

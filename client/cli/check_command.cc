@@ -1,4 +1,3 @@
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 #include <google/protobuf/struct.pb.h>
@@ -34,10 +33,13 @@ struct Findings {
   std::vector<std::string> warnings;
   std::string summary;  // empty if there are errors
 
+  // Adds an error whose message names the file, as those of reading a file do.
+  void AddError(const absl::Status& status) {
+    errors.push_back(absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}}));
+  }
+  // Adds an error about the content of a file.
   void AddError(const absl::Status& status, const std::string& file) {
-    std::string message = absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}});
-    if (!absl::StartsWith(message, file)) message = absl::StrCat(file, ": ", message);
-    errors.push_back(std::move(message));
+    AddError(absl::Status(status.code(), absl::StrCat(file, ": ", status.message())));
   }
 };
 
@@ -46,11 +48,11 @@ std::optional<v1::Measurements> ReadData(const std::string& file, const DataColu
                                          Findings& findings) {
   int refused = 0;
   const auto note = [&](const absl::Status& refusal) {
-    if (++refused <= kMaxLines) findings.AddError(refusal, file);
+    if (++refused <= kMaxLines) findings.AddError(refusal);
     return absl::OkStatus();
   };
   auto data = ReadDataFile(file, columns, note);
-  if (!data.ok()) findings.AddError(data.status(), file);
+  if (!data.ok()) findings.AddError(data.status());
   if (refused > kMaxLines) {
     findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMaxLines, " more"));
   }
@@ -89,7 +91,7 @@ Findings Check(const CheckArguments& arguments, std::ostream& out) {
   }
   const auto problem = ReadProblemFile(arguments.problem_file);
   if (!problem.ok()) {
-    findings.AddError(problem.status(), arguments.problem_file);
+    findings.AddError(problem.status());
     return findings;
   }
   const auto models = OpenModels(arguments.place);

@@ -1,3 +1,5 @@
+#include <absl/strings/match.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -13,6 +15,7 @@
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
 #include "polyest/problem_file.h"
@@ -46,6 +49,23 @@ absl::Status AddCandidates(const DesignArguments& arguments,
   return absl::OkStatus();
 }
 
+// Returns the error with the name of the file in front that it is about. A field of a candidate's
+// inputs is named as in the candidate's own file.
+absl::Status InInputFile(const absl::Status& status, const DesignArguments& arguments,
+                         const v1::ComputeExperimentDesignRequest& request) {
+  const FieldPath field = FieldOf(status).value_or(FieldPath());
+  int index = 0;
+  if (!absl::IsInvalidArgument(status) || field.steps().size() < 2 ||
+      field.steps()[0] != FieldStep("candidates") ||
+      !absl::SimpleAtoi(field.steps()[1].text(), &index) || index >= request.candidates_size()) {
+    return InFile(status, arguments.problem_file, arguments.data_file);
+  }
+  absl::string_view message = status.message();
+  const std::string candidate = FieldPath{"candidates", index}.ToString() + ".";
+  if (absl::StartsWith(message, candidate + "inputs")) message.remove_prefix(candidate.size());
+  return absl::InvalidArgumentError(absl::StrCat(request.candidates(index).name(), ": ", message));
+}
+
 absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   v1::ComputeExperimentDesignRequest request;
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file));
@@ -62,9 +82,7 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   request.set_sample_count(arguments.samples);
   for (const std::string& output : arguments.outputs) request.add_possible()->set_output(output);
   auto response = MakeBackend(arguments.place)->ComputeExperimentDesign(request);
-  if (!response.ok()) {
-    return InFile(response.status(), arguments.problem_file, arguments.data_file);
-  }
+  if (!response.ok()) return InInputFile(response.status(), arguments, request);
   return response;
 }
 

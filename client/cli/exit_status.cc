@@ -6,8 +6,20 @@
 #include <optional>
 
 #include "core/common/field_error.h"
+#include "polyest/v1/problem.pb.h"
 
 namespace polyest::internal {
+namespace {
+
+bool IsFieldOfProblem(const FieldStep& step) {
+  const google::protobuf::Descriptor& problem = *v1::Problem::descriptor();
+  for (int i = 0; i < problem.field_count(); ++i) {
+    if (problem.field(i)->json_name() == step.text()) return true;
+  }
+  return false;
+}
+
+}  // namespace
 
 ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
   switch (status.code()) {
@@ -47,8 +59,10 @@ int Report(const absl::Status& status, absl::string_view server, std::ostream& e
 absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
                     absl::string_view data_file) {
   const std::optional<FieldPath> field = FieldOf(status);
-  if (!absl::IsInvalidArgument(status) || !field) return status;
-  const bool is_of_data = !field->empty() && field->steps().front() == FieldStep("measurements");
+  if (!absl::IsInvalidArgument(status) || !field || field->empty()) return status;
+  const FieldStep& first = field->steps().front();
+  const bool is_of_data = first == FieldStep("measurements");
+  if (!is_of_data && !IsFieldOfProblem(first)) return status;
   return absl::InvalidArgumentError(
       absl::StrCat(is_of_data ? data_file : problem_file, ": ", status.message()));
 }

@@ -75,6 +75,14 @@ TEST_F(CheckTest, SaysAllThatIsWrongWithProblemAndDataAtOnce) {
                           HasSubstr("d.csv:6: the row has 2 cells"), "polyest: 6 errors"));
 }
 
+TEST_F(CheckTest, NamesAProblemFileThatIsCalledAsAField) {
+  File("model", R"({"model": {"builtin": "rocket"}})");
+  const Finished run = RunProgram(
+      {"/usr/bin/env", "--chdir=" + folder_.string(), POLYEST_PROGRAM, "check", "model"});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(Lines(run.err)[0], HasSubstr("polyest: model: model.builtin: "));
+}
+
 TEST_F(CheckTest, CountsTheBadLinesThatItDoesNotShow) {
   std::string data = "t,x\n";
   for (int i = 0; i < 50; ++i) absl::StrAppend(&data, i, ",?\n");

@@ -134,11 +134,22 @@ TEST_F(ErrorsTest, AMessageTooLarge) {
   // Two doubles a row: a little more than 1 MiB.
   std::string data = "t,x\n";
   for (int i = 1; i <= 70'000; ++i) absl::StrAppend(&data, i, ",0\n");
-  EXPECT_THAT(OneLine(Run({"estimate", File("p.json", kProblem), File("d.csv", data), "--server",
-                           daemon.address()}),
-                      3),
-              AllOf(HasSubstr(daemon.address()), HasSubstr("larger than max"),
-                    HasSubstr("raise the daemon's --max-message-mb, or use polyest stream")));
+  const std::string problem = File("p.json", kProblem);
+  const std::string file = File("d.csv", data);
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"estimate"},
+                                                  {"explain"},
+                                                  {"posterior"},
+                                                  {"profile"},
+                                                  {"regularization"},
+                                                  {"cost"},
+                                                  {"design", "--until", "1"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {problem, file, "--server", daemon.address()});
+    EXPECT_THAT(OneLine(Run(arguments), 3),
+                AllOf(HasSubstr(daemon.address()), HasSubstr("larger than max"),
+                      HasSubstr("raise the daemon's --max-message-mb, or use polyest stream")))
+        << command[0];
+  }
 }
 
 TEST_F(ErrorsTest, AProblemTooLarge) {
@@ -225,9 +236,23 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
   EXPECT_THAT(OneLine(Run({"design", streamed, "--until", "1"}), 2), HasSubstr("road is streamed"));
   const std::string other = File("other.json", R"({"inputs": [{"name": "wind"}]})");
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", other}), 2),
-              HasSubstr("candidates[1].inputs[0]"));
+              HasSubstr("polyest: " + other + ": inputs[0]"));
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", "absent.json"}), 2),
               HasSubstr("absent.json"));
+}
+
+TEST_F(ErrorsTest, AnOptionThatIsRefusedIsNotBlamedOnAFile) {
+  const std::string problem = File("p.json", kProblem);
+  const std::string data = File("d.csv", kData);
+  EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--quantiles", "2"}), 2),
+              StartsWith("polyest: probabilities[0]: 2 must"));
+  EXPECT_THAT(OneLine(Run({"design", problem, "--until", "0"}), 2),
+              StartsWith("polyest: untilS: 0 must"));
+  DaemonProcess daemon;
+  EXPECT_THAT(
+      OneLine(Run({"stream", problem, data, "--server", daemon.address(), "--session", "No Name"}),
+              2),
+      StartsWith("polyest: sessionId: "));
 }
 
 TEST_F(ErrorsTest, BadUsage) {
