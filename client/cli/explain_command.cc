@@ -75,15 +75,23 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
   return problem;
 }
 
+// Returns the duration of the longest run, s. Of a session's runs, it knows the last one and, if
+// the session has a streamed input, the first.
+double LongestRun(const ExplainInput& input) {
+  const auto& times = input.measurements.time_s();
+  const double longest = times.empty() ? 0 : *std::max_element(times.begin(), times.end());
+  return std::max(longest, input.estimate.time());
+}
+
 // Returns a request about the same experiment with each further output of the model measured, and
 // about the experiments with each input alone.
-v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem,
-                                                const v1::Estimate& estimate, int rows) {
+v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem, double until_s,
+                                                int rows) {
   v1::ComputeExperimentDesignRequest request;
   *request.mutable_subject()->mutable_experiment()->mutable_problem() = problem;
-  request.set_until_s(estimate.time());
+  request.set_until_s(until_s);
   const int times = std::clamp(rows, 1, kMaxTimes);
-  request.set_step_s(estimate.time() / times);
+  request.set_step_s(until_s / times);
   request.set_sample_count(1);
   request.add_candidates()->mutable_inputs()->CopyFrom(problem.inputs());
   if (problem.inputs_size() < 2) return request;
@@ -143,10 +151,11 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     if (i >= input.problem.uncertain_size()) break;
     if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
   }
-  Design design;
-  if (!open.empty()) {
+  // Without any duration there is no experiment to design; the answer has no remedies then.
+  std::optional<Design> design;
+  if (const double until_s = LongestRun(input); !open.empty() && until_s > 0) {
     const v1::Problem problem = WithoutStreamedInputs(input.problem, input.measurements);
-    auto answer = backend->ComputeExperimentDesign(Alternatives(problem, estimate, input.rows));
+    auto answer = backend->ComputeExperimentDesign(Alternatives(problem, until_s, input.rows));
     if (!answer.ok()) return InInput(answer.status(), arguments);
     design = *std::move(answer);
   }
@@ -154,7 +163,8 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
   PrintTradeOffs(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);
-  for (const int i : open) PrintSentence(out, Remedy(design, i, estimate.parameters(i)));
+  if (!design) return absl::OkStatus();
+  for (const int i : open) PrintSentence(out, Remedy(*design, i, estimate.parameters(i)));
   return absl::OkStatus();
 }
 

@@ -15,6 +15,12 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+constexpr char kOneMass[] = R"({
+  "model": {"builtin": "mass_spring_damper"},
+  "uncertain": [{"name": "v0", "uniform": {"lower": 0.9, "upper": 1.1}}],
+  "measured": [{"output": "x", "noise": {"absolute": 1}}]
+})";
+
 class ExplainTest : public CommandTest {
  protected:
   // The explanation of a record of `outputs`, as the problem predicts them; by that of `as`, if it
@@ -92,6 +98,22 @@ TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
   EXPECT_THAT(run.out,
               AllOf(HasSubstr("v0[0] is not identified"), HasSubstr("v0[1] is not identified"),
                     HasSubstr("would determine v0[0] to ±")));
+}
+
+TEST_F(ExplainTest, ProposesNothingForARecordWithoutDuration) {
+  const std::string problem = File("problem.json", kOneMass);
+  const Finished run = Run({"explain", problem, File("data.csv", "t,x\n0,0.1\n")});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("v0 is not identified"), Not(HasSubstr("would ")),
+                             Not(HasSubstr("experiment"))));
+}
+
+TEST_F(ExplainTest, ProposesForTheLongestRunWhereTheLastHasJustBegun) {
+  const std::string problem = File("problem.json", kOneMass);
+  const Finished run = Run({"explain", problem, File("data.csv", "t,run,x\n0.5,0,0.1\n0,1,0.1\n")});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("v0 is not identified"), HasSubstr("would determine v0 to ±")));
 }
 
 TEST_F(ExplainTest, NamesTheExcitationToChange) {
