@@ -112,6 +112,7 @@ class StreamCommand {
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(first.status());
     auto session = WaitForSession();
+    if (!session.ok() && interrupted()) return std::nullopt;
     if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);
     auto last = Send(*session, *reader, *std::move(first));
     if (!last.ok()) return InFile(last.status(), arguments_.problem_file, name);
@@ -153,6 +154,7 @@ class StreamCommand {
       progress_.AddRows(batch.time_s_size());
       if (session.resumed_after) skipped += RemoveRowsUpTo(*session.resumed_after, batch);
       if (batch.time_s_size() > 0) {
+        if (!any_sent) TellOfResumption(session, skipped);
         pace.Wait(batch);
         POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
         any_sent = true;
@@ -162,17 +164,21 @@ class StreamCommand {
       if (interrupted()) break;  // the rows read may end within a row
       POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
     }
-    if (session.resumed_after) {
-      Tell(absl::StrFormat("resumed %s after t = %g s of run %d, %d rows were there already",
-                           session.name, session.resumed_after->time_s, session.resumed_after->run,
-                           skipped));
-    }
+    if (!any_sent) TellOfResumption(session, skipped);
     if (EndsRun() && any_sent && !interrupted()) {
       v1::Measurements end;
       end.set_end_of_run(true);
       POLYEST_RETURN_IF_ERROR(stream.Send(std::move(end)));
     }
     return stream.Finish();
+  }
+
+  // Reports that a session is resumed, once the number of rows is known that it has already.
+  void TellOfResumption(const StreamSession& session, int64_t skipped) {
+    if (!session.resumed_after) return;
+    Tell(absl::StrFormat(
+        "resumed %s after t = %g s of run %d; %d rows were already there and have been skipped",
+        session.name, session.resumed_after->time_s, session.resumed_after->run, skipped));
   }
 
   // Returns whether the stream must end the run, because the last rows of a streamed input would

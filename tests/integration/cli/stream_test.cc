@@ -106,8 +106,34 @@ TEST_F(StreamTest, ResumesASessionWhereItEnded) {
   const Finished second =
       Run(Command(File("d.csv", DemoRows(100)), {"--format", "jsonl", "--session", "rig-1"}));
   ASSERT_EQ(second.exit_status, 0) << second.err;
-  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s of run 0, 45 rows"));
+  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s of run 0; 45 rows"));
   ExpectSame(LastEstimate(second.out), EstimateOf(100));
+}
+
+TEST_F(StreamTest, SaysThatItResumesASessionBeforeTheDataEnd) {
+  ASSERT_EQ(Run(Command(File("d.csv", DemoRows(45)), {"--session", "rig-1"})).exit_status, 0);
+  std::vector<std::string> arguments = Command("-", {"--session", "rig-1"});
+  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
+  Process process(arguments);
+  process.Write(DemoRows(60));
+  // The input stays open meanwhile.
+  Client client(daemon_.address());
+  while (process.Errors().find("resumed sessions/rig-1") == std::string::npos) {
+    ASSERT_TRUE(client.GetStatus({}).ok());
+  }
+  process.CloseInput();
+  process.ReadAll();
+  EXPECT_EQ(process.Wait(), 0) << process.Errors();
+  EXPECT_EQ(process.Errors(),
+            "polyest: resumed sessions/rig-1 after t = 2.25 s of run 0; 45 rows were already there "
+            "and have been skipped\n");
+}
+
+TEST_F(StreamTest, SaysThatAllRowsWereThereAlready) {
+  const std::string data = File("d.csv", DemoRows(45));
+  ASSERT_EQ(Run(Command(data, {"--session", "rig-1"})).exit_status, 0);
+  EXPECT_THAT(Run(Command(data, {"--session", "rig-1"})).err,
+              HasSubstr("; 45 rows were already there"));
 }
 
 TEST_F(StreamTest, DoesNotMixProblemsInASession) {
@@ -240,8 +266,9 @@ TEST_F(StreamTest, WaitsForRoomForItsSessionUntilItIsInterrupted) {
     ASSERT_TRUE(client.GetStatus({}).ok());
   }
   process.Signal(SIGINT);
-  EXPECT_EQ(process.Wait(), 3);
-  EXPECT_THAT(Lines(process.Errors()).back(), HasSubstr("(--max-memory-mb)"));
+  EXPECT_EQ(process.Wait(), 1);
+  EXPECT_THAT(process.Errors(), HasSubstr("(--max-memory-mb)"));
+  EXPECT_EQ(Lines(process.Errors()).back(), "polyest: interrupted before the first estimate");
 }
 
 TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {

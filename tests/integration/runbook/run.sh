@@ -126,9 +126,9 @@ run "Back up" 1
   polyest delete rig1-monday --server "$address"
   commands "Back up" 2 | grep import | sed "s|OTHER:PORT|$address|" | bash -eu
 ) >/dev/null || fail "export and import do not work"
-expect "$(stream 90)" "60 rows were there already"
+expect "$(stream 90)" "60 rows were already there"
 run "Restore"
-expect "$(stream 60)" "60 rows were there already"
+expect "$(stream 60)" "60 rows were already there"
 
 say "looking into a damaged file"
 mkdir "$root/damaged"
@@ -142,14 +142,14 @@ mv "$root/var/lib/polyest" "$root/kept"
 mkdir -m 0700 "$root/var/lib/polyest"
 mv "$root/damaged/recovered.db" "$root/var/lib/polyest/journal.db"
 systemctl start polyestd || fail "what was recovered is refused"
-expect "$(stream 60)" "60 rows were there already"
+expect "$(stream 60)" "60 rows were already there"
 systemctl stop polyestd
 rm -r "$root/var/lib/polyest" && mv "$root/kept" "$root/var/lib/polyest"
 systemctl start polyestd
 
 say "making room"
 run "Disk full"
-expect "$(stream 60)" "60 rows were there already"
+expect "$(stream 60)" "60 rows were already there"
 
 say "rotating and revoking"
 cp rig1.token old.token
