@@ -27,8 +27,8 @@ struct CostGridOptions {
   int points = 0;  // on each axis; 0: 201 for one parameter, 41 for two
   // Values at which the other uncertain parameters are held, by name; the prior mean otherwise.
   std::map<std::string, double> held;
-  // α², at least 0. Default: the problem's fixed one. Where a rule chooses α² it must be given:
-  // what the rule chose in an estimate from the same samples, Estimate::regularization.
+  // α² ≥ 0. Default: the problem's fixed one. If a rule chooses α², it must be given: the rule's
+  // choice in an estimate from the same samples, Estimate::regularization.
   std::optional<double> regularization;
   int threads = 1;  // ≥ 1; results do not depend on it
 };
@@ -43,10 +43,9 @@ struct CostGrid {
   double regularization = 1;  // α² used
 };
 
-// Computes the cost on a grid from runs of the model itself and not of an expansion: what is drawn
-// is the cost as it is. Noise of unknown size or correlation is
-// marginalized; outliers are not looked for. INVALID_ARGUMENT names the field (or row and column),
-// the value and the rule.
+// Computes the cost on a grid from runs of the model itself, without an expansion. Noise of unknown
+// size or correlation is marginalized; outliers are not sought. INVALID_ARGUMENT names the field
+// (or row and column), the value and the rule.
 absl::StatusOr<CostGrid> EvaluateCostGrid(const Problem& problem, const Samples& samples,
                                           const CostGridOptions& options, const Stop& stop = {});
 

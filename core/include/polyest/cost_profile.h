@@ -2,10 +2,10 @@
 
 // Profiles of the cost: J minimized over all other parameters at each of several values of one,
 //   J_p(θ_i) = min over the others of J.
-// Its rise over the minimum says how well the parameter alone is known, whatever the others make up
-// for: ½ at one standard deviation of a Gaussian posterior, 2 at two. A flat one is a parameter
-// that is not identified, and what the others do along it shows with which parameters it trades
-// off. Estimator::CurrentProfiles computes them.
+// Its rise above the minimum shows how well the parameter is known, whatever the others compensate:
+// ½ at one standard deviation of a Gaussian posterior, 2 at two. A flat profile means that the
+// parameter is not identified; the values of the others along it show with which parameters it
+// trades off. Estimator::CurrentProfiles computes profiles.
 
 #include <string>
 #include <vector>

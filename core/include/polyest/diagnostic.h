@@ -1,6 +1,6 @@
 #pragma once
 
-// What an answer says of its own quality: numerical outcomes that are not errors.
+// Warnings about the quality of an answer. They are not errors: the answer is there.
 
 #include <string>
 
@@ -8,8 +8,8 @@ namespace polyest {
 
 // What a diagnostic warns of.
 enum class DiagnosticCode {
-  kNotIdentified,        // a parameter or direction on which the data say less than the prior
-  kUndersampled,         // the samples taken do not see what an uncertain parameter changes
+  kNotIdentified,        // the verdict on a parameter is kNotIdentified
+  kUndersampled,         // the samples miss what an uncertain parameter changes
   kExpansionInaccurate,  // the expansion differs from the model by too much; uncertainty widened
   kModelMisfit,          // residuals far from what the noise would leave
   kAtPriorBound,         // the estimate lies on a bound of the prior
@@ -17,9 +17,9 @@ enum class DiagnosticCode {
   kNotConverged,         // the minimizer gave up, or the posterior's chains have not mixed
   kPointsFailed,         // trajectories that could not be integrated were left out
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
-  kCorrelatedResiduals,  // residuals are not white, and the noise is taken to be
-  kNoiseNotLearned,      // a noise of unknown size, of which there are too few samples
-  kRegularizationNotDetermined,  // the rule asked for does not choose an α²; 1 stands instead
+  kCorrelatedResiduals,  // residuals are correlated in time; the noise is taken to be white
+  kNoiseNotLearned,      // too few samples to learn a noise of unknown size from
+  kRegularizationNotDetermined,  // the rule asked for does not choose an α²; it stays 1
 };
 
 // One warning.

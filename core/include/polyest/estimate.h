@@ -22,35 +22,37 @@ struct CostValue {
   double total = 0;     // mismatch + α² prior
 };
 
-// Whether the data tell a parameter or a direction.
+// How well the data determine a parameter or a direction.
 enum class Verdict {
-  // A parameter: its standard deviation is at most half the prior's. A direction: the data know it
-  // ten times better than the prior, in variance.
+  // A parameter: its standard deviation is at most half the prior's. A direction: the data's
+  // information is at least ten times the prior's.
   kIdentified,
   // Between the two others.
   kWeak,
-  // A parameter: its standard deviation is at least 0.9 of the prior's. A direction: the data know
-  // it less well than the prior.
+  // A parameter: its standard deviation is at least 0.9 of the prior's. A direction: the data's
+  // information is less than the prior's.
   kNotIdentified,
 };
 
-// A combination of parameters and how well the data alone know it.
+// A combination of parameters, and how well the data alone determine it.
 struct Direction {
   double information = 0;  // ≥ 0: prior variance ÷ variance from the data
   // Unit vector over the uncertain parameters, each in units of the prior standard deviation of its
-  // normal score. Correlated parameters move together in a direction on which the data are silent
-  // for one.
+  // normal score. If the data tell nothing about one of two correlated parameters, both still
+  // change together along a direction.
   Vector coefficients;
   Verdict verdict = Verdict::kNotIdentified;  // by `information`
 };
 
-// Two parameters that the data cannot tell apart, and their combination that is known far better,
-// k/m or k1 + k2.
+// Two parameters that the data cannot tell apart, and a combination of them, such as k/m or
+// k1 + k2, that is known far better than either.
 struct TradeOff {
-  int first = 0, second = 0;    // indices of the uncertain parameters
-  std::string combination;      // as text, "k/m"
-  double relative_std_dev = 0;  // of the combination: posterior standard deviation ÷ |mean|
-  // The same of either parameter alone.
+  int first = 0, second = 0;  // indices of the uncertain parameters
+  std::string combination;    // as text, "k/m"
+  // Of the combination: posterior standard deviation ÷ |mean|; of a product or quotient, the
+  // standard deviation of its logarithm.
+  double relative_std_dev = 0;
+  // Posterior standard deviation ÷ |mean| of each parameter alone.
   double first_alone = 0, second_alone = 0;
 };
 
@@ -59,7 +61,7 @@ struct ParameterEstimate {
   std::string name;              // "x_0[2]" for run 2's own value
   std::string unit;              // SI; "1" for a plain number
   double map = 0;                // at the minimum of the cost: the most probable value
-  double std_dev = 0;            // from the cost's curvature there; the prior's if that is less
+  double std_dev = 0;            // from the cost's curvature there; at most the prior's
   double mean = 0;               // of the posterior
   double lower95 = 0;            // 2.5 % quantile of the posterior
   double upper95 = 0;            // 97.5 % quantile of the posterior
@@ -67,26 +69,26 @@ struct ParameterEstimate {
   double prior_mean = 0;         // of the prior
   double prior_std_dev = 0;      // of the prior
   double contraction = 0;        // std_dev ÷ prior_std_dev, 0 … 1
-  double bias = 0;               // what α² ≠ 1 adds to map; 0 for α² = 1
+  double bias = 0;               // how far α² ≠ 1 moves map; 0 for α² = 1
   Verdict verdict = Verdict::kNotIdentified;  // by the contraction of the normal score
 };
 
 // One of the separated pieces of a posterior.
 struct ComponentEstimate {
-  double weight = 0;  // the posterior's probability of it, 0 … 1
-  // Of this piece alone: the minimum and the curvature there, mean, standard deviation and limits.
+  double weight = 0;  // the posterior's probability of this piece, 0 … 1
+  // The parameters as this piece alone gives them.
   std::vector<ParameterEstimate> parameters;
 };
 
-// How well the samples of one measured output are met.
+// How well the model fits the samples of one measured output.
 struct ChannelEstimate {
   std::string output;   // its name
   int64_t samples = 0;  // number of them
   // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples` when
-  // model and noise are right, and by its making when the noise was unknown.
+  // model and noise are right, and by construction when the noise was unknown.
   double chi_squared = 0;
-  // Root mean square of the noise assumed or, where it was unknown, estimated; in the output's
-  // unit.
+  // Root mean square of the noise: as assumed or, where it was unknown, as estimated; in the
+  // output's unit.
   double noise_std_dev = 0;
   double lag1_correlation = 0;   // of the residuals (whitened), −1 … 1, free of the fit's bias
   double effective_samples = 0;  // number of independent samples that would tell as much
@@ -99,16 +101,16 @@ struct ExpansionSummary {
   int order = 0;   // p
   int terms = 0;   // S
   int points = 0;  // Q
-  // Root mean square over the samples of (model − expansion)/σ, the worst over the posterior; small
-  // beside 1 when the expansion can be trusted.
+  // Root mean square over the samples of (model − expansion)/σ, at the worst of some draws of the
+  // posterior at which the model itself is run; small beside 1 when the expansion can be trusted.
   double residual_to_noise = 0;
   int reexpansions = 0;      // how often the outputs were expanded again
-  int64_t trajectories = 0;  // model runs in all, in units of the whole record so far
+  int64_t trajectories = 0;  // runs of the model in all, each over the whole record so far
 };
 
-// An estimate. Of a posterior in several pieces: map, std_dev, covariance, cost, channels and
-// directions are those of the heaviest piece; mean, posterior_std_dev and limits those of all. A
-// parameter that each piece identifies, but not which of them it is, is kWeak.
+// An estimate. If the posterior has several pieces, then map, std_dev, covariance, cost, channels
+// and directions are those of the heaviest piece, and mean, posterior_std_dev and limits those of
+// all pieces. A parameter is kWeak if each piece identifies it but the pieces disagree.
 struct Estimate {
   std::vector<ParameterEstimate> parameters;  // in the problem's order
   std::vector<ComponentEstimate> components;  // heaviest first; none when there is one piece
@@ -117,11 +119,11 @@ struct Estimate {
   double regularization = 1;                  // α² used
   std::vector<ChannelEstimate> channels;      // in the problem's order
   std::vector<Direction> directions;          // the best known first
-  std::vector<TradeOff> trade_offs;           // pairs known together, not alone
+  std::vector<TradeOff> trade_offs;           // pairs of which only a combination is known
   ExpansionSummary expansion;                 // what it was computed on
   std::vector<Diagnostic> diagnostics;        // warnings; empty is good
   double time_s = 0;                          // of the last sample
-  int64_t samples = 0;                        // values taken, over all outputs and runs
+  int64_t samples = 0;                        // values used, over all outputs and runs
 };
 
 }  // namespace polyest

@@ -33,9 +33,9 @@ namespace internal {
 class EstimatorAccess;
 }
 
-// All that an estimator has made of the first rows of a record.
+// The state of an estimator after the first rows of a record.
 struct EstimatorSnapshot {
-  int64_t rows = 0;   // how many rows
+  int64_t rows = 0;   // number of rows
   std::string state;  // for Estimator::Restore; a binary format of this version of polyest
 };
 
@@ -44,19 +44,19 @@ struct EstimatorOptions {
   int threads = 1;  // ≥ 1, for model runs; results do not depend on it
   // Where samples are kept, empty at first; in memory when null.
   std::shared_ptr<SampleStore> store;
-  // Called by Process, if given, once at each checkpoint of the record that it comes to: after
-  // every IntegrationOptions::samples_between_checkpoints rows of a run, and before a new run once
-  // so many rows have passed since the checkpoint before. A model that simulates itself has only
-  // the latter. It changes no answer.
+  // Called by Process, if given, once at each checkpoint of the record: after every
+  // IntegrationOptions::samples_between_checkpoints rows of a run, and before a new run if as many
+  // rows have passed since the checkpoint before. A model that simulates itself (an FMU) has
+  // checkpoints before new runs only. The function does not change any answer.
   std::function<void(EstimatorSnapshot)> snapshot;
 };
 
-// An estimator of one problem, for one thread at a time.
+// An estimator of one problem. Use it from one thread at a time.
 class Estimator {
  public:
-  // Makes an estimator. INVALID_ARGUMENT or RESOURCE_EXHAUSTED name the field of `problem` or
-  // `options`, its value and the rule (an unknown name is answered with the names there are);
-  // FAILED_PRECONDITION when the problem's expansion cannot be computed or the store is not empty.
+  // Makes an estimator. INVALID_ARGUMENT and RESOURCE_EXHAUSTED name the field of `problem` or
+  // `options`, its value and the rule; an unknown name is answered with the known ones.
+  // FAILED_PRECONDITION if the problem's expansion cannot be computed or the store is not empty.
   static absl::StatusOr<std::unique_ptr<Estimator>> Make(Problem problem,
                                                          EstimatorOptions options = {});
   ~Estimator();
@@ -64,46 +64,48 @@ class Estimator {
   // The problem that is estimated.
   const Problem& problem() const;
 
-  // Checks the whole of `samples` and stores all of it or, when anything is wrong, nothing.
-  // INVALID_ARGUMENT names row, column, value and rule. Cheap: no numerics.
+  // Checks `samples` and stores all of them or, if anything is wrong, nothing. INVALID_ARGUMENT
+  // names row, column, value and rule. Cheap: it computes nothing.
   absl::Status Append(const Samples& samples);
 
-  // Takes every stored sample not yet taken, expanding again where needed; the last few rows of a
-  // run with a smooth streamed input wait for the rows after them or for the run's end
-  // (Samples::end_of_run), since its curve up to them depends on what follows. On a stop request
-  // returns its status; what was taken stays, and the next call goes on from there.
+  // Processes all stored samples that are not processed yet, and expands the outputs again where
+  // needed. The last few rows of a run with a smooth streamed input wait until later rows settle
+  // its curve, or until the run ends (Samples::end_of_run). On a stop request returns its status;
+  // the next call goes on from there. FAILED_PRECONDITION if too few trajectories of the model can
+  // be integrated, or the posterior has too few values of finite cost to draw from.
   absl::Status Process(const Stop& stop = {});
 
-  // Restores the estimator to the state saved in `snapshot`, at a fraction of the cost of its rows:
-  // every later answer has the same bits as without. For an estimator of the same problem to which
-  // the same rows have been appended, and maybe more, and none of them processed. Otherwise, and
-  // for a snapshot of another version, FAILED_PRECONDITION; DATA_LOSS for bytes cut off, corrupted
-  // or inconsistent. The estimator is then unchanged and may process its rows itself.
+  // Restores the estimator to the state saved in `snapshot`, much faster than processing the rows.
+  // Every later answer has the same bits as without. The estimator must be of the same problem,
+  // with the same rows appended (or more) and none processed; otherwise FAILED_PRECONDITION, as for
+  // a snapshot of another version. DATA_LOSS if bytes are cut off, corrupted or inconsistent. The
+  // estimator is then unchanged and can process its rows itself.
   absl::Status Restore(const EstimatorSnapshot& snapshot);
 
-  // Returns the estimate from all samples processed. Does not change the estimator: how often it is
-  // asked never changes a later answer. Its cost does not depend on the number of samples. Not OK
-  // only on a stop request.
+  // Returns the estimate from all processed samples. It does not change the estimator, so how often
+  // it is called never changes a later answer. Its time does not depend on the number of samples.
+  // Not OK on a stop request; FAILED_PRECONDITION if the posterior has too few values of finite
+  // cost to draw from.
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop = {}) const;
 
   // Returns the posterior of the same samples in detail. INVALID_ARGUMENT names the option, its
-  // value and the rule.
+  // value and the rule; otherwise as CurrentEstimate.
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop = {}) const;
 
   // Returns the profiles of the cost of the same samples. INVALID_ARGUMENT names the option, its
-  // value and the rule.
+  // value and the rule; otherwise as CurrentEstimate.
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
                                                const Stop& stop = {}) const;
 
-  // Returns the minima of the same samples' cost over α². INVALID_ARGUMENT names the option, its
-  // value and the rule.
+  // Returns the minima of the same samples' cost for several α². INVALID_ARGUMENT names the option,
+  // its value and the rule; otherwise as CurrentEstimate.
   absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
       const RegularizationOptions& options, const Stop& stop = {}) const;
 
   // The number of rows appended.
   int64_t rows_appended() const;
-  // The number of rows that answers are of.
+  // The number of rows processed, from which answers are computed.
   int64_t rows_processed() const;
 
  private:

@@ -11,9 +11,11 @@ namespace polyest {
 
 // Where the model is run to find the expansion: the collocation points.
 enum class PointSet {
-  kHalton,       // a low-discrepancy sequence in all dimensions
-  kHammersley,   // the same with evenly spaced values of the first parameter
-  kGaussTensor,  // the tensor grid of Gauss quadrature, (order + 1)ⁿ points; few parameters only
+  kHalton,      // a low-discrepancy sequence in all dimensions
+  kHammersley,  // the same with evenly spaced values of the first parameter
+  // The tensor grid of Gauss quadrature over the prior, (order + 1)ⁿ points; for few parameters. An
+  // expansion made again elsewhere has points_per_term points per term.
+  kGaussTensor,
 };
 
 // Terms of an expansion past which a problem is RESOURCE_EXHAUSTED.
@@ -24,9 +26,10 @@ inline constexpr int64_t kMaxPoints = 20'000;
 // An expansion has the products of the parameters' polynomials of degrees j_1 … j_n with
 // j_1^q + … + j_n^q ≤ p^q: S terms. They are fitted to Q runs of the model.
 struct ExpansionOptions {
-  // p ≥ 1. Without it an adaptive expansion begins at 3, or less for so many uncertain parameters
-  // that 3 is not affordable, and goes up while it is not accurate where the posterior is, as far
-  // as that is affordable; any other has the order it would begin with.
+  // p ≥ 1. Without it an adaptive expansion begins with order 3, or with less if order 3 has more
+  // than 250 terms. The order rises, to at most 9 or 500 terms, if the posterior is so wide that
+  // the present order does not follow the model and a higher one does. An expansion that is not
+  // adaptive keeps its first order.
   std::optional<int> order = std::nullopt;
   double hyperbolic_exponent = 1;  // q in (0, 1]; 1 is the total degree
   double points_per_term = 2;  // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise

@@ -1,7 +1,7 @@
 #pragma once
 
-// The next experiment: how much its samples are expected to tell about the uncertain parameters, by
-// output, by sample time and, compared by the caller, by input.
+// The next experiment: how much its samples are expected to tell about the uncertain parameters,
+// for each output and sample time. To compare inputs, call it once for each.
 //
 // With samples y_k + noise of variance R_k, and a_k = ∂y_k/∂ξ in units of the prior's standard
 // deviations and of √R_k, the precision after the experiment is M = Id + Σ_k a_k a_kᵀ in units of
@@ -9,7 +9,7 @@
 // deviation in one direction. Expected values are means over draws of the truth from the prior
 // (K. Chaloner and I. Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10,
 // 1995). Slopes are those of the expansion over the prior, and its residual variance counts as
-// noise: an expansion that does not hold promises too little, not too much.
+// noise: an inaccurate expansion promises too little, not too much.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -34,8 +34,8 @@ struct ExperimentOptions {
   double step_s = 0;   // > 0; samples may be taken at 0, step, 2 step … until
   int samples = 10;    // sample times to choose, 1 … kMaxSampleTimes
   // Outputs that could be measured besides those of the problem; empty: all others of the model.
-  // The noise of one without numbers is 1 % of the range of its predictions; one that is measured,
-  // or given before, has a noise already and must be without.
+  // The noise of an output without numbers is 1 % of the range of its predictions. An output that
+  // the problem measures, or that is in this list already, must have no numbers.
   std::vector<MeasuredOutput> possible;
   int threads = 1;  // ≥ 1; results do not depend on it
 
@@ -67,7 +67,7 @@ struct SampleTime {
 
 // What an experiment is expected to tell.
 struct ExperimentDesign {
-  // By samples at all times of what the problem measures, or, if that is nothing, of all outputs.
+  // By samples at all times of what the problem measures, or of all outputs if it measures none.
   InformationGain gain;
   std::vector<OutputGain> outputs;  // the measured ones first
   std::vector<SampleTime> samples;  // of the same outputs, in the order of their choice
@@ -79,17 +79,17 @@ struct ExperimentDesign {
   std::vector<Diagnostic> diagnostics;
 };
 
-// Computes what an experiment is expected to tell. What is known beforehand is the problem's prior;
-// α² plays no part. INVALID_ARGUMENT names the field, the value and the rule; otherwise as
+// Computes what an experiment is expected to tell. What is known beforehand is the problem's prior,
+// whatever α² is. INVALID_ARGUMENT names the field, the value and the rule; otherwise as
 // PropagatePrior.
 absl::StatusOr<ExperimentDesign> DesignExperiment(const Problem& problem,
                                                   const ExperimentOptions& options,
                                                   const Stop& stop = {});
 
-// Returns the problem with what an estimate says of its parameters for its prior: normal with the
-// estimate's means and covariance, cut off at bounds of the old prior that are within five standard
-// deviations. An output whose noise the problem does not know gets the estimate's. INVALID_ARGUMENT
-// when the problem cannot be used or the estimate is not one of it.
+// Returns the problem with an estimate of its parameters as the prior: normal, with the estimate's
+// means and covariance, cut off at bounds of the old prior that are within five standard
+// deviations. An output whose noise is unknown gets the estimated noise. INVALID_ARGUMENT if the
+// problem cannot be used or the estimate is not an estimate of it.
 absl::StatusOr<Problem> WithEstimateAsPrior(const Problem& problem, const Estimate& estimate);
 
 }  // namespace polyest

@@ -1,6 +1,6 @@
 #pragma once
 
-// How a model's trajectories are integrated, and what is said of those that cannot be.
+// How a model's trajectories are integrated, and the description of one that fails.
 
 #include <absl/status/status.h>
 
@@ -18,14 +18,14 @@ enum class IntegrationMethod {
 // Options of the integrator.
 struct IntegrationOptions {
   IntegrationMethod method = IntegrationMethod::kAuto;  // which integrator
-  // Estimated local error of each state of each trajectory ≤ relative_tolerance × the largest
-  // magnitude that this state has had so far over a block of trajectories, + 1e-14 in SI units; in
-  // fact × that of the trajectory itself, unless that is below a thousandth of the block's. From
-  // 1e-13 to 0.01.
+  // From 1e-13 to 0.01. The estimated local error of each state of each trajectory is at most
+  // relative_tolerance × the largest magnitude of this state so far, + 1e-14 in SI units. That
+  // magnitude is the trajectory's own, but at least a thousandth of the largest in its block of
+  // trajectories.
   double relative_tolerance = 1e-7;
   // Most steps from one sample to the next, ≥ 1; a trajectory that needs more has failed.
   int max_steps = 100'000;
-  // ≥ 1. After so many samples of a run, and as many again, …, the integrators start anew from the
+  // ≥ 1. Each time this number of samples of a run has passed, the integrators start anew from the
   // states there, so that an estimator can be restored there (EstimatorOptions::snapshot). That
   // changes results, within the tolerance.
   int samples_between_checkpoints = 4096;

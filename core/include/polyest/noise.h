@@ -20,15 +20,15 @@ enum class NoiseCorrelation {
 // its residual u in units of the noise.
 enum class OutlierHandling {
   kNone,      // the weight is 1
-  kStudentT,  // (ν + 1)/(ν + u²), ν = 4: gross errors lose their influence
+  kStudentT,  // (ν + 1)/(ν + u²), ν = 4: gross errors have almost no influence
   kHuber,     // min(1, 1.345/|u|): gross errors keep a bounded influence
 };
 
 // Standard deviation of the noise of one sample z:
 //   σ = max(10⁻⁶, absolute + relative·|z| + relative_to_max·max|z|),
 // the maximum over the output's samples up to and including this one in time order, so that how
-// samples are cut into batches does not matter. When its size is unknown, σ times a factor to be
-// estimated; without numbers σ is then 1.
+// samples are cut into batches does not matter. If the size of the noise is unknown, a factor of σ
+// is estimated; without numbers σ is then 1.
 struct NoiseModel {
   double absolute = 0;         // ≥ 0, in the output's unit
   double relative = 0;         // ≥ 0, of |z|

@@ -1,7 +1,7 @@
 #pragma once
 
-// The posterior in full: marginal and joint densities, quantiles and draws. What an estimate says
-// of the posterior is the same, from fewer draws. Estimator::CurrentPosterior computes it.
+// The posterior in detail: marginal and joint densities, quantiles and draws. An estimate describes
+// the same posterior from fewer draws. Estimator::CurrentPosterior computes it.
 
 #include <cstddef>
 #include <cstdint>
@@ -24,8 +24,8 @@ inline constexpr size_t kMaxProbabilities = 1'000;    // PosteriorOptions::proba
 
 // How draws of the posterior were made.
 enum class PosteriorMethod {
-  kImportanceSampling,  // independent draws of a Gaussian, weighted: the posterior is nearly that
-  kMarkovChains,        // differential evolution from tempered particles
+  kImportanceSampling,  // weighted draws of a Gaussian; for a posterior that is nearly Gaussian
+  kMarkovChains,        // differential evolution, started from draws of tempered posteriors
 };
 
 // What to compute.
@@ -35,7 +35,7 @@ struct PosteriorOptions {
   // Pairs of uncertain parameters, each of two different ones, whose joint density is wanted.
   std::vector<std::pair<std::string, std::string>> joints;
   int joint_bins = 40;  // on each axis of a joint density, ≥ 1
-  int samples = 0;      // number of draws given out
+  int samples = 0;      // number of draws to return
 };
 
 // The posterior of one parameter; numbers are in its unit unless said otherwise.
@@ -46,7 +46,7 @@ struct PosteriorMarginal {
   double std_dev = 0;         // of the posterior
   Vector quantiles;           // one for each probability asked for
   DensityEstimate density;    // over the central 99.9 %; empty when not asked for
-  double effective_size = 0;  // number of independent draws that would do as well
+  double effective_size = 0;  // number of independent draws that would tell as much
   double r_hat = 0;           // of the chains, 1 when they have mixed; 0 for importance sampling
 };
 
@@ -59,14 +59,13 @@ struct PosteriorJoint {
 // The posterior.
 struct Posterior {
   PosteriorMethod method = PosteriorMethod::kMarkovChains;  // how it was drawn
-  int64_t draws = 0;                         // number of draws that the answer sums up
+  int64_t draws = 0;                         // number of draws the answer is computed from
   double effective_size = 0;                 // the least of the marginals'
   double r_hat = 0;                          // the largest of the marginals'
   std::vector<PosteriorMarginal> marginals;  // in the problem's order
   std::vector<PosteriorJoint> joints;        // as asked for
-  Matrix samples;  // draws given out × uncertain parameters, equally weighted
-  // What an estimate from the same draws is warned of, and kNotConverged where its chains have not
-  // mixed.
+  Matrix samples;  // draws returned × uncertain parameters, equally weighted
+  // Those of an estimate from the same draws, and kNotConverged if the chains have not mixed.
   std::vector<Diagnostic> diagnostics;
   double time_s = 0;          // of the last sample
   int64_t sample_values = 0;  // values taken, as Estimate::samples

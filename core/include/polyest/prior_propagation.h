@@ -1,6 +1,6 @@
 #pragma once
 
-// What the prior predicts of the outputs over time, before anything is measured.
+// What the prior predicts for the outputs over time, before anything is measured.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -17,7 +17,7 @@
 
 namespace polyest {
 
-// Numbers answered past which a propagation is RESOURCE_EXHAUSTED.
+// The most numbers in an answer: times × outputs × numbers for each; past it RESOURCE_EXHAUSTED.
 inline constexpr int64_t kMaxPropagatedValues = 5'000'000;
 // The most bins of a density.
 inline constexpr int kMaxDensityBins = 1'000;
@@ -46,7 +46,7 @@ struct PropagatedOutput {
   Vector standard_deviation;  // one for each time
   Matrix quantiles;           // times × probabilities
   // Root mean square of model − expansion at the collocation points, one for each time (degrees of
-  // freedom Q − S): what the figures above are uncertain by.
+  // freedom Q − S): the error of the numbers above.
   Vector residual;
   std::vector<DensityEstimate> densities;  // one for each time, or none
 };

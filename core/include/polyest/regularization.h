@@ -1,10 +1,10 @@
 #pragma once
 
-// The minima of the cost J_mismatch + α² J_prior over the regularization weight α², and the α² that
-// the rules of RegularizationMode choose. Estimator::CurrentRegularizationSweep computes them, all
-// on one expansion, where the posterior of α² = 1 is: an α² that pulls the minimum out of the
-// region in which the expansion is trusted has no point, nor do the rules look at it. (A fixed
-// expansion, ExpansionOptions::adaptive = false, reaches farther, and is less exact.)
+// The minima of the cost J_mismatch + α² J_prior for several regularization weights α², and the α²
+// that the rules of RegularizationMode choose. Estimator::CurrentRegularizationSweep computes them
+// all on one expansion, where the posterior of α² = 1 is. An α² that pulls the minimum out of the
+// region in which the expansion is trusted has no point, and the rules leave it out. (A fixed
+// expansion, ExpansionOptions::adaptive = false, reaches farther and is less exact.)
 
 #include <absl/status/status.h>
 
@@ -35,7 +35,7 @@ struct RegularizationPoint {
   double regularization = 1;        // α²
   CostValue cost;                   // at the minimum
   double effective_parameters = 0;  // number of parameters that the data fit, 0 … n
-  double log_evidence = 0;          // log p(data | α²) less the largest of the points
+  double log_evidence = 0;          // log p(data | α²) less the largest of all points
   Vector map;                       // the parameters at the minimum, n
   Vector std_dev;                   // from the curvature there, at most the prior's, n
   bool converged = true;            // whether the minimizer converged
@@ -45,7 +45,7 @@ struct RegularizationPoint {
 struct RegularizationChoice {
   bool determined = false;    // whether the rule chooses one
   double regularization = 1;  // α²; 1 where it is not determined
-  std::string reason;         // why it is not, or empty
+  std::string reason;         // why the rule chooses none; empty if it does
 };
 
 // The minima over α².

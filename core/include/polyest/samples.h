@@ -18,13 +18,13 @@ struct SampleColumn {
   std::vector<bool> missing;  // one for each row; empty: none is missing. Inputs are never missing
 };
 
-// Measurements: rows in time order, columns by name. All measured outputs and streamed inputs of
-// the problem must be there.
+// Measurements: rows in time order, columns by name. All streamed inputs of the problem must have a
+// column; a measured output without one has no samples in these rows.
 struct Samples {
   std::vector<double> time_s;  // ≥ 0, strictly increasing within a run
   std::vector<int> run;        // one for each row, from 0, never decreasing; empty: all are run 0
   std::vector<SampleColumn> columns;  // in any order
-  // No more rows of the last row's run will follow; may come without rows.
+  // True when the last row's run has no further rows. There may then be no rows here at all.
   bool end_of_run = false;
 
   // The number of rows.
@@ -46,23 +46,23 @@ struct RowBlock {
   // Row by row: the standard deviation of each measured output's sample, in its unit; 0 where
   // missing.
   std::vector<double> noise;
-  int ahead = 0;           // the last so many rows only tell how the inputs go on
-  bool run_ended = false;  // no more rows of the last row's run will follow
+  int ahead = 0;           // the last `ahead` rows only continue the curves of the inputs
+  bool run_ended = false;  // whether the last row's run has no further rows
 
   // The number of rows without those ahead.
   int count() const { return static_cast<int>(rows.size()) - ahead; }
 };
 
-// Where the rows of a record are kept, so that a moved expansion can be computed over them again.
-// An estimator has one in memory unless it is given another (EstimatorOptions::store), such as one
-// on disk. Rows are appended and never changed. Only the estimator's own thread calls it.
+// Keeps the rows of a record, so that a moved expansion can be computed over them again. An
+// estimator keeps them in memory unless it is given another store (EstimatorOptions::store), such
+// as one on disk. Rows are appended and never changed. Only the estimator's own thread calls it.
 class SampleStore {
  public:
   virtual ~SampleStore() = default;
   // The number of rows appended.
   virtual int64_t rows() const = 0;
-  // Appends all of the block, its mark of an ended run included, or nothing and says why. A block
-  // without rows only marks the last row's run as ended.
+  // Appends the whole block with its run_ended, or nothing and says why. A block without rows only
+  // marks the last row's run as ended.
   virtual absl::Status Append(const RowBlock& block) = 0;
   // Reads rows [first, first + count), which must be there, into the block; none of them is ahead.
   virtual absl::Status Read(int64_t first, int64_t count, RowBlock& block) const = 0;

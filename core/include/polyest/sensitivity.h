@@ -5,16 +5,16 @@
 // sensitivity analysis using polynomial chaos expansions", Reliab. Eng. Syst. Saf. 93, 2008).
 //
 // In an orthonormal basis the variance of y = Σ_s c_s φ_s(ξ) is V = Σ_{s≥1} c_s². Of it are
-//   first order  S_i = Σ c_s²/V over the terms s in which ξ_i alone occurs: the share that would go
-//                      on average if parameter i were known;
-//   total        T_i = Σ c_s²/V over the terms s in which ξ_i occurs: the share that would be left
-//                      on average if all others were known. T_i ≥ S_i, the difference being what i
-//                      does together with others; Σ_i S_i ≤ 1 ≤ Σ_i T_i.
-// The germs stand for the parameters one to one, so that these are the parameters' own indices;
-// correlated parameters have none.
+//   first order  S_i = Σ c_s²/V over the terms s in which ξ_i alone occurs: the share that would
+//                      vanish on average if parameter i were known;
+//   total        T_i = Σ c_s²/V over the terms s in which ξ_i occurs: the share that would remain
+//                      on average if all others were known. T_i ≥ S_i; the difference is due to
+//                      interactions of i with others. Σ_i S_i ≤ 1 ≤ Σ_i T_i.
+// Each germ belongs to one parameter, so these are the parameters' own indices. Correlated
+// parameters have none.
 //
-// The activity of a parameter is its share in the variance of all outputs over all of the time,
-// each in units of its noise σ_o:
+// The activity of a parameter is the share of the variance of all outputs and times that involves
+// it, each output in units of its noise σ_o:
 //   a_i = Σ_o ∫ T_i V/σ_o² dt ÷ Σ_o ∫ V/σ_o² dt                     (trapezoidal rule).
 
 #include <absl/status/status.h>
@@ -30,8 +30,8 @@
 
 namespace polyest {
 
-// An expansion that leaves more than this share of an output's variance unexplained is called
-// inaccurate: residual² ÷ V.
+// An expansion is inaccurate if it leaves more than this share of an output's variance unexplained:
+// residual² ÷ V.
 inline constexpr double kUnexplained = 0.05;
 
 // What to compute.
@@ -57,19 +57,19 @@ struct OutputSensitivity {
   Matrix first_order;
   Matrix total;  // T_i, 0 … 1; 0 where the output does not vary
   // Root mean square of model − expansion at the collocation points (degrees of freedom Q − S).
-  // Where it is not small beside √V the indices cannot be believed.
+  // Where it is not small beside √V, the indices cannot be trusted.
   Vector residual;
   // σ_o of a sample equal to the mean: the problem's noise of the output, or 1 % of the range of
   // its predictions.
   Vector noise;
 };
 
-// How much one parameter matters over all.
+// How much one parameter matters over all outputs and times.
 struct ParameterActivity {
   std::string parameter;  // its name
   double share = 0;       // a_i, 0 … 1; 0 when nothing varies
-  // The largest √(T_i V)/σ_o of any output at any time: the most that not knowing this parameter
-  // changes one sample, in standard deviations of its noise.
+  // The largest √(T_i V)/σ_o of any output at any time: the most by which not knowing this
+  // parameter changes one sample, in standard deviations of the sample's noise.
   double peak_to_noise = 0;
 };
 

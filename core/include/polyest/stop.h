@@ -11,9 +11,9 @@
 
 namespace polyest {
 
-// Tells long work to end early: on request (a caller went away) or at a deadline. A
-// default-constructed Stop never does. The numerics poll Check() between samples and between
-// sampler sweeps; what was ingested before stays valid.
+// Tells long work to end early: on request, for instance because a caller went away, or at a
+// deadline. A default-constructed Stop never does. The numerics call Check() between samples and
+// between sweeps of a sampler; what was processed before stays valid.
 class Stop {
  public:
   // The clock of deadlines: one that is never set back.
