@@ -8,6 +8,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "polyest/connection.h"
@@ -20,13 +21,14 @@
 
 namespace polyest {
 
-// Converts a gRPC status to an absl::Status of the same code and message. The Refusal
-// (proto/wire/refusal) or the field in its details is kept.
+// Returns a gRPC status as the same absl::Status. If the daemon sent an ErrorInfo, the payloads
+// `polyest/reason` (such as DISK_FULL), `polyest/limit` (the daemon's option) and
+// `polyest/retry-delay-ms` (when to try again) hold it as text; one that does not apply is absent.
 absl::Status FromGrpc(const grpc::Status& status);
 
-// Calls a daemon. Threads may share a client. Every function fails with the daemon's status, with
-// UNAVAILABLE when the daemon cannot be reached, with DEADLINE_EXCEEDED when it did not answer in
-// time, and with the error of DaemonConnection::Open when the options cannot be used.
+// Calls the daemon. Threads may share a client. Every function fails with the daemon's status, with
+// UNAVAILABLE if the daemon cannot be reached, with DEADLINE_EXCEEDED if it did not answer in time,
+// and as DaemonConnection::Open if the options cannot be used.
 class Client {
  public:
   // `server` is HOST:PORT. Connects on the first call.
@@ -41,28 +43,28 @@ class Client {
   // Returns the JSON schema of problem files.
   absl::StatusOr<v1::GetProblemSchemaResponse> GetProblemSchema(
       const v1::GetProblemSchemaRequest& request);
-  // Estimates the parameters of a problem from all of its measurements.
+  // Computes the estimate of a session, or of a problem with its measurements.
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
       const v1::ComputeEstimateRequest& request);
-  // Returns the outputs over time that the prior predicts.
+  // Computes what the prior predicts for the outputs over time.
   absl::StatusOr<v1::ComputePropagationResponse> ComputePropagation(
       const v1::ComputePropagationRequest& request);
-  // Returns the cost over one or two parameters.
+  // Computes the cost over one or two parameters.
   absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
       const v1::ComputeCostGridRequest& request);
-  // Returns how much of the variance of the outputs each parameter causes, over time.
+  // Computes which parameters the outputs depend on, and when.
   absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(
       const v1::ComputeSensitivityRequest& request);
-  // Returns the information that candidates for the next experiment are expected to give.
+  // Computes what a next experiment is expected to tell.
   absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
       const v1::ComputeExperimentDesignRequest& request);
-  // Returns the posterior's densities, quantiles and samples.
+  // Computes the posterior in detail.
   absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
       const v1::ComputePosteriorRequest& request);
-  // Returns the least cost over all other parameters, along each parameter.
+  // Computes the cost over each parameter, minimized over all the others.
   absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
       const v1::ComputeCostProfilesRequest& request);
-  // Returns the minima of the cost over the regularization weight.
+  // Computes the minima of the cost for several regularization weights.
   absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request);
   // Starts a computation that can be polled and cancelled.
@@ -89,30 +91,28 @@ class Client {
       const v1::AddMeasurementsRequest& request);
   // Returns a session's present estimate.
   absl::StatusOr<v1::Estimate> GetEstimate(const v1::GetEstimateRequest& request);
-  // Returns the daemon's version, load and uptime.
+  // Returns the daemon's version, load and memory.
   absl::StatusOr<v1::DaemonStatus> GetStatus(const v1::GetStatusRequest& request);
-  // Calls `estimate` with each response until it returns false, which gives OK, or until the daemon
-  // ends the stream. `call`, if given, is a fresh context for this call: another thread may cancel
-  // it, which ends the watch with CANCELLED.
+  // Calls `estimate` with the session's present estimate and then with new ones, until it returns
+  // false (the answer is then OK) or the daemon ends the watch. `call`, if given, is a new context
+  // for this call: another thread may cancel it, which ends the watch with CANCELLED.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
                             const std::function<bool(const v1::WatchSessionResponse&)>& estimate,
                             grpc::ClientContext* call = nullptr);
-  // Calls `take` with each record of a session. Ends with the status of `take` when that is not OK.
+  // Calls `take` with each record of a session. If `take` fails, the export ends with its status.
   absl::Status ExportSession(const v1::ExportSessionRequest& request,
                              const std::function<absl::Status(const v1::SessionRecord&)>& take);
-  // Sends the records that `next` returns until it returns none. An error of `next` cancels the
-  // import, of which nothing remains, and is returned. `session_id` is that of
-  // ImportSessionRequest.
+  // Sends the records that `next` returns until it returns none. If `next` fails, nothing is
+  // imported and its status is returned. `session_id`: as in ImportSessionRequest.
   absl::StatusOr<v1::Session> ImportSession(
       const std::string& session_id,
       const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next);
 
-  // Returns the stub of the session service, for MeasurementStream. Another call must have
-  // succeeded before.
+  // The stub that MeasurementStream uses. Call it only after another call has succeeded.
   v1::SessionService::Stub& sessions() { return *sessions_; }
   // Adds the token to a call made on a stub.
   void Identify(grpc::ClientContext& call) const { connection_->Identify(call); }
-  // Returns the value of the header that Identify would add now, to detect a changed token.
+  // Returns what Identify would add now; it shows whether the token has changed.
   std::string Authorization() const { return connection_->Authorization(); }
   // Returns the daemon's address, HOST:PORT.
   const std::string& server() const { return server_; }

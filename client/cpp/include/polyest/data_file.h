@@ -32,27 +32,26 @@ struct DataColumns {
 // Returns the columns that data for this problem may have.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
-// Receives the error of a refused line or of a refused column of the header. If it returns OK, the
-// line or column is left out and reading goes on; any other status ends the reading.
+// Receives the error of a refused line. If it returns OK, the line is left out and reading goes on;
+// otherwise reading ends with its status.
 using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
 
-// Ends the reading at the first refused line, with its error.
+// Ends the reading at the first refused line, with that line's error.
 inline absl::Status StopAtRefusedLine(absl::Status refusal) { return refusal; }
 
-// Reads batches of rows, so that a long file or an endless pipe is never held in memory whole.
+// Reads batches of rows, so a long file or an endless pipe is never in memory as a whole.
 class DataReader {
  public:
-  // Reads the header. Messages call the file `name`. `in` must outlive the reader. INVALID_ARGUMENT
-  // if there is no header, or if a column is unknown, repeated or missing.
+  // Reads the header. Messages call the file `name`. `in` must outlive the reader.
+  // INVALID_ARGUMENT: no header, or a column that is unknown, repeated or missing.
   static absl::StatusOr<DataReader> Open(std::istream& in, std::string name,
                                          const DataColumns& columns,
                                          RefusedLine refused = StopAtRefusedLine);
 
-  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. Refuses with
-  // INVALID_ARGUMENT, naming file, line, column, value and rule: a cell that is not a finite
-  // number, a time that is negative or does not increase within its run, a run that decreases or is
-  // not 0 in the first row, a row with too few or too many cells, a streamed input without a value,
-  // and data without any row.
+  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT
+  // names file, line, column, value and rule. It is the answer to a cell that is not a finite
+  // number, a time that does not increase within its run, a run that decreases, a row with too few
+  // or too many cells, a streamed input without a value, and data without any row.
   absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
 
  private:

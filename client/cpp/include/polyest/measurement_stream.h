@@ -1,13 +1,13 @@
 #pragma once
 
-// Sends batches of measurements to a session and receives estimates, over a connection that may
+// Streams batches of measurements into a session and receives estimates, over a connection that may
 // break.
 //
-// A batch is kept until the daemon has acknowledged it. When the connection breaks, the next Send
-// or Finish connects again, asks for the last batch that the session has, and sends the batches
-// after it. So no batch is lost and none is counted twice. The stream also connects again when the
-// daemon has no room now but may have later (its disk is full, it is busy), and when the token was
-// replaced. Open, too, tries again while the daemon cannot be reached.
+// The stream keeps a batch until the daemon has acknowledged it. If the connection breaks, the next
+// Send or Finish connects again, asks for the last batch that the session has, and sends the
+// batches after it. So no batch is lost or counted twice. It does the same if the daemon has no
+// room now but says that it may have later (its disk is full, or it is busy), and if the token was
+// replaced. Open also tries again while the daemon cannot be reached.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -32,51 +32,48 @@ struct MeasurementStreamOptions {
   int max_unacknowledged = 16;
   // Policy that says how often the daemon sends estimates; none: after every batch.
   std::optional<v1::StreamMeasurementsRequest::EstimatePolicy> estimates;
-  // Delay before the first attempt to connect again. It doubles from one attempt to the next.
+  // The delay before the first attempt to connect again; it doubles from one attempt to the next.
   std::chrono::milliseconds first_delay{100};
-  // Longest delay between attempts, unless the daemon asks for a longer one.
+  // The longest such delay.
   std::chrono::milliseconds max_delay{5'000};
-  // Number of attempts to reach the daemon, ≥ 0, without an acknowledgement in between, after which
-  // the stream fails. While the daemon responds and asks to try later, attempts are not limited.
+  // Attempts to reach the daemon without an acknowledgement in between, ≥ 0; then the stream fails.
+  // While the daemon answers and asks to try later, the number of attempts is not limited.
   int max_attempts = 16;
-  // Waits for a delay. If it returns false, the stream gives up and fails. Null: the thread sleeps.
+  // Waits for the given time; returns false to give up. Null: sleeps.
   std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };
 
-// Callbacks of a stream, all optional. They are called from a thread of gRPC, one at a time, except
-// `connection`, which is called from within Open, Send and Finish.
+// Functions that a stream calls; each may be left out. Those for estimates and acknowledgements are
+// called from a thread of gRPC, one at a time; `connection` is called within Open, Send and Finish.
 struct MeasurementStreamCallbacks {
   // Receives a new estimate, as often as MeasurementStreamOptions::estimates says.
   std::function<void(const v1::Estimate&)> estimate;
-  // Receives the sequence number up to which the daemon has stored the batches.
+  // Receives the number up to which the daemon has stored all batches.
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
-  // Receives one sentence when the connection fails or is restored, and when the daemon has no room
-  // for batches or has room again.
+  // Receives one sentence when the connection fails or is back, and when the daemon has no room or
+  // has room again.
   std::function<void(const std::string&)> connection;
 };
 
-// A stream of measurements, for use by one thread. After a function has failed, the stream cannot
-// be used any more.
+// A stream of batches. Use it from one thread; after a failure, make a new stream.
 class MeasurementStream {
  public:
-  // `session` is the name of an existing session, `sessions/{id}`. `client` must outlive the
-  // stream.
+  // `session` is `sessions/{id}`, an existing session. `client` must outlive the stream.
   MeasurementStream(Client& client, std::string session, MeasurementStreamOptions options,
                     MeasurementStreamCallbacks callbacks);
-  // Cancels the connection and drops the batches that are not acknowledged.
+  // Cancels the stream. Batches without an acknowledgement may be lost.
   ~MeasurementStream();
   MeasurementStream(const MeasurementStream&) = delete;
   MeasurementStream& operator=(const MeasurementStream&) = delete;
 
-  // Connects. Must be called once, before any other function. The numbers of batches continue from
-  // the session's last. NOT_FOUND if there is no such session; UNAVAILABLE if there is no
-  // connection after all attempts.
+  // Connects. Call it once, before the other functions. Batches are numbered from the session's
+  // last one on. NOT_FOUND: no such session. UNAVAILABLE: no connection after all attempts.
   absl::Status Open();
-  // Hands over one batch. Waits while too many batches are not acknowledged. DATA_LOSS if the
-  // daemon has lost the session; UNAVAILABLE if there is no connection after all attempts.
+  // Sends one batch; waits while too many are not acknowledged. DATA_LOSS: the daemon has lost the
+  // session or acknowledged batches of it. UNAVAILABLE: no connection after all attempts.
   absl::Status Send(v1::Measurements batch);
-  // Ends the batches, waits for all acknowledgements and returns the last estimate; none if the
-  // session has no samples. Fails like Send.
+  // Ends the stream: waits for all acknowledgements and returns the last estimate, or none if the
+  // session has no samples. Fails as Send.
   absl::StatusOr<std::optional<v1::Estimate>> Finish();
 
  private:

@@ -11,13 +11,13 @@
 
 namespace polyest {
 
-// Reads a problem from text. Refuses with INVALID_ARGUMENT text that is not JSON, fields that the
-// schema does not have (all of them, each with the nearest known name) and a value of the wrong
-// type. The message is one line that begins with `name` and, where the parser reports them, the
-// line or the field.
+// Reads a problem from text. INVALID_ARGUMENT for text that is not JSON, for unknown fields (it
+// names all of them, each with the nearest known name) and for a value of the wrong type. The
+// message is one line that begins with `name` and, where the parser tells it, the line or the
+// field.
 absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_view name);
 
-// Reads a problem from a file of at most 16 MiB. Its name begins every message.
+// Reads a problem from a file of at most 16 MiB; every message begins with the file's name.
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path);
 
 }  // namespace polyest
