@@ -28,7 +28,7 @@ struct ProfileOptions {
 // The profile of one parameter.
 struct CostProfile {
   std::string parameter;  // its name
-  std::string unit;       // SI; "1" for a plain number
+  std::string unit;       // "1" for a plain number; empty: the equations give none
   // Values of the parameter, ascending: over four posterior standard deviations to each side of the
   // minimum of each piece of the posterior, as far as the prior and the expansion reach.
   Vector value;

@@ -59,7 +59,7 @@ struct TradeOff {
 // What is known of one uncertain parameter; numbers are in its unit unless said otherwise.
 struct ParameterEstimate {
   std::string name;              // "x_0[2]" for run 2's own value
-  std::string unit;              // SI; "1" for a plain number
+  std::string unit;              // "1" for a plain number; empty: the equations give none
   double map = 0;                // at the minimum of the cost: the most probable value
   double std_dev = 0;            // from the cost's curvature there; at most the prior's
   double mean = 0;               // of the posterior

@@ -52,7 +52,7 @@ struct InformationGain {
 // What samples of one output at all times are expected to tell.
 struct OutputGain {
   std::string output;        // its name
-  std::string unit;          // SI; "1" for a plain number
+  std::string unit;          // "1" for a plain number; empty: the equations give none
   double noise = 0;          // root mean square of σ over times and draws, in the output's unit
   bool measured = false;     // whether the problem measures it
   InformationGain alone;     // by this output alone

@@ -53,7 +53,7 @@ struct HalfSineBumpInput {
   double duration_s = 1;  // T > 0
 };
 
-// amplitude · the curve through the knots; before the first and after the last the end values.
+// amplitude · the curve through the knots; outside of them, the value of the nearest knot.
 struct TableInput {
   std::vector<double> time_s;                            // at least one knot, strictly increasing
   std::vector<double> value;                             // one for each knot

@@ -22,7 +22,7 @@ namespace polyest {
 // A state, parameter, input or output of a model.
 struct Quantity {
   std::string name;          // unique within its list
-  std::string unit;          // SI, as in "N/m"; "1" for a plain number
+  std::string unit;          // such as "N/m"; "1" for a plain number; empty: not given
   std::string meaning;       // one line
   double default_value = 0;  // of a parameter; unused for states, inputs, outputs
   bool has_default = true;   // of a parameter; without one a problem must give it a value

@@ -41,7 +41,7 @@ struct PosteriorOptions {
 // The posterior of one parameter; numbers are in its unit unless said otherwise.
 struct PosteriorMarginal {
   std::string parameter;      // its name
-  std::string unit;           // SI; "1" for a plain number
+  std::string unit;           // "1" for a plain number; empty: the equations give none
   double mean = 0;            // of the posterior
   double std_dev = 0;         // of the posterior
   Vector quantiles;           // one for each probability asked for

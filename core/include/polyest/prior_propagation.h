@@ -41,7 +41,7 @@ struct PropagationOptions {
 // One output over time, in its unit.
 struct PropagatedOutput {
   std::string output;         // its name
-  std::string unit;           // SI; "1" for a plain number
+  std::string unit;           // "1" for a plain number; empty: the equations give none
   Vector mean;                // one for each time
   Vector standard_deviation;  // one for each time
   Matrix quantiles;           // times × probabilities

@@ -2,8 +2,8 @@
 
 // What is to be estimated: a model, what of it is uncertain, what drives it and what is measured.
 //
-// What can be given a value or a prior by name, the settable quantities, are the model's
-// parameters, its initial states among them, and the parameters of its channels,
+// The settable quantities can be given a value or a prior by name. They are the model's parameters,
+// its initial states among them, and the parameters of its channels,
 //
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
 //   sample = x.gain · x + x.offset + noise                         of an output x,
@@ -48,8 +48,8 @@ enum class RegularizationMode {
 // Everything an estimator is made from. Names are checked when it is made.
 struct Problem {
   std::shared_ptr<const Model> model;  // not null
-  // Settable quantities whose values are known. Those named neither here nor among the uncertain
-  // and the derived ones have the model's default.
+  // Settable quantities whose values are known. A quantity that is neither fixed nor uncertain nor
+  // derived has the model's default.
   std::map<std::string, double> fixed;
   std::vector<UncertainParameter> uncertain;  // what is estimated; at least one
   std::vector<Correlation> correlations;      // of pairs of them; a pair not listed has none

@@ -49,7 +49,7 @@ struct SensitivityOptions {
 // parameters.
 struct OutputSensitivity {
   std::string output;         // its name
-  std::string unit;           // SI; "1" for a plain number
+  std::string unit;           // "1" for a plain number; empty: the equations give none
   Vector mean;                // under the prior
   Vector standard_deviation;  // √V
   // S_i, 0 … 1; 0 where the output does not vary: where √V is no more than an error of the

@@ -6,8 +6,9 @@
 //
 // Lognormal, from its own mean m and standard deviation s:
 //   scale² = log(1 + s²/m²),  location = log m − scale²/2.
-// Estimates are modes of densities of ξ. That of an affine θ is the same; of a lognormal it is the
-// θ whose logarithm is most likely: the prior's is e^location, the median, between mode and mean.
+// Estimates are modes of densities of ξ. For an affine θ this is also the mode of θ. For a
+// lognormal θ it is the value whose logarithm is most likely: for the prior, e^location, which is
+// the median and lies between mode and mean.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
