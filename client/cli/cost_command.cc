@@ -1,7 +1,6 @@
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
-#include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "core/common/status.h"
@@ -36,14 +35,7 @@ void PrintCsv(const v1::ComputeCostGridResponse& cost, std::ostream& out) {
 }  // namespace
 
 int RunCommand(const CostArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto response = EvaluateCost(arguments);
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kCsv) {
-    PrintCsv(*response, out);
-  } else {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  }
-  return kExitOk;
+  return PrintAnswer(EvaluateCost(arguments), arguments, nullptr, PrintCsv, out, err);
 }
 
 }  // namespace polyest::internal

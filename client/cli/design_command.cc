@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -165,14 +165,7 @@ void PrintTables(const Design& design, std::ostream& out) {
 }  // namespace
 
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto response = DesignExperiment(arguments);
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  } else {
-    PrintTables(*response, out);
-  }
-  return kExitOk;
+  return PrintAnswer(DesignExperiment(arguments), arguments, PrintTables, nullptr, out, err);
 }
 
 }  // namespace polyest::internal

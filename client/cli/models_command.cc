@@ -3,10 +3,9 @@
 
 #include <memory>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
-#include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/screen.h"
 #include "client/cli/text_table.h"
@@ -70,28 +69,16 @@ void PrintModel(const v1::Model& model, std::ostream& out) {
   if (!model.source().empty()) out << "\nsource: " << model.source() << '\n';
 }
 
-// Prints a response or reports its error. Returns the exit status.
-template <typename Response, typename PrintTable>
-int Print(const absl::StatusOr<Response>& response, const ModelsArguments& arguments,
-          PrintTable print_table, std::ostream& out, std::ostream& err) {
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  } else {
-    print_table(*response, out);
-  }
-  return kExitOk;
-}
-
 }  // namespace
 
 int RunCommand(const ModelsArguments& arguments, std::ostream& out, std::ostream& err) {
-  if (arguments.name.empty())
-    return Print(ListAll(arguments.place), arguments, PrintList, out, err);
+  if (arguments.name.empty()) {
+    return PrintAnswer(ListAll(arguments.place), arguments, PrintList, nullptr, out, err);
+  }
   v1::GetModelRequest request;
   request.set_name(absl::StrCat("models/", arguments.name));
   const auto model = MakeBackend(arguments.place)->GetModel(request);
-  return Print(model, arguments, PrintModel, out, err);
+  return PrintAnswer(model, arguments, PrintModel, nullptr, out, err);
 }
 
 }  // namespace polyest::internal

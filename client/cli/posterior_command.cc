@@ -6,11 +6,10 @@
 #include <array>
 #include <utility>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
-#include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -124,20 +123,16 @@ void PrintParameters(const v1::ComputePosteriorResponse& posterior, std::ostream
 }  // namespace
 
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto response = GetPosterior(arguments);
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  } else if (arguments.format == Format::kTable) {
-    PrintTable(*response, out);
-  } else if (arguments.samples > 0) {
-    PrintSamples(*response, out);
-  } else if (!arguments.joints.empty()) {
-    PrintJoints(*response, out);
-  } else {
-    PrintParameters(*response, out);
-  }
-  return kExitOk;
+  const auto print_csv = [&](const auto& posterior, std::ostream& csv) {
+    if (arguments.samples > 0) {
+      PrintSamples(posterior, csv);
+    } else if (!arguments.joints.empty()) {
+      PrintJoints(posterior, csv);
+    } else {
+      PrintParameters(posterior, csv);
+    }
+  };
+  return PrintAnswer(GetPosterior(arguments), arguments, PrintTable, print_csv, out, err);
 }
 
 }  // namespace polyest::internal

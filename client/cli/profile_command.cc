@@ -4,11 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
-#include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -94,16 +93,7 @@ void PrintCsv(const v1::ComputeCostProfilesResponse& response, std::ostream& out
 }  // namespace
 
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto response = Profile(arguments);
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  } else if (arguments.format == Format::kCsv) {
-    PrintCsv(*response, out);
-  } else {
-    PrintTables(*response, out);
-  }
-  return kExitOk;
+  return PrintAnswer(Profile(arguments), arguments, PrintTables, PrintCsv, out, err);
 }
 
 }  // namespace polyest::internal

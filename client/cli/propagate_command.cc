@@ -3,11 +3,11 @@
 
 #include <utility>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -86,16 +86,7 @@ void PrintCsv(const v1::ComputePropagationResponse& propagation, std::ostream& o
 }  // namespace
 
 int RunCommand(const PropagateArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto response = Propagate(arguments);
-  if (!response.ok()) return Report(response.status(), arguments.place.server, err);
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*response, /*several_lines=*/true) << '\n';
-  } else if (arguments.format == Format::kCsv) {
-    PrintCsv(*response, out);
-  } else {
-    PrintTables(*response, out);
-  }
-  return kExitOk;
+  return PrintAnswer(Propagate(arguments), arguments, PrintTables, PrintCsv, out, err);
 }
 
 }  // namespace polyest::internal

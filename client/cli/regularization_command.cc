@@ -4,11 +4,11 @@
 
 #include <fstream>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/regularization_plot.h"
@@ -113,14 +113,7 @@ int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std:
     const absl::Status written = WritePlot(*sweep, arguments.plot_file);
     if (!written.ok()) return Report(written, "", err);
   }
-  if (arguments.format == Format::kJson) {
-    out << ToJson(*sweep, /*several_lines=*/true) << '\n';
-  } else if (arguments.format == Format::kCsv) {
-    PrintCsv(*sweep, out);
-  } else {
-    PrintTable(*sweep, out);
-  }
-  return kExitOk;
+  return PrintAnswer(sweep, arguments, PrintTable, PrintCsv, out, err);
 }
 
 }  // namespace polyest::internal

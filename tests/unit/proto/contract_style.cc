@@ -80,6 +80,14 @@ bool SaysPresence(const std::string& comment) {
   return false;
 }
 
+// Whether the message, or one that it is declared in, says that the daemon sets all of it.
+bool IsOutput(const Descriptor* message) {
+  for (; message != nullptr; message = message->containing_type()) {
+    if (absl::StrContains(CommentOf(*message), "Output only")) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 ContractStyle::Exceptions ContractStyle::Unused() const {
@@ -143,12 +151,8 @@ void ContractStyle::CheckField(const FieldDescriptor& field) {
   if (IsInteger(field) && !field.is_repeated() && is_plural) {
     NoteUnlessExcepted(name, "is a count without _count in its name");
   }
-  const std::string& message = field.containing_type()->name();
-  const bool of_resource = message == "Model" || message == "Session" || message == "Operation" ||
-                           message == "DaemonStatus";
-  const bool of_request = absl::EndsWith(message, "Request");
-  const bool top_level = field.containing_type()->containing_type() == nullptr;
-  if (top_level && (of_request || of_resource) && field.real_containing_oneof() == nullptr &&
+  // Of a oneof's members one is set; the oneof says so.
+  if (field.real_containing_oneof() == nullptr && !IsOutput(field.containing_type()) &&
       !SaysPresence(CommentOf(field))) {
     Note(name, "says neither Required, Default, May be empty nor Output only");
   }

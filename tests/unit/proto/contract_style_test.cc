@@ -101,12 +101,12 @@ TEST(ContractStyle, HasNothingAgainstAGoodFile) {
       // How long, s. Required.
       double until_s = 1;
     }
-    // Answers.
+    // Answers. Output only.
     message WatchResponse {
       // How many.
       int32 row_count = 1;
     }
-    // Is as it always was.
+    // Is as it always was. Output only.
     message Kept {
       // s.
       double time = 1;
@@ -130,12 +130,12 @@ TEST(ContractStyle, WantsACommentOnEverything) {
                            "Thing.Kind: ", "Thing.KIND_UNSPECIFIED: ", "SomeService: ", "Do: "}) {
     EXPECT_THAT(breaches, testing::Contains(std::string(name) + "has no comment"));
   }
-  EXPECT_THAT(breaches, SizeIs(8));
+  EXPECT_THAT(breaches, SizeIs(9));  // and the name, which says no presence
 }
 
 void ExpectBreach(const std::string& field, const std::string& breach) {
   const auto breaches =
-      BreachesOf("// A thing.\nmessage Thing {\n  // A field.\n  " + field + "\n}");
+      BreachesOf("// A thing. Output only.\nmessage Thing {\n  // A field.\n  " + field + "\n}");
   ASSERT_THAT(breaches, SizeIs(1)) << field;
   EXPECT_THAT(breaches[0], HasSubstr(breach));
 }
@@ -157,12 +157,12 @@ TEST(ContractStyle, WantsNoMapsInStreams) {
   const std::string messages = R"(
     // Asks.
     message DoRequest {}
-    // Answers.
+    // Answers. Output only.
     message DoResponse {
       // What is in it.
       Inner inner = 1;
     }
-    // Is in it.
+    // Is in it. Output only.
     message Inner {
       // By name.
       map<string, double> values = 1;
@@ -190,11 +190,13 @@ TEST(ContractStyle, WantsTheNamesOfRequestsAndAnswers) {
   EXPECT_THAT(of_method("rpc ComputeThing(Ask) returns (Answer);"), SizeIs(4));
 }
 
-TEST(ContractStyle, WantsRequestsToSayWhatMayBeLeftOut) {
-  const auto breaches =
-      BreachesOf("// Asks.\nmessage DoRequest {\n  // A name.\n  string name = 1;\n}");
+TEST(ContractStyle, WantsFieldsToSayWhoSetsThemAndWhatMayBeLeftOut) {
+  const std::string field = " {\n  // A name.\n  string name = 1;\n}";
+  const auto breaches = BreachesOf("// Asks.\nmessage DoRequest" + field);
   ASSERT_THAT(breaches, SizeIs(1));
   EXPECT_THAT(breaches[0], HasSubstr("says neither"));
+  EXPECT_THAT(BreachesOf("// Is asked for.\nmessage Thing" + field), SizeIs(1));
+  EXPECT_THAT(BreachesOf("// Answers. Output only.\nmessage DoResponse" + field), IsEmpty());
 }
 
 }  // namespace
