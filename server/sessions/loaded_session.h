@@ -39,8 +39,8 @@ class LoadedSession {
                                                              const ModelLibrary& models,
                                                              const Stop& stop);
 
-  // From here on, gives the estimator's snapshots to the journal, as those of this session, and reads
-  // rows that are no longer in memory from it. The journal must outlive this.
+  // From here on, gives the estimator's snapshots to the journal, as those of this session, and
+  // reads rows that are no longer in memory from it. The journal must outlive this.
   void Attach(SessionJournal& journal, int64_t session);
   // Lets go of the rows of batches up to `sequence`, which the journal must keep.
   void Release(int64_t sequence) { store_->Release(sequence); }
