@@ -1,6 +1,7 @@
 #include "client/cli/json_format.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/io/coded_stream.h>
@@ -74,23 +75,40 @@ const google::protobuf::DescriptorPool& JsonTypes(const google::protobuf::FileDe
   return pool;
 }
 
+// A message's type as JSON has it.
+struct JsonType {
+  explicit JsonType(const google::protobuf::Message& message)
+      : resolver(google::protobuf::util::NewTypeResolverForDescriptorPool(
+            kUrlPrefix, &JsonTypes(*message.GetDescriptor()->file()))),
+        url(absl::StrCat(kUrlPrefix, "/", message.GetDescriptor()->full_name())) {}
+
+  const std::unique_ptr<google::protobuf::util::TypeResolver> resolver;
+  const std::string url;
+};
+
 }  // namespace
 
 std::string ToJson(const google::protobuf::Message& message, bool several_lines) {
-  namespace util = google::protobuf::util;
-  util::JsonPrintOptions options;
+  google::protobuf::util::JsonPrintOptions options;
   options.add_whitespace = several_lines;
   options.always_print_primitive_fields = true;
-  const auto* const descriptor = message.GetDescriptor();
-  const std::unique_ptr<util::TypeResolver> types(
-      util::NewTypeResolverForDescriptorPool(kUrlPrefix, &JsonTypes(*descriptor->file())));
+  const JsonType type(message);
   std::string json;
-  POLYEST_CHECK(util::BinaryToJsonString(types.get(),
-                                         std::string(kUrlPrefix) + "/" + descriptor->full_name(),
-                                         Serialize(message), &json, options)
+  POLYEST_CHECK(google::protobuf::util::BinaryToJsonString(type.resolver.get(), type.url,
+                                                           Serialize(message), &json, options)
                     .ok());
   absl::StripTrailingAsciiWhitespace(&json);
   return json;
+}
+
+absl::Status FromJson(const std::string& json, google::protobuf::Message& message) {
+  const JsonType type(message);
+  std::string bytes;
+  const auto read =
+      google::protobuf::util::JsonToBinaryString(type.resolver.get(), type.url, json, &bytes);
+  if (!read.ok()) return absl::InvalidArgumentError(read.ToString());
+  POLYEST_CHECK(message.ParseFromString(bytes));
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

@@ -3,13 +3,13 @@
 // of 200 rows of client/examples/oscillator.csv in four batches.
 
 #include <google/protobuf/util/delimited_message_util.h>
-#include <google/protobuf/util/json_util.h>
 
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <sstream>
 
+#include "client/cli/json_format.h"
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest::internal {
@@ -64,8 +64,8 @@ class StoredByAnOlderVersionTest : public testing::Test {
     std::stringstream json;
     json << in.rdbuf();
     v1::Estimate estimate;
-    const auto parsed = google::protobuf::util::JsonStringToMessage(json.str(), &estimate);
-    EXPECT_TRUE(parsed.ok()) << parsed.ToString();
+    const absl::Status parsed = FromJson(json.str(), estimate);
+    EXPECT_TRUE(parsed.ok()) << parsed;
     return estimate;
   }
 

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/json_format.h"
 #include "polyest/v1/estimate.pb.h"
 #include "tests/integration/cli/process.h"
 #include "tests/testing/test_folder.h"
@@ -88,8 +89,8 @@ class CommandTest : public ::testing::Test {
 
   static v1::Estimate ParseEstimate(const std::string& json) {
     v1::Estimate estimate;
-    const auto status = google::protobuf::util::JsonStringToMessage(json, &estimate);
-    EXPECT_TRUE(status.ok()) << status.ToString() << "\n" << json;
+    const absl::Status status = FromJson(json, estimate);
+    EXPECT_TRUE(status.ok()) << status << "\n" << json;
     return estimate;
   }
 

@@ -10,6 +10,7 @@
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
 #include "polyest/v1/model_service.pb.h"
+#include "polyest/v1/problem.pb.h"
 
 namespace polyest::internal {
 namespace {
@@ -146,6 +147,15 @@ TEST(ToJson, HasTheContractsNames) {
   EXPECT_THAT(json, HasSubstr(R"("diagnostics":[{"code":"UNDERSAMPLED")"));
   EXPECT_THAT(json, HasSubstr(R"("coefficients":{"k":0.99,"mu":-0.1})"));
   EXPECT_THAT(json, HasSubstr(R"("time":10,"samples":"200","sequence":"7")"));
+}
+
+TEST(FromJson, ReadsWhatToJsonWrites) {
+  const v1::Estimate estimate = ExampleEstimate();
+  v1::Estimate again;
+  const absl::Status read = FromJson(ToJson(estimate, /*several_lines=*/true), again);
+  ASSERT_TRUE(read.ok()) << read;
+  EXPECT_EQ(again.SerializeAsString(), estimate.SerializeAsString());
+  EXPECT_TRUE(absl::IsInvalidArgument(FromJson("{\"directions\": 3}", again)));
 }
 
 TEST(ToJson, IsTheSameForTheSameMessage) {
