@@ -73,6 +73,7 @@ TEST_F(OperationStoreTest, ListsTheNextPageAlsoWhenTheLastOfOneIsDeleted) {
   ASSERT_EQ(next.operations.size(), 1u);
   EXPECT_EQ(next.operations[0].name(), second);
   EXPECT_FALSE(next.more);
+  RunAll();
 }
 
 TEST_F(OperationStoreTest, CancelsWhatWaits) {
