@@ -15,7 +15,8 @@ packages=(
   libsystemd-dev libspdlog-dev prometheus-cpp-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev clang-format python3-yaml openssl sqlite3 libfaketime
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl sqlite3 libfaketime
+  python3-yaml python3-grpcio python3-protobuf
 )
 # SUNDIALS' CMake configuration wants OpenMP of whatever compiler there is.
 sanitizer_packages=(

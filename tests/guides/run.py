@@ -6,8 +6,11 @@ Markdown files if none is given. Fails with "guide:line" when
 
   - a command of a block fenced ```sh fails (the blocks of a guide run in order, in one copy of the
     examples, from the top of the repository; `cd` holds until the end of the guide),
+  - a block fenced ```python whose first line is "# FILE.py" is saved as that file for the blocks
+    after it, and one of these fails,
   - a block fenced ```output is not what the ```sh block before it prints (numbers to a unit of their last
     digit),
+  - a block is fenced otherwise, so that its commands would not be run,
   - a problem in a block fenced ```json is not one that `polyest check` accepts,
   - a picture of the program's is not what the commands of its guide draw,
   - a link within the repository leads nowhere,
@@ -23,10 +26,13 @@ from pathlib import Path
 from sandbox import Sandbox
 
 MAX_FIRST_PAGE_LINES = 180
-MAX_CONSOLE_BLOCKS = 15
+MAX_CONSOLE_BLOCKS = 10
+NOT_COMMANDS = {"cmake", "cpp", "csv", "text", "toml"}
 OWN_TEST = {"deploy/runbook.md"}
 SECONDS_PER_BLOCK = 300  # ends a command that hangs
 
+# A program that the reader saves: its first line names the file.
+PROGRAM = re.compile(r"# (\S+\.py)\n")
 NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 COLOR = re.compile(r"#[0-9a-f]{6}")
 LETTERS = str.maketrans("0123456789", "ghijklmnop")
@@ -139,12 +145,16 @@ def run_guide(source, programs, guide, failures):
                 if status != 0:
                     failures.add(sandbox.failed_at or f"{guide}:{line}",
                                  f"exit status {status}: {error.strip()[-600:]}")
+            elif language == "python" and (program := PROGRAM.match(block)):
+                sandbox.save(program[1], block)
             elif language == "output" and not same_output(block, printed):
                 failures.add(f"{guide}:{line}", f"the command printed instead:\n{printed}")
             elif language == "json" and '"model"' in block and '"uncertain"' in block:
                 error = sandbox.check_problem(block)
                 if error:
                     failures.add(f"{guide}:{line}", error)
+            elif language not in NOT_COMMANDS | {"json", "output", "python"}:
+                failures.add(f"{guide}:{line}", f'fence the block ```sh or ```text, not "{language}"')
         check_pictures(source, guide, sandbox, failures)
     return run, console
 

@@ -23,6 +23,11 @@ GUIDES = {
     "a command prints something else":
         (f"```sh\n{OSCILLATOR} --format json | head -c 13\n```\n\n```output\n{{\"directions\n```\n",
          "README.md:6: the command printed instead"),
+    "a program fails":
+        ("```python\n# a.py\nraise SystemExit(3)\n```\n\n```sh\npython3 a.py\n```\n",
+         "README.md:7: exit status 3"),
+    "a block has no language":
+        ("```\nfalse\n```\n", "README.md:2: fence the block ```sh or ```text"),
     "a problem is not valid":
         ('```json\n{"model": {"builtin": "none"}, "uncertain": []}\n```\n', "README.md:2: "),
     "a link leads nowhere":
@@ -51,6 +56,7 @@ def main():
     for mistake, (guide, message) in GUIDES.items():
         with tempfile.TemporaryDirectory(prefix="polyest-guides-test-") as folder:
             shutil.copytree(Path(source) / "client/examples", Path(folder) / "client/examples")
+            (Path(folder) / "proto/polyest").mkdir(parents=True)
             (Path(folder) / "deploy").mkdir()
             shutil.copy(Path(source) / "deploy/polyestd.toml", Path(folder) / "deploy")
             (Path(folder) / "p.svg").write_text("<svg></svg>\n")

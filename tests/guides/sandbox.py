@@ -43,8 +43,9 @@ echo "${line#listening on }" >"$ROOT/address"
 echo "$line"
 """
 
-# HOST:PORT is the daemon of the test, port 50051 the one that the guide has started.
-POLYEST = r"""#!/usr/bin/env bash
+# Runs a program for which HOST:PORT is the daemon of the test, port 50051 the one that the guide has
+# started.
+CLIENT = r"""#!/usr/bin/env bash
 set -euo pipefail
 arguments=()
 for argument in "$@"; do
@@ -54,7 +55,7 @@ for argument in "$@"; do
   esac
   arguments+=("$argument")
 done
-exec "$PROGRAMS/polyest" "${arguments[@]}"
+exec PROGRAM "${arguments[@]}"
 """
 
 STOP_DAEMON = r"""#!/usr/bin/env bash
@@ -79,6 +80,7 @@ class Sandbox:
         self.failed_at = ""
         checkout = self.root / "checkout"
         shutil.copytree(source / "client/examples", checkout / "client/examples")
+        shutil.copytree(source / "proto/polyest", checkout / "proto/polyest")
         (checkout / "deploy").mkdir()
         shutil.copy(source / "deploy/polyestd.toml", checkout / "deploy")
         self._programs(checkout / "build/release/bin")
@@ -100,7 +102,9 @@ class Sandbox:
 
     def _programs(self, folder):
         self._write(folder / "polyestd", POLYESTD)
-        self._write(folder / "polyest", POLYEST)
+        self._write(folder / "polyest", CLIENT.replace("PROGRAM", '"$PROGRAMS/polyest"'))
+        # The one that Debian's packages are for.
+        self._write(folder / "python3", CLIENT.replace("PROGRAM", "/usr/bin/python3 -B"))
         self._write(folder / "stop-daemon", STOP_DAEMON)
         for name in REFUSED:
             self._write(folder / name, f'#!/bin/bash\necho "{name} is not for a test; fence the block '
@@ -122,6 +126,10 @@ class Sandbox:
         self.daemon.wait()
         self.daemon.stdout.close()
         shutil.rmtree(self.root)
+
+    def save(self, file, text):
+        """Writes a file whose path is as seen from the folder that the commands run in."""
+        self._write(Path((self.root / "folder").read_text().strip()) / file, text)
 
     def run(self, guide, line, block, seconds):
         """Returns the exit status and what is printed; failed_at is the guide and line."""
