@@ -13,27 +13,25 @@
 
 namespace polyest::internal {
 
-// Prints the answer as JSON, by `print_csv` or by `print_table`, as `arguments` say, or reports why
-// there is none. Returns the exit status. A command without one of the formats passes nullptr; its
-// options must not offer it.
-template <typename Answer, typename Arguments, typename PrintTable, typename PrintCsv>
+template <typename Answer>
+using Printer = void (*)(const Answer&, std::ostream&);
+
+// Prints the answer as a table, as CSV or as JSON, as `arguments` say, or reports why there is
+// none. Returns the exit status. A printer is null for a command whose options do not offer its
+// format.
+template <typename Answer, typename Arguments>
 int PrintAnswer(const absl::StatusOr<Answer>& answer, const Arguments& arguments,
-                const PrintTable& print_table, const PrintCsv& print_csv, std::ostream& out,
+                std::type_identity_t<Printer<Answer>> print_table,
+                std::type_identity_t<Printer<Answer>> print_csv, std::ostream& out,
                 std::ostream& err) {
   if (!answer.ok()) return Report(answer.status(), arguments.place.server, err);
-  if constexpr (!std::is_null_pointer_v<PrintTable>) {
-    if (arguments.format == Format::kTable) {
-      print_table(*answer, out);
-      return kExitOk;
-    }
+  if (arguments.format == Format::kTable && print_table != nullptr) {
+    print_table(*answer, out);
+  } else if (arguments.format == Format::kCsv && print_csv != nullptr) {
+    print_csv(*answer, out);
+  } else {
+    out << ToJson(*answer, /*several_lines=*/true) << '\n';
   }
-  if constexpr (!std::is_null_pointer_v<PrintCsv>) {
-    if (arguments.format == Format::kCsv) {
-      print_csv(*answer, out);
-      return kExitOk;
-    }
-  }
-  out << ToJson(*answer, /*several_lines=*/true) << '\n';
   return kExitOk;
 }
 

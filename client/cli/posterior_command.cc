@@ -123,15 +123,12 @@ void PrintParameters(const v1::ComputePosteriorResponse& posterior, std::ostream
 }  // namespace
 
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto print_csv = [&](const auto& posterior, std::ostream& csv) {
-    if (arguments.samples > 0) {
-      PrintSamples(posterior, csv);
-    } else if (!arguments.joints.empty()) {
-      PrintJoints(posterior, csv);
-    } else {
-      PrintParameters(posterior, csv);
-    }
-  };
+  Printer<v1::ComputePosteriorResponse> print_csv = PrintParameters;
+  if (arguments.samples > 0) {
+    print_csv = PrintSamples;
+  } else if (!arguments.joints.empty()) {
+    print_csv = PrintJoints;
+  }
   return PrintAnswer(GetPosterior(arguments), arguments, PrintTable, print_csv, out, err);
 }
 
