@@ -69,14 +69,14 @@ absl::Status MemoryJournal::Delete(int64_t session) {
 }
 
 absl::Status MemoryJournal::Keep(JournalEntry entry) {
-  const auto found = sessions_.find(entry.session);
-  const int64_t last = found == sessions_.end() ? 0 : found->second.head.place.sequence;
-  if (found == sessions_.end() || entry.place.sequence != last + 1) {
+  POLYEST_RETURN_IF_ERROR(Find(entry.session).status());
+  Kept& kept = sessions_[entry.session];
+  if (entry.place.sequence != kept.head.place.sequence + 1) {
     return absl::FailedPreconditionError(
         absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
   }
-  found->second.head.place = entry.place;
-  found->second.batches.push_back(std::move(entry));
+  kept.batches.push_back(std::move(entry));
+  kept.head.place = kept.batches.back().place;
   return absl::OkStatus();
 }
 

@@ -91,7 +91,7 @@ class SessionJournal {
   virtual absl::Status Delete(int64_t session) = 0;
 
   // Appends a batch and calls `done` once the batch is kept or cannot be kept. FAILED_PRECONDITION
-  // when it does not follow the session's last one.
+  // when it does not follow the last one of a session that exists.
   virtual void Append(JournalEntry entry, Done done) = 0;
   // Saves the latest snapshot of a session, now or later. Drops it silently when the session or the
   // snapshot's batch does not exist or the disk fails, because snapshots only save time.
@@ -100,7 +100,7 @@ class SessionJournal {
   // Returns the problem of a session. Waits for the disk, as do the following.
   virtual absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const = 0;
   // Calls `take` with the batches after batch `after`, in order, until it returns an error, which
-  // is then returned. A session that does not exist may count as one without batches.
+  // is then returned. OK means that none is missing, also when the session is deleted meanwhile.
   virtual absl::Status ReadBatches(
       int64_t session, int64_t after,
       const std::function<absl::Status(const JournalBatch&)>& take) const = 0;

@@ -36,6 +36,10 @@ absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
       .Bind(entry.place.last_row.time_s);
   POLYEST_RETURN_IF_ERROR(query.Run());
   if (database.changes() > 0) return absl::OkStatus();
+  SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
+  session.Bind(entry.session);
+  POLYEST_ASSIGN_OR_RETURN(const bool there, session.Step());
+  if (!there) return NotThere();
   return absl::FailedPreconditionError(
       absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
 }
@@ -256,15 +260,17 @@ absl::Status SqliteJournal::ReadBatches(
     const std::function<absl::Status(const JournalBatch&)>& take) const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
+  // One statement looks for the session and for its batches, because the session may be deleted and
+  // its batches removed between two. Without batches it gives one row, which has no sequence.
   SqliteQuery query(*database,
-                    "SELECT sequence, measurements, digest FROM batch WHERE session = ? AND "
-                    "sequence > ? ORDER BY sequence");
+                    "SELECT sequence, measurements, digest FROM session LEFT JOIN batch ON "
+                    "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
   query.Bind(session).Bind(after);
+  POLYEST_ASSIGN_OR_RETURN(bool row, query.Step());
+  if (!row) return NotThere();
   JournalBatch batch;
   batch.sequence = after;
-  while (true) {
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return absl::OkStatus();
+  while (row && query.Integer(0) > 0) {
     const std::string bytes = query.Bytes(1);
     const bool whole = query.Integer(0) == batch.sequence + 1 && query.Bytes(2) == Digest(bytes) &&
                        batch.measurements.ParseFromString(bytes);
@@ -274,7 +280,9 @@ absl::Status SqliteJournal::ReadBatches(
           "batch %d of the session is damaged or missing in the journal", batch.sequence));
     }
     POLYEST_RETURN_IF_ERROR(take(batch));
+    POLYEST_ASSIGN_OR_RETURN(row, query.Step());
   }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::string> SqliteJournal::ReadDigest(int64_t session, int64_t sequence) const {

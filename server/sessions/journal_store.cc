@@ -113,7 +113,6 @@ absl::StatusOr<JournalStore::Rows> JournalStore::ReadSegment(const Segment& segm
   const absl::Status status = journal_->ReadBatches(number_, segment.first_batch - 1, append);
   if (!status.ok() && status != enough) return status;
   if (static_cast<int64_t>(read.rows.size()) != rows) {
-    POLYEST_RETURN_IF_ERROR(journal_->ReadProblem(number_).status());  // deleted meanwhile
     return absl::DataLossError("rows of the session are missing in the journal");
   }
   return std::make_shared<const RowBlock>(std::move(read));

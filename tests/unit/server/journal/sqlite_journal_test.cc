@@ -185,6 +185,19 @@ TEST_F(SqliteJournalTest, SaysWhichBatchIsDamagedAndLeavesTheOthersAlone) {
   EXPECT_EQ(*CountBatches(c), 1);
 }
 
+TEST_F(SqliteJournalTest, ReadsNothingOfADeletedSessionWhoseBatchesAreStillToBeRemoved) {
+  ASSERT_TRUE(Open().ok());
+  const int64_t number = Create("sessions/a");
+  for (const int64_t sequence : {1, 2, 3}) ASSERT_TRUE(Append(number, sequence).ok());
+  // As in the midst of the removal, which goes on only when the journal is opened again.
+  Change(
+      "DELETE FROM session; DELETE FROM batch WHERE sequence = 1; "
+      "INSERT INTO deleted VALUES (" +
+      std::to_string(number) + ")");
+  EXPECT_TRUE(absl::IsNotFound(CountBatches(number).status()));
+  EXPECT_TRUE(absl::IsNotFound(Append(number, 4)));
+}
+
 TEST_F(SqliteJournalTest, RefusesWhatDoesNotFitOnTheDiskAndKeepsTheRest) {
   ASSERT_TRUE(Open(/*max_mb=*/1).ok());
   const int64_t number = Create("sessions/a");
