@@ -1,5 +1,7 @@
 #include "server/sessions/batch_intake.h"
 
+#include <absl/cleanup/cleanup.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -24,14 +26,20 @@ double BatchIntake::measured_s() const {
   return measured_s_;
 }
 
-absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits) {
+absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits,
+                               const Record& record) {
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch));
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, WireFields(checks_.Check(samples)));
   POLYEST_RETURN_IF_ERROR(CheckRuns(checked.after.run + 1, limits));
+  waiting_.push_back(Following(std::move(samples)));
+  absl::Cleanup undo = [this] { waiting_.pop_back(); };
+  if (record) POLYEST_RETURN_IF_ERROR(record(waiting_.back().place));
+  std::move(undo).Cancel();
+  // What follows needs no memory, so that a lack of memory leaves everything as it was.
   checks_.Accept(checked);
-  Advance(samples);
-  waiting_.push_back({std::move(samples), place_, measured_s_});
+  place_ = waiting_.back().place;
+  measured_s_ = waiting_.back().measured_s;
   return absl::OkStatus();
 }
 
@@ -53,16 +61,20 @@ std::optional<TakenBatch> BatchIntake::Next(int64_t sequence) {
   return next;
 }
 
-void BatchIntake::Advance(const Samples& samples) {
-  ++place_.sequence;
-  place_.samples += CountValues(samples);
-  place_.rows += static_cast<int64_t>(samples.rows());
+// Returns the next batch, which has these samples.
+TakenBatch BatchIntake::Following(Samples samples) const {
+  SessionPlace place = place_;
+  double measured_s = measured_s_;
+  ++place.sequence;
+  place.samples += CountValues(samples);
+  place.rows += static_cast<int64_t>(samples.rows());
   for (size_t row = 0; row < samples.rows(); ++row) {
     const SampleRow next{samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]};
-    const bool same_run = next.run == place_.last_row.run;
-    measured_s_ += next.time_s - (same_run ? place_.last_row.time_s : 0);
-    place_.last_row = next;
+    const bool same_run = next.run == place.last_row.run;
+    measured_s += next.time_s - (same_run ? place.last_row.time_s : 0);
+    place.last_row = next;
   }
+  return {std::move(samples), place, measured_s};
 }
 
 // Counts the values of measured outputs that are not missing, as an estimate counts its samples.

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -40,10 +41,14 @@ class BatchIntake {
   SessionPlace place() const;
   double measured_s() const;
 
-  // Checks the next batch and takes all of it or nothing; cheap. Refuses a bad batch with
-  // INVALID_ARGUMENT, and one whose runs bring more parameters than the limits allow with
-  // RESOURCE_EXHAUSTED. An estimator of the problem accepts every batch that is taken here.
-  absl::Status Take(const v1::Measurements& batch, const ProblemLimits& limits = {});
+  // Records a batch elsewhere, too; gets the place of the session after it.
+  using Record = std::function<absl::Status(const SessionPlace&)>;
+  // Checks the next batch and takes all of it or nothing, also when memory is short; cheap. Refuses
+  // a bad batch with INVALID_ARGUMENT, and one whose runs bring more parameters than the limits
+  // allow with RESOURCE_EXHAUSTED. Calls `record`, if there is one, for a good batch, and takes the
+  // batch if that succeeds. An estimator of the problem accepts every batch that is taken here.
+  absl::Status Take(const v1::Measurements& batch, const ProblemLimits& limits = {},
+                    const Record& record = {});
 
   // Removes and returns the oldest batch that has not been handed on yet. Returns nothing when
   // there is none or its number is above `sequence`.
@@ -52,7 +57,7 @@ class BatchIntake {
  private:
   absl::Status CheckRuns(int runs, const ProblemLimits& limits);
   int64_t CountValues(const Samples& samples) const;
-  void Advance(const Samples& samples);
+  TakenBatch Following(Samples samples) const;
 
   const ResolvedProblem problem_;
   std::set<std::string> measured_;

@@ -64,8 +64,8 @@ absl::Status BatchLedger::Take(const SessionPlace& place, std::string digest, ui
   const std::lock_guard lock(mutex_);
   if (losses != losses_) return last_loss_;
   POLYEST_CHECK(place.sequence == taken_.sequence + 1);
-  taken_ = place;
   under_way_.push_back({place, std::move(digest)});
+  taken_ = place;
   return absl::OkStatus();
 }
 

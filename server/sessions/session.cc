@@ -163,9 +163,11 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     const double measured_s = intake.measured_s();
     POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch));
     absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_s_size()); };
-    POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem));
-    entry.place = intake.place();
-    POLYEST_RETURN_IF_ERROR(ledger_.Take(entry.place, entry.digest, present.losses));
+    const auto record = [&](const SessionPlace& place) {
+      entry.place = place;
+      return ledger_.Take(place, entry.digest, present.losses);
+    };
+    POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem, record));
     const int64_t values = entry.place.samples - before.samples;
     std::move(release_room).Cancel();
     Keep(std::move(entry), present.losses, batch.time_s_size(), values,

@@ -1,0 +1,58 @@
+#include "server/sessions/batch_intake.h"
+
+#include <gtest/gtest.h>
+
+#include <new>
+
+#include "server/sessions/loaded_session.h"
+#include "tests/testing/problem_json.h"
+
+namespace polyest::internal {
+namespace {
+
+v1::Measurements Row(double time_s) {
+  v1::Measurements batch;
+  batch.add_time_s(time_s);
+  v1::Measurements::Channel& x = *batch.add_channels();
+  x.set_name("x");
+  x.add_values(0.1);
+  return batch;
+}
+
+class BatchIntakeTest : public testing::Test {
+ protected:
+  void ExpectUntouched() {
+    EXPECT_EQ(intake_.place().sequence, 1);
+    EXPECT_EQ(intake_.place().rows, 1);
+    EXPECT_EQ(intake_.measured_s(), 0.1);
+  }
+
+  const ModelLibrary models_;
+  const std::unique_ptr<LoadedSession> loaded_ =
+      LoadedSession::Make(SmallProblem(), models_).value();
+  BatchIntake& intake_ = loaded_->intake();
+};
+
+TEST_F(BatchIntakeTest, TakesOnlyWhatCanBeRecorded) {
+  ASSERT_TRUE(intake_.Take(Row(0.1)).ok());
+  const auto refuse = [](const SessionPlace&) { return absl::ResourceExhaustedError("full"); };
+  EXPECT_EQ(intake_.Take(Row(0.2), {}, refuse), absl::ResourceExhaustedError("full"));
+  ExpectUntouched();
+  const auto lack_memory = [](const SessionPlace&) -> absl::Status { throw std::bad_alloc(); };
+  EXPECT_THROW(intake_.Take(Row(0.2), {}, lack_memory).IgnoreError(), std::bad_alloc);
+  ExpectUntouched();
+  SessionPlace recorded;
+  const auto record = [&](const SessionPlace& place) {
+    recorded = place;
+    return absl::OkStatus();
+  };
+  // The batch was not taken, so that it can come again.
+  ASSERT_TRUE(intake_.Take(Row(0.2), {}, record).ok());
+  EXPECT_EQ(recorded.sequence, 2);
+  EXPECT_EQ(intake_.Next(2)->place.sequence, 1);
+  EXPECT_EQ(intake_.Next(2)->place.sequence, 2);
+  EXPECT_FALSE(intake_.Next(2));
+}
+
+}  // namespace
+}  // namespace polyest::internal
