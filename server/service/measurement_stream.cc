@@ -288,9 +288,10 @@ void MeasurementFlow::Send(v1::StreamMeasurementsResponse response, int64_t sequ
     std::lock_guard lock(mutex_);
     outbox_.push_back({std::move(response), sequence});
   }
-  session_->WhenKept(sequence, [flow = shared_from_this(), sequence](const absl::Status& kept) {
-    flow->OnKept(sequence, kept);
-  });
+  session_->WhenKept(sequence, losses_,
+                     [flow = shared_from_this(), sequence](const absl::Status& kept) {
+                       flow->OnKept(sequence, kept);
+                     });
 }
 
 void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {

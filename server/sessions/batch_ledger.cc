@@ -91,11 +91,11 @@ void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& 
   for (const auto& [waited_for, done] : settled) done(kept);
 }
 
-void BatchLedger::WhenKept(int64_t sequence, Done done) {
+void BatchLedger::WhenKept(int64_t sequence, uint64_t losses, Done done) {
   absl::Status now;
   {
     const std::lock_guard lock(mutex_);
-    if (sequence > taken_.sequence) {
+    if (losses != losses_) {
       now = last_loss_;
     } else if (sequence > kept_.sequence) {
       waiting_.emplace(sequence, std::move(done));

@@ -55,8 +55,9 @@ class BatchLedger {
   // for a batch that is lost already.
   void Settle(uint64_t losses, int64_t sequence, const absl::Status& kept);
   // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
-  // when one of them is lost.
-  void WhenKept(int64_t sequence, Done done);
+  // when one of them is lost. If there were more losses since the caller saw `losses` of them,
+  // calls it with the reason of the last one, because another batch may have the number now.
+  void WhenKept(int64_t sequence, uint64_t losses, Done done);
   // Calls `done` when everything taken so far is kept, for a caller that has seen `losses` losses;
   // with the reason of the last loss if there were more since.
   void WhenAllKept(uint64_t losses, Done done);

@@ -220,9 +220,10 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
   if (latest == passed_on_) return latest;
   passed_on_ = latest;
   CountEstimate(*latest, Clock::now() - begin);
-  WhenKept(latest->sequence(), [self = shared_from_this(), latest](const absl::Status& kept) {
-    if (kept.ok()) self->observers_.OnEstimate(latest);
-  });
+  WhenKept(latest->sequence(), Present().losses,
+           [self = shared_from_this(), latest](const absl::Status& kept) {
+             if (kept.ok()) self->observers_.OnEstimate(latest);
+           });
   return latest;
 }
 
@@ -244,7 +245,7 @@ absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const S
   POLYEST_RETURN_IF_ERROR(CheckOpen());
   if (ledger_.taken().samples > 0) {
     POLYEST_ASSIGN_OR_RETURN(const SharedEstimate present, CurrentEstimate(stop));
-    WhenKept(present->sequence(), [observer, present](const absl::Status& kept) {
+    WhenKept(present->sequence(), Present().losses, [observer, present](const absl::Status& kept) {
       if (kept.ok()) observer->OnEstimate(present);
     });
   }

@@ -90,10 +90,10 @@ class Session : public std::enable_shared_from_this<Session> {
   // from here on.
   void Close();
 
-  // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
-  // when one of them is lost.
-  void WhenKept(int64_t sequence, BatchLedger::Done done) {
-    ledger_.WhenKept(sequence, std::move(done));
+  // Calls `done` when every batch up to `sequence` is kept, at once if all are, for a caller that
+  // has seen `losses` losses; with the reason when one of them is lost or there were more losses.
+  void WhenKept(int64_t sequence, uint64_t losses, BatchLedger::Done done) {
+    ledger_.WhenKept(sequence, losses, std::move(done));
   }
   // Calls `done` when everything taken is kept, for a caller that has seen `losses` losses; with
   // the reason of the last loss if there were more since.

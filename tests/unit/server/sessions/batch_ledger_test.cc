@@ -61,7 +61,7 @@ TEST_F(BatchLedgerTest, TellsWhenABatchIsKeptAndNotBefore) {
   Take(5);
   std::vector<int64_t> told;
   for (const int64_t sequence : {5, 3, 4}) {
-    ledger_.WhenKept(sequence, [&told, sequence](const absl::Status& kept) {
+    ledger_.WhenKept(sequence, ledger_.losses(), [&told, sequence](const absl::Status& kept) {
       EXPECT_TRUE(kept.ok());
       told.push_back(sequence);
     });
@@ -94,9 +94,9 @@ TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
   Take(6);
   std::vector<absl::StatusCode> told;
   const auto tell = [&](const absl::Status& kept) { told.push_back(kept.code()); };
-  ledger_.WhenKept(4, tell);
-  ledger_.WhenKept(6, tell);
   const uint64_t losses = ledger_.losses();
+  ledger_.WhenKept(4, losses, tell);
+  ledger_.WhenKept(6, losses, tell);
   ledger_.Settle(losses, 4, absl::OkStatus());
   ledger_.Settle(losses, 5, absl::ResourceExhaustedError("full"));
   ledger_.Settle(losses, 6, absl::FailedPreconditionError("does not follow"));
@@ -109,11 +109,27 @@ TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
     EXPECT_EQ(ledger_.Check(sequence, "", losses, {}).status(),
               absl::ResourceExhaustedError("full"));
   }
-  ledger_.WhenKept(6, tell);
+  ledger_.WhenKept(6, losses, tell);
   EXPECT_EQ(told.back(), absl::StatusCode::kResourceExhausted);
   Take(5);
   Keep(5);
   EXPECT_EQ(ledger_.kept().sequence, 5);
+}
+
+TEST_F(BatchLedgerTest, DoesNotTakeALaterBatchForALostOneOfTheSameNumber) {
+  std::vector<absl::StatusCode> told;
+  const auto tell = [&](const absl::Status& kept) { told.push_back(kept.code()); };
+  const uint64_t losses = ledger_.losses();
+  Take(4);
+  ledger_.Settle(losses, 4, absl::ResourceExhaustedError("full"));
+  Take(4);
+  ledger_.WhenKept(4, losses, tell);
+  ledger_.WhenKept(4, ledger_.losses(), tell);
+  EXPECT_EQ(told, (std::vector{absl::StatusCode::kResourceExhausted}));
+  Keep(4);
+  ledger_.WhenKept(4, losses, tell);
+  EXPECT_EQ(told, (std::vector{absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk,
+                               absl::StatusCode::kResourceExhausted}));
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ class SessionTest : public testing::Test {
   // What is known so far of whether the batch is kept.
   std::shared_ptr<std::optional<absl::Status>> Kept(int64_t sequence) {
     auto kept = std::make_shared<std::optional<absl::Status>>();
-    session_->WhenKept(sequence, [kept](const absl::Status& status) { *kept = status; });
+    session_->WhenKept(sequence, losses_, [kept](const absl::Status& status) { *kept = status; });
     return kept;
   }
 
@@ -60,6 +60,7 @@ class SessionTest : public testing::Test {
   ModelLibrary models_;
   SessionLimits limits_{.batch_rows = 4, .rows = 6};
   std::shared_ptr<Session> session_;
+  uint64_t losses_ = 0;  // that whoever asks for Kept has seen
 };
 
 TEST_F(SessionTest, AcknowledgesBatchesAndCountsTheirValues) {
@@ -289,6 +290,8 @@ TEST_F(SessionTest, ForgetsWhatAFullDiskCouldNotKeepAndGoesOnAfterIt) {
   EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
   journal_.Fail(absl::OkStatus());
   ASSERT_TRUE(Add(2, Batch({0.25})).ok());
+  EXPECT_EQ(Kept(2)->value().code(), absl::StatusCode::kResourceExhausted);
+  losses_ = session_->losses();
   EXPECT_TRUE(Kept(2)->value().ok());
   EXPECT_EQ((*session_->CurrentEstimate({}))->samples(), 2);
 }
