@@ -12,18 +12,16 @@
 
 namespace polyest::internal {
 
-void ExportFlow::OnStart(ExportReactor* reactor, const grpc::CallbackServerContext& call,
-                         const absl::Status& admitted, const std::string& session) {
+void ExportFlow::OnStart(ExportReactor* reactor, const absl::StatusOr<Caller>& admitted,
+                         const std::string& session) {
   const std::lock_guard lock(mutex_);
   reactor_ = reactor;
-  const absl::Status begun = admitted.ok() ? Begin(call, session) : admitted;
+  const absl::Status begun = admitted.ok() ? Begin(*admitted, session) : admitted.status();
   if (!begun.ok()) End(begun);
   Advance();
 }
 
-absl::Status ExportFlow::Begin(const grpc::CallbackServerContext& call,
-                               const std::string& session) {
-  POLYEST_ASSIGN_OR_RETURN(const Caller caller, context_.access.Authorize(call, "ExportSession"));
+absl::Status ExportFlow::Begin(const Caller& caller, const std::string& session) {
   POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", session).status());
   POLYEST_ASSIGN_OR_RETURN(auto found, context_.sessions.Get(caller.tenant, session));
   export_ = std::make_unique<SessionExport>(std::move(found));
@@ -113,10 +111,16 @@ void ExportFlow::OnDone() {
 ExportCall::ExportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
                        const std::string& session)
     : flow_(std::make_shared<ExportFlow>(context)) {
-  auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
-  const absl::Status admitted = ticket.status();
-  if (admitted.ok()) ticket_ = *std::move(ticket);
-  flow_->OnStart(this, call, admitted, session);
+  absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ExportSession");
+  if (admitted.ok()) {
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
+    if (ticket.ok()) {
+      ticket_ = *std::move(ticket);
+    } else {
+      admitted = ticket.status();
+    }
+  }
+  flow_->OnStart(this, admitted, session);
 }
 
 void ExportCall::OnDone() {

@@ -22,8 +22,9 @@ class ExportFlow final : public Drainable, public std::enable_shared_from_this<E
  public:
   explicit ExportFlow(ServiceContext& context) : context_(context) {}
 
-  void OnStart(ExportReactor* reactor, const grpc::CallbackServerContext& call,
-               const absl::Status& admitted, const std::string& session);
+  // Begins for the caller admitted, or ends the call at once.
+  void OnStart(ExportReactor* reactor, const absl::StatusOr<Caller>& admitted,
+               const std::string& session);
   void OnWritten(bool ok);
   void OnCancelled();
   void OnDone();
@@ -31,7 +32,7 @@ class ExportFlow final : public Drainable, public std::enable_shared_from_this<E
 
  private:
   // The following are called with the mutex held.
-  absl::Status Begin(const grpc::CallbackServerContext& call, const std::string& session);
+  absl::Status Begin(const Caller& caller, const std::string& session);
   void End(const absl::Status& status);
   void Advance();
   absl::Status StartReading();

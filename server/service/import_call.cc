@@ -10,16 +10,14 @@
 
 namespace polyest::internal {
 
-void ImportFlow::OnStart(ImportReactor* reactor, const grpc::CallbackServerContext& call,
-                         const absl::Status& admitted) {
+void ImportFlow::OnStart(ImportReactor* reactor, const absl::StatusOr<Caller>& admitted) {
   const std::lock_guard lock(mutex_);
   reactor_ = reactor;
-  const auto caller = context_.access.Authorize(call, "ImportSession");
-  if (!admitted.ok() || !caller.ok()) {
-    End(admitted.ok() ? caller.status() : admitted);
+  if (admitted.ok()) {
+    import_ = std::make_unique<SessionImport>(context_.sessions, admitted->tenant);
+    lane_ = absl::StrCat(admitted->tenant, "/calls");
   } else {
-    import_ = std::make_unique<SessionImport>(context_.sessions, caller->tenant);
-    lane_ = absl::StrCat(caller->tenant, "/calls");
+    End(admitted.status());
   }
   Advance();
 }
@@ -43,13 +41,16 @@ void ImportFlow::OnRead(bool ok) {
 void ImportFlow::Take() {
   const absl::Status taken =
       Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
-  const bool over = !taken.ok() || half_closed_;
-  // The import is destroyed before the call ends, because the daemon may be destroyed at any moment
-  // after that.
-  if (over) import_ = nullptr;
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
+  if (!taken.ok() || half_closed_) End(taken);
+  if (end_) {
+    // The import is destroyed before the call ends, because the daemon may be destroyed at any
+    // moment after that; and without the mutex, because its destruction waits for the journal.
+    lock.unlock();
+    import_ = nullptr;
+    lock.lock();
+  }
   working_ = false;
-  if (over) End(taken);
   Advance();
 }
 
@@ -94,6 +95,9 @@ void ImportFlow::Advance() {
 }
 
 void ImportFlow::OnDone() {
+  // A call that ends between two records leaves the import, and the executor may hold the flow for
+  // longer than there are sessions.
+  import_ = nullptr;
   const std::lock_guard lock(mutex_);
   reactor_ = nullptr;
 }
@@ -101,10 +105,16 @@ void ImportFlow::OnDone() {
 ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
                        v1::Session* response)
     : flow_(std::make_shared<ImportFlow>(context, response)) {
-  auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
-  const absl::Status admitted = ticket.status();
-  if (admitted.ok()) ticket_ = *std::move(ticket);
-  flow_->OnStart(this, call, admitted);
+  absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ImportSession");
+  if (admitted.ok()) {
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    if (ticket.ok()) {
+      ticket_ = *std::move(ticket);
+    } else {
+      admitted = ticket.status();
+    }
+  }
+  flow_->OnStart(this, admitted);
 }
 
 void ImportCall::OnDone() {

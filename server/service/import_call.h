@@ -21,8 +21,8 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
   ImportFlow(ServiceContext& context, v1::Session* response)
       : context_(context), response_(response) {}
 
-  void OnStart(ImportReactor* reactor, const grpc::CallbackServerContext& call,
-               const absl::Status& admitted);
+  // Begins for the caller admitted, or ends the call at once.
+  void OnStart(ImportReactor* reactor, const absl::StatusOr<Caller>& admitted);
   void OnRead(bool ok);
   void OnCancelled();
   void OnDone();

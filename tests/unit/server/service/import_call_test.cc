@@ -1,0 +1,129 @@
+#include "server/service/import_call.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <future>
+#include <semaphore>
+
+#include "server/digest/digest.h"
+#include "server/service/export_call.h"
+#include "tests/testing/faulty_journal.h"
+#include "tests/testing/problem_json.h"
+#include "tests/testing/test_folder.h"
+
+namespace polyest::internal {
+namespace {
+
+// gRPC's side of an import.
+class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest> {
+ public:
+  explicit Reader(ImportCall& call) : call_(call) { BindReactor(&call); }
+
+  // Waits until a record is asked for, and gives this one.
+  void Give(const v1::SessionRecord& record) {
+    asked_.acquire();
+    *request_->mutable_record() = record;
+    call_.OnReadDone(true);
+  }
+  void SendInitialMetadata() override {}
+  void Read(v1::ImportSessionRequest* request) override {
+    request_ = request;
+    asked_.release();
+  }
+  void Finish(grpc::Status status) override { on_finish(status); }
+
+  std::function<void(const grpc::Status&)> on_finish;
+
+ private:
+  grpc::internal::ServerReactor* reactor() override { return &call_; }
+  void CallOnDone() override {}
+
+  ImportCall& call_;
+  v1::ImportSessionRequest* request_ = nullptr;
+  std::binary_semaphore asked_{0};
+};
+
+class ImportCallTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const SessionServices services{.executor = executor_, .journal = journal_, .models = models_};
+    sessions_ =
+        SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
+  }
+  v1::SessionRecord Head() {
+    v1::SessionRecord record;
+    record.mutable_head()->set_name("sessions/a");
+    record.mutable_head()->set_problem(DeterministicBytes(SmallProblem()));
+    record.mutable_head()->set_batch_count(2);
+    return record;
+  }
+  v1::SessionRecord Batch() {
+    v1::SessionRecord record;
+    record.mutable_batch()->set_sequence(1);
+    v1::Measurements& rows = *record.mutable_batch()->mutable_measurements();
+    rows.add_time_s(0.1);
+    rows.add_channels()->set_name("x");
+    rows.mutable_channels(0)->add_values(0.1);
+    return record;
+  }
+  // Lets in everybody, or whoever has a token.
+  ServiceContext Context(const std::string& token_file = "") {
+    access_ = AccessControl::Open({.token_file = token_file}).value();
+    return {.executor = executor_,
+            .intake = executor_,
+            .sessions = *sessions_,
+            .calls = calls_,
+            .access = *access_,
+            .stop = {},
+            .models = models_,
+            .max_computing = std::chrono::seconds(60),
+            .wall_clock = {}};
+  }
+
+  FaultyJournal journal_;
+  ModelLibrary models_;
+  OpenCalls calls_;
+  std::unique_ptr<AccessControl> access_;
+  grpc::CallbackServerContext call_;
+  v1::Session imported_;
+  std::unique_ptr<SessionRegistry> sessions_;
+  // Runs what it has to the end before anything else goes.
+  Executor executor_{
+      {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
+};
+
+TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
+  ServiceContext context = Context();
+  auto* const import = new ImportCall(context, call_, &imported_);
+  Reader reader(*import);
+  std::promise<grpc::StatusCode> finished;
+  reader.on_finish = [&](const grpc::Status& status) {
+    // The session is gone before the call ends.
+    EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
+    finished.set_value(status.error_code());
+  };
+  reader.Give(Head());
+  journal_.Hold();
+  reader.Give(Batch());
+  EXPECT_TRUE(journal_.ReadProblem(1).ok());
+  import->OnCancel();
+  journal_.Release();
+  EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::CANCELLED);
+  import->OnDone();
+}
+
+TEST_F(ImportCallTest, OccupiesNothingForAStranger) {
+  const TestFolder folder;
+  const NewToken token = *MakeTokenFor("anna:chassis:admin");
+  ServiceContext context = Context(folder.Write("tokens", token.line + "\n"));
+  auto* const import = new ImportCall(context, call_, &imported_);
+  auto* const exported = new ExportCall(context, call_, "sessions/a");
+  EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWriter), 0);
+  EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWatcher), 0);
+  import->OnDone();
+  exported->OnDone();
+}
+
+}  // namespace
+}  // namespace polyest::internal
