@@ -26,15 +26,21 @@ class CallStop {
     // The deadline is kept by the monotonic clock, because the wall clock may be set meanwhile.
     const gpr_timespec deadline =
         gpr_convert_clock_type(context.raw_deadline(), GPR_CLOCK_MONOTONIC);
-    if (gpr_time_cmp(deadline, gpr_inf_future(GPR_CLOCK_MONOTONIC)) == 0) return;
-    const gpr_timespec remaining = gpr_time_sub(deadline, gpr_now(GPR_CLOCK_MONOTONIC));
-    deadline_ = Stop::Clock::now() + std::chrono::seconds(remaining.tv_sec) +
-                std::chrono::nanoseconds(remaining.tv_nsec);
+    const auto remaining = Duration(gpr_time_sub(deadline, gpr_now(GPR_CLOCK_MONOTONIC)));
+    if (remaining) deadline_ = Stop::Clock::now() + *remaining;
   }
 
   // Makes a stop for work without a call, and so without a deadline.
   CallStop(std::stop_token token, std::chrono::seconds max_computing)
       : token_(std::move(token)), max_computing_(max_computing) {}
+
+  // Returns the time that remains until a deadline; nothing if it is longer than any call lasts,
+  // because the clock cannot count as far as a client may ask.
+  static std::optional<std::chrono::nanoseconds> Duration(const gpr_timespec& remaining) {
+    constexpr std::chrono::seconds kLongest = std::chrono::years(10);
+    if (remaining.tv_sec > kLongest.count()) return std::nullopt;
+    return std::chrono::seconds(remaining.tv_sec) + std::chrono::nanoseconds(remaining.tv_nsec);
+  }
 
   // Returns the stop of a piece of work that begins now.
   Stop Begin() const {
