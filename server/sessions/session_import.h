@@ -25,7 +25,8 @@ class SessionImport {
   // batch that is streamed. Must not be called again after an error.
   absl::Status Take(const v1::ImportSessionRequest& request);
   // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
-  // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile.
+  // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
+  // RESOURCE_EXHAUSTED when the last place has been.
   absl::StatusOr<std::shared_ptr<Session>> Finish();
 
  private:

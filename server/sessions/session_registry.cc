@@ -83,10 +83,23 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
     SessionHead head, std::unique_ptr<LoadedSession> loaded) {
   const Key key(head.tenant, head.name);
   auto session = std::make_shared<Session>(services_, std::move(head), std::move(loaded));
+  const absl::Status added = Add(key, session);
+  if (added.ok()) return session;
+  services_.journal.Delete(session->number()).IgnoreError();
+  services_.rows->Forget(session->number());
+  return added;
+}
+
+absl::Status SessionRegistry::Add(const Key& key, const std::shared_ptr<Session>& session) {
   const std::lock_guard lock(mutex_);
-  ++count_[key.first];
-  sessions_.emplace(key, session);
-  return session;
+  // The journal has no two sessions of a name, so one that is still here is just being deleted. The
+  // new one takes its place.
+  if (!sessions_.contains(key)) {
+    POLYEST_RETURN_IF_ERROR(CheckCount(key.first));
+    ++count_[key.first];
+  }
+  sessions_[key] = session;
+  return absl::OkStatus();
 }
 
 absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
@@ -99,13 +112,18 @@ absl::Status SessionRegistry::CheckFree(const Key& key) const {
     return absl::AlreadyExistsError(
         absl::StrFormat("there is a session \"%s\" already", key.second));
   }
+  POLYEST_RETURN_IF_ERROR(CheckCount(key.first));
+  return services_.memory.Check();
+}
+
+absl::Status SessionRegistry::CheckCount(const std::string& tenant) const {
   if (static_cast<int64_t>(sessions_.size()) >= services_.limits.sessions) {
     return LimitExceeded(
         "--max-sessions",
         absl::StrFormat("the daemon keeps at most %d sessions (--max-sessions); delete one",
                         services_.limits.sessions));
   }
-  const auto count = count_.find(key.first);
+  const auto count = count_.find(tenant);
   if (count != count_.end() && count->second >= services_.limits.sessions_per_tenant) {
     return LimitExceeded(
         "--max-sessions-per-tenant",
@@ -113,7 +131,7 @@ absl::Status SessionRegistry::CheckFree(const Key& key) const {
                         "one",
                         services_.limits.sessions_per_tenant));
   }
-  return services_.memory.Check();
+  return absl::OkStatus();
 }
 
 std::string SessionRegistry::ChooseName(const std::string& tenant) {
@@ -152,8 +170,12 @@ absl::Status SessionRegistry::Delete(const std::string& tenant, const std::strin
   POLYEST_RETURN_IF_ERROR(deleted);
   {
     const std::lock_guard lock(mutex_);
-    sessions_.erase({tenant, name});
-    --count_[tenant];
+    // A new session may have the name by now, which the journal has had free since.
+    const auto found = sessions_.find({tenant, name});
+    if (found != sessions_.end() && found->second == session) {
+      sessions_.erase(found);
+      --count_[tenant];
+    }
   }
   services_.rows->Forget(session->number());
   session->Close();

@@ -41,7 +41,8 @@ class SessionRegistry {
   absl::Status Delete(const std::string& tenant, const std::string& name);
 
   // The following two are for SessionImport. CheckRoom refuses a name that is taken, and any name
-  // when a limit is reached. Adopt adds a session that the journal keeps.
+  // when a limit is reached. Adopt adds a session that the journal keeps; RESOURCE_EXHAUSTED, with
+  // the session deleted, when others have come first and a limit of sessions is reached.
   absl::Status CheckRoom(const std::string& tenant, const std::string& name) const;
   absl::StatusOr<std::shared_ptr<Session>> Adopt(SessionHead head,
                                                  std::unique_ptr<LoadedSession> loaded);
@@ -55,8 +56,10 @@ class SessionRegistry {
   using Key = std::pair<std::string, std::string>;  // tenant, name
 
   SessionRegistry(const SessionServices& services, WallClock clock);
+  absl::Status Add(const Key& key, const std::shared_ptr<Session>& session);
   // The following are called with the mutex held.
   absl::Status CheckFree(const Key& key) const;
+  absl::Status CheckCount(const std::string& tenant) const;
   std::string ChooseName(const std::string& tenant);
 
   SessionServices services_;

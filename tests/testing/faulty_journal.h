@@ -3,6 +3,7 @@
 // A session journal that can behave as if its disk were slow, full or broken.
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -35,6 +36,12 @@ class FaultyJournal final : public SessionJournal {
     failure_ = status;
   }
 
+  // Calls `then` once the journal has deleted a session, before the caller hears of it.
+  void AfterDeleting(std::function<void()> then) {
+    const std::lock_guard lock(mutex_);
+    then_ = std::move(then);
+  }
+
   bool durable() const override { return true; }
   absl::StatusOr<std::vector<SessionHead>> Heads() const override { return journal_.Heads(); }
   absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
@@ -45,7 +52,9 @@ class FaultyJournal final : public SessionJournal {
   absl::Status Show(int64_t session) override { return journal_.Show(session); }
   absl::Status Delete(int64_t session) override {
     if (const absl::Status failed = failure(); !failed.ok()) return failed;
-    return journal_.Delete(session);
+    const absl::Status deleted = journal_.Delete(session);
+    if (const auto then = TakeThen()) then();
+    return deleted;
   }
   void Append(JournalEntry entry, Done done) override {
     {
@@ -82,11 +91,17 @@ class FaultyJournal final : public SessionJournal {
     return failure_;
   }
 
+  std::function<void()> TakeThen() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(then_, nullptr);
+  }
+
   MemoryJournal journal_;
   mutable std::mutex mutex_;
   bool holding_ = false;
   std::deque<std::pair<JournalEntry, Done>> held_;
   absl::Status failure_;
+  std::function<void()> then_;
 };
 
 }  // namespace polyest::internal

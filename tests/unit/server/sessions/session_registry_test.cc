@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "proto/wire/refusal/refusal.h"
+#include "server/digest/digest.h"
+#include "server/sessions/session_import.h"
 #include "tests/testing/faulty_journal.h"
 #include "tests/testing/problem_json.h"
 
@@ -30,6 +32,14 @@ class SessionRegistryTest : public testing::Test {
     std::vector<std::string> names;
     for (const auto& session : registry_->List("t", after, count)) names.push_back(session->name());
     return names;
+  }
+
+  // The head of a session without batches, which is all of it.
+  static v1::ImportSessionRequest ImportOf(const std::string& id) {
+    v1::ImportSessionRequest request;
+    request.set_session_id(id);
+    request.mutable_record()->mutable_head()->set_problem(DeterministicBytes(SmallProblem()));
+    return request;
   }
 
   static v1::Measurements Rows(std::initializer_list<double> times) {
@@ -116,6 +126,38 @@ TEST_F(SessionRegistryTest, HoldsNoMoreThanItsLimit) {
   ASSERT_TRUE(registry_->Delete("other", "sessions/d").ok());
   ASSERT_TRUE(registry_->Delete("t", "sessions/b").ok());
   EXPECT_TRUE(StatusOfCreate("d").ok());
+}
+
+TEST_F(SessionRegistryTest, HoldsNoMoreThanItsLimitHoweverManyImportsBeganBeforeIt) {
+  limits_.sessions = 1;
+  Open();
+  SessionImport first(*registry_, "t"), second(*registry_, "t");
+  ASSERT_TRUE(first.Take(ImportOf("a")).ok());
+  ASSERT_TRUE(second.Take(ImportOf("b")).ok());
+  EXPECT_TRUE(first.Finish().ok());
+  EXPECT_EQ(RefusalOf(second.Finish().status())->limit, "--max-sessions");
+  EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a"));
+  EXPECT_EQ(journal_.Heads()->size(), 1u);
+  ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
+  EXPECT_TRUE(StatusOfCreate("b").ok());
+}
+
+TEST_F(SessionRegistryTest, HasASessionThatTakesTheNameOfOneJustBeingDeleted) {
+  limits_.sessions = 2;
+  Open();
+  SessionImport import(*registry_, "t");
+  ASSERT_TRUE(import.Take(ImportOf("a")).ok());
+  ASSERT_TRUE(StatusOfCreate("a").ok());
+  const auto old = *registry_->Get("t", "sessions/a");
+  journal_.AfterDeleting([&] { EXPECT_TRUE(import.Finish().ok()); });
+  ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
+  const auto session = registry_->Get("t", "sessions/a");
+  ASSERT_TRUE(session.ok()) << session.status();
+  EXPECT_NE(*session, old);
+  EXPECT_TRUE(Add(*session, 1, Rows({0.1})).ok());
+  // It counts once.
+  EXPECT_TRUE(StatusOfCreate("b").ok());
+  EXPECT_EQ(RefusalOf(StatusOfCreate("c"))->limit, "--max-sessions");
 }
 
 TEST_F(SessionRegistryTest, ListsInTheOrderOfNamesFromAnyPlace) {
