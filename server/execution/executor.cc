@@ -34,10 +34,7 @@ Executor::~Executor() {
 
 absl::Status Executor::Submit(const std::string& lane, Task task) {
   POLYEST_RETURN_IF_ERROR(Reserve(lane));
-  Enqueue(lane, [this, lane, task = std::move(task)] {
-    task();
-    Release(lane);
-  });
+  Enqueue(lane, std::move(task));
   return absl::OkStatus();
 }
 
@@ -68,13 +65,6 @@ absl::Status Executor::Reserve(const std::string& lane) {
   ++accepted_;
   ++lanes_[lane].accepted;
   return absl::OkStatus();
-}
-
-void Executor::Release(const std::string& lane) {
-  const std::lock_guard lock(mutex_);
-  --accepted_;
-  --lanes_[lane].accepted;
-  if (ending_ && accepted_ == 0) ready_.notify_all();
 }
 
 void Executor::Enqueue(const std::string& lane, Task task) {
@@ -114,8 +104,11 @@ void Executor::Run() {
     task = nullptr;
     lock.lock();
     --lane.running;
+    --lane.accepted;
+    --accepted_;
     GiveTurn(name, lane);
-    if (lane.accepted == 0 && lane.running == 0) lanes_.erase(name);
+    if (lane.accepted == 0) lanes_.erase(name);
+    if (ending_ && accepted_ == 0) ready_.notify_all();
   }
 }
 
@@ -148,7 +141,6 @@ void Strand::RunOne() {
   // The next task goes to the end of the queue, so that a busy strand does not keep others from
   // their turn.
   if (more) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
-  executor_.Release(lane_);
 }
 
 }  // namespace polyest::internal

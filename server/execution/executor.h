@@ -57,9 +57,7 @@ class Executor {
 
   // Takes room for one task; RESOURCE_EXHAUSTED when there is none.
   absl::Status Reserve(const std::string& lane);
-  // Gives the room of one task back.
-  void Release(const std::string& lane);
-  // Queues a task whose room has been taken.
+  // Queues a task whose room has been taken. The room is given back after the task.
   void Enqueue(const std::string& lane, Task task);
   void Run();
   // Puts the lane among those that take turns, if it may run a task. Called with the mutex held.

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <future>
 #include <latch>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace polyest::internal {
@@ -120,6 +123,17 @@ TEST(Executor, KeepsRoomForOthersWhenOneLaneIsFull) {
   EXPECT_TRUE(executor.Submit("b", [] {}).ok());
   EXPECT_EQ(executor.accepted(), 3);
   end.count_down();
+}
+
+TEST(Executor, CountsATaskUntilNothingIsLeftOfIt) {
+  std::promise<std::pair<int, int>> counts;
+  Executor executor(OneLane(1, 1));
+  const auto count = [&](void*) { counts.set_value({executor.accepted(), executor.waiting()}); };
+  // The pointer goes with the task that holds it, and counts then.
+  const absl::Status accepted =
+      executor.Submit(kLane, [held = std::shared_ptr<void>(nullptr, count)] {});
+  ASSERT_TRUE(accepted.ok()) << accepted;
+  EXPECT_EQ(counts.get_future().get(), std::pair(1, 0));
 }
 
 TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
