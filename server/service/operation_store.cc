@@ -20,6 +20,20 @@ constexpr std::chrono::seconds kRetryLater{1};
 
 }  // namespace
 
+// Takes up one of the tenant's places. The work holds it in the queue and until it has ended,
+// because its request takes memory as long, whether its operation has been forgotten or not.
+class OperationStore::Place {
+ public:
+  Place(OperationStore& store, std::string tenant) : store_(store), tenant_(std::move(tenant)) {}
+  ~Place() { store_.Leave(tenant_); }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+ private:
+  OperationStore& store_;
+  const std::string tenant_;
+};
+
 // Holds one operation. The work shares its ownership, so that an operation may be forgotten while
 // it is under way.
 class OperationStore::Entry {
@@ -37,29 +51,28 @@ class OperationStore::Entry {
   // Returns the result, which only the job may use before its end.
   v1::ComputationResult* result() { return &result_; }
   std::stop_token token() const { return stop_.get_token(); }
-  void RequestStop() { stop_.request_stop(); }
 
-  void Begin() {
-    const std::lock_guard lock(mutex_);
-    operation_.set_state(v1::Operation::RUNNING);
-  }
-
-  // Ends the operation and returns true; returns false if it has ended already.
-  bool End(const absl::Status& status, const google::protobuf::Timestamp& time,
-           Clock::time_point now) {
+  // Begins the work; returns false if it was cancelled while it waited.
+  bool Begin() {
     const std::lock_guard lock(mutex_);
     if (end_) return false;
-    end_ = now;
-    *operation_.mutable_end_time() = time;
-    if (status.ok()) {
-      operation_.set_state(v1::Operation::SUCCEEDED);
-      return true;
-    }
-    const bool cancelled = absl::IsCancelled(status) && stop_.stop_requested();
-    operation_.set_state(cancelled ? v1::Operation::CANCELLED : v1::Operation::FAILED);
-    *operation_.mutable_error() = ToRpcStatus(status);
-    result_.Clear();
+    operation_.set_state(v1::Operation::RUNNING);
     return true;
+  }
+
+  // Ends the operation if it has not ended already.
+  void End(const absl::Status& status, const google::protobuf::Timestamp& time,
+           Clock::time_point now) {
+    const std::lock_guard lock(mutex_);
+    EndNow(status, time, now);
+  }
+
+  // Asks the work to end early; ends the operation at once if its work has not begun.
+  void Cancel(const google::protobuf::Timestamp& time, Clock::time_point now) {
+    stop_.request_stop();
+    const std::lock_guard lock(mutex_);
+    if (operation_.state() != v1::Operation::QUEUED) return;
+    EndNow(Stop(token()).Check(), time, now);
   }
 
   v1::Operation Describe(bool with_result, Clock::time_point now) const {
@@ -81,6 +94,22 @@ class OperationStore::Entry {
   }
 
  private:
+  // Called with the mutex held.
+  void EndNow(const absl::Status& status, const google::protobuf::Timestamp& time,
+              Clock::time_point now) {
+    if (end_) return;
+    end_ = now;
+    *operation_.mutable_end_time() = time;
+    if (status.ok()) {
+      operation_.set_state(v1::Operation::SUCCEEDED);
+      return;
+    }
+    const bool cancelled = absl::IsCancelled(status) && stop_.stop_requested();
+    operation_.set_state(cancelled ? v1::Operation::CANCELLED : v1::Operation::FAILED);
+    *operation_.mutable_error() = ToRpcStatus(status);
+    result_.Clear();
+  }
+
   const Clock::time_point begin_;
   std::stop_source stop_;
   v1::ComputationResult result_;
@@ -96,12 +125,21 @@ OperationStore::OperationStore(const OperationLimits& limits, WallClock wall_clo
 OperationStore::~OperationStore() {
   CancelAll();
   std::unique_lock lock(mutex_);
-  ended_.wait(lock, [this] { return under_way_ == 0; });
+  left_.wait(lock, [this] { return places_.empty(); });
 }
 
 void OperationStore::CancelAll() {
   const std::lock_guard lock(mutex_);
-  for (const auto& [key, entry] : entries_) entry->RequestStop();
+  for (const auto& [key, entry] : entries_) Cancel(*entry);
+}
+
+void OperationStore::Cancel(Entry& entry) { entry.Cancel(wall_clock_(), now_()); }
+
+void OperationStore::Leave(const std::string& tenant) {
+  const std::lock_guard lock(mutex_);
+  const auto place = places_.find(tenant);
+  if (--place->second == 0) places_.erase(place);
+  left_.notify_all();
 }
 
 void OperationStore::ForgetOld() {
@@ -120,13 +158,16 @@ OperationStore::OfTenant(const std::string& tenant) {
 
 absl::Status OperationStore::MakeRoom(const std::string& tenant) {
   const auto [first, last] = OfTenant(tenant);
-  if (static_cast<size_t>(std::distance(first, last)) < limits_.per_tenant) return absl::OkStatus();
+  const auto places = places_.find(tenant);
+  const bool full = places != places_.end() && places->second >= limits_.per_tenant;
+  const auto operations = static_cast<size_t>(std::distance(first, last));
+  if (!full && operations < limits_.per_tenant) return absl::OkStatus();
   auto oldest = last;
   for (auto one = first; one != last; ++one) {
     const auto end = one->second->end();
     if (end && (oldest == last || *end < *oldest->second->end())) oldest = one;
   }
-  if (oldest == last) {
+  if (full || oldest == last) {
     return Refuse(
         absl::StatusCode::kResourceExhausted,
         absl::StrCat("a tenant has at most ", limits_.per_tenant, " operations under way"),
@@ -149,36 +190,28 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
     POLYEST_RETURN_IF_ERROR(MakeRoom(tenant));
     key = {tenant, ++started_};
     entries_[key] = entry;
-    ++under_way_;
+    ++places_[tenant];
   }
+  const auto place = std::make_shared<const Place>(*this, tenant);
   const v1::Operation started = entry->Describe(/*with_result=*/false, now_());
-  const absl::Status accepted = job.submit([this, entry, work = job.work] { Run(entry, work); });
+  const absl::Status accepted =
+      job.submit([this, entry, place, work = job.work] { Run(entry, place, work); });
   if (accepted.ok()) return started;
-  End(*entry, accepted);
   const std::lock_guard lock(mutex_);
   entries_.erase(key);
   return accepted;
 }
 
-void OperationStore::Run(const std::shared_ptr<Entry>& entry, const UnaryCall::Work& work) {
+void OperationStore::Run(const std::shared_ptr<Entry>& entry,
+                         const std::shared_ptr<const Place>& place, const UnaryCall::Work& work) {
+  if (!entry->Begin()) return;
   const CallStop call_stop(entry->token(), limits_.max_computing);
   const Stop stop = call_stop.Begin();
-  const auto finish = [this, entry, call_stop](const absl::Status& outcome) {
-    End(*entry, call_stop.Name(outcome));
+  const auto finish = [this, entry, place, call_stop](const absl::Status& outcome) {
+    entry->End(call_stop.Name(outcome), wall_clock_(), now_());
   };
-  absl::Status status = stop.Check();
-  if (status.ok()) {
-    entry->Begin();
-    status = Guarded([&] { return work(stop, finish); });
-  }
+  const absl::Status status = Guarded([&] { return work(stop, finish); });
   if (!status.ok()) finish(status);
-}
-
-void OperationStore::End(Entry& entry, const absl::Status& status) {
-  if (!entry.End(status, wall_clock_(), now_())) return;
-  const std::lock_guard lock(mutex_);
-  --under_way_;
-  ended_.notify_all();
 }
 
 absl::StatusOr<OperationStore::Entries::iterator> OperationStore::Find(const std::string& tenant,
@@ -216,14 +249,14 @@ absl::StatusOr<v1::Operation> OperationStore::Cancel(const std::string& tenant,
                                                      const std::string& name) {
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
-  found->second->RequestStop();
+  Cancel(*found->second);
   return found->second->Describe(/*with_result=*/false, now_());
 }
 
 absl::Status OperationStore::Delete(const std::string& tenant, const std::string& name) {
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
-  found->second->RequestStop();
+  Cancel(*found->second);
   entries_.erase(found);
   return absl::OkStatus();
 }

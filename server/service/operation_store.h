@@ -38,14 +38,14 @@ class OperationStore {
   using MakeJob = std::function<absl::StatusOr<Job>(v1::ComputationResult*)>;
 
   OperationStore(const OperationLimits& limits, WallClock wall_clock, Now now = Clock::now);
-  // Cancels the operations under way and waits for their ends.
+  // Cancels the operations under way and waits until no work waits or runs.
   ~OperationStore();
   OperationStore(const OperationStore&) = delete;
   OperationStore& operator=(const OperationStore&) = delete;
 
   // Starts the job and returns its operation. Returns make_job's error if that fails;
-  // RESOURCE_EXHAUSTED when all of the tenant's operations are under way, or the job finds no room
-  // in its queue.
+  // RESOURCE_EXHAUSTED when all of the tenant's operations are under way, counting those cancelled
+  // or deleted whose work has yet to leave its queue, or when the job finds no room in its queue.
   absl::StatusOr<v1::Operation> Start(const std::string& tenant, const std::string& method,
                                       const MakeJob& make_job);
   // Returns an operation, with its result if it has ended.
@@ -58,7 +58,8 @@ class OperationStore {
   };
   // Returns at most `count` ≥ 1 operations, those whose number is above `after`. Numbers are ≥ 1.
   Page List(const std::string& tenant, int64_t after, size_t count);
-  // Asks an operation to end early, and returns it; one that has ended stays as it is.
+  // Asks an operation to end early, and returns it; one that waits is cancelled at once, and one
+  // that has ended stays as it is.
   absl::StatusOr<v1::Operation> Cancel(const std::string& tenant, const std::string& name);
   // Forgets an operation, and cancels it if it is under way.
   absl::Status Delete(const std::string& tenant, const std::string& name);
@@ -67,6 +68,7 @@ class OperationStore {
 
  private:
   class Entry;
+  class Place;
   using Key = std::pair<std::string, int64_t>;  // tenant, number
   using Entries = std::map<Key, std::shared_ptr<Entry>>;
 
@@ -75,18 +77,20 @@ class OperationStore {
   absl::Status MakeRoom(const std::string& tenant);
   std::pair<Entries::iterator, Entries::iterator> OfTenant(const std::string& tenant);
   absl::StatusOr<Entries::iterator> Find(const std::string& tenant, const std::string& name);
+  void Cancel(Entry& entry);
 
-  void Run(const std::shared_ptr<Entry>& entry, const UnaryCall::Work& work);
-  void End(Entry& entry, const absl::Status& status);
+  void Run(const std::shared_ptr<Entry>& entry, const std::shared_ptr<const Place>& place,
+           const UnaryCall::Work& work);
+  void Leave(const std::string& tenant);
 
   const OperationLimits limits_;
   const WallClock wall_clock_;
   const Now now_;
   std::mutex mutex_;
-  std::condition_variable ended_;
+  std::condition_variable left_;
   Entries entries_;
+  std::map<std::string, size_t> places_;  // taken up by work, by tenant; none is 0
   int64_t started_ = 0;
-  int under_way_ = 0;
 };
 
 }  // namespace polyest::internal

@@ -16,7 +16,8 @@ class OperationStoreTest : public testing::Test {
                    queue_.push_back(std::move(task));
                    return absl::OkStatus();
                  },
-                 [result, outcome](const Stop& stop, const UnaryCall::Finisher& finish) {
+                 [this, result, outcome](const Stop& stop, const UnaryCall::Finisher& finish) {
+                   ++ran_;
                    result->mutable_estimate()->mutable_estimate()->set_samples(7);
                    const absl::Status stopped = stop.Check();
                    finish(stopped.ok() ? outcome : stopped);
@@ -25,6 +26,8 @@ class OperationStoreTest : public testing::Test {
     });
   }
 
+  // The store waits for its jobs at its end.
+  void TearDown() override { RunAll(); }
   void RunAll() {
     for (Task& task : queue_) task();
     queue_.clear();
@@ -34,6 +37,7 @@ class OperationStoreTest : public testing::Test {
 
   std::vector<Task> queue_;
   bool full_ = false;
+  int ran_ = 0;
   OperationStore::Clock::time_point now_{};
   OperationStore store_{{.per_tenant = 2, .max_computing = std::chrono::seconds(60)},
                         [] { return google::protobuf::Timestamp(); },
@@ -76,11 +80,28 @@ TEST_F(OperationStoreTest, ListsTheNextPageAlsoWhenTheLastOfOneIsDeleted) {
   RunAll();
 }
 
-TEST_F(OperationStoreTest, CancelsWhatWaits) {
-  const auto started = Start();
-  ASSERT_TRUE(store_.Cancel("a", started->name()).ok());
+TEST_F(OperationStoreTest, CancelsWhatWaitsAtOnce) {
+  const std::string name = Start()->name();
+  EXPECT_EQ(store_.Cancel("a", name)->state(), v1::Operation::CANCELLED);
+  now_ += std::chrono::seconds(5);
   RunAll();
-  EXPECT_EQ(StateOf(started->name()), v1::Operation::CANCELLED);
+  const auto cancelled = store_.Get("a", name);
+  EXPECT_EQ(cancelled->state(), v1::Operation::CANCELLED);
+  EXPECT_EQ(cancelled->error().code(), static_cast<int>(absl::StatusCode::kCancelled));
+  EXPECT_EQ(cancelled->elapsed_time_s(), 0);
+  EXPECT_FALSE(cancelled->has_response());
+  EXPECT_EQ(ran_, 0);
+}
+
+TEST_F(OperationStoreTest, CountsWhatIsCancelledOrDeletedUntilItLeavesTheQueue) {
+  ASSERT_TRUE(store_.Cancel("a", Start()->name()).ok());
+  ASSERT_TRUE(store_.Delete("a", Start()->name()).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
+  EXPECT_TRUE(Start("b").ok());
+  RunAll();
+  EXPECT_EQ(ran_, 1);  // the other tenant's
+  EXPECT_TRUE(Start().ok());
+  EXPECT_TRUE(Start().ok());
 }
 
 TEST_F(OperationStoreTest, LeavesWhatIsDoneAsItIs) {
