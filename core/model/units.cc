@@ -252,7 +252,7 @@ std::string FormatUnit(const Unit& unit) {
     if (NearPower(power, 0)) continue;
     std::string& side = power > 0 ? above : below;
     const std::string exponent =
-        NearPower(std::abs(power), 1) ? "" : absl::StrCat("^", std::abs(power));
+        NearPower(std::abs(power), 1) ? "" : absl::StrFormat("^%.12g", std::abs(power));
     const char* separator = power < 0 ? "/" : above.empty() ? "" : " ";
     absl::StrAppend(&side, separator, std::string(kBase[i]), exponent);
   }

@@ -69,6 +69,17 @@ TEST(Units, AreWrittenInAWayThatReadsAsTheSame) {
   }
 }
 
+TEST(Units, KeepTheirPowersWhenTheyAreWritten) {
+  for (const double power : {1.0 / 3, 2.0 / 3, 1.0 / 7, -5.0 / 3, 31 + 1.0 / 3, 0.1 + 0.2}) {
+    for (const char* base : {"m", "kN s", "mol/l"}) {
+      const Unit unit = Power(Parse(base), power);
+      EXPECT_TRUE(SameUnit(Parse(FormatUnit(unit)), unit)) << FormatUnit(unit);
+    }
+  }
+  EXPECT_EQ(FormatUnit(Parse("m^0.5")), "m^0.5");
+  EXPECT_EQ(FormatUnit(Parse("kg^2.5/s^12")), "kg^2.5/s^12");
+}
+
 TEST(Units, ThatAreNoneAreRefusedInWords) {
   const auto error = [](const std::string& text) {
     return std::string(ParseUnit(text).status().message());
