@@ -17,12 +17,19 @@ namespace {
 
 constexpr char kLockName[] = ".lock";
 
-// Returns a locked descriptor of the file, or −1 if it cannot be opened or another descriptor holds
-// the lock.
-int Lock(const std::filesystem::path& file, int flags) {
-  const int descriptor = open(file.c_str(), flags | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0600);
+// Largest number of folders made for one that no other process takes for an abandoned one.
+constexpr int kAttempts = 100;
+
+// Locks the file, which is made if there is none, and returns its descriptor. Returns −1 if that
+// fails, another descriptor holds the lock, or the file has been removed meanwhile.
+int Lock(const std::filesystem::path& file) {
+  const int descriptor = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (descriptor < 0) return -1;
-  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  struct stat status;
+  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0 && fstat(descriptor, &status) == 0 &&
+      status.st_nlink > 0) {
+    return descriptor;
+  }
   close(descriptor);
   return -1;
 }
@@ -32,7 +39,8 @@ bool IsOwnFolder(const std::filesystem::path& path) {
   return lstat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid();
 }
 
-// Removes the folders of processes that have ended.
+// Removes the folders of processes that have ended. One may have ended before it locked its folder,
+// so a folder without a lock is removed, too; a process that is just making it then makes another.
 void RemoveAbandoned(const std::filesystem::path& below) {
   std::error_code error;
   for (std::filesystem::directory_iterator entry(below, error), end; !error && entry != end;
@@ -40,10 +48,14 @@ void RemoveAbandoned(const std::filesystem::path& below) {
     const std::filesystem::path path = entry->path();
     if (!path.filename().string().starts_with(TemporaryFolder::kPrefix)) continue;
     if (!IsOwnFolder(path)) continue;
-    const int lock = Lock(path / kLockName, 0);
+    const int lock = Lock(path / kLockName);
     if (lock < 0) continue;
+    // The new name keeps a process that is just making the folder from locking it again meanwhile.
+    std::filesystem::path abandoned = path;
+    abandoned += "-abandoned";
     std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
+    std::filesystem::rename(path, abandoned, ignored);
+    std::filesystem::remove_all(abandoned, ignored);
     close(lock);
   }
 }
@@ -57,18 +69,18 @@ absl::StatusOr<std::unique_ptr<TemporaryFolder>> TemporaryFolder::Make() {
     return absl::ResourceExhaustedError("there is no folder for temporary files; set TMPDIR");
   }
   RemoveAbandoned(below);
-  std::string path = (below / kPrefix).string() + "XXXXXX";
-  if (mkdtemp(path.data()) == nullptr) {
-    return absl::ResourceExhaustedError(absl::StrFormat("no folder can be made below %s: %s",
-                                                        below.string(), std::strerror(errno)));
-  }
-  const int lock = Lock(std::filesystem::path(path) / kLockName, O_CREAT);
-  if (lock < 0) {
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    std::string path = (below / kPrefix).string() + "XXXXXX";
+    if (mkdtemp(path.data()) == nullptr) {
+      return absl::ResourceExhaustedError(absl::StrFormat("no folder can be made below %s: %s",
+                                                          below.string(), std::strerror(errno)));
+    }
+    const int lock = Lock(std::filesystem::path(path) / kLockName);
+    if (lock >= 0) return std::unique_ptr<TemporaryFolder>(new TemporaryFolder(path, lock));
     std::filesystem::remove_all(path, error);
-    return absl::ResourceExhaustedError(
-        absl::StrFormat("the temporary folder %s cannot be locked", path));
   }
-  return std::unique_ptr<TemporaryFolder>(new TemporaryFolder(path, lock));
+  return absl::ResourceExhaustedError(
+      absl::StrFormat("no temporary folder below %s can be locked", below.string()));
 }
 
 TemporaryFolder::~TemporaryFolder() {
