@@ -19,6 +19,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <system_error>
+#include <thread>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
@@ -29,6 +30,10 @@ namespace polyest::internal {
 namespace {
 
 constexpr char kProgram[] = "polyest-fmu-worker";
+
+// Time that a worker may take to its end once it has closed its socket.
+constexpr std::chrono::milliseconds kLongestEnd{1'000};
+constexpr std::chrono::milliseconds kEndPause{1};
 
 absl::Status SystemError(const char* what) {
   return absl::ResourceExhaustedError(
@@ -64,6 +69,15 @@ void DescribeSignals(posix_spawnattr_t& attributes) {
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawnattr_setflags(&attributes,
                            POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+}
+
+// Reaps the process as wait4 does, whatever signals this process gets meanwhile.
+pid_t Reap(pid_t pid, int flags, int& status, rusage& usage) {
+  pid_t reaped = -1;
+  do {
+    reaped = wait4(pid, &status, flags, &usage);
+  } while (reaped < 0 && errno == EINTR);
+  return reaped;
 }
 
 bool IsProgram(const std::filesystem::path& path) { return access(path.c_str(), X_OK) == 0; }
@@ -239,20 +253,25 @@ std::string WorkerProcess::WhatItDid() const {
 }
 
 absl::Status WorkerProcess::Died() {
-  // The worker may only have closed the socket, but it is then useless too.
   int status = 0;
   rusage usage{};
-  kill(pid_, SIGKILL);
-  const bool known = wait4(pid_, &status, 0, &usage) == pid_;
-  pid_ = -1;
-  Kill();
+  // The socket closes just before the worker ends, which is told only when it has ended by itself.
+  pid_t ended = 0;
+  for (auto waited = kEndPause; ended == 0 && waited <= kLongestEnd; waited += kEndPause) {
+    ended = Reap(pid_, WNOHANG, status, usage);
+    if (ended == 0) std::this_thread::sleep_for(kEndPause);
+  }
   std::string end = "ended";
-  if (known && WIFSIGNALED(status)) {
+  if (ended == 0) {
+    end = "broke off and was stopped";
+  } else if (ended > 0 && WIFSIGNALED(status)) {
     end = absl::StrFormat("was killed by signal %d (%s)", WTERMSIG(status),
                           strsignal(WTERMSIG(status)));
-  } else if (known) {
+  } else if (ended > 0) {
     end = absl::StrFormat("ended with status %d", WEXITSTATUS(status));
   }
+  if (ended != 0) pid_ = -1;
+  Kill();
   // The kernel counts the memory that this process had when it started the worker as the worker's.
   rusage own{};
   getrusage(RUSAGE_SELF, &own);
@@ -268,9 +287,10 @@ absl::Status WorkerProcess::Died() {
 
 void WorkerProcess::Kill() {
   if (pid_ >= 0) {
+    int status = 0;
+    rusage usage{};
     kill(pid_, SIGKILL);
-    while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
-    }
+    Reap(pid_, 0, status, usage);
     pid_ = -1;
   }
   if (socket_ >= 0) close(socket_);

@@ -67,7 +67,8 @@ class WorkerProcess {
   absl::Status SendSome();
   absl::Status ReceiveSome();
   absl::Status CheckProgress();
-  // Reaps the dead worker and returns an error that describes its last activity.
+  // Reaps the dead worker, or stops one that has only closed its socket, and returns an error that
+  // describes its last activity.
   absl::Status Died();
   std::string WhatItDid() const;
 
