@@ -5,7 +5,7 @@
 #   tests/release.sh [STEP]...    all steps, in this order, unless some are named
 #
 #   crashes      kills the daemon 200 times while rigs stream to it (17 minutes on two cores)
-#   sanitized    all unit tests under the address and undefined-behaviour sanitizers
+#   sanitized    the long unit tests under the address and undefined-behaviour sanitizers
 #   fuzz         fuzzes equations and calls for half an hour
 #   threads      looks for races in the tests in which threads meet (90 minutes)
 #   calibration  asks of 1,008 campaigns whether the uncertainty is true (10 minutes)
@@ -26,7 +26,7 @@ crashes() {
   POLYEST_TEST_CRASHES=200 ctest --preset release --tests-regex 'integration/durability_test'
 }
 
-sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label unit; }
+sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label long; }
 
 fuzz() { tests/fuzz/run.sh 1800; }
 
