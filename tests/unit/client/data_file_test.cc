@@ -251,7 +251,7 @@ TEST(DataReader, GoesOnAfterABadColumnIfAsked) {
   const Sieved sieved = Sieve("t,x,y,x\n0,1,a,b\n1,?,a,b\n", kColumns);
   EXPECT_THAT(sieved.refusals,
               ElementsAre(HasSubstr("unknown column \"y\""), HasSubstr("\"x\" is named twice"),
-                          HasSubstr("the column \"force\" of the streamed input"),
+                          HasSubstr("the column \"force\" for the streamed input"),
                           HasSubstr("data.csv:3: column x")));
   ASSERT_TRUE(sieved.data.ok()) << sieved.data.status();
   EXPECT_THAT(sieved.data->channels(), SizeIs(1));

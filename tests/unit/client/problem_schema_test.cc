@@ -213,7 +213,8 @@ TEST(ProblemSchema, SeesMistakes) {
 }
 
 TEST(ProblemSchema, ExplainsEveryField) {
-  EXPECT_THAT(kProblemSchema, HasSubstr("\"description\": \"What is uncertain, with its prior."));
+  EXPECT_THAT(kProblemSchema,
+              HasSubstr("\"description\": \"The uncertain quantities, each with its prior."));
   EXPECT_THAT(kProblemSchema, HasSubstr("Whether a natural cubic spline runs"));
 }
 

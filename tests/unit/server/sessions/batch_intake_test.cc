@@ -27,7 +27,7 @@ class BatchIntakeTest : public testing::Test {
     EXPECT_EQ(intake_.measured_s(), 0.1);
   }
 
-  const ModelLibrary models_;
+  ModelLibrary models_;
   const std::unique_ptr<LoadedSession> loaded_ =
       LoadedSession::Make(SmallProblem(), models_).value();
   BatchIntake& intake_ = loaded_->intake();
