@@ -51,9 +51,9 @@ int64_t ResidentMegabytes(pid_t process) {
 }
 
 TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
-  constexpr int kSessions = 10'000;
+  constexpr int kStored = 10'000;
   const TestFolder data;
-  Store(data.path(), kSessions);
+  Store(data.path(), kStored);
   DaemonProcess daemon({"--listen", "127.0.0.1:0", "--data-dir", data.path()});
   const std::string address = daemon.ReadAddress();
   ASSERT_FALSE(address.empty()) << daemon.Errors();
@@ -74,7 +74,7 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
     }
     list.set_page_token(page.next_page_token());
   } while (!list.page_token().empty());
-  EXPECT_EQ(listed, kSessions);
+  EXPECT_EQ(listed, kStored);
   EXPECT_EQ(loaded, 0);
   const int64_t resident = ResidentMegabytes(daemon.pid());
   EXPECT_GT(resident, 0);
@@ -83,7 +83,7 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
   // Any of them comes back on use.
   grpc::ClientContext context;
   v1::GetEstimateRequest get;
-  get.set_session(Name(kSessions / 2));
+  get.set_session(Name(kStored / 2));
   v1::Estimate estimate;
   const grpc::Status status = stub->GetEstimate(&context, get, &estimate);
   ASSERT_TRUE(status.ok()) << status.error_message();

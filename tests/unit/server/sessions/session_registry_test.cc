@@ -256,11 +256,11 @@ TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoa
 }
 
 TEST_F(SessionRegistryTest, OnlyShowsTheClockOnTheWallWhichMayJump) {
-  for (const auto& [id, seconds] : {std::pair("a", 1'000'000'000), {"b", -5}, {"c", 2}}) {
-    wall_clock_s_ = seconds;
+  for (const auto& [id, time_s] : {std::pair("a", 1'000'000'000), {"b", -5}, {"c", 2}}) {
+    wall_clock_s_ = time_s;
     ASSERT_TRUE(StatusOfCreate(id).ok());
     const auto session = *registry_->Get("t", absl::StrCat("sessions/", id));
-    EXPECT_EQ(session->Describe().create_time().seconds(), seconds);
+    EXPECT_EQ(session->Describe().create_time().seconds(), time_s);
     EXPECT_TRUE(Add(session, 1, Rows({0.1})).ok());
     ASSERT_TRUE(session->IdleTime());
     EXPECT_LT(*session->IdleTime(), std::chrono::minutes(1));
