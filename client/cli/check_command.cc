@@ -82,6 +82,32 @@ absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements&
   return absl::OkStatus();
 }
 
+// Adds the summary of a problem without errors and of its data, and warnings of both.
+void AddSummary(const CheckArguments& arguments, const v1::Problem& problem,
+                const ModelLibrary& models, const std::optional<v1::Measurements>& data,
+                std::ostream& out, Findings& findings) {
+  const auto resolved = ToProblem(problem, models);
+  POLYEST_CHECK(resolved.ok());
+  std::ostringstream summary;
+  summary.copyfmt(out);  // for the width of its tables
+  const auto remarks = SummarizeProblem(problem, *resolved);
+  if (remarks.ok()) {
+    Print(*remarks, summary);
+  } else {
+    findings.AddError(remarks.status(), arguments.problem_file);
+  }
+  if (problem.measured().empty()) {
+    findings.warnings.emplace_back(
+        "the problem has no measured outputs: it can be propagated, but its parameters cannot be "
+        "estimated");
+  }
+  if (data) {
+    const absl::Status checked = CheckRecord(*resolved, *data, findings, summary);
+    if (!checked.ok()) findings.AddError(checked, arguments.data_file);
+  }
+  findings.summary = summary.str();
+}
+
 Findings Check(const CheckArguments& arguments, std::ostream& out) {
   Findings findings;
   const absl::Status order = CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file);
@@ -106,27 +132,7 @@ Findings Check(const CheckArguments& arguments, std::ostream& out) {
   if (!arguments.data_file.empty()) {
     data = ReadData(arguments.data_file, ColumnsOf(*problem), findings);
   }
-  if (!findings.errors.empty()) return findings;
-  const auto resolved = ToProblem(*problem, *models);
-  POLYEST_CHECK(resolved.ok());
-  std::ostringstream summary;
-  summary.copyfmt(out);  // for the width of its tables
-  const auto remarks = SummarizeProblem(*problem, *resolved);
-  if (remarks.ok()) {
-    Print(*remarks, summary);
-  } else {
-    findings.AddError(remarks.status(), arguments.problem_file);
-  }
-  if (problem->measured().empty()) {
-    findings.warnings.emplace_back(
-        "the problem has no measured outputs: it can be propagated, but its parameters cannot be "
-        "estimated");
-  }
-  if (data) {
-    const absl::Status checked = CheckRecord(*resolved, *data, findings, summary);
-    if (!checked.ok()) findings.AddError(checked, arguments.data_file);
-  }
-  findings.summary = summary.str();
+  if (findings.errors.empty()) AddSummary(arguments, *problem, *models, data, out, findings);
   return findings;
 }
 

@@ -163,25 +163,26 @@ absl::Status Listen(const std::vector<std::string>& addresses, bool insecure,
   return absl::OkStatus();
 }
 
-}  // namespace
-
-CommandLine ParseCommandLine(int argc, char** argv) {
-  CLI::App app("Estimates uncertain parameters of mechanical models from streamed measurements.",
-               "polyestd");
-  CommandLine command_line;
-  DaemonOptions& daemon = command_line.daemon;
-  std::vector<std::string> listen{daemon.listen.front().ToString()};
+// Options whose text is understood when all of them are known.
+struct Texts {
+  std::vector<std::string> listen{DaemonOptions().listen.front().ToString()};
   std::string durability = "disk";
-  app.add_option("--listen", listen,
+  std::string metrics;
+  std::string new_token;
+  bool insecure = false;
+};
+
+void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
+  app.add_option("--listen", texts.listen,
                  "HOST:PORT to listen on; port 0 picks a free one; repeat the option, or separate "
                  "by commas, to listen on several")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->default_str(listen.front());
+      ->default_str(texts.listen.front());
   app.add_option("--data-dir", daemon.data_dir,
                  "Folder in which sessions are kept; by default $STATE_DIRECTORY, or "
                  "$XDG_STATE_HOME/polyest, or ~/.local/state/polyest");
-  app.add_option("--durability", durability,
+  app.add_option("--durability", texts.durability,
                  "disk: a batch is acknowledged when it is on disk; memory: sessions end with the "
                  "daemon")
       ->check(CLI::IsMember({"disk", "memory"}))
@@ -195,15 +196,40 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   app.add_option("--threads", daemon.threads, "Threads of the numerics; 0: one a core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+}
+
+// Sets what follows from the texts. INVALID_ARGUMENT or FAILED_PRECONDITION, naming the option.
+absl::Status Apply(const Texts& texts, DaemonOptions& daemon) {
+  if (texts.durability == "memory") {
+    daemon.data_dir.clear();
+  } else if (daemon.data_dir.empty()) {
+    daemon.data_dir = DefaultDataDir();
+    if (daemon.data_dir.empty()) {
+      return absl::InvalidArgumentError(
+          "--data-dir: say where sessions are kept; there is no home folder to choose");
+    }
+  }
+  POLYEST_RETURN_IF_ERROR(Listen(texts.listen, texts.insecure, daemon));
+  if (texts.metrics.empty()) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(daemon.metrics, MetricsAddress(texts.metrics, texts.insecure));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+CommandLine ParseCommandLine(int argc, char** argv) {
+  CLI::App app("Estimates uncertain parameters of mechanical models from streamed measurements.",
+               "polyestd");
+  CommandLine command_line;
+  DaemonOptions& daemon = command_line.daemon;
+  Texts texts;
+  AddService(app, daemon, texts);
   AddLimits(app, daemon);
   app.add_option("--max-message-mb", daemon.max_message_mb, "Largest message taken, MiB")
       ->check(CLI::Range(1, 2047))
       ->capture_default_str();
-  bool insecure = false;
-  std::string new_token;
-  AddSecurity(app, daemon, insecure, new_token);
-  std::string metrics;
-  AddOperations(app, command_line, metrics);
+  AddSecurity(app, daemon, texts.insecure, texts.new_token);
+  AddOperations(app, command_line, texts.metrics);
   app.set_version_flag("--version", "polyestd " POLYEST_VERSION);
   AddConfiguration(app, {"--new-token"});
   try {
@@ -213,24 +239,11 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return Refuse(DescribeError(app, error, argc, argv));
   }
-  if (!new_token.empty()) return PrintNewToken(new_token);
+  if (!texts.new_token.empty()) return PrintNewToken(texts.new_token);
   const std::string wrong_variable = CheckEnvironment(app, environ);
   if (!wrong_variable.empty()) return Refuse(wrong_variable);
-  if (durability == "memory") {
-    daemon.data_dir.clear();
-  } else if (daemon.data_dir.empty()) {
-    daemon.data_dir = DefaultDataDir();
-    if (daemon.data_dir.empty()) {
-      return Refuse("--data-dir: say where sessions are kept; there is no home folder to choose");
-    }
-  }
-  const absl::Status listening = Listen(listen, insecure, daemon);
-  if (!listening.ok()) return Refuse(std::string(listening.message()));
-  if (!metrics.empty()) {
-    auto metrics_address = MetricsAddress(metrics, insecure);
-    if (!metrics_address.ok()) return Refuse(std::string(metrics_address.status().message()));
-    daemon.metrics = *std::move(metrics_address);
-  }
+  const absl::Status applied = Apply(texts, daemon);
+  if (!applied.ok()) return Refuse(std::string(applied.message()));
   return command_line;
 }
 
