@@ -147,8 +147,11 @@ void MeasurementStream::TellOfRoom(Lock& lock) {
   lock.lock();
 }
 
-void MeasurementStream::Tell(const std::string& sentence) const {
-  if (callbacks_.connection) callbacks_.connection(sentence);
+// Reports a sentence unless it is the one reported last, as while a disk stays full.
+void MeasurementStream::Tell(const std::string& sentence) {
+  if (sentence == told_ || !callbacks_.connection) return;
+  told_ = sentence;
+  callbacks_.connection(sentence);
 }
 
 // Writes the next batch, or half-closes the connection after the last one, if no write is pending.

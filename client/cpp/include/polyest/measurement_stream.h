@@ -51,7 +51,7 @@ struct MeasurementStreamCallbacks {
   // Receives the number up to which the daemon has stored all batches.
   std::function<void(const v1::Acknowledgement&)> acknowledgement;
   // Receives one sentence when the connection fails or is back, and when the daemon has no room or
-  // has room again.
+  // has room again. A sentence is not repeated.
   std::function<void(const std::string&)> connection;
 };
 
@@ -90,7 +90,7 @@ class MeasurementStream {
   void Write();
   void Take(const v1::StreamMeasurementsResponse& response);
   bool Wait(std::chrono::milliseconds delay) const;
-  void Tell(const std::string& sentence) const;
+  void Tell(const std::string& sentence);
 
   Client& client_;
   const std::string session_;
@@ -109,6 +109,7 @@ class MeasurementStream {
   int attempts_ = 0;           // to reach the daemon, since the last acknowledgement or refusal
   int refusals_ = 0;           // for lack of room, since the last acknowledgement
   bool told_of_refusal_ = false;
+  std::string told_;  // the sentence reported last
   bool finishing_ = false;
   std::optional<v1::Estimate> last_estimate_;
 };
