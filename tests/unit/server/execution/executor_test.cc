@@ -47,8 +47,8 @@ TEST(Executor, GivesWayToOtherThreadsWhenItIsTold) {
 }
 
 TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
+  std::latch started(1), go_on(1), second_ran(1);
   Executor executor(OneLane(1, 2));
-  std::latch started(1), go_on(1);
   ASSERT_TRUE(executor
                   .Submit(kLane,
                           [&] {
@@ -57,7 +57,6 @@ TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
                           })
                   .ok());
   started.wait();
-  std::latch second_ran(1);
   ASSERT_TRUE(executor.Submit(kLane, [&] { second_ran.count_down(); }).ok());
   const absl::Status refused = executor.Submit(kLane, [] { FAIL() << "was refused"; });
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
@@ -71,20 +70,20 @@ TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
 }
 
 TEST(Executor, RunsTasksAtTheSameTimeOnItsThreads) {
-  Executor executor(OneLane(2, 2));
   std::latch both(2);  // opens only when two tasks run at once
+  Executor executor(OneLane(2, 2));
   for (int i = 0; i < 2; ++i)
     ASSERT_TRUE(executor.Submit(kLane, [&] { both.arrive_and_wait(); }).ok());
   both.wait();
 }
 
 TEST(Executor, KeepsAThreadForOthersWhileOneLaneIsBusyWithLongTasks) {
-  Executor executor({.threads_per_lane = 1, .threads = 2, .capacity = 10, .capacity_per_lane = 10});
   std::latch end(1), long_one_runs(1), other_ran(1);
   const auto long_task = [&](bool first) {
     if (first) long_one_runs.count_down();
     end.wait();
   };
+  Executor executor({.threads_per_lane = 1, .threads = 2, .capacity = 10, .capacity_per_lane = 10});
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(executor.Submit("long", [&, i] { long_task(i == 0); }).ok());
   }
@@ -97,8 +96,8 @@ TEST(Executor, KeepsAThreadForOthersWhileOneLaneIsBusyWithLongTasks) {
 TEST(Executor, LetsLanesTakeTurns) {
   std::vector<char> order;
   {
-    Executor executor(OneLane(1, 10));
     std::latch go_on(1), started(1);
+    Executor executor(OneLane(1, 10));
     const auto first = [&] {
       started.count_down();
       go_on.wait();
@@ -115,8 +114,8 @@ TEST(Executor, LetsLanesTakeTurns) {
 }
 
 TEST(Executor, KeepsRoomForOthersWhenOneLaneIsFull) {
-  Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 3, .capacity_per_lane = 2});
   std::latch end(1);
+  Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 3, .capacity_per_lane = 2});
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(executor.Submit("a", [&] { end.wait(); }).ok());
   EXPECT_EQ(executor.Submit("a", [] {}).message(),
             "the daemon is busy: its queue of 2 tasks is full; try later");
@@ -166,8 +165,8 @@ TEST(Strand, RunsItsTasksInOrderAndOneAtATime) {
 TEST(Strand, LetsOthersHaveTheirTurnBetweenItsTasks) {
   std::vector<char> order;
   {
-    Executor executor(OneLane(1, 10));
     std::latch go_on(1);
+    Executor executor(OneLane(1, 10));
     ASSERT_TRUE(executor.Submit(kLane, [&] { go_on.wait(); }).ok());
     auto a = std::make_shared<Strand>(executor, kLane);
     auto b = std::make_shared<Strand>(executor, kLane);
