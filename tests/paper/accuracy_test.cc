@@ -1,7 +1,8 @@
-// How near the estimate with re-expansion comes to least squares on the exact model, in posterior
-// standard deviations. The bounds are those that the method was published with here: worst error
-// of a mean 0.08, standard deviations (of curvature) within 2 %, trajectories no more than those
-// named; means of 2,000 particles carry a sampling error of 1/√2000 = 0.022 each.
+// Tests how near the estimate with re-expansion comes to least squares on the exact model.
+// Differences are measured in posterior standard deviations. The bounds are those published
+// together with the method: the worst error of a mean is 0.08, standard deviations (from the
+// curvature) are within 2 %, and no more trajectories are used than named. A mean of 2,000
+// particles has a sampling error of 1/√2000 = 0.022.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -72,8 +73,9 @@ TEST(Oscillator, NeedsFewerTrajectoriesThanTheSketchOfTheMethod) {
   EXPECT_LT(sum / 12, 45);
 }
 
-// The paper's fixed expansion on the same long record is wrong by hundreds of standard deviations
-// of its own curvature. It must say so, and what it reports must then hold the truth.
+// The paper's fixed expansion on the same long record is wrong by hundreds of the standard
+// deviations that its own curvature gives. The estimate must say so, and what it then reports must
+// contain the truth.
 TEST(FixedExpansion, OfALongRecordSaysThatItIsInaccurateAndWidens) {
   OscillatorTruth truth;
   const Samples record = OscillatorRecord(50, 52, truth);
@@ -107,7 +109,8 @@ Problem AirTrack(int order) {
 
 class AirTrackRecord : public ::testing::TestWithParam<int> {};
 
-// Oracle: scipy's least squares on the closed form, standard deviations from its Jacobian.
+// The oracle is scipy's least squares on the closed form, with standard deviations from its
+// Jacobian.
 TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
   const auto record = SharedRecord("air_track_1mass.csv", {"x"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_1mass.csv is not there";
@@ -128,8 +131,8 @@ TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
 
 INSTANTIATE_TEST_SUITE_P(OrdersTwoAndThree, AirTrackRecord, ::testing::Values(2, 3));
 
-// Twelve unknowns from a cold start; a fit of the whole record at once ends in wrong minima.
-// Oracle: least squares on the exact model from the right minimum.
+// The record has twelve unknowns and starts cold; a fit of the whole record at once ends in wrong
+// minima. The oracle is least squares on the exact model from the right minimum.
 TEST(TwoGlidersRecord, AgreesWithLeastSquaresOnTheExactModel) {
   const auto record = SharedRecord("air_track_2mass.csv", {"x1", "x2"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_2mass.csv is not there";
@@ -138,7 +141,7 @@ TEST(TwoGlidersRecord, AgreesWithLeastSquaresOnTheExactModel) {
                                     {63.0541, .0275}, {-61.9872, .0275}};
   const Estimate estimate = EstimateInBatches(testing::TwoGlidersProblem(2), *record, 1000);
   for (size_t i = 0; i < exact.size(); ++i) {
-    // The bound on the mean adds four sampling errors to the published 0.08; the oracle's standard
+    // The bound on the mean is the published 0.08 plus four sampling errors. The oracle's standard
     // deviations are given to three digits.
     ExpectNear(estimate.parameters[i], exact[i], 0.1, 0.17, 0.03);
   }
@@ -149,8 +152,8 @@ TEST(TwoGlidersRecord, AgreesWithLeastSquaresOnTheExactModel) {
   }
 }
 
-// Large angles at an irregular 6 Hz. Oracle: least squares by others, g/L 1.3556 ± 0.0007 with
-// their own noise.
+// The pendulum swings at large angles and is sampled at an irregular 6 Hz. The oracle is least
+// squares by the authors of the record with their own noise: g/L = 1.3556 ± 0.0007.
 TEST(PendulumRecord, AgreesWithTheirsWhoRecordedIt) {
   const auto record = SharedRecord("pendulum.csv", {"theta"});
   if (!record) GTEST_SKIP() << "../shared/data/pendulum.csv is not there";
@@ -200,7 +203,7 @@ TEST(Estimates, AreTheSameBitsForAnyBatchesAndThreads) {
   ExpectSameBits(whole, EstimateInBatches(problem, record, 30, /*threads=*/2));
 }
 
-// 112 points are two blocks of the ensemble, so that threads have something to share.
+// The 112 points make two blocks of the ensemble, so that threads have work to share.
 TEST(Estimates, AreTheSameBitsForAnyThreadsOfALargeEnsemble) {
   const auto record = SharedRecord("air_track_1mass.csv", {"x"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_1mass.csv is not there";

@@ -1,4 +1,4 @@
-// Figures 13 and 14 and sections 3.5 and 3.6: what cannot be identified, and what helps.
+// Tests figures 13 and 14 and sections 3.5 and 3.6: what cannot be identified, and what helps.
 
 #include <absl/strings/match.h>
 #include <gtest/gtest.h>
@@ -10,8 +10,9 @@
 namespace polyest::internal {
 namespace {
 
-// Values computed from (55)–(56) with ω_obs = 6.098601, to four digits: half a unit of the last
-// one, and as much again for the polynomial, whose error is residualToNoise · ρ.
+// The expected values are computed from (55)–(56) with ω_obs = 6.098601, to four digits. The
+// tolerance is half a unit of the last digit, and as much again for the error of the polynomial,
+// which is residualToNoise · ρ.
 constexpr double kFourDigits = 1e-4;
 
 void ExpectGerm(const VariantResult& variant, double xi1, double xi2) {
@@ -45,7 +46,7 @@ TEST(Figure14, DrawsTheContoursOfTheRegularizationThatEachRuleChooses) {
     }
     if (absl::StrContains(variant.name, "α² by") && chosen != 1) ++changed;
   }
-  EXPECT_GE(changed, 2);  // of three rules
+  EXPECT_GE(changed, 2);  // of the three rules
 }
 
 TEST(Figure13, MeasuresTheFrequencyOfTheReference) {
@@ -63,13 +64,14 @@ TEST(Figure13, OneDirectionIsIdentifiedAndTheValleyIsNot) {
   ASSERT_EQ(directions.size(), 2u);
   EXPECT_EQ(directions[0].verdict, Verdict::kIdentified);
   EXPECT_EQ(directions[1].verdict, Verdict::kNotIdentified);
-  // λ = |∂ω/∂ξ|²/ρ² at the estimate, up to the curvature of ω times the misfit left, a per cent.
+  // The eigenvalue is λ = |∂ω/∂ξ|²/ρ² at the estimate. The curvature of ω times the remaining
+  // misfit adds about a per cent.
   const double m = variant.estimate.parameters[0].map, k = variant.estimate.parameters[1].map;
   const double omega = std::sqrt(k / m);
   const double slope_m = -omega / (2 * m) * 6.667, slope_k = omega / (2 * k) * 1052.8;
   const double information = (slope_m * slope_m + slope_k * slope_k) / (0.0628 * 0.0628);
   EXPECT_NEAR(directions[0].information, information, 0.02 * information);
-  // The direction is ω's gradient.
+  // The direction is the gradient of ω.
   EXPECT_NEAR(directions[0].coefficients(0) / directions[0].coefficients(1), slope_m / slope_k,
               0.02);
   EXPECT_EQ(variant.estimate.parameters[0].verdict, Verdict::kNotIdentified);
@@ -103,7 +105,8 @@ TEST(Figure14, MoreWeightMovesTheEstimateTowardsThePrior) {
     EXPECT_LT(distance, before) << alpha_squared;
     before = distance;
   }
-  // λ = 50 against α² = 1000: all but λ/(λ + α²) of the way.
+  // The information λ = 50 stands against α² = 1000, so that the estimate goes all but
+  // λ/(λ + α²) of the way to the prior.
   EXPECT_LT(before, 0.05 * 0.4227);
 }
 
@@ -112,7 +115,8 @@ TEST(Figure14, NamesTheWeightThatTheLCurveChooses) {
   const VariantResult& chosen = result.variants.back();
   ASSERT_EQ(result.experiment.variants.back().problem.regularization_mode,
             RegularizationMode::kLCurve);
-  // One noise-free value can be met exactly: the curve has no corner, and Bayes' own weight stays.
+  // One noise-free value can be met exactly, so that the curve has no corner and Bayes' own weight
+  // stays.
   EXPECT_DOUBLE_EQ(chosen.estimate.regularization, 1);
   ExpectGerm(chosen, 0.0951, -0.4032);
 }
@@ -123,12 +127,14 @@ TEST(Figure14, DiscrepancyAndEvidenceAskForTheWeightOfTheClosedForm) {
   for (const auto& [v, mode] : {std::pair{count - 3, RegularizationMode::kDiscrepancy},
                                 {count - 2, RegularizationMode::kEvidence}}) {
     ASSERT_EQ(result.experiment.variants[v].problem.regularization_mode, mode);
-    // Of one datum z (in units of its noise, from the prior's mode) and the information λ both
-    // choose α² = λ/(z² − 1) where ω is linear; λ is 47.3 at the mode and 50 at the estimate.
+    // Both rules choose α² = λ/(z² − 1) for one datum z where ω is linear. Here z is in units of
+    // its noise, measured from the prior's mode, and λ is the information: 47.3 at the mode and 50
+    // at the estimate.
     const double z = (6.098601 - 2 * M_PI) / 0.0628;
     const Estimate& estimate = result.variants[v].estimate;
     EXPECT_NEAR(estimate.regularization, 48.7 / (z * z - 1), 0.5);
-    // Some 40 N/m towards the prior's 7895.68, to the curvature of √ over as much.
+    // The bias is some 40 N/m towards the prior's 7895.68, up to the curvature of √ over that
+    // distance.
     EXPECT_NEAR(estimate.parameters[1].bias,
                 estimate.parameters[1].map - 200 * 4 * M_PI * M_PI + 1052.8 * 0.4032, 1);
     EXPECT_GT(estimate.parameters[1].bias, 30);
@@ -138,7 +144,8 @@ TEST(Figure14, DiscrepancyAndEvidenceAskForTheWeightOfTheClosedForm) {
 TEST(Section35, ThetaIsNotSeenInTheDifference) {
   const VariantResult& variant = Rerun("3.5").variants[0];
   const ParameterEstimate& theta = variant.estimate.parameters[0];
-  // x1 − x2 of two trajectories agrees to the integration's error, 10⁻⁹ of the noise's 10⁻³.
+  // The difference x1 − x2 of two trajectories agrees up to the integration error, 10⁻⁹ against the
+  // noise of 10⁻³.
   EXPECT_NEAR(theta.map, theta.prior_mean, 1e-4 * theta.prior_std_dev);
   EXPECT_NEAR(theta.std_dev, theta.prior_std_dev, 1e-6 * theta.prior_std_dev);
   EXPECT_EQ(theta.verdict, Verdict::kNotIdentified);
@@ -161,7 +168,7 @@ TEST(Section36, TheSameBumpOnBothSidesLeavesTheInertiaUnknown) {
   EXPECT_EQ(mass.verdict, Verdict::kIdentified);
   EXPECT_LE(std::abs(mass.map - 580), 3 * mass.std_dev);
   EXPECT_EQ(inertia.verdict, Verdict::kNotIdentified);
-  // Beta(2, 2) on [55, 80]: mode 67.5, standard deviation 25 √(1/20).
+  // The prior is Beta(2, 2) on [55, 80]: its mode is 67.5, its standard deviation 25 √(1/20).
   EXPECT_NEAR(inertia.map, 67.5, 1e-3 * 25);
   EXPECT_NEAR(inertia.std_dev, 25 * std::sqrt(0.05), 1e-6 * 25);
   ASSERT_EQ(variant.estimate.directions.size(), 2u);

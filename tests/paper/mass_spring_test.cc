@@ -1,5 +1,5 @@
-// Figures 4 to 12, against the closed form of (28)–(31) and (52). The unknown is an amplitude
-// θ = θ_nom + s ξ and the outputs are θ g(t), so that with a_k = s g(t_k), e_k = z_k − θ_nom g(t_k)
+// Tests figures 4 to 12 against the closed form of (28)–(31) and (52). The unknown is an amplitude
+// θ = θ_nom + s ξ and the outputs are θ g(t). With a_k = s g(t_k) and e_k = z_k − θ_nom g(t_k),
 //   ξ̂_mismatch = (Σ e_k a_k/R_k) / H,  H = Σ a_k²/R_k,
 //   ∂J/∂ξ = H (ξ − ξ̂_mismatch) + 2ξ/(1 − ξ²),  ∂²J/∂ξ² = H + 2(1 + ξ²)/(1 − ξ²)²
 // for the prior ¾ (1 − ξ²).
@@ -22,12 +22,12 @@ using std::numbers::pi;
 
 const double kPriorGermStdDev = std::sqrt(0.2);  // of beta(2, 2) on [−1, 1]
 
-// An output per unit of the amplitude.
+// Returns an output per unit of the amplitude.
 double Shape(const std::string& unknown, const std::string& output, double t) {
   if (unknown == "v0") {
     return output == "x" ? std::sin(2 * pi * t) / (2 * pi) : std::cos(2 * pi * t);
   }
-  // (51) with ω_n = 3π, ω = π, M = 200 kg: x = 2/(M (ω_n² − ω²)) F0 sin πt sin 2πt.
+  // Uses (51) with ω_n = 3π, ω = π, M = 200 kg: x = 2/(M (ω_n² − ω²)) F0 sin πt sin 2πt.
   const double b = 2 / (200 * 8 * pi * pi);
   if (output == "x") return b * std::sin(pi * t) * std::sin(2 * pi * t);
   return b * pi *
@@ -62,7 +62,7 @@ ClosedForm Solve(const ExperimentVariant& variant, const Samples& samples) {
   }
   form.mismatch_minimum = ea / form.information;
   form.min_mismatch = (ee - ea * ea / form.information) / 2;
-  // The slope rises from −∞ to +∞ over (−1, 1): bisect.
+  // The slope rises from −∞ to +∞ over (−1, 1), so that bisection finds its root.
   double lower = -1, upper = 1;
   for (int i = 0; i < 100; ++i) {
     const double xi = (lower + upper) / 2;
@@ -79,9 +79,10 @@ ClosedForm Solve(const ExperimentVariant& variant, const Samples& samples) {
 
 class AmplitudeFigure : public testing::TestWithParam<const char*> {};
 
-// The integration's local error is 10⁻¹¹ of the amplitude, over some hundreds of steps 10⁻⁹; in ξ
-// it is ten times that at most, the amplitude being about 4 times what ξ = 1 adds to it. What is at
-// the noise floor of 10⁻⁶ can shift the flat figures 4 and 11 by Σ a e/R ≈ √N · 4·10⁻⁹/10⁻⁶.
+// The local error of the integration is 10⁻¹¹ of the amplitude, over some hundreds of steps 10⁻⁹.
+// In ξ it is at most ten times that, because the amplitude is about 4 times what ξ = 1 adds to it.
+// Samples at the noise floor of 10⁻⁶ can shift the flat figures 4 and 11 by Σ a e/R ≈ √N ·
+// 4·10⁻⁹/10⁻⁶.
 TEST_P(AmplitudeFigure, EstimateIsTheClosedForm) {
   const ExperimentResult& result = Rerun(GetParam());
   for (size_t v = 0; v < result.variants.size(); ++v) {
@@ -116,20 +117,21 @@ INSTANTIATE_TEST_SUITE_P(Figures, AmplitudeFigure,
                          testing::Values("4", "5", "6", "7", "8", "11", "12"),
                          [](const auto& figure) { return std::string("Figure") + figure.param; });
 
-// What figures 4 and 11 show: samples at zeros of the outputs say nothing.
+// Expects what figures 4 and 11 show: samples at zeros of the outputs give no information.
 void ExpectNoInformation(const ExperimentResult& result, double mode, double prior_std_dev) {
   for (const VariantResult& variant : result.variants) {
     SCOPED_TRACE(variant.name);
     const ParameterEstimate& unknown = variant.estimate.parameters[0];
-    // As above: the integration's error against the noise floor, in units of ξ · scale.
+    // The tolerance is the integration error against the noise floor, as above, in units of ξ ·
+    // scale.
     EXPECT_NEAR(unknown.map, mode, 0.01 * prior_std_dev);
     EXPECT_NEAR(unknown.std_dev, prior_std_dev, 1e-9 * prior_std_dev);
     EXPECT_NEAR(unknown.contraction, 1, 1e-9);
     EXPECT_EQ(unknown.verdict, Verdict::kNotIdentified);
     EXPECT_TRUE(HasDiagnostic(variant.estimate, DiagnosticCode::kNotIdentified));
     EXPECT_TRUE(HasDiagnostic(variant.estimate, DiagnosticCode::kUndersampled));
-    // Flat: over all of Ω the mismatch moves by less than 0.02, where one informative sample a
-    // standard deviation away would move it by ½.
+    // The mismatch is flat: over all of Ω it changes by less than 0.02. One informative sample a
+    // standard deviation away would change it by ½.
     const Matrix& mismatch = variant.cost.mismatch;
     EXPECT_LT(mismatch.maxCoeff() - mismatch.minCoeff(), 0.02);
     EXPECT_GT(mismatch.minCoeff(), 0);
@@ -141,7 +143,7 @@ TEST(Figure4, TenZeroCrossingsReturnThePrior) {
 }
 
 TEST(Figure4, MismatchIsTheNoiseAlone) {
-  // (48): ½ Σ ε²/R with R at its floor, (10⁻⁶)².
+  // The expected value is (48), ½ Σ ε²/R with R at its floor, (10⁻⁶)².
   const VariantResult& variant = Rerun("4").variants[0];
   double noise = 0;
   for (double z : variant.samples.columns[0].value) noise += z * z / 1e-12;
@@ -193,7 +195,8 @@ TEST(Figure6, ThirtyTimesAreNarrowerThanThree) {
   for (size_t v = 0; v < three.size(); ++v) {
     EXPECT_LT(thirty[v].std_dev_germ(0), three[v].std_dev_germ(0)) << thirty[v].name;
   }
-  // "10 % usable": a tenth of the prior's range, and less than half of three times' uncertainty.
+  // The paper's "10 % usable" means a tenth of the prior's range. The second bound asks for less
+  // than half the uncertainty from three sample times.
   EXPECT_LT(thirty[2].std_dev_germ(0), 0.1);
   EXPECT_LT(thirty[2].std_dev_germ(0), 0.5 * three[2].std_dev_germ(0));
 }
@@ -202,12 +205,13 @@ TEST(Figure7, ZeroCrossingsShiftTheMismatchByAConstantAndNothingElse) {
   const ExperimentResult& result = Rerun("7");
   const VariantResult &five = result.variants[0], &ten = result.variants[1];
   const double std_dev = five.std_dev_germ(0);
-  // The minimizer cannot tell points whose cost, about 10, differs by rounding:
-  // √(2 · 10 · 2·10⁻¹⁶) = 6·10⁻⁸ standard deviations; the crossings' own errors, 10⁻⁹ of the
-  // 10⁻³ that is their noise, add less. Allowed is 10⁻⁵.
+  // The minimizer cannot tell apart points whose cost, about 10, differs by rounding: √(2 · 10 ·
+  // 2·10⁻¹⁶) = 6·10⁻⁸ standard deviations. The errors of the crossings themselves, 10⁻⁹ against
+  // their noise of 10⁻³, add less. The test allows 10⁻⁵.
   EXPECT_NEAR(ten.map_germ(0), five.map_germ(0), 1e-5 * std_dev);
   EXPECT_NEAR(ten.std_dev_germ(0), std_dev, 1e-5 * std_dev);
-  // (48) over the crossings: ½ Σ ε²/R, R from the channel's largest value so far.
+  // The expected value is (48) over the crossings: ½ Σ ε²/R, with R from the channel's largest
+  // value so far.
   const std::vector<double>& z = ten.samples.columns[0].value;
   const NoiseModel& noise = result.experiment.variants[1].problem.measured[0].noise;
   double largest = 0, constant = 0;
@@ -218,7 +222,8 @@ TEST(Figure7, ZeroCrossingsShiftTheMismatchByAConstantAndNothingElse) {
   }
   EXPECT_GT(constant, 0.1);
   EXPECT_NEAR(ten.estimate.cost.mismatch - five.estimate.cost.mismatch, constant, 1e-4);
-  // Over all of Ω: 5 samples, errors of 10⁻⁹/10⁻⁴ standard deviations times ε/σ of about 2.
+  // The shift over all of Ω comes from 5 samples with errors of 10⁻⁹/10⁻⁴ standard deviations,
+  // times ε/σ of about 2.
   const Matrix shift = ten.cost.mismatch - five.cost.mismatch;
   EXPECT_NEAR(shift.minCoeff(), constant, 1e-3);
   EXPECT_NEAR(shift.maxCoeff(), constant, 1e-3);
@@ -234,7 +239,7 @@ TEST(Figure8, OneTimeOfDisplacementAndVelocityIdentifies) {
 TEST(Figure12, ThreeTimesFindTheForce) {
   const auto& variants = Rerun("12").variants;
   EXPECT_EQ(variants[0].estimate.parameters[0].verdict, Verdict::kIdentified);
-  EXPECT_LT(variants[0].estimate.parameters[0].std_dev, 1);  // N, of 1115
+  EXPECT_LT(variants[0].estimate.parameters[0].std_dev, 1);  // in N, where the prior has 1115
   EXPECT_LT(variants[0].std_dev_germ(0), variants[1].std_dev_germ(0));
 }
 

@@ -1,5 +1,5 @@
-// Records of real hardware, their models given as text, their inputs measured. The values asked for
-// are those of least squares on the exact models by others (the README of the data).
+// Tests records of real hardware with measured inputs and models given as text. The expected values
+// come from least squares on the exact models by others (see the README of the data).
 
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ const ParameterEstimate& Parameter(const Estimate& estimate, const std::string& 
   return estimate.parameters.front();
 }
 
-// Root mean square of sample − model at the estimate.
+// Returns the root mean square of sample − model at the estimate.
 double Residual(const Estimate& estimate) {
   const ChannelEstimate& channel = estimate.channels.front();
   return channel.noise_std_dev *
@@ -69,8 +69,8 @@ TEST(Silverbox, IsIdentifiedWithACubicInput) {
   EXPECT_EQ(estimate.samples, 20000);
 }
 
-// A straight line between samples takes away from the highest frequencies: the residual is more
-// than twice as large and k3 is 3 % too small.
+// Linear interpolation between samples weakens the highest frequencies: the residual is more than
+// twice as large, and k3 is 3 % too small.
 TEST(Silverbox, IsBiasedByALinearInput) {
   auto record = SharedRecord("silverbox_multisine.csv", {"u", "y"});
   if (!record) GTEST_SKIP() << "silverbox_multisine.csv is not there";

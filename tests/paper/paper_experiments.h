@@ -10,7 +10,7 @@
 
 namespace polyest::internal {
 
-// The experiment of a figure, run once a program.
+// Returns the result of a figure's experiment, which runs once per program.
 inline const ExperimentResult& Rerun(const std::string& figure) {
   static std::map<std::string, ExperimentResult> results;
   const auto known = results.find(figure);

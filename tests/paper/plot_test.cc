@@ -22,8 +22,8 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-// Whether every tag is closed in order and every '<' and '&' in text and attributes is markup: what
-// XML calls well-formed, for the elements and attributes that our writer makes.
+// Returns whether the text is well-formed XML, for the elements and attributes that our writer
+// makes: every tag is closed in order, and every '<' and '&' in text and attributes is markup.
 testing::AssertionResult IsWellFormed(const std::string& text) {
   std::vector<std::string> open;
   size_t elements = 0;
@@ -76,7 +76,7 @@ TEST(Contours, OfABowlAreClosedCircles) {
   const auto lines = ContourLines(axis, axis, value, 1.05);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_TRUE(lines[0].closed);
-  // Linear interpolation of x² over h = 0.1 is wrong by h²/4 at most: 2r Δr ≤ h²/4.
+  // The error of linear interpolation of x² over h = 0.1 is h²/4 at most: 2r Δr ≤ h²/4.
   for (const auto& [x, y] : lines[0].points) {
     EXPECT_NEAR(x * x + y * y, 1.05, 0.01 / 4 + 1e-12);
   }
@@ -102,7 +102,8 @@ TEST(Contours, OfASaddleDoNotCross) {
   for (double level : {0.4, 0.6}) {
     const auto lines = ContourLines(axis, axis, value, level);
     ASSERT_EQ(lines.size(), 2u) << level;
-    // Below the centre's ½ the high corners are joined: each line cuts off a low corner.
+    // At a level below the centre's ½ the high corners are joined, so that each line cuts off a low
+    // corner.
     const auto& [x, y] = lines[0].points[0];
     const auto& [u, v] = lines[0].points[1];
     const bool cuts_off_low = std::abs((x + u) / 2 + (y + v) / 2 - 1) < 0.2;
@@ -134,7 +135,7 @@ TEST_P(EveryFigure, PlotsAsWellFormedSvgWithoutOutsideResources) {
   EXPECT_THAT(svg, HasSubstr("estimate"));
   EXPECT_THAT(svg, HasSubstr("<poly"));
   EXPECT_THAT(svg, Not(HasSubstr("href")));
-  // No number that is none: as an attribute or among a line's points.
+  // The picture contains no NaN or infinity, neither as an attribute nor among a line's points.
   EXPECT_FALSE(std::regex_search(svg, std::regex("[\",]-?(nan|inf)[\", ]")));
   EXPECT_TRUE(svg == RenderSvg(plot)) << "not the same text again";
 }

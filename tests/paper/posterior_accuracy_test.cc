@@ -1,8 +1,8 @@
-// How near means, standard deviations and 95 % limits of the posterior come to those of the exact
-// model, in posterior standard deviations: within 3 %, for five problems of as many shapes. The
-// oracle is e^{−J} on a fine grid over the prior's domain, J from closed forms of the model: for
-// one or two unknowns it is more exact than any Markov chain on the exact model would be, and has
-// no sampling error of its own.
+// Tests how near means, standard deviations and 95 % limits of the posterior come to those of the
+// exact model: within 3 % of a posterior standard deviation, for five problems of different shapes.
+// The oracle is e^{−J} on a fine grid over the prior's domain, with J from closed forms of the
+// model. For one or two unknowns it is more exact than any Markov chain on the exact model, and it
+// has no sampling error of its own.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ struct Summary {
 };
 
 struct Domain {
-  Vector lower, upper;  // beyond which the density is negligible or 0
+  Vector lower, upper;  // The density beyond them is negligible or 0.
 };
 
 struct Case {
@@ -40,12 +40,12 @@ struct Case {
   Domain domain;
   std::function<double(const Vector& theta)> cost;  // −log density, up to a constant
   PosteriorMethod method;
-  bool gaussian;  // or NON_GAUSSIAN is said
+  bool gaussian;  // Otherwise NON_GAUSSIAN is reported.
 };
 
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
-// Of one marginal given by its probabilities in cells of equal width.
+// Summarizes one marginal, given by its probabilities in cells of equal width.
 Summary SummaryOf(const Vector& mass, double lower, double width) {
   const double all = mass.sum();
   const auto at = [&](double cell) { return lower + (cell + 0.5) * width; };
@@ -73,8 +73,8 @@ Summary SummaryOf(const Vector& mass, double lower, double width) {
   return summary;
 }
 
-// Midpoint rule with ten cells a standard deviation or more of the cases below: its error is of the
-// order of (1/10)²/24 of a standard deviation.
+// Integrates by the midpoint rule with at least ten cells per standard deviation of the cases
+// below. The error is of the order of (1/10)²/24 of a standard deviation.
 std::vector<Summary> ByQuadrature(const Case& one) {
   const Eigen::Index n = one.domain.lower.size();
   const Eigen::Index cells = n == 1 ? 200'000 : 600;
@@ -115,7 +115,7 @@ Samples Record(const char* output, const std::vector<double>& values) {
   return samples;
 }
 
-// ½ Σ ((z − y)/σ)²
+// Returns ½ Σ ((z − y)/σ)².
 double Mismatch(const std::vector<double>& values, double y, double noise) {
   double sum = 0;
   for (const double z : values) sum += 0.5 * std::pow((z - y) / noise, 2);
@@ -126,7 +126,7 @@ Vector V(std::initializer_list<double> values) {
   return Eigen::Map<const Vector>(values.begin(), static_cast<Eigen::Index>(values.size()));
 }
 
-// ω = √(k/m) measured to 25 %: the stiffness goes with its square.
+// The frequency ω = √(k/m) is measured to 25 %; the stiffness varies with its square.
 Case Skewed() {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_frequency");
@@ -164,7 +164,7 @@ double OscillatorCost(const Samples& samples, const Vector& theta) {
   return sum;
 }
 
-// The damping that the data ask for, 0.09 N s/m, is below the prior's 0.1 … 0.3.
+// The data ask for a damping of 0.09 N s/m, which is below the prior's 0.1 … 0.3.
 Case AtABound() {
   const Samples samples = OscillatorSamples(0.09, 3);
   return {"atABound",
@@ -187,7 +187,7 @@ Case Gaussian() {
           true};
 }
 
-// b − a² measured: the posterior lies along a parabola.
+// The data measure b − a², so that the posterior lies along a parabola.
 Case Banana() {
   const double noise = 0.3;
   const std::vector<double> values = {0.1, -0.2};
@@ -206,7 +206,7 @@ Case Banana() {
           false};
 }
 
-// a² measured: two pieces, of unequal weight by the prior.
+// The data measure a²: the posterior has two pieces, which the prior weighs unequally.
 Case Bimodal() {
   const double noise = 0.05;
   const std::vector<double> values = {0.36, 0.41};
@@ -232,9 +232,10 @@ void ExpectNear(const Summary& summary, const Summary& exact, double max_limit_e
   EXPECT_NEAR((summary.upper95 - exact.upper95) / exact.std_dev, 0, max_limit_error);
 }
 
-// An estimate is made of fewer draws. A limit at the probability p of a density f has the error
-// √(p(1 − p)/N)/f from N of them: in the long tails here f is about 0.02/s, so that 4,000, what
-// chains of 30,000 effective draws have in tails where they mix worst, leave 0.12 s.
+// Returns the largest allowed error of a limit. An estimate is made of fewer draws than a study.
+// From N draws, a limit at the probability p of a density f has the error √(p(1 − p)/N)/f. In the
+// long tails here f is about 0.02/s (s is the standard deviation). Chains of 30,000 effective draws
+// have 4,000 in the tails where they mix worst, which leaves an error of 0.12 s.
 double MaxLimitErrorOfEstimates(PosteriorMethod method) {
   return method == PosteriorMethod::kImportanceSampling ? 0.03 : 0.12;
 }

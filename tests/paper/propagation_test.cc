@@ -1,4 +1,4 @@
-// What the prior predicts, by the expansion, against Monte Carlo on the model itself.
+// Compares what the prior predicts through the expansion with Monte Carlo on the model itself.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 constexpr int kRuns = 20'000;
 constexpr double kErrors = 4;  // standard errors allowed
 
-// θ of kRuns draws from the prior, kRuns × n.
+// Draws θ from the prior kRuns times, kRuns × n.
 Matrix DrawParameters(const Prior& prior) {
   std::mt19937_64 engine(1);
   Matrix thetas(kRuns, prior.dimension());
@@ -30,7 +30,7 @@ Matrix DrawParameters(const Prior& prior) {
   return thetas;
 }
 
-// One output at one time over all runs, against what the expansion says of it.
+// Compares one output at one time over all runs with what the expansion predicts for it.
 void ExpectAgreement(std::vector<double> runs, const PropagatedOutput& predicted, int k,
                      const std::vector<double>& probabilities) {
   const double n = kRuns;
@@ -44,13 +44,13 @@ void ExpectAgreement(std::vector<double> runs, const PropagatedOutput& predicted
   }
   const double std_dev = std::sqrt(second);
   const double mean_error = std_dev / std::sqrt(n);
-  // Var(s²) ≈ (μ₄ − σ⁴)/n, and s = √s²: its error is half that over σ.
+  // The variance of s² is Var(s²) ≈ (μ₄ − σ⁴)/n. The error of s = √s² is half its root over σ.
   const double std_dev_error = std::sqrt((fourth - second * second) / n) / (2 * std_dev);
   ASSERT_LT(predicted.residual(k), mean_error) << "the expansion must be finer than the oracle";
   EXPECT_NEAR(predicted.mean(k), mean, kErrors * mean_error);
   EXPECT_NEAR(predicted.standard_deviation(k), std_dev, kErrors * std_dev_error);
-  // The number of runs below the p-quantile is binomial: the quantile lies between the order
-  // statistics of rank n p ± 4 √(n p (1 − p)).
+  // The number of runs below the p-quantile is binomial, so that the quantile lies between the
+  // order statistics of rank n p ± 4 √(n p (1 − p)).
   std::sort(runs.begin(), runs.end());
   for (size_t q = 0; q < probabilities.size(); ++q) {
     const double p = probabilities[q], spread = kErrors * std::sqrt(n * p * (1 - p));
@@ -68,7 +68,7 @@ void ExpectPropagationIsMonteCarlo(Problem problem, const std::vector<std::strin
   options.until_s = until_s;
   options.step_s = step_s;
   options.outputs = outputs;
-  // Draws of the expansion: their own quantiles are to be finer than the oracle's.
+  // The draws of the expansion are many, so that their quantiles are finer than the oracle's.
   options.density_samples = 200'000;
   const auto propagation = PropagatePrior(*resolved, options, {});
   ASSERT_TRUE(propagation.ok()) << propagation.status();
@@ -85,7 +85,7 @@ void ExpectPropagationIsMonteCarlo(Problem problem, const std::vector<std::strin
   Matrix values(kRuns, m * static_cast<Eigen::Index>(propagation->time_s.size()));
   ASSERT_TRUE(model.Advance(propagation->time_s, values, {}).ok());
   ASSERT_TRUE(model.failures().empty());
-  // At t = 0 nothing is uncertain yet.
+  // The loop starts at 1 because nothing is uncertain yet at t = 0.
   for (size_t k = 1; k < propagation->time_s.size(); ++k) {
     for (Eigen::Index j = 0; j < m; ++j) {
       SCOPED_TRACE(propagation->outputs[j].output + " at " +

@@ -1,5 +1,5 @@
-// Records of real hardware with noise that nobody has said anything about. Oracles: what others
-// found with noise of their own choice (the residuals in pixels and mrad, g/L = 1.3556).
+// Tests records of real hardware whose noise is unknown. The oracles are the results of others, who
+// chose the noise themselves (the residuals in pixels and mrad, g/L = 1.3556).
 
 #include <gtest/gtest.h>
 
@@ -25,14 +25,14 @@ bool Has(const Estimate& estimate, DiagnosticCode code) {
   return false;
 }
 
-// From a cold start with broad priors.
+// The estimate starts cold, with broad priors.
 TEST(TwoGlidersRecordNoise, HasTheResidualsThatOthersFound) {
   const auto record = SharedRecord("air_track_2mass.csv", {"x1", "x2"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_2mass.csv is not there";
   Problem problem = testing::TwoGlidersProblem(2);
   for (MeasuredOutput& measured : problem.measured) measured.noise = kUnknown;
   const Estimate estimate = EstimateInBatches(problem, *record, 1000);
-  // Ours has the N − n/2 degrees of freedom left of each channel in its denominator, theirs N.
+  // Our denominator holds the N − n/2 degrees of freedom left to each channel, theirs holds N.
   EXPECT_NEAR(estimate.channels[0].noise_std_dev, 0.62, 0.01);
   EXPECT_NEAR(estimate.channels[1].noise_std_dev, 0.59, 0.01);
   EXPECT_TRUE(Has(estimate, DiagnosticCode::kCorrelatedResiduals));

@@ -1,10 +1,10 @@
-// The project's reference scenario over many seeds of the noise.
+// Runs the project's reference scenario over many seeds of the noise.
 //
-// R is taken from the measured value and not from the true one, which nobody knows: a sample that
-// the noise made larger weighs less, E[e/R(z)] = −2 p sgn(y)/σ to first order in the relative noise
-// p, as if every sample were 2 % of its σ too small. Through the derivatives of the outputs that
+// R is computed from the measured value, because nobody knows the true one. A sample that the noise
+// made larger therefore weighs less: E[e/R(z)] = −2 p sgn(y)/σ to first order in the relative noise
+// p, as if every sample were 2 % of its σ too small. Through the derivatives of the outputs this
 // makes a bias of 0.13 standard deviations of m_a and 0.05 of d at these true values (integrated
-// over ε at each sample; at others in the prior 0.05 to 0.22). It would grow like √samples.
+// over ε at each sample; 0.05 to 0.22 at others in the prior). The bias would grow like √samples.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ Estimate EstimateFrom(const ResolvedProblem& problem, const Samples& samples) {
   return *std::move(estimate);
 }
 
-// From the seeds 1 … 100.
+// Estimates with the noise of each of the seeds 1 … 100.
 std::vector<Estimate> EstimateEverySeed(const Experiment& experiment) {
   const ExperimentVariant& variant = experiment.variants.front();
   const auto problem = ResolvedProblem::Make(variant.problem);
@@ -48,7 +48,7 @@ std::vector<Estimate> EstimateEverySeed(const Experiment& experiment) {
   return estimates;
 }
 
-// Oracle: that z = (map − true)/stdDev is standard normal but for the bias above.
+// The oracle is that z = (map − true)/stdDev is standard normal, except for the bias above.
 TEST(ReferenceScenario, CoversTheTruthAsOftenAsItSays) {
   const auto experiment = MakeExperiment("reference");
   ASSERT_TRUE(experiment.ok());
@@ -68,7 +68,7 @@ TEST(ReferenceScenario, CoversTheTruthAsOftenAsItSays) {
     }
     EXPECT_GE(within_two, 90);
     EXPECT_LE(within_two, 99);
-    // Three standard deviations of the mean and of the variance of 100 values.
+    // The bounds are three standard deviations of the mean and of the variance of 100 values.
     const double mean = sum / kSeeds;
     EXPECT_NEAR(mean, kBias[i], 3 / std::sqrt(kSeeds));
     EXPECT_NEAR(squares / kSeeds - mean * mean, 1, 3 * std::sqrt(2.0 / kSeeds));
