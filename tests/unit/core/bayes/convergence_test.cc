@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-// Chains of x_t = ρ x_{t−1} + √(1 − ρ²) ε, started from the stationary N(0, 1).
+// Makes chains of x_t = ρ x_{t−1} + √(1 − ρ²) ε, started from the stationary N(0, 1).
 Matrix Autoregressive(int times, int chains, double correlation) {
   std::mt19937_64 generator(7);
   std::normal_distribution<double> normal;
@@ -27,7 +27,7 @@ TEST(RankNormalized, GivesNormalScoresWhateverTheQuantity) {
   Matrix draws(2, 2);
   draws << 3, -1, 700, 2;
   const Matrix scores = RankNormalized(draws);
-  // Φ⁻¹((4 − 3/8)/(4 + 1/4)) of the largest; the smallest mirrors it.
+  // The largest draw has the score Φ⁻¹((4 − 3/8)/(4 + 1/4)); the smallest mirrors it.
   EXPECT_NEAR(scores(1, 0), 1.0491313979639714, 1e-12);
   EXPECT_NEAR(scores(0, 1), -scores(1, 0), 1e-12);
   EXPECT_EQ(scores, RankNormalized(draws.array().exp().matrix().cwiseMin(1e300)));
@@ -41,8 +41,8 @@ TEST(RankNormalized, LetsEqualDrawsShareTheirRanks) {
   EXPECT_NEAR(scores(0, 0), 0, 1e-12);  // the middle of four ranks
 }
 
-// For white draws the variance of the means of 8 sequences of N is W/N, so that R̂² − 1 is about
-// 1/N times what a χ² of 7 degrees over 7 varies: below 4.4 with probability 1 − 10⁻⁴.
+// The variance of the means of 8 sequences of N white draws is W/N. R̂² − 1 is therefore about 1/N
+// times the variation of a χ² of 7 degrees over 7: below 4.4 with probability 1 − 10⁻⁴.
 TEST(SplitRHat, IsOneForChainsThatAgree) {
   const Matrix draws = Autoregressive(50, 40, 0);
   const double count = 25 * 10;
@@ -65,9 +65,10 @@ TEST(SplitRHat, IsOneForDrawsThatDoNotVary) {
   EXPECT_EQ(SplitRHat(RankNormalized(Matrix::Ones(10, 8)), 4), 1);
 }
 
-// τ = (1 + ρ)/(1 − ρ) of an autoregressive chain. An estimate from N draws that sums M lags has the
-// relative variance 2 (2M + 1)/N (A. Sokal, Monte Carlo Methods in Statistical Mechanics, 1996):
-// for the last one, with some 60 lags, 8 %; the bound is three of these.
+// The oracle is τ = (1 + ρ)/(1 − ρ) of an autoregressive chain. An estimate from N draws that sums
+// M lags has the relative variance 2 (2M + 1)/N (A. Sokal, Monte Carlo Methods in Statistical
+// Mechanics, 1996). Its root is 8 % for the last chain, with some 60 lags; the bound is three of
+// these.
 TEST(EffectiveSize, IsThatOfAnAutoregressiveProcess) {
   for (const double correlation : {0.0, 0.5, 0.9}) {
     const Matrix draws = Autoregressive(400, 100, correlation);
@@ -76,7 +77,7 @@ TEST(EffectiveSize, IsThatOfAnAutoregressiveProcess) {
   }
 }
 
-// Chains that stay where they started are worth one draw each, or two as far as T times can tell.
+// Chains that never move are worth one draw each, or two as far as T times can tell.
 TEST(EffectiveSize, OfChainsThatDoNotMoveIsTheirNumber) {
   const Matrix start = Autoregressive(1, 500, 0);
   const double effective = EffectiveSize(RankNormalized(start.replicate(40, 1)));

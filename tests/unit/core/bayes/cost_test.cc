@@ -14,7 +14,8 @@
 namespace polyest::internal {
 namespace {
 
-// Sums of `count` samples with random coefficients about φ_0, and the same mismatch term by term.
+// Holds sums of `count` samples with random coefficients about φ_0, and computes the same mismatch
+// term by term.
 struct RandomRecord {
   Matrix coefficients;  // one sample a column
   Vector z, variance;
@@ -61,14 +62,14 @@ TEST(MismatchSums, EqualTheDirectSum) {
 }
 
 TEST(MismatchSums, KeepTheirDigitsUnderAnOffsetOfAMillionSigma) {
-  // φ_0 = 1 first, as in every basis: the offset never enters d. About zero, w would be 10¹⁵ and
-  // leave the residual's sum with no more than three digits.
+  // The first entry is φ_0 = 1, as in every basis, so that the offset never enters d. About zero, w
+  // would be 10¹⁵ and leave no more than three digits to the sum of the residuals.
   const RandomRecord record(6, 1000, 1e6);
   const Vector phi_0 = Vector::LinSpaced(6, 1, 0.5);
   Vector phi = Vector::LinSpaced(6, 1, -2);
   const double direct = record.ChiSquared(phi);
   EXPECT_LT(direct, 1e5);
-  // e itself is a difference of numbers of 10⁶: 10⁶ ε = 2e-10 a sample
+  // The error e is itself a difference of numbers of 10⁶: 10⁶ ε = 2e-10 a sample.
   EXPECT_NEAR(record.SumsAbout(phi_0).ChiSquared(phi - phi_0), direct, 1e-9 * direct);
 }
 
@@ -84,14 +85,14 @@ TEST(MismatchSums, OfPartsAddUpToThoseOfAll) {
   EXPECT_EQ(first.b(), all.b());
   EXPECT_EQ(first.w(), all.w());
   EXPECT_EQ(first.count(), 2);
-  // By hand: χ² at d = 0 is 0.5²/4 + 2²/0.25.
+  // By hand, χ² at d = 0 is 0.5²/4 + 2²/0.25.
   EXPECT_DOUBLE_EQ(all.ChiSquared(Vector::Zero(2)), 16.0625);
 }
 
 TEST(Cost, OfASampledSineHasTheClosedFormOfTheInitialVelocity) {
-  // §3.1: x = v0/(2π) sin 2πt, v0 = v0nom (1 + ξ/2), ξ ~ beta(2, 2). With
-  // a_k = ½ v0nom/(2π) sin 2πt_k and e_k = z_k − v0nom/(2π) sin 2πt_k the mismatch is least at
-  // ξ̂ = Σ e_k a_k/R_k ÷ Σ a_k²/R_k and has the curvature Σ a_k²/R_k: (44)–(47) put right.
+  // The problem is that of §3.1: x = v0/(2π) sin 2πt, v0 = v0nom (1 + ξ/2), ξ ~ beta(2, 2). With
+  // a_k = ½ v0nom/(2π) sin 2πt_k and e_k = z_k − v0nom/(2π) sin 2πt_k the mismatch is least at ξ̂ =
+  // Σ e_k a_k/R_k ÷ Σ a_k²/R_k and has the curvature Σ a_k²/R_k. These are (44)–(47), corrected.
   const Prior prior({UncertainParameter::Beta("v0", 2, 2, 0.5, 1.5).value()});
   const auto basis = std::make_shared<const Basis>(prior.germs(), 4);
   const double deviation = 1 / std::sqrt(5.0);  // of the germ: φ_1 = ξ √5
@@ -120,7 +121,7 @@ TEST(Cost, OfASampledSineHasTheClosedFormOfTheInitialVelocity) {
   EXPECT_GT(std::abs(best[0] - 0.23), 1e-4);  // the disturbance is seen
 }
 
-// A cost with every term at work: a nonlinear expansion in a moved, skewed region.
+// Makes a cost in which every term matters: a nonlinear expansion in a moved, skewed region.
 Cost SkewedCost(double regularization, int order = 4) {
   const Prior prior({UncertainParameter::Normal("a", 1, 2).value(),
                      UncertainParameter::Beta("b", 2, 3, 0, 1).value(),
@@ -138,7 +139,8 @@ Cost SkewedCost(double regularization, int order = 4) {
 TEST(Cost, GradientAndHessianAreThoseOfCentralDifferences) {
   const Cost cost = SkewedCost(2.5);
   const Eigen::Vector3d eta(0.3, -0.4, 0.2);
-  // Central differences: error h²/6 J‴ + ε J/h; polynomials of degree 8 with J of 10⁴.
+  // Central differences have the error h²/6 J‴ + ε J/h. The polynomials are of degree 8 and J is
+  // 10⁴.
   const double h = 1e-5;
   Vector gradient(3), forward(3), backward(3);
   const CostValue value = cost.EvaluateWithGradient(eta, gradient);
@@ -161,7 +163,7 @@ TEST(Cost, OfManyPointsIsThatOfEach) {
   const Cost cost = SkewedCost(1.5);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(-4, 4);
-  // More than one block, with a rest, and many points outside Ω.
+  // The points fill more than one block, with a remainder, and many lie outside Ω.
   const Matrix etas = Matrix::NullaryExpr(333, 3, [&] { return uniform(random); });
   Vector totals;
   cost.EvaluateMany(etas, totals);
@@ -206,8 +208,8 @@ TEST(Cost, WithoutWeightIgnoresAPriorThatIsZeroAtItsBound) {
   EXPECT_TRUE(std::isfinite(totals[0]));
 }
 
-// §3.4 on an expansion; the numbers are of Newton's method on (55) itself, and agree with the
-// printed (0.09, −0.40).
+// The problem is that of §3.4 on an expansion. The numbers come from Newton's method on (55) itself
+// and agree with the printed (0.09, −0.40).
 TEST(Cost, OfTheFrequencyExampleHasItsMinimumInTheValley) {
   struct Case {
     double noise;
@@ -225,7 +227,7 @@ TEST(Cost, OfTheFrequencyExampleHasItsMinimumInTheValley) {
     EXPECT_NEAR(directions[0].information, expected.information, 1e-4 * expected.information);
     EXPECT_LT(directions[1].information, 1e-3);
     EXPECT_EQ(directions[1].verdict, Verdict::kNotIdentified);
-    // Along the valley m and k rise together.
+    // The mass m and the stiffness k rise together along the valley.
     EXPECT_GT(directions[1].coefficients.minCoeff(), 0.2);
   }
 }
@@ -235,7 +237,7 @@ TEST(Cost, OfTheFrequencyExampleLeavesTheMassAtItsPrior) {
   const Minimum minimum = FrequencyMinimum(cost);
   const Curvature curvature =
       CovarianceFromCurvature(cost.Hessian(minimum.point), cost.prior(), minimum.point);
-  // Inverse Hessian of (55) at its minimum.
+  // The expected values are those of the inverse Hessian of (55) at its minimum.
   EXPECT_NEAR(curvature.standard_deviation[0] / 6.667, 0.973781, 1e-5);
   EXPECT_NEAR(curvature.standard_deviation[1] / 1052.8, 0.267533, 1e-5);
   const std::vector<Direction> directions =

@@ -38,7 +38,8 @@ TEST(Curvature, KeepsThePriorWhereItKnowsLess) {
 }
 
 TEST(Curvature, KeepsThePriorAlongAnObliqueValley) {
-  // Known across (1, 1) with curvature 10⁴, not at all along it: variance ½ + ½·10⁻⁴ in each unit.
+  // The data know the direction across (1, 1) with curvature 10⁴ and nothing along it, so that the
+  // variance is ½ + ½·10⁻⁴ in each unit.
   const Eigen::Vector2d across(M_SQRT1_2, -M_SQRT1_2);
   const Matrix hessian = 1e4 * across * across.transpose();
   const Curvature curvature = CovarianceFromCurvature(hessian, TwoNormals(), Vector::Zero(2));
@@ -47,8 +48,8 @@ TEST(Curvature, KeepsThePriorAlongAnObliqueValley) {
 }
 
 TEST(Curvature, IsMeasuredInPriorStandardDeviations) {
-  // uniform on [0, 6]: scale 3, germ deviation 1/√3. The prior's variance of θ is 3, of ξ ⅓: a
-  // curvature of 3 is the prior's own, 12 halves the deviation.
+  // The prior, uniform on [0, 6], has the scale 3 and the germ deviation 1/√3. Its variance is 3 in
+  // θ and ⅓ in ξ: a curvature of 3 is the prior's own, 12 halves the deviation.
   const Prior prior({UncertainParameter::Uniform("a", 0, 6).value()});
   const auto deviation = [&](double curvature) {
     return CovarianceFromCurvature(Matrix::Constant(1, 1, curvature), prior, Vector::Zero(1))
@@ -69,7 +70,7 @@ TEST(Curvature, ThatIsNoNumberLeavesThePrior) {
 TEST(Directions, AreSortedByInformationInPriorUnits) {
   const Prior prior({UncertainParameter::Uniform("a", 0, 6).value(),
                      UncertainParameter::Normal("b", 0, 1).value()});
-  // λ = (germ variance) × curvature: 6/3 = 2 and 50.
+  // The information is λ = (germ variance) × curvature: 6/3 = 2 and 50.
   const Matrix hessian = Eigen::Vector2d(6, 50).asDiagonal();
   const std::vector<Direction> directions = Directions(hessian, prior);
   ASSERT_EQ(directions.size(), 2u);

@@ -10,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-// Quasi-random standard normal points.
+// Returns quasi-random standard normal points.
 Matrix NormalPoints(int dimension, int count) {
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
   return CollocationPoints(PointSet::kHalton, germs, 0, count).value();
@@ -30,8 +30,8 @@ TEST(LogEvidence, OfAGaussianIsItsNormalization) {
   }
 }
 
-// e^{−x} on x > 0: log Z = 0, though the Gaussian beside it has half of its points where there is
-// nothing.
+// The density is e^{−x} on x > 0, so that log Z = 0. Half of the points of the Gaussian beside it
+// lie where the density is zero.
 TEST(LogEvidence, OfADensityAtABoundIsExact) {
   const Vector u = UnitCubePoints(PointSet::kHalton, 1, 20'000);
   const Matrix draws = -(1 - u.array()).log().matrix();
@@ -42,7 +42,7 @@ TEST(LogEvidence, OfADensityAtABoundIsExact) {
 }
 
 TEST(LogEvidence, OfWeightedDrawsIsThatOfTheirDensity) {
-  // Drawn with twice the width, weighted to the standard normal.
+  // The draws have twice the width and are weighted to the standard normal.
   const Matrix draws = 2 * NormalPoints(1, 20'000);
   Vector weights = (-0.5 * draws.col(0).array().square() * (1 - 0.25)).exp();
   weights /= weights.sum();

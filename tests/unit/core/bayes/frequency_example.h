@@ -1,6 +1,7 @@
 #pragma once
 
-// §3.4: mass and stiffness normal, one frequency measured, as a cost on an expansion.
+// Gives the example of §3.4 as a cost on an expansion: mass and stiffness are normal, and one
+// frequency is measured.
 
 #include <cmath>
 
@@ -21,7 +22,8 @@ inline double Frequency(const Vector& xi) {
   return std::sqrt(stiffness / (kMeanMass + kMassDeviation * xi[0]));
 }
 
-// Order 8 in Hermite polynomials; its error of ω near the minimum is below 10⁻⁷ rad/s.
+// Makes the cost with Hermite polynomials of order 8. Their error of ω near the minimum is below
+// 10⁻⁷ rad/s.
 inline Cost FrequencyCost(double noise, double regularization) {
   const Prior prior(
       {UncertainParameter::Normal("m", kMeanMass, kMassDeviation).value(),

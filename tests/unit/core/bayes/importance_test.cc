@@ -27,8 +27,8 @@ WeightedDraws Sample(const Cost& cost, const Vector& minimum, double bound, int 
                           Matrix(cholesky.matrixL()), points);
 }
 
-// Closed form: the posterior is the Gaussian of precision I + aaᵀ/σ². The quasi-random points'
-// error is far below that of as many random ones, 1/√16384 = 0.8 %.
+// The posterior is, in closed form, the Gaussian of precision I + aaᵀ/σ². The error of the
+// quasi-random points is far below that of as many random ones, 1/√16384 = 0.8 %.
 TEST(ImportanceSample, HasTheMomentsAndQuantilesOfAGaussian) {
   const Eigen::Vector2d a(1, 2);
   const double z = 1.5, noise = 0.3;
@@ -48,8 +48,8 @@ TEST(ImportanceSample, HasTheMomentsAndQuantilesOfAGaussian) {
   }
 }
 
-// Σ w² N = ∫p²/q for the Gaussian p and the mixture q of two wider ones, which is below that of the
-// first alone: (s²/√(2s² − 1))ⁿ/0.85.
+// The oracle is Σ w² N = ∫p²/q for the Gaussian p and the mixture q of two wider Gaussians. It is
+// below that of the first alone: (s²/√(2s² − 1))ⁿ/0.85.
 TEST(ImportanceSample, KeepsMostOfItsPointsOnAGaussian) {
   for (const int n : {1, 3, 6}) {
     const Cost cost = CostOf(Normals(n), {});
@@ -58,7 +58,7 @@ TEST(ImportanceSample, KeepsMostOfItsPointsOnAGaussian) {
   }
 }
 
-// Half of the Gaussian is cut off: half of the points are left, and the mean is √(2/π).
+// The box cuts off half of the Gaussian: half of the points are left, and the mean is √(2/π).
 TEST(ImportanceSample, CountsNothingOutsideOfTheBox) {
   const Cost cost = CostOf(Normals(1), {});
   const WeightedDraws draws = ImportanceSample(cost, Vector::Zero(1), Vector::Constant(1, 20),
@@ -77,7 +77,8 @@ TEST(ImportanceSample, HasNoDrawsWhereThereIsNoDensity) {
   EXPECT_EQ(draws.etas.rows(), 0);
 }
 
-// Of a² with the Gaussian of one piece: a wide net, a posterior twice as narrow as the curvature.
+// The data measure b − a². The proposal is a wide Gaussian about one minimum, while the posterior
+// is twice as narrow as the curvature says.
 TEST(ImportanceSample, LosesItsEffectiveSizeWhereThePosteriorIsNotGaussian) {
   const Cost cost =
       CostOf(Normals(2), {{[](const Vector& xi) { return xi[1] - xi[0] * xi[0]; }, 0, 0.05}});

@@ -10,8 +10,8 @@
 namespace polyest::internal {
 namespace {
 
-// Linear data z_i = s_i ξ_i with unit noise, unit normal priors and a residual χ² that no ξ
-// removes: the minimum for α² is ξ_i = s_i z_i/(s_i² + α²).
+// Returns the minimum for α² of linear data z_i = s_i ξ_i with unit noise and unit normal priors:
+// ξ_i = s_i z_i/(s_i² + α²). `residual` is the χ² that no ξ removes.
 MinimumAt LinearProblem(Eigen::Vector2d s, Eigen::Vector2d z, double residual) {
   return [=](double regularization) -> std::optional<RegularizedMinimum> {
     CostValue cost;
@@ -40,7 +40,8 @@ Prior TwoNormals() {
 }
 
 TEST(LCurve, FindsTheCornerOfAnIllPosedProblem) {
-  // ξ_2 = 0.01/(10⁻⁴ + α²) runs away below α² = 0.02; ξ_1 = 0.5 costs mismatch above α² = 200.
+  // The unknown ξ_2 = 0.01/(10⁻⁴ + α²) runs away below α² = 0.02. The unknown ξ_1 = 0.5 costs
+  // mismatch above α² = 200.
   const RegularizationChoice choice =
       ChooseByLCurve(Sweep(LinearProblem({100, 0.01}, {50, 1}, 4)), TwoNormals());
   EXPECT_TRUE(choice.determined);

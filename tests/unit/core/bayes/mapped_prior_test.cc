@@ -1,5 +1,5 @@
-// Priors whose parameters are not affine maps of independent germs: lognormal, truncated normal and
-// correlated ones.
+// Tests priors whose parameters are not affine maps of independent germs: lognormal, truncated
+// normal and correlated ones.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ UncertainParameter Lognormal(const char* name, double mean, double std_dev) {
   return UncertainParameter::Lognormal(name, mean, std_dev).value();
 }
 
-// Five correlated parameters of all families in a chain, and an uncorrelated one among them.
+// Makes five correlated parameters of all families in a chain, and an uncorrelated one among them.
 Prior Chain() {
   return Prior::Make({Normal("a", 3, 2), Lognormal("b", 40, 5),
                       UncertainParameter::Uniform("free", 0, 4).value(),
@@ -47,7 +47,7 @@ Prior Chain() {
       .value();
 }
 
-// Points of the prior, count × n.
+// Returns points of the prior, count × n.
 Matrix PriorPoints(const Prior& prior, int count) {
   Matrix points = CollocationPoints(PointSet::kHalton, prior.germs(), 1, count).value();
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
@@ -86,7 +86,8 @@ TEST(TruncatedNormalPrior, IsTheGermMovedAndScaled) {
   const Prior prior({c});
   EXPECT_NEAR(prior.ToParameters(prior.lower())[0], 0, 1e-16);
   EXPECT_EQ(prior.upper()[0], kInfinity);
-  // From −½ on: mean φ(½)/Φ(½) standard deviations above that of the whole normal.
+  // The normal is cut at −½, so that the mean lies φ(½)/Φ(½) standard deviations above that of the
+  // whole normal.
   const double ratio = 0.35206532676429952 / 0.69146246127401312;
   EXPECT_NEAR(prior.Mean()[0], 0.2 + 0.4 * ratio, 1e-14);
   EXPECT_NEAR(prior.StandardDeviation()[0], 0.4 * std::sqrt(1 - 0.5 * ratio - ratio * ratio),
@@ -98,7 +99,7 @@ TEST(MappedPrior, GermsAndParametersMapThereAndBack) {
   const Matrix xis = CollocationPoints(PointSet::kHalton, prior.germs(), 1, 200).value();
   for (Eigen::Index i = 0; i < xis.rows(); ++i) {
     const Vector xi = xis.row(i).transpose();
-    // Quantiles are good to 10⁻¹² of a standard deviation; the slope of a score against its
+    // Quantiles are exact to 10⁻¹² of a standard deviation. The slope of a score against its
     // parameter stays below a thousand prior standard deviations at such points.
     EXPECT_LT((prior.ToGerm(prior.ToParameters(xi)) - xi).cwiseAbs().maxCoeff(), 1e-8) << i;
   }
@@ -123,8 +124,8 @@ TEST(MappedPrior, JacobianIsThatOfTheMap) {
   }
 }
 
-// Star discrepancy of 20,000 Halton points in seven dimensions: below 0.01 in practice; moments of
-// heavy tails suffer most.
+// The star discrepancy of 20,000 Halton points in seven dimensions is below 0.01 in practice. The
+// moments of heavy tails suffer most.
 TEST(MappedPrior, PointsHaveTheMarginalsMomentsAndTheCopulasRankCorrelations) {
   const Prior prior = Chain();
   const Matrix points = PriorPoints(prior, 20'000);
@@ -154,8 +155,8 @@ TEST(MappedPrior, PointsHaveTheMarginalsMomentsAndTheCopulasRankCorrelations) {
 }
 
 TEST(MappedPrior, CovarianceIsTheClosedForm) {
-  // Of the pairs normal–normal ρ s s′, lognormal–lognormal m m′ (e^{ρσσ′} − 1) and normal–lognormal
-  // ρ s m σ, with σ² = log(1 + s²/m²).
+  // The covariance of a pair is ρ s s′ for normal–normal, m m′ (e^{ρσσ′} − 1) for
+  // lognormal–lognormal and ρ s m σ for normal–lognormal, with σ² = log(1 + s²/m²).
   const Prior prior = Prior::Make({Normal("a", 3, 2), Normal("b", -1, 0.5), Lognormal("c", 40, 5),
                                    Lognormal("d", 1, 2)},
                                   {{"a", "b", 0.6}, {"c", "d", -0.5}, {"a", "c", 0.4}})
@@ -185,7 +186,7 @@ TEST(MappedPrior, NarrowGaussiansAreMappedByTheDeltaMethod) {
   const Matrix hessian = 1e8 * Matrix::Identity(prior.dimension(), prior.dimension());
   const Curvature curvature = CovarianceFromCurvature(hessian, prior, xi);
   const Matrix jacobian = prior.Jacobian(xi);
-  // Beside it the next order is s² = 10⁻⁸.
+  // The next order is smaller by s² = 10⁻⁸.
   EXPECT_TRUE(curvature.covariance.isApprox(1e-8 * jacobian * jacobian.transpose(), 1e-7));
 }
 
@@ -199,19 +200,19 @@ TEST(MappedPrior, WithoutInformationTheCurvatureGivesThePrior) {
   EXPECT_TRUE(curvature.contraction.isApprox(Vector::Ones(prior.dimension()), 1e-12));
 }
 
-// Conditioning of a bivariate normal: measured a with curvature λ, b's variance is 1 − ρ² λ/(1 +
-// λ).
+// The oracle is a bivariate normal under conditioning: when a is measured with the curvature λ, the
+// variance of b is 1 − ρ² λ/(1 + λ).
 TEST(MappedPrior, WhatIsKnownOfOneIsKnownOfItsPartner) {
   const double rho = 0.95, lambda = 1e6;
   const Prior prior =
       Prior::Make({Normal("a", 0, 1), Normal("b", 0, 1)}, {{"a", "b", rho}}).value();
-  // J = ½ λ z_a² + ½ ξᵀξ, z_a = ξ_a
+  // The cost is J = ½ λ z_a² + ½ ξᵀξ with z_a = ξ_a.
   const Matrix mismatch = Eigen::Vector2d(lambda, 0).asDiagonal();
   const Curvature curvature =
       CovarianceFromCurvature(mismatch + Matrix::Identity(2, 2), prior, Vector::Zero(2));
   EXPECT_NEAR(curvature.contraction[1], std::sqrt(1 - rho * rho * lambda / (1 + lambda)), 1e-9);
   EXPECT_EQ(VerdictOfContraction(curvature.contraction[1]), Verdict::kIdentified);
-  // Along the direction of the information b moves ρ times as far as a.
+  // The parameter b moves ρ times as far as a along the direction of the information.
   const std::vector<Direction> directions = Directions(mismatch, prior);
   EXPECT_NEAR(directions[0].information, lambda, 1e-6);
   EXPECT_NEAR(directions[0].coefficients[1] / directions[0].coefficients[0], rho, 1e-12);

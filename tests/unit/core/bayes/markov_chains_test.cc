@@ -25,7 +25,7 @@ struct Exact {
   double std_dev = 0;
 };
 
-// Of the density e^{−J} on [−1, 1] by the midpoint rule.
+// Computes the moments of the density e^{−J} on [−1, 1] by the midpoint rule.
 Exact ByQuadrature(const Cost& cost) {
   constexpr int kCells = 20'000;
   double weight = 0, first = 0, second = 0;
@@ -39,7 +39,7 @@ Exact ByQuadrature(const Cost& cost) {
   return {first / weight, std::sqrt(second / weight - first * first / (weight * weight))};
 }
 
-// A mean has the standard error s/√N of its effective size; four of them.
+// Allows a mean four of its standard errors s/√N, with N the effective size.
 void ExpectMean(const Chains& chains, const Exact& exact) {
   const double error = 4 * exact.std_dev / std::sqrt(chains.effective_size[0]);
   EXPECT_NEAR(chains.etas.col(0).mean(), exact.mean, error);
@@ -54,7 +54,7 @@ TEST(RunChains, AgreeWithQuadratureAtABound) {
   EXPECT_LE(chains.etas.maxCoeff(), 1);
 }
 
-// Two pieces, the right one seven times as heavy.
+// The posterior has two pieces, the right one seven times as heavy.
 TEST(RunChains, WeighSeparatePieces) {
   const Cost cost =
       CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0] * xi[0]; }, 0.36, 0.05},
@@ -64,7 +64,8 @@ TEST(RunChains, WeighSeparatePieces) {
   EXPECT_LT(chains.r_hat[0], 1.02);
 }
 
-// The pieces are so far apart and so narrow that nothing jumps, and each group has one of its own.
+// The pieces are so far apart and so narrow that no chain jumps between them. Each group of chains
+// has a piece of its own.
 TEST(RunChains, SayThatGroupsNeverMet) {
   const Cost cost =
       CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0] * xi[0]; }, 0.36, 1e-4}});

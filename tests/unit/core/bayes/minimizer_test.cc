@@ -30,7 +30,7 @@ Matrix Row(std::initializer_list<double> values) {
   return row;
 }
 
-// ½ (x − centre)ᵀ H (x − centre) + offset
+// Returns ½ (x − centre)ᵀ H (x − centre) + offset as a function.
 std::function<double(const Vector&, Vector*)> Quadratic(Matrix hessian, Vector centre,
                                                         double offset = 0) {
   return [=](const Vector& x, Vector* gradient) {
@@ -60,7 +60,7 @@ TEST(Minimizer, SolvesAnIllConditionedQuadratic) {
     const auto minima = FindMinima(InCube(n, 1, Quadratic(IllConditioned(n, 1e8), centre, 1000)),
                                    Matrix::Constant(1, n, 0.9), {}, {});
     EXPECT_TRUE(minima[0].converged) << n << " " << minima[0].reason;
-    // gradient rounding ε·10⁸ over the least curvature 1
+    // The bound is the gradient's rounding ε·10⁸ over the least curvature 1.
     EXPECT_LT(Error(minima[0], centre), 1e-7) << n;
     EXPECT_NEAR(minima[0].value, 1000, 1e-9);
   }
@@ -92,7 +92,7 @@ TEST(Minimizer, SolvesRosenbrock) {
 
 TEST(Minimizer, DoesNotMindTheScalesOfFunctionAndVariables) {
   for (const double function_scale : {1e-12, 1.0, 1e12}) {
-    // x_0 over 10⁶, x_1 over 10⁻⁶
+    // The range of x_0 is 10⁶, that of x_1 is 10⁻⁶.
     const Vector centre = Eigen::Vector2d(3e5, -2e-7);
     const Matrix hessian =
         function_scale * Eigen::Vector2d(1e-12, 1e12).asDiagonal().toDenseMatrix();
@@ -110,7 +110,7 @@ TEST(Minimizer, StopsAtABound) {
   hessian << 2, 1, 1, 4;
   const auto minima =
       FindMinima(InCube(2, 1, Quadratic(hessian, Eigen::Vector2d(3, 0.2))), Row({0, 0}), {}, {});
-  // On x_0 = 1: 4 (x_1 − 0.2) + (1 − 3) = 0.
+  // The minimum on x_0 = 1 satisfies 4 (x_1 − 0.2) + (1 − 3) = 0.
   EXPECT_TRUE(minima[0].converged);
   EXPECT_EQ(minima[0].point[0], 1);
   EXPECT_NEAR(minima[0].point[1], 0.7, 1e-10);
@@ -126,10 +126,11 @@ TEST(Minimizer, StopsAtACorner) {
 TEST(Minimizer, StopsAtAnObliqueConstraint) {
   auto problem = InCube(3, 5, Quadratic(Matrix::Identity(3, 3), Eigen::Vector3d(2, 1, 3)));
   problem.constraint.resize(2, 3);
-  problem.constraint << 1, 2, 2, 0, 0, -1;  // the second never active
+  problem.constraint << 1, 2, 2, 0, 0, -1;  // The second is never active.
   problem.bound = Eigen::Vector2d(1, 4);
   const auto minima = FindMinima(problem, Row({-4, -4, 0}), {}, {});
-  // The nearest point of the plane: excess (2 + 2 + 6 − 1)/9 = 1 along (1, 2, 2).
+  // The minimum is the nearest point of the plane, an excess of (2 + 2 + 6 − 1)/9 = 1 along (1, 2,
+  // 2).
   EXPECT_TRUE(minima[0].converged);
   EXPECT_LT(Error(minima[0], Eigen::Vector3d(1, -1, 1)), 1e-9);
   EXPECT_LE((problem.constraint * minima[0].point - problem.bound).maxCoeff(), 1e-12);
@@ -156,7 +157,7 @@ TEST(Minimizer, MovesStartsInside) {
   EXPECT_LT(Error(minima[0], Eigen::Vector2d(-0.15, 0.35)), 1e-9);
 }
 
-// (x² − 1)² + x/10: minima near ±1, a maximum near 0.
+// Returns (x² − 1)² + x/10, which has minima near ±1 and a maximum near 0.
 double DoubleWell(const Vector& x, Vector* gradient) {
   const double a = x[0] * x[0] - 1;
   if (gradient != nullptr) (*gradient)[0] = 4 * x[0] * a + 0.1;
@@ -191,7 +192,7 @@ TEST(Minimizer, LeavesASaddlePoint) {
 }
 
 TEST(Minimizer, BacksOffFromAnInfiniteRegion) {
-  // −log(0.3 − x) + …: infinite from 0.3 on, its minimum close before.
+  // The barrier −log(0.3 − x) + … is infinite from 0.3 on and has its minimum close before.
   const auto barrier = [](const Vector& x, Vector* gradient) {
     const double room = 0.3 - x[0];
     if (!(room > 0)) return kInfinity;

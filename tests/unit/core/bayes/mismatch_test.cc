@@ -1,5 +1,5 @@
-// The likelihood of a channel with noise of unknown size or correlation. Oracles: quadrature over
-// what is marginalized, central differences.
+// Tests the likelihood of a channel whose noise has an unknown size or correlation. The oracles are
+// quadrature over the marginalized quantities and central differences.
 
 #include "core/bayes/mismatch.h"
 
@@ -12,8 +12,8 @@
 namespace polyest::internal {
 namespace {
 
-// log ∫ e^{f(x)} dx by the trapezoidal rule, which for a smooth f that vanishes at both ends is
-// exact to rounding.
+// Returns log ∫ e^{f(x)} dx by the trapezoidal rule. The rule is exact to rounding for a smooth f
+// whose exponential vanishes at both ends.
 template <class Function>
 double LogIntegral(Function f, double from, double to, int points) {
   std::vector<double> values;
@@ -34,7 +34,7 @@ TEST(NegativeLogLikelihood, IsHalfOfChiSquaredWhenTheNoiseIsKnown) {
 TEST(NegativeLogLikelihood, MarginalizesAnUnknownScale) {
   const int n = 15;
   const auto exact = [&](double chi_squared) {
-    // x = log s: ∫ s^−N e^{−χ²/2s²} ds/s
+    // The substitution is x = log s: ∫ s^−N e^{−χ²/2s²} ds/s.
     return -LogIntegral([&](double x) { return -n * x - 0.5 * chi_squared * std::exp(-2 * x); }, -6,
                         12, 4000);
   };
@@ -46,7 +46,7 @@ TEST(NegativeLogLikelihood, MarginalizesAnUnknownScale) {
   EXPECT_DOUBLE_EQ(NegativeLogLikelihood(n, n, 0, true, false), 0.5 * n);
 }
 
-// Residuals that end with 0, so that Σ_{k<N} u_k² is all of χ².
+// Holds residuals that end with 0, so that Σ_{k<N} u_k² is all of χ².
 struct Residuals {
   explicit Residuals(double correlation) {
     std::mt19937_64 random(7);
@@ -65,11 +65,11 @@ struct Residuals {
 };
 
 TEST(NegativeLogLikelihood, MarginalizesAnUnknownCorrelation) {
-  // Σ (u_k − a u_{k−1})² = A − 2 a B + a² A
+  // The sum is Σ (u_k − a u_{k−1})² = A − 2 a B + a² A.
   const auto exact = [](const Residuals& u) {
     return -LogIntegral([&](double a) { return -0.5 * (u.a - 2 * a * u.b + a * a * u.a); }, -9, 9,
                         4000) -
-           0.5 * std::log(u.a);  // the curvature of the exponent in a, which is left out
+           0.5 * std::log(u.a);  // The likelihood leaves out the curvature of the exponent in a.
   };
   const Residuals white(0), red(0.8);
   EXPECT_NEAR(NegativeLogLikelihood(20, red.a, red.d, false, true) -
@@ -88,7 +88,7 @@ TEST(NegativeLogLikelihood, MarginalizesScaleAndCorrelationTogether) {
         -25, 25, 8000);
   };
   const Residuals white(0), red(0.8);
-  // The tails of a fall as a^−N: beyond ±25 less than 10⁻²⁰ of the integral.
+  // The tails in a fall as a^−N: beyond ±25 lies less than 10⁻²⁰ of the integral.
   EXPECT_NEAR(NegativeLogLikelihood(20, red.a, red.d, true, true) -
                   NegativeLogLikelihood(20, white.a, white.d, true, true),
               exact(red) - exact(white), 1e-8);
@@ -122,14 +122,14 @@ ChannelSums RandomChannel(bool scale_unknown, bool correlation_unknown) {
 
 class MismatchOf : public ::testing::TestWithParam<std::pair<bool, bool>> {
  protected:
-  // One channel with known noise beside it.
+  // The second channel has known noise.
   Mismatch mismatch_{std::vector<ChannelSums>{RandomChannel(false, false),
                                               RandomChannel(GetParam().first, GetParam().second)}};
   Vector d_ = Eigen::Vector4d(0.2, -0.1, 0.15, 0.05);
 };
 
 TEST_P(MismatchOf, HasTheGradientAndCurvatureOfCentralDifferences) {
-  const double h = 1e-5;  // error h² J‴ + ε J/h, J of 100
+  const double h = 1e-5;  // The error is h² J‴ + ε J/h with J of 100.
   Vector gradient(kTerms), forward(kTerms), backward(kTerms);
   EXPECT_DOUBLE_EQ(mismatch_.EvaluateWithGradient(d_, gradient), mismatch_.Evaluate(d_));
   const Matrix curvature = mismatch_.Curvature(d_, Matrix::Identity(kTerms, kTerms));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Costs whose outputs are polynomials, so that order 2 holds them exactly.
+// Makes costs whose outputs are polynomials, which order 2 represents exactly.
 
 #include <functional>
 #include <memory>
@@ -18,7 +18,7 @@ struct Measurement {
   double noise = 0;
 };
 
-// J = ½ Σ ((z − y(ξ))/σ)² + J_apriori, exact because order 2 holds the outputs.
+// Returns J = ½ Σ ((z − y(ξ))/σ)² + J_apriori, exact because order 2 represents the outputs.
 inline Cost CostOf(const Prior& prior, const std::vector<Measurement>& measurements) {
   const auto basis = std::make_shared<const Basis>(prior.germs(), 2);
   const Matrix points = CollocationPoints(PointSet::kGaussTensor, prior.germs(), 2, 0).value();

@@ -28,10 +28,11 @@ Particles Sample(const Cost& cost, double half_width, const SamplerOptions& opti
   return Sample(cost, half_width, options, Matrix(0, cost.dimension()));
 }
 
-// Tempering never lets the effective size fall below half, and moves only renew what resampling
-// has copied: the particles are worth at least half their number of independent draws. A mean then
-// has the standard error s/√(N/2), a standard deviation (of a density whose tails are a Gaussian's
-// or shorter) s/√N, a probability p √(p (1 − p)/(N/2)); the bounds are four of these.
+// The bounds are four standard errors. Tempering never lets the effective size fall below half, and
+// moves only renew the copies that resampling made, so that the particles are worth at least half
+// their number of independent draws. A mean then has the standard error s/√(N/2). A standard
+// deviation (of a density whose tails are no longer than a Gaussian's) has s/√N, and a probability
+// p has √(p (1 − p)/(N/2)).
 double MeanError(double std_dev, Eigen::Index particles) {
   return 4 * std_dev / std::sqrt(0.5 * static_cast<double>(particles));
 }
@@ -49,7 +50,7 @@ Moments MomentsOf(const Vector& samples) {
   return {mean, std::sqrt((samples.array() - mean).square().mean())};
 }
 
-// Of the density e^{−J} on [−bound, bound] by the midpoint rule.
+// Computes the moments of the density e^{−J} on [−bound, bound] by the midpoint rule.
 Moments MomentsByQuadrature(const std::function<double(double)>& cost, double bound) {
   constexpr int kCells = 200'000;
   double weight = 0, first = 0, second = 0;
@@ -69,7 +70,8 @@ void ExpectMoments(const Vector& samples, const Moments& expected) {
   EXPECT_NEAR(moments.std_dev, expected.std_dev, StdDevError(expected.std_dev, samples.size()));
 }
 
-// Normal prior, outputs linear in ξ: the posterior is the Gaussian of precision I + aaᵀ/σ².
+// The prior is normal and the outputs are linear in ξ, so that the posterior is the Gaussian of
+// precision I + aaᵀ/σ².
 TEST(SamplePosterior, HasTheMomentsOfAGaussian) {
   const Prior prior({UncertainParameter::Normal("a", 0, 1).value(),
                      UncertainParameter::Normal("b", 0, 1).value()});
@@ -85,7 +87,8 @@ TEST(SamplePosterior, HasTheMomentsOfAGaussian) {
   for (int i = 0; i < 2; ++i) {
     ExpectMoments(particles.etas.col(i), {mean[i], std::sqrt(covariance(i, i))});
   }
-  // The narrow direction, six times narrower than either parameter alone, and the correlation.
+  // The checks below cover the direction that is six times narrower than either parameter alone,
+  // and the correlation.
   const Vector along = particles.etas * (a / a.norm());
   ExpectMoments(along, {a.dot(mean) / a.norm(), 1 / std::sqrt(1 + 5 / (noise * noise))});
   const double product =
@@ -105,7 +108,7 @@ TEST(SamplePosterior, ReportsTheCostOfEachParticle) {
   }
 }
 
-// Much narrower than the box: 10⁻⁴ of it.
+// The peak is 10⁻⁴ as wide as the box.
 TEST(SamplePosterior, FindsANarrowPeak) {
   const double noise = 1e-4;
   const Cost cost = CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0]; }, 0.3, noise}});
@@ -118,7 +121,7 @@ TEST(SamplePosterior, ReturnsThePriorWhereTheDataSayNothing) {
 }
 
 TEST(SamplePosterior, StopsAtABoundOfThePrior) {
-  const double z = 1.2, noise = 0.3;  // most likely beyond the bound
+  const double z = 1.2, noise = 0.3;  // The most likely value lies beyond the bound.
   const Cost cost = CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0]; }, z, noise}});
   const Particles particles = Sample(cost, 1.15);
   EXPECT_LE(particles.etas.maxCoeff(), 1);
@@ -141,7 +144,8 @@ double ShareAboveZero(const Particles& particles) {
   return (particles.etas.col(0).array() > 0).cast<double>().mean();
 }
 
-// ξ² measured: two pieces of equal weight, which no move of the size of one piece connects.
+// The data measure ξ²: the posterior has two pieces of equal weight, which no move of the size of
+// one piece connects.
 TEST(SamplePosterior, KeepsBothPiecesOfASymmetricPosterior) {
   const double z = 0.36, noise = 0.05;
   for (const Prior& prior : {OneUniform(), OneNormal()}) {
@@ -150,7 +154,7 @@ TEST(SamplePosterior, KeepsBothPiecesOfASymmetricPosterior) {
     const Particles particles = Sample(cost, bound);
     const auto count = static_cast<double>(particles.etas.rows());
     EXPECT_NEAR(ShareAboveZero(particles), 0.5, 4 * 0.5 / std::sqrt(0.5 * count));
-    // ξ² itself has the moments of either piece.
+    // The modulus |ξ| has the moments of either piece.
     const double weight = std::isfinite(prior.upper()[0]) ? 0 : 1;
     const auto density = [&](double xi) {
       const double error = (xi * xi - z) / noise;
@@ -163,7 +167,7 @@ TEST(SamplePosterior, KeepsBothPiecesOfASymmetricPosterior) {
   }
 }
 
-// Guesses say where to look and must not say what to find.
+// The guesses say where to look and must not decide what is found.
 TEST(SamplePosterior, FindsThePieceThatTheGuessesMiss) {
   const Cost cost =
       CostOf(OneUniform(), {{[](const Vector& xi) { return xi[0] * xi[0]; }, 0.36, 0.05}});

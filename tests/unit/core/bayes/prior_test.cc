@@ -24,7 +24,8 @@ Prior OneOfEach() {
 
 TEST(Prior, HasTheMomentsOfItsDensities) {
   const Prior prior = OneOfEach();
-  // Textbook moments: uniform width/√12, beta(2, 2) on a unit width √(1/20), gamma √shape · scale.
+  // The moments are the textbook ones: uniform width/√12, beta(2, 2) on a unit width √(1/20), gamma
+  // √shape · scale.
   EXPECT_TRUE(prior.Mean().isApprox(Eigen::Vector4d(0.2, 40, 1, 1.4), 1e-14));
   EXPECT_TRUE(prior.StandardDeviation().isApprox(
       Eigen::Vector4d(0.03, 20 / std::sqrt(12.0), std::sqrt(0.05), 0.2), 1e-14));
@@ -41,7 +42,7 @@ TEST(Prior, MapsBetweenGermsAndParameters) {
 TEST(Prior, NegativeLogDensityIsTheSumOfTheClosedForms) {
   const Prior prior = OneOfEach();
   const Eigen::Vector4d xi(-1.5, 0.25, -0.5, 3);
-  // normal, ½, ¾ (1 − ξ²), ξ³ e^{−ξ}/Γ(4)
+  // The four densities are the normal, ½, ¾ (1 − ξ²) and ξ³ e^{−ξ}/Γ(4).
   const double expected = 0.5 * std::log(2 * M_PI) + 1.125 + std::log(2.0) - std::log(0.75 * 0.75) -
                           (3 * std::log(3.0) - 3 - std::log(6.0));
   EXPECT_NEAR(prior.NegativeLogDensity(xi), expected, 1e-13);
@@ -50,7 +51,7 @@ TEST(Prior, NegativeLogDensityIsTheSumOfTheClosedForms) {
 TEST(Prior, DerivativesAreThoseOfTheClosedForms) {
   const Prior prior = OneOfEach();
   const Eigen::Vector4d xi(-1.5, 0.25, -0.5, 3);
-  // d/dξ of ξ²/2, constant, −log(1 − ξ²), ξ − 3 log ξ
+  // The derivatives are those of ξ²/2, a constant, −log(1 − ξ²) and ξ − 3 log ξ.
   EXPECT_TRUE(prior.Gradient(xi).isApprox(Eigen::Vector4d(-1.5, 0, -1 / 0.75, 0), 1e-13));
   EXPECT_TRUE(prior.Curvature(xi).isApprox(Eigen::Vector4d(1, 0, 2 * 1.25 / (0.75 * 0.75), 3.0 / 9),
                                            1e-13));

@@ -18,8 +18,8 @@ UncertainParameter Normal(const char* name) {
   return UncertainParameter::Normal(name, 0, 1).value();
 }
 
-// Linear data z_i = s_i ξ_i + noise of unit variance, and a residual χ² that no ξ removes, as a
-// cost: in Hermite polynomials ξ itself is a basis polynomial. Everything has a closed form:
+// Holds linear data z_i = s_i ξ_i + noise of unit variance, with a residual χ² that no ξ removes,
+// as a cost. In Hermite polynomials ξ itself is a basis polynomial. Everything has a closed form:
 //   ξ̂_i = s_i z_i/(s_i² + α²),  γ = Σ s_i²/(s_i² + α²),
 //   p(z | α²) = ∏ N(z_i; 0, 1 + s_i²/α²) × constant,  θ = ξ.
 struct LinearProblem {
@@ -32,7 +32,7 @@ struct LinearProblem {
     for (int i = 0; i < n; ++i) parameters[static_cast<size_t>(i)].name = std::string(1, 'a' + i);
     const Prior prior(parameters);
     const auto basis = std::make_shared<const Basis>(prior.germs(), 1);
-    Matrix points = Matrix::Identity(n, n);  // φ(e_i) − φ(0) is the column of ξ_i
+    Matrix points = Matrix::Identity(n, n);  // φ(e_i) − φ(0) is the column of ξ_i.
     Vector phi_0(basis->size()), phi(basis->size());
     basis->Evaluate(Vector::Zero(n), phi_0);
     MismatchSums sums(basis->size());
@@ -83,7 +83,7 @@ LinearProblem Problem(std::initializer_list<double> s, std::initializer_list<dou
           Eigen::Map<const Vector>(z.begin(), static_cast<Eigen::Index>(z.size())), residual};
 }
 
-// ∫ ρ^{α²} dξ by the trapezoidal rule over `from` … `to`.
+// Returns ∫ ρ^{α²} dξ by the trapezoidal rule over `from` … `to`.
 double Integral(const Germ& germ, double regularization, double from, double to) {
   constexpr int kSteps = 400'000;
   const double step = (to - from) / kSteps;
@@ -102,9 +102,9 @@ TEST(RegularizationPrior, IsNormalizedWhateverItsWeight) {
     for (const double regularization : {0.01, 0.3, 1.0, 7.0}) {
       SCOPED_TRACE(testing::Message()
                    << static_cast<int>(germ.family()) << ", α² " << regularization);
-      // Past it no density is above e^−40 of its greatest value.
+      // The density beyond this reach is nowhere above e^−40 of its greatest value.
       const double reach = 40 / regularization + 40;
-      // The rule's error is that of ξ^0.03 at 0, of a gamma density: O(step^1.03).
+      // The error of the rule comes from ξ^0.03 at 0, of a gamma density: O(step^1.03).
       EXPECT_NEAR(LogNormalization(germ, regularization),
                   std::log(Integral(germ, regularization, std::max(germ.Lower(), -reach),
                                     std::min(germ.Upper(), reach))),
@@ -115,7 +115,7 @@ TEST(RegularizationPrior, IsNormalizedWhateverItsWeight) {
 }
 
 TEST(RegularizationPrior, OfAGreatWeightIsTheNormalAboutTheMode) {
-  // Laplace: ∫ ρ^r → ρ(mode)^r √(2π/(−r (log ρ)″)), exact to O(1/r).
+  // Laplace's method gives ∫ ρ^r → ρ(mode)^r √(2π/(−r (log ρ)″)), exact to O(1/r).
   const double r = 1e6;
   for (const Germ& germ : {Germ::Beta(2, 2), Germ::Beta(3, 2), Germ::Gamma(4)}) {
     const double mode = germ.Mode();
@@ -125,11 +125,10 @@ TEST(RegularizationPrior, OfAGreatWeightIsTheNormalAboutTheMode) {
 }
 
 TEST(RegularizationPrior, OfATailIsAnExponentialEvenWhereItsProbabilityUnderflows) {
-  // ∫_a^∞ e^{−r ξ²/2} = e^{−r a²/2}/(r a) (1 − 1/(r a²) + …), r a² = 16·10⁶.
+  // The integral is ∫_a^∞ e^{−r ξ²/2} = e^{−r a²/2}/(r a) (1 − 1/(r a²) + …) with r a² = 16·10⁶.
   const double r = 1e6, a = 4;
   const Germ germ = Germ::TruncatedNormal(a, std::numeric_limits<double>::infinity());
   EXPECT_NEAR(LogNormalization(germ, r) - r * germ.LogDensity(a), -std::log(r * a), 1e-6);
-  // Its mirror image.
   const Germ mirror = Germ::TruncatedNormal(-std::numeric_limits<double>::infinity(), -a);
   EXPECT_NEAR(LogNormalization(mirror, r), LogNormalization(germ, r), 1e-6);
 }
@@ -154,7 +153,7 @@ TEST(RegularizedMinimum, OfALinearProblemHasItsEvidenceAndEffectiveParameters) {
   }
 }
 
-// A cost of two parameters, of which data z = ξ_1 with unit noise ÷ s know the first.
+// Makes a cost of two parameters. The data z = ξ_1, with unit noise ÷ s, inform the first only.
 Cost FirstOfTwo(const UncertainParameter& second, double s, double z, double regularization) {
   const Prior prior({Normal("a"), second});
   const auto basis = std::make_shared<const Basis>(prior.germs(), 1);
@@ -176,7 +175,7 @@ TEST(RegularizedMinimum, HasNoEvidenceFromAParameterThatTheDataLeaveToThePrior) 
         UncertainParameter::Beta("b", 3, 1, 0, 1).value(),
         UncertainParameter::TruncatedNormal("b", 0, 1, -1, 3).value()}) {
     const auto log_evidence = [&](double r) {
-      // Off the bounds, as a minimizer keeps.
+      // The point stays off the bounds, as a minimizer does.
       const double mode = std::clamp(Germ(second.germ).Mode(), Germ(second.germ).Lower() + 1e-9,
                                      Germ(second.germ).Upper() - 1e-9);
       const Vector at = Eigen::Vector2d(s * s * z / (s * s + r), mode);
@@ -194,7 +193,7 @@ TEST(RegularizedMinimum, HasNoEvidenceFromAParameterThatTheDataLeaveToThePrior) 
 }
 
 TEST(Evidence, OfOneParameterIsGreatestWhereThePriorIsAsWideAsWhatIsSeen) {
-  // N(z; 0, 1 + s²/α²) is greatest for z² = 1 + s²/α².
+  // The evidence N(z; 0, 1 + s²/α²) is greatest for z² = 1 + s²/α².
   const LinearProblem problem = Problem({10}, {30}, 5);
   const RegularizationChoice choice = ChooseByEvidence(problem.Sweep(), problem.At());
   EXPECT_TRUE(choice.determined);
@@ -205,7 +204,7 @@ TEST(Evidence, OfAnIllPosedProblemIsThatOfTheClosedForm) {
   const LinearProblem problem = Problem({100, 20, 3}, {250, -30, 2}, 40);
   const RegularizationChoice choice = ChooseByEvidence(problem.Sweep(), problem.At());
   ASSERT_TRUE(choice.determined);
-  // The maximum of the closed form, by a fine scan.
+  // The oracle is the maximum of the closed form, found by a fine scan.
   double best = 1;
   for (double tau = std::log(1e-3); tau < std::log(1e3); tau += 1e-4) {
     if (problem.LogEvidence(std::exp(tau)) > problem.LogEvidence(best)) best = std::exp(tau);
@@ -214,7 +213,7 @@ TEST(Evidence, OfAnIllPosedProblemIsThatOfTheClosedForm) {
 }
 
 TEST(Evidence, DoesNotChooseWhereThePriorsMostLikelyValueIsTheBest) {
-  // z² < 1: the data would have the prior as narrow as can be.
+  // The datum has z² < 1, so that the evidence is greatest for a prior as narrow as can be.
   const LinearProblem problem = Problem({10}, {0.2}, 5);
   const RegularizationChoice choice = ChooseByEvidence(problem.Sweep(), problem.At());
   EXPECT_FALSE(choice.determined);
@@ -239,7 +238,7 @@ TEST(Discrepancy, IsMetAtTheRootOfTheClosedForm) {
 }
 
 TEST(Discrepancy, OfOneDatumIsWhatThePriorLeaves) {
-  // (α²/(s² + α²))² z² = 1 − s²/(s² + α²): α² = s²/(z² − 1).
+  // The condition (α²/(s² + α²))² z² = 1 − s²/(s² + α²) gives α² = s²/(z² − 1).
   const LinearProblem problem = Problem({10}, {4}, 0);
   const RegularizationChoice choice = ChooseByDiscrepancy(problem.Sweep(), problem.At(), 1);
   EXPECT_TRUE(choice.determined);
@@ -262,7 +261,7 @@ TEST(RegularizationBias, OfALinearProblemIsTheShiftFromBayesRule) {
   const LinearProblem problem = Problem({3, 0.5, 0}, {4, -1, 0}, 10);
   for (const double regularization : {0.0, 0.01, 1.0, 50.0}) {
     Vector at = problem.Minimum(regularization);
-    at[2] = 0;  // which the data do not inform
+    at[2] = 0;  // The data do not inform it.
     const Vector bias = RegularizationBias(problem.MakeCost(regularization), at, {});
     const Vector expected = at - problem.Minimum(1);
     EXPECT_LT((bias - expected).norm(), 1e-6) << regularization;
@@ -271,14 +270,15 @@ TEST(RegularizationBias, OfALinearProblemIsTheShiftFromBayesRule) {
   EXPECT_EQ(RegularizationBias(problem.MakeCost(1), problem.Minimum(1), {}).norm(), 0);
 }
 
-// One datum z of a parameter with unit noise in the germ, in the germ's own linear polynomial.
+// Makes the cost of one datum z of a parameter, with unit noise in the germ, in the germ's own
+// linear polynomial.
 Cost OneParameter(const UncertainParameter& parameter, double z, double regularization) {
   const Prior prior({parameter});
   const auto basis = std::make_shared<const Basis>(prior.germs(), 1);
   Vector phi_0(2), phi_1(2);
   basis->Evaluate(Vector::Zero(1), phi_0);
   basis->Evaluate(Vector::Ones(1), phi_1);
-  // c with cᵀ(φ(ξ) − φ(0)) = ξ
+  // The vector c satisfies cᵀ(φ(ξ) − φ(0)) = ξ.
   Vector c = Vector::Zero(2);
   c[1] = 1 / (phi_1[1] - phi_0[1]);
   MismatchSums sums(2);
@@ -286,8 +286,8 @@ Cost OneParameter(const UncertainParameter& parameter, double z, double regulari
   return Cost(basis, Region::WholePrior(1), Vector::Zero(1), sums, prior, regularization);
 }
 
-// Against quadrature of ∫ e^{−J_mismatch} ρ^{α²} ÷ Z. Laplace's error is O(the posterior's variance
-// × the prior term's third and fourth derivatives): here 0.01 α².
+// The oracle is quadrature of ∫ e^{−J_mismatch} ρ^{α²} ÷ Z. The error of Laplace's method is O(the
+// posterior's variance × the prior term's third and fourth derivatives): here 0.01 α².
 TEST(Evidence, OfASkewedPriorIsThatOfQuadrature) {
   const auto log_evidence = [](const UncertainParameter& parameter, double z, double r) {
     const Germ germ(parameter.germ);
@@ -318,14 +318,14 @@ TEST(RegularizationBias, OfAUniformPriorIsNone) {
   const auto uniform = UncertainParameter::Uniform("a", 0, 10).value();
   const Vector at = Vector::Constant(1, 0.4);
   EXPECT_EQ(RegularizationBias(OneParameter(uniform, 0.4, 100), at, {})[0], 0);
-  // Nor at its bound, where the data ask for more.
+  // The bias is also zero at the bound, beyond which the data ask to go.
   const Vector bound = Vector::Constant(1, 1 - 1e-9);
   EXPECT_NEAR(RegularizationBias(OneParameter(uniform, 1.4, 100), bound, {})[0], 0, 1e-7);
 }
 
 TEST(RegularizationBias, TakesASkewedPriorAsItIs) {
-  // J = 50 (ξ − z)² + α² (ξ − (s − 1) log ξ), the minimum the root of 100 (ξ − z) + α² (1 −
-  // (s − 1)/ξ) = 0, a quadratic; θ = 5 ξ.
+  // The cost is J = 50 (ξ − z)² + α² (ξ − (s − 1) log ξ). Its minimum is the root of the quadratic
+  // 100 (ξ − z) + α² (1 − (s − 1)/ξ) = 0, and θ = 5 ξ.
   const auto gamma = UncertainParameter::Gamma("a", 4, 5, 0).value();
   const double z = 2;
   const auto root = [&](double r) {

@@ -13,11 +13,11 @@ const Eigen::Vector4d kWeights(0.1, 0.4, 0.2, 0.3);
 
 TEST(WeightedSamples, HaveTheMomentsOfTheirWeights) {
   EXPECT_NEAR(WeightedMean(kDraws, kWeights), 2, 1e-15);
-  // 0.1·4 + 0.4·1 + 0.2·1 + 0.3·0
+  // The variance is 0.1·4 + 0.4·1 + 0.2·1 + 0.3·0.
   EXPECT_NEAR(WeightedStandardDeviation(kDraws, kWeights), 1, 1e-15);
 }
 
-// Cumulative probabilities at the draws 1, 2, 3, 4: 0.2, 0.55, 0.8, 0.95.
+// The cumulative probabilities at the draws 1, 2, 3, 4 are 0.2, 0.55, 0.8, 0.95.
 TEST(WeightedQuantiles, RunLinearlyBetweenDraws) {
   const WeightedQuantiles quantile(kDraws, kWeights);
   EXPECT_NEAR(quantile(0.2), 1, 1e-12);
@@ -29,7 +29,8 @@ TEST(WeightedQuantiles, RunLinearlyBetweenDraws) {
 
 TEST(WeightedDensity, HoldsTheProbabilityOfItsBins) {
   const int count = 10'000;
-  const Vector draws = Vector::LinSpaced(count, 0, 1).array().sqrt();  // density 2x on [0, 1]
+  // The density is 2x on [0, 1].
+  const Vector draws = Vector::LinSpaced(count, 0, 1).array().sqrt();
   const Vector weights = Vector::Constant(count, 1.0 / count);
   const DensityEstimate density = WeightedDensity(draws, weights, 20);
   ASSERT_EQ(density.value.size(), 20);
@@ -60,7 +61,7 @@ TEST(WeightedJointDensity, OfIndependentDrawsIsTheProductOfTheMarginals) {
   const JointDensity joint = WeightedJointDensity(first, second, weights, 5);
   ASSERT_EQ(joint.density.rows(), 5);
   ASSERT_EQ(joint.density.cols(), 5);
-  // Uniform on [0, 1] × [0, 10]; a bin holds 60 ± 1 draws a side.
+  // The density is uniform on [0, 1] × [0, 10]; a bin holds 60 ± 1 draws a side.
   EXPECT_NEAR(joint.density.minCoeff(), 0.1, 0.004);
   EXPECT_NEAR(joint.density.maxCoeff(), 0.1, 0.004);
   EXPECT_NEAR(joint.second[4], 9, 0.02);
