@@ -17,7 +17,7 @@ std::vector<Germ> FourFamilies() {
 
 Vector InsideAllSupports() { return Vector{{0.7, -0.35, 0.2, 1.9}}; }
 
-// f'(x) from five points: exact for polynomials up to degree 4, whatever the step.
+// Computes f'(x) from five points, exactly for polynomials up to degree 4, whatever the step.
 template <typename Function>
 auto FivePointDerivative(const Function& f, Vector x, int variable) {
   constexpr double kStep = 0.5;
@@ -100,7 +100,8 @@ TEST(Basis, OfOrderTenIsOrthonormalInOneDimension) {
 
 TEST(Basis, ManyPointsAgreeWithOneAtATime) {
   const Basis basis(FourFamilies(), 4);
-  for (const int count : {1, 7, 128, 300}) {  // below, at and beyond the points taken at a time
+  // below, at and beyond the number of points taken at a time
+  for (const int count : {1, 7, 128, 300}) {
     const Matrix points = CollocationPoints(PointSet::kHalton, basis.germs(), 4, count).value();
     Matrix values;
     basis.EvaluateMany(points, values);
@@ -117,7 +118,8 @@ TEST(Basis, GradientIsTheDerivativeOfTheValues) {
   const Basis basis(FourFamilies(), 4);
   const Vector xi = InsideAllSupports();
   Vector phi(basis.size());
-  Matrix gradient = Matrix::Constant(basis.size(), 4, 99);  // whatever was there must go
+  // Evaluation must overwrite these values.
+  Matrix gradient = Matrix::Constant(basis.size(), 4, 99);
   basis.EvaluateWithGradient(xi, phi, gradient);
   EXPECT_EQ(phi, Values(basis, xi));
   for (int k = 0; k < 4; ++k) {

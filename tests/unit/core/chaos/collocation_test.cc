@@ -38,8 +38,8 @@ TEST(CollocationPoints, EveryCoordinateIsEvenlySpreadInsideTheOpenCube) {
     for (int k = 0; k < 15; ++k) {
       std::set<double> distinct(points.col(k).begin(), points.col(k).end());
       EXPECT_EQ(distinct.size(), 500u);
-      // Of 500 consecutive radical inverses in base b, each interval [i/b, (i+1)/b) receives
-      // 500/b to within one; the mean is then ½ to within b/500 and b ≤ 47.
+      // Each interval [i/b, (i+1)/b) receives 500/b of 500 consecutive radical inverses in base b,
+      // to within one. The mean is then ½ to within b/500, and b ≤ 47.
       EXPECT_NEAR(points.col(k).mean(), 0.5, 47. / 500) << k;
     }
   }
@@ -83,11 +83,12 @@ TEST(CollocationPoints, AGridTooLargeIsRefusedWithItsSize) {
 
 struct Case {
   int dimension, order, points;
-  double measured;  // condition number
+  double measured;  // the condition number
 };
 
 TEST(CollocationMatrix, OfHaltonPointsIsWellConditioned) {
-  // Measured 5.2, 3.2, 6.1, 4.3 and 5.3; plain Halton gives 67.7 in the last case.
+  // The measured values are 5.2, 3.2, 6.1, 4.3 and 5.3; plain Halton points give 67.7 in the last
+  // case.
   for (const Case& c : {Case{2, 3, 20, 5.2}, Case{5, 2, 42, 3.2}, Case{5, 3, 112, 6.1},
                         Case{6, 2, 56, 4.3}, Case{12, 2, 182, 5.3}}) {
     const std::vector<Germ> germs(static_cast<size_t>(c.dimension), Germ::Uniform());
@@ -100,7 +101,8 @@ TEST(CollocationMatrix, OfHaltonPointsIsWellConditioned) {
 }
 
 TEST(CollocationMatrix, ConditionIsTheRatioOfSingularValues) {
-  // Points ±1 and the basis 1, √3 ξ: the columns are orthogonal with lengths √2 and √6.
+  // The points are ±1 and the basis is 1, √3 ξ, so that the columns are orthogonal with lengths √2
+  // and √6.
   const Basis basis({Germ::Uniform()}, 1);
   const auto matrix = CollocationMatrix::Factor(basis, Vector{{-1, 1}});
   ASSERT_TRUE(matrix.ok());
@@ -119,7 +121,8 @@ TEST(CollocationMatrix, RecoversPolynomialsExactly) {
   Matrix coefficients(basis.size(), 2);
   Vector variance(2);
   matrix->Solve(matrix->matrix() * expected, coefficients, variance);
-  // Backward stable: the error is the condition number (some 100 here) times rounding.
+  // The solution is backward stable: the error is the condition number (some 100 here) times
+  // rounding.
   EXPECT_LT((coefficients - expected).lpNorm<Eigen::Infinity>(), 1e-12);
   EXPECT_LT(variance.maxCoeff(), 1e-24);
 }
@@ -147,7 +150,7 @@ TEST(CollocationMatrix, InterpolationShowsNoResidual) {
 }
 
 TEST(CollocationMatrix, PointsAtWhichTheBasisOverflowsAreRefused) {
-  // With few terms and with many, of which the singular values are found in other ways.
+  // The singular values are found in different ways for few terms and for many.
   for (const int order : {3, 30}) {
     const Basis basis({Germ::Normal()}, order);
     const Vector points = 1e150 * Vector::LinSpaced(2 * basis.size(), -1, 1);

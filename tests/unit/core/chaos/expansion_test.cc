@@ -9,7 +9,8 @@ namespace polyest::internal {
 namespace {
 
 TEST(Expansion, MomentsAreThoseOfTheCoefficients) {
-  // ξ² of a standard normal is 1 + √2 φ_2: mean 1, variance 2. The second output is constant.
+  // The first output, ξ² of a standard normal, is 1 + √2 φ_2: mean 1, variance 2. The second is
+  // constant.
   const auto basis = std::make_shared<Basis>(std::vector<Germ>{Germ::Normal()}, 2);
   Matrix coefficients = Matrix::Zero(3, 2);
   coefficients.col(0) << 1, 0, std::sqrt(2);
@@ -66,7 +67,7 @@ TEST(QuantileOfSamples, InterpolatesTheOrderStatistics) {
   EXPECT_EQ(QuantileOfSamples(samples, 0), 1);
   EXPECT_EQ(QuantileOfSamples(samples, 1), 5);
   EXPECT_EQ(QuantileOfSamples(samples, 0.5), 2.5);
-  EXPECT_NEAR(QuantileOfSamples(samples, 0.9), 3 + 0.7 * 2, 1e-14);  // position 2.7
+  EXPECT_NEAR(QuantileOfSamples(samples, 0.9), 3 + 0.7 * 2, 1e-14);  // at position 2.7
   EXPECT_EQ(QuantileOfSamples(Vector::Constant(1, 7), 0.3), 7);
 }
 

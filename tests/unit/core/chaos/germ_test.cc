@@ -18,7 +18,8 @@ const std::vector<Germ>& AllGerms() {
   static const std::vector<Germ> germs = {
       Germ::Normal(), Germ::Uniform(), Germ::Beta(2, 2), Germ::Beta(1, 1), Germ::Beta(1.5, 4.2),
       Germ::Beta(1, 3), Germ::Beta(30, 2.5), Germ::Gamma(1), Germ::Gamma(2.7), Germ::Gamma(50),
-      // Lopsided, one-sided, far out in a tail, narrow, and hardly cut at all.
+      // The truncations are lopsided, one-sided, far out in a tail, narrow, and nearly without
+      // effect.
       Germ::TruncatedNormal(-1, 2.5), Germ::TruncatedNormal(-kInfinity, 0.3),
       Germ::TruncatedNormal(4.5, kInfinity), Germ::TruncatedNormal(0.4, 0.401),
       Germ::TruncatedNormal(-9, kInfinity)};
@@ -30,8 +31,8 @@ std::string Name(const Germ& germ) {
          std::to_string(germ.first_shape()) + ", " + std::to_string(germ.second_shape()) + ")";
 }
 
-// ∫ f ρ dξ by the trapezoidal rule after a substitution that makes the integrand fall off doubly
-// exponentially at both ends, where that rule converges exponentially. It knows the density alone.
+// Returns ∫ f ρ dξ by the trapezoidal rule. A substitution makes the integrand fall off doubly
+// exponentially at both ends, where that rule converges exponentially. It uses the density alone.
 double Integral(const Germ& germ, const std::function<double(double)>& f) {
   constexpr double kStep = 1.0 / 64;
   double sum = 0;
@@ -39,7 +40,7 @@ double Integral(const Germ& germ, const std::function<double(double)>& f) {
     const double t = i * kStep;
     double xi = t, slope = 1;
     const bool below = std::isfinite(germ.Lower()), above = std::isfinite(germ.Upper());
-    if (below != above) {  // away from the one bound
+    if (below != above) {  // away from the only bound
       const double distance = std::exp(t - std::exp(-t));
       xi = below ? germ.Lower() + distance : germ.Upper() - distance;
       slope = distance * (1 + std::exp(-t));
@@ -55,7 +56,7 @@ double Integral(const Germ& germ, const std::function<double(double)>& f) {
   return sum;
 }
 
-// P_0 … P_order of the germ at ξ by the recurrence.
+// Returns P_0 … P_order of the germ at ξ by the recurrence.
 Vector Polynomials(const Germ& germ, int order, double xi) {
   const RecurrenceCoefficients recurrence = germ.Recurrence(order + 1);
   Vector values(order + 1);
@@ -88,7 +89,7 @@ TEST(Germ, PolynomialsAreOrthonormalUnderTheDensityUpToOrderTen) {
           const Vector values = Polynomials(germ, i, xi);
           return values[i] * values[j];
         });
-        // Rounding grows with the cancellation between the lobes of the integrand.
+        // The rounding error grows with the cancellation between the lobes of the integrand.
         EXPECT_NEAR(product, i == j ? 1 : 0, 1e-9) << i << ", " << j;
       }
     }
@@ -97,18 +98,20 @@ TEST(Germ, PolynomialsAreOrthonormalUnderTheDensityUpToOrderTen) {
 
 TEST(Germ, PolynomialsAreTheTextbookOnes) {
   for (const double x : {-0.9, -0.3, 0.0, 0.4, 1.0}) {
-    // Hermite He_5 / √5!
+    // The polynomial is Hermite's He_5 / √5!.
     EXPECT_NEAR(Polynomials(Germ::Normal(), 5, x)[5],
                 (std::pow(x, 5) - 10 * std::pow(x, 3) + 15 * x) / std::sqrt(120), 1e-14);
-    // Legendre √7 (5x³ − 3x)/2
+    // The polynomial is Legendre's √7 (5x³ − 3x)/2.
     EXPECT_NEAR(Polynomials(Germ::Uniform(), 3, x)[3], std::sqrt(7) * (5 * x * x * x - 3 * x) / 2,
                 1e-14);
-    // Under ¾(1 − x²), the paper's (40)–(41) put right: √5 x, √(7/8)(5x² − 1), √(15/8)(7x³ − 3x)
+    // The polynomials under ¾(1 − x²) are √5 x, √(7/8)(5x² − 1), √(15/8)(7x³ − 3x): the paper's
+    // (40)–(41), corrected.
     const Vector jacobi = Polynomials(Germ::Beta(2, 2), 3, x);
     EXPECT_NEAR(jacobi[1], std::sqrt(5) * x, 1e-14);
     EXPECT_NEAR(jacobi[2], std::sqrt(7.0 / 8) * (5 * x * x - 1), 1e-14);
     EXPECT_NEAR(jacobi[3], std::sqrt(15.0 / 8) * (7 * x * x * x - 3 * x), 1e-13);
-    // Laguerre (x³ − 9x² + 18x − 6)/6; generalized (x² − 6x + 6)/(2√3)
+    // The polynomials are Laguerre's (x³ − 9x² + 18x − 6)/6 and the generalized (x² − 6x +
+    // 6)/(2√3).
     const double y = 1 + x;
     EXPECT_NEAR(Polynomials(Germ::Gamma(1), 3, y)[3], (y * y * y - 9 * y * y + 18 * y - 6) / 6,
                 1e-14);
@@ -131,7 +134,7 @@ TEST(Germ, LogDensityDerivativesAreThoseOfTheLogDensity) {
     SCOPED_TRACE(Name(germ));
     for (const double p : {0.1, 0.5, 0.8}) {
       const double xi = germ.Quantile(p), h = 1e-3 * germ.StandardDeviation();
-      const auto difference = [&](auto f) {  // five points: error O(h⁴)
+      const auto difference = [&](auto f) {  // Five points have the error O(h⁴).
         return (f(xi - 2 * h) - 8 * f(xi - h) + 8 * f(xi + h) - f(xi + 2 * h)) / (12 * h);
       };
       const double scale = 1 / germ.StandardDeviation();
@@ -162,7 +165,7 @@ TEST(Germ, DensityVanishesOutsideTheSupport) {
 
 TEST(Germ, CumulativeProbabilitiesAgreeWithClosedForms) {
   for (const double u : {1e-8, 0.01, 0.3, 0.5, 0.77, 0.999}) {
-    const double xi = 2 * u - 1;  // rounded: compare at the u that it means
+    const double xi = 2 * u - 1;  // ξ is rounded; v is the u that it stands for.
     const double v = (1 + xi) / 2;
     EXPECT_NEAR(Germ::Beta(2, 2).CumulativeProbability(xi) / (v * v * (3 - 2 * v)), 1, 1e-13);
     EXPECT_NEAR(Germ::Beta(5, 1).CumulativeProbability(xi) / std::pow(v, 5), 1, 1e-13);
@@ -171,7 +174,7 @@ TEST(Germ, CumulativeProbabilitiesAgreeWithClosedForms) {
   }
   for (const double x : {1e-8, 0.1, 1.0, 4.0, 30.0}) {
     EXPECT_NEAR(Germ::Gamma(1).CumulativeProbability(x) / -std::expm1(-x), 1, 1e-13);
-    // P(3/2, x) = erf √x − 2 √(x/π) e^(−x), which cancels for small x.
+    // The closed form P(3/2, x) = erf √x − 2 √(x/π) e^(−x) cancels for small x.
     if (x > 0.01) {
       EXPECT_NEAR(Germ::Gamma(1.5).CumulativeProbability(x),
                   std::erf(std::sqrt(x)) - 2 * std::sqrt(x / std::numbers::pi) * std::exp(-x),
@@ -185,11 +188,11 @@ TEST(Germ, QuantilesAreThePublishedOnes) {
   EXPECT_NEAR(Germ::Normal().Quantile(0.975), 1.959963984540054, 1e-14);
   EXPECT_NEAR(Germ::Normal().Quantile(0.5), 0, 1e-15);
   EXPECT_NEAR(Germ::Normal().Quantile(1e-10), -6.361340902404056, 1e-13);
-  // χ² with 10 degrees of freedom, 95 %: 18.307038053275146 = 2 · Gamma(5)
+  // The 95 % quantile of χ² with 10 degrees of freedom is 18.307038053275146 = 2 · Gamma(5).
   EXPECT_NEAR(2 * Germ::Gamma(5).Quantile(0.95), 18.307038053275146, 1e-12);
   for (const double p : {1e-12, 1e-6, 0.2, 0.5, 0.50001, 0.9, 1 - 1e-9}) {
     EXPECT_NEAR(Germ::Gamma(1).Quantile(p) / -std::log1p(-p), 1, 1e-13) << p;
-    // u²(3 − 2u) = p has the root u = ½ + sin(asin(2p − 1)/3). The rounding of 2p − 1 reaches the
+    // The root of u²(3 − 2u) = p is u = ½ + sin(asin(2p − 1)/3). The rounding of 2p − 1 reaches the
     // arcsine divided by 2√(p(1 − p)).
     EXPECT_NEAR(Germ::Beta(2, 2).Quantile(p), 2 * std::sin(std::asin(2 * p - 1) / 3),
                 1e-15 + 1e-16 / std::sqrt(p * (1 - p)))
@@ -204,7 +207,8 @@ TEST(Germ, QuantileInvertsCumulativeProbability) {
       const double xi = germ.Quantile(p);
       ASSERT_GT(xi, germ.Lower());
       ASSERT_LT(xi, germ.Upper());
-      // An error of 1e-12 standard deviations in ξ, and the rounding of the probability.
+      // The bound allows an error of 1e-12 standard deviations in ξ, and the rounding of the
+      // probability.
       const double allowed = germ.Density(xi) * 1e-12 * germ.StandardDeviation() + 1e-14 * p;
       EXPECT_NEAR(germ.CumulativeProbability(xi), p, allowed + 2e-16) << p;
     }
@@ -226,7 +230,7 @@ TEST(Germ, QuantileKeepsTheFarTails) {
 }
 
 TEST(Germ, QuantileFollowsTheNormalLimitForLargeShapes) {
-  // Wilson and Hilferty's cube-root approximation of the gamma quantile is good to O(1/shape)
+  // The cube-root approximation of the gamma quantile by Wilson and Hilferty is exact to O(1/shape)
   // standard deviations.
   const double shape = 1e4, z = 1.959963984540054;
   const double cube = 1 - 1 / (9 * shape) + z / (3 * std::sqrt(shape));
@@ -251,8 +255,8 @@ TEST(Germ, KeepsItsAccuracyUpToTheLargestShape) {
   }
 }
 
-// Robert's formulas: with Z = Φ(b) − Φ(a), mean (φ(a) − φ(b))/Z, variance 1 + (aφ(a) − bφ(b))/Z −
-// mean².
+// The oracle is the textbook's closed form: with Z = Φ(b) − Φ(a), the mean is (φ(a) − φ(b))/Z and
+// the variance 1 + (aφ(a) − bφ(b))/Z − mean² (Robert).
 TEST(TruncatedNormal, HasTheClosedFormsMoments) {
   const Germ normal = Germ::Normal();
   for (const auto& [a, b] : {std::pair{-1.0, 2.5}, {-3.0, 0.5}, {0.5, 4.0}}) {
@@ -262,7 +266,7 @@ TEST(TruncatedNormal, HasTheClosedFormsMoments) {
     EXPECT_NEAR(Germ::TruncatedNormal(a, b).Mean(), mean, 1e-13);
     EXPECT_NEAR(Germ::TruncatedNormal(a, b).StandardDeviation(), std::sqrt(variance), 1e-13);
   }
-  // The half-normal: √(2/π) and 1 − 2/π.
+  // The half-normal has the mean √(2/π) and the variance 1 − 2/π.
   const Germ half = Germ::TruncatedNormal(0, kInfinity);
   EXPECT_NEAR(half.Mean(), std::sqrt(2 / std::numbers::pi), 1e-14);
   EXPECT_NEAR(half.StandardDeviation(), std::sqrt(1 - 2 / std::numbers::pi), 1e-14);
@@ -272,13 +276,13 @@ TEST(TruncatedNormal, WithoutBoundsIsNormalAndWithNarrowOnesUniform) {
   const RecurrenceCoefficients whole = Germ::TruncatedNormal(-kInfinity, kInfinity).Recurrence(30);
   EXPECT_LT(whole.a.cwiseAbs().maxCoeff(), 1e-11);
   EXPECT_TRUE(whole.b.isApprox(Germ::Normal().Recurrence(30).b, 1e-11));
-  // Over [−h, h] the density changes by h²/2 of itself.
+  // The density changes over [−h, h] by h²/2 of itself.
   const double h = 1e-4;
   const RecurrenceCoefficients narrow = Germ::TruncatedNormal(-h, h).Recurrence(12);
   EXPECT_TRUE(narrow.b.tail(11).isApprox(h * h * Germ::Uniform().Recurrence(12).b.tail(11), h * h));
 }
 
-// By panels of 1/50, in each of which eight Gauss–Legendre nodes are exact to rounding for
+// Integrates in panels of 1/50. Eight Gauss–Legendre nodes in each are exact to rounding for
 // polynomials whose zeros lie no closer.
 TEST(TruncatedNormal, HasAsManyOrthonormalPolynomialsAsItSays) {
   const int order = Germ::kMaxTruncatedNormalOrder;
@@ -307,11 +311,11 @@ TEST(TruncatedNormal, HasAsManyOrthonormalPolynomialsAsItSays) {
 
 TEST(TruncatedNormal, QuantileKeepsBothTails) {
   const Germ germ = Germ::TruncatedNormal(-kInfinity, 3);
-  // P(ξ < −20 | ξ < 3) = Φ(−20)/Φ(3)
+  // The tail is P(ξ < −20 | ξ < 3) = Φ(−20)/Φ(3).
   const double tail = Germ::Normal().CumulativeProbability(-20) / 0.99865010196836991;
   EXPECT_NEAR(germ.Quantile(tail), -20, 1e-12);
   EXPECT_NEAR(germ.CumulativeProbability(-20) / tail, 1, 1e-12);
-  // Beyond 4.5 the density is all but e^{−4.5 (ξ − 4.5)}.
+  // The density beyond 4.5 is nearly e^{−4.5 (ξ − 4.5)}.
   EXPECT_NEAR(Germ::TruncatedNormal(4.5, kInfinity).Quantile(1e-9), 4.5 + 1e-9 / 4.7, 1e-10);
 }
 
@@ -321,7 +325,7 @@ TEST(Germ, NormalScoresMapThereAndBackInBothTails) {
     EXPECT_NEAR(germ.NormalScore(germ.Quantile(0.2)), Germ::Normal().Quantile(0.2), 1e-8);
     for (const double score : {-5.0, -1.0, 0.0, 0.5, 3.0, 5.0}) {
       const double xi = germ.OfNormalScore(score);
-      // ξ rounds; in the score that is dz/dξ = ρ/φ times as much.
+      // The rounding of ξ appears in the score multiplied by dz/dξ = ρ/φ.
       const double rounding =
           4e-16 * (std::abs(xi) + 1) * germ.Density(xi) / Germ::Normal().Density(score);
       EXPECT_NEAR(germ.NormalScore(xi), score, 1e-11 + 4 * rounding) << score;
@@ -330,7 +334,7 @@ TEST(Germ, NormalScoresMapThereAndBackInBothTails) {
     EXPECT_GE(germ.OfNormalScore(40), germ.OfNormalScore(30));
     EXPECT_TRUE(std::isfinite(germ.OfNormalScore(1000)));
   }
-  // Exact where 1 − p has rounded to nothing: 1 − e^{−x} = Φ(20), x = −log Φ(−20).
+  // The score is exact even though 1 − p has rounded to 0: 1 − e^{−x} = Φ(20), x = −log Φ(−20).
   EXPECT_NEAR(Germ::Gamma(1).OfNormalScore(20), 203.91715537109727, 1e-9);
 }
 

@@ -62,9 +62,9 @@ TEST(MultiIndex, AHyperbolicSetHasEveryIndexWithinItsBoundAndNoOther) {
   }
 }
 
-// √1 + √1 = √4 and √1 + √1 + √1 = √9: sums that meet the bound belong to the set.
+// Sums that meet the bound belong to the set: √1 + √1 = √4 and √1 + √1 + √1 = √9.
 TEST(MultiIndex, TheHyperbolicBoundItselfBelongsToTheSet) {
-  EXPECT_EQ(TermCount(2, {3, 0.5}, 100), 7);  // 1, three of each variable alone
+  EXPECT_EQ(TermCount(2, {3, 0.5}, 100), 7);  // 1, and three of each variable alone
   EXPECT_EQ(TermCount(2, {4, 0.5}, 100), 10);
   EXPECT_EQ(MultiIndices(3, {9, 0.5}).rowwise().minCoeff().maxCoeff(), 1);
 }

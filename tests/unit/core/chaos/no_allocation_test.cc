@@ -1,6 +1,5 @@
-// Eigen allocates by malloc, so that is what is counted: this definition takes the place of the C
-// library's and passes on to it. Sanitizers bring their own malloc, so these tests are skipped
-// under them.
+// Counts calls of malloc, by which Eigen allocates: this definition replaces the C library's and
+// passes calls on to it. Sanitizers bring their own malloc, so these tests are skipped under them.
 
 #include <gtest/gtest.h>
 

@@ -19,7 +19,7 @@ TEST(FieldPath, IsReadFromWhatAProgramHasWritten) {
   const FieldPath path{"measured", 12, "noise", "absolute"};
   EXPECT_EQ(FieldPath("measured[12].noise.absolute"), path);
   EXPECT_EQ(FieldPath(""), FieldPath());
-  // Out of another program's message it may be anything.
+  // A path from another program's message may be any text.
   for (const char* odd : {"[", "a[", "a[0", ".", "a..b", "[]", "]"}) FieldPath(odd).ToString();
 }
 

@@ -1,4 +1,5 @@
-// Oracles: what each decomposition is defined by, to a small multiple of the rounding of its size.
+// Checks each decomposition against its definition, to a small multiple of the rounding of its
+// size.
 
 #include "core/common/linear_algebra.h"
 
@@ -9,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kSize = 30;  // beyond the sizes for which Eigen multiplies without blocks
+constexpr int kSize = 30;  // larger than the sizes that Eigen multiplies without blocks
 constexpr double kRounding = 1e-12;
 
 Matrix SomeMatrix(int rows, int columns) {
@@ -125,7 +126,7 @@ TEST(Conditioning, IsTheRatioOfSingularValues) {
   EXPECT_EQ(singular.number, std::numeric_limits<double>::infinity());
 }
 
-// Oracle: A = U diag(σ) Vᵀ with orthonormal U and V has the singular values σ.
+// The oracle is A = U diag(σ) Vᵀ with orthonormal U and V, which has the singular values σ.
 TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
   const Vector values = Vector::LinSpaced(kSize, 1, 1e6);
   const Matrix left = OrthonormalBasisFrom(SomeMatrix(kSize, 1).col(0));
@@ -133,10 +134,10 @@ TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
   const Matrix matrix = left * values.asDiagonal() * right.transpose();
   const Conditioning conditioning = ConditioningOf(matrix);
   EXPECT_EQ(conditioning.rank, kSize);
-  // The smallest value is rounded by some ε of the largest.
+  // The rounding of the smallest value is some ε of the largest.
   EXPECT_NEAR(conditioning.number, 1e6, 1e6 * 1e6 * kRounding);
   EXPECT_EQ(ConditioningOf(Matrix::Constant(1, 1, -3)).number, 1);
-  EXPECT_NEAR(ConditioningOf(left).number, 1, kRounding);  // many equal ones
+  EXPECT_NEAR(ConditioningOf(left).number, 1, kRounding);  // Many singular values are equal.
   EXPECT_EQ(ConditioningOf(Matrix::Zero(3, 3)).rank, 0);
 }
 
