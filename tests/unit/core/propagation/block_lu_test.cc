@@ -20,7 +20,7 @@ TEST(BlockLu, SolvesEachPointsOwnSystemWhateverItsPivots) {
       x(p, i) = std::cos(3.0 * i + p);
       for (int j = 0; j < kSize; ++j) a(i, j) = std::sin(1.3 * (i + 1) * (j + 2) + 5 * p);
     }
-    if (p % 2 == 0) a(0, 0) = 0;  // impossible without pivoting
+    if (p % 2 == 0) a(0, 0) = 0;  // makes pivoting necessary
     matrices.push_back(a);
   }
   for (int i = 0; i < kSize; ++i) {
@@ -35,7 +35,7 @@ TEST(BlockLu, SolvesEachPointsOwnSystemWhateverItsPivots) {
   lu.SolveInPlace(solution);
   for (int p = 0; p < kPoints; ++p) {
     const Eigen::VectorXd exact = matrices[p].partialPivLu().solve(x.row(p).transpose().matrix());
-    // Both carry rounding errors of 1e-16 times a condition number, below 1e4 for these.
+    // Both solutions carry rounding errors of 1e-16 times a condition number, below 1e4 for these.
     EXPECT_LT((solution.row(p).transpose().matrix() - exact).norm(), 1e-11 * exact.norm()) << p;
   }
 }

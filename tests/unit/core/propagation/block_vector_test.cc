@@ -74,7 +74,7 @@ TEST_F(BlockVector, MeasuresTheWorstPointAndRemembersIt) {
   At(0).setZero();
   At(0)(11, 2) = -0.004;
   At(0)(4, 0) = 0.003;
-  // 0.004/(1e-3 · 2)
+  // The norm is 0.004/(1e-3 · 2).
   EXPECT_NEAR(N_VWrmsNorm(vectors_[0], vectors_[1]), 2, 1e-9);
   EXPECT_EQ(scale_.worst_point(), 11);
   At(0)(7, 1) = std::numeric_limits<double>::quiet_NaN();
@@ -89,7 +89,7 @@ TEST(ErrorScale, RemembersTheLargestMagnitudeOfEachPointsState) {
   scale.Grow(x);
   scale.Grow(Eigen::ArrayXXd::Constant(8, 1, 1e-9));
   EXPECT_NEAR(1 / scale.weights()(2, 0), 3e-2, 1e-12);
-  // A point at 0 is measured against a thousandth of the others.
+  // The errors of a point at 0 are measured against a thousandth of the others' size.
   EXPECT_NEAR(1 / scale.weights()(5, 0), 3e-5, 1e-12);
 }
 
@@ -97,7 +97,7 @@ TEST(ErrorScale, CountsTheMagnitudeAtTheEndOfTheStepUnderTest) {
   ErrorScale scale(8, 1, 1e-2);
   const Eigen::ArrayXXd end = Eigen::ArrayXXd::Constant(8, 1, 0.5);
   const Eigen::ArrayXXd error = Eigen::ArrayXXd::Constant(8, 1, 0.01);
-  EXPECT_GT(scale.Norm(error, scale.weights()), 1e6);  // nothing known but the absolute tolerance
+  EXPECT_GT(scale.Norm(error, scale.weights()), 1e6);  // Only the absolute tolerance is known.
   scale.Watch(&end);
   EXPECT_NEAR(scale.Norm(error, scale.weights()), 0.01 / (1e-2 * 0.5), 1e-9);
 }

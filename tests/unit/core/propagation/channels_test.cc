@@ -1,6 +1,6 @@
-// Inputs with a gain, a delay and an offset of each point's own, and outputs with a gain and an
-// offset. Oracle: the undamped oscillator of mass m = 1 and stiffness k = ω² from rest under a
-// force F that jumps on at t₀, x(t) = F/k (1 − cos ω(t − t₀)).
+// Tests inputs with a gain, a delay and an offset of each point's own, and outputs with a gain and
+// an offset. The oracle is the undamped oscillator of mass m = 1 and stiffness k = ω², at rest
+// until a force F jumps on at t₀: x(t) = F/k (1 − cos ω(t − t₀)).
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kOmega = 3;
-// The integrator's relative tolerance is 1e-7 a step; some hundred steps.
+// The relative tolerance of the integrator is 1e-7 a step, and there are some hundred steps.
 constexpr double kTolerance = 2e-5;
 
 double StepResponse(double force, double since_s) {
@@ -53,7 +53,8 @@ TEST_P(DelayedInput, ActsOnEachPointAtItsOwnTime) {
 }
 
 TEST(DelayedInput, OfACornerIsFollowedByErrorControl) {
-  // A ramp from 0 at 0.5 s to 1 at 1.5 s: the response is the integral of step responses.
+  // The input is a ramp from 0 at 0.5 s to 1 at 1.5 s; its response is the integral of step
+  // responses.
   Driven ensemble(2, TableInput{.time_s = {0.5, 1.5}, .value = {0, 1}});
   ensemble.specification.input_delays_s.resize(2, 1);
   ensemble.specification.input_delays_s << 0, 0.3;
@@ -118,7 +119,7 @@ TEST(OutputChannel, MultipliesAndShiftsWhatTheModelGives) {
   }
 }
 
-// A trajectory that fails is replaced by a copy of another, channels and all.
+// A failed trajectory is replaced by a copy of another, including its channels.
 TEST(DelayedInput, SurvivesTheFailureOfAPoint) {
   Driven ensemble(2, StepInput{.amplitude = 1, .time_s = 0.5});
   ensemble.Set("m", 0, std::numeric_limits<double>::quiet_NaN());

@@ -1,5 +1,5 @@
-// Ensembles restored at a checkpoint. The oracle is the ensemble that was not interrupted; of the
-// restarts themselves, the closed form.
+// Tests ensembles restored at a checkpoint. The oracle is the ensemble that was not interrupted.
+// The restarts themselves are compared with the closed form.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ std::vector<double> Part(const std::vector<double>& times_s, size_t first, size_
           times_s.begin() + static_cast<std::ptrdiff_t>(end)};
 }
 
-// Propagates to the checkpoint, and from there both on and restored: returns the state.
+// Propagates to the checkpoint, then both onwards and from the restored state. Returns the state.
 EnsembleState ExpectSameBitsAfter(Ensemble ensemble, size_t checkpoint, size_t end,
                                   double step_s = 0.1) {
   ensemble.specification.integration.samples_between_checkpoints = kInterval;
@@ -36,7 +36,7 @@ EnsembleState ExpectSameBitsAfter(Ensemble ensemble, size_t checkpoint, size_t e
   const Matrix a = ensemble.Advance(undisturbed, rest);
   const std::vector<PointFailure> failures = ensemble.failures;
   const Matrix b = ensemble.Advance(restored, rest);
-  // NaN of failed points and all.
+  // The NaN of failed points must agree too.
   EXPECT_EQ(a.array().isNaN().cast<int>().matrix(), b.array().isNaN().cast<int>().matrix());
   EXPECT_TRUE(((a.array() == b.array()) || a.array().isNaN()).all());
   EXPECT_EQ(failures.size(), ensemble.failures.size());
@@ -56,7 +56,7 @@ Ensemble Oscillators(int points) {
   return ensemble;
 }
 
-// Springs beyond whose ridge at x = 1 the motion reaches infinity.
+// Makes springs whose potential has a ridge at x = 1; beyond it the motion reaches infinity.
 Ensemble SofteningSprings(int points) {
   Ensemble ensemble("duffing", points, {"x"});
   ensemble.Set("c", 0);
@@ -65,7 +65,7 @@ Ensemble SofteningSprings(int points) {
   return ensemble;
 }
 
-// x(t) = cos t with a fast mode beside it.
+// Makes oscillators with x(t) = cos t and a fast mode beside it.
 Ensemble StiffOscillators() {
   Ensemble ensemble("mass_spring_damper", 9, {"x"});
   ensemble.Set("m", 1e-6);
@@ -87,7 +87,7 @@ TEST(Checkpoint, KeepsTheStiffMethodInUse) {
   Ensemble ensemble = StiffOscillators();
   const EnsembleState state = ExpectSameBitsAfter(ensemble, 20, 60);
   ASSERT_EQ(state.blocks.size(), 1u);
-  EXPECT_TRUE(state.blocks[0].stiff);  // found out on the way
+  EXPECT_TRUE(state.blocks[0].stiff);  // The integrator found this out on the way.
   ensemble.specification.integration.method = IntegrationMethod::kStiff;
   ensemble.Drive("force", HalfSineBumpInput{1, 2.5, 1}, 0.5);
   ExpectSameBitsAfter(ensemble, 20, 60);
@@ -96,14 +96,14 @@ TEST(Checkpoint, KeepsTheStiffMethodInUse) {
 TEST(Checkpoint, KeepsWhichPointsHaveFailed) {
   Ensemble ensemble = SofteningSprings(20);
   ensemble.Set("x0", 0, 2.5);   // fails before the checkpoint
-  ensemble.Set("x0", 19, 2.0);  // so does this one, which the padding copies
+  ensemble.Set("x0", 19, 2.0);  // fails before it too, and the padding copies it
   ensemble.Set("x0", 7, 1.01);  // fails after it
   const EnsembleState state = ExpectSameBitsAfter(ensemble, 20, 60);
   EXPECT_EQ(state.blocks[0].failures.size(), 2u);
   EXPECT_FALSE(state.blocks[0].alive[0]);
   EXPECT_TRUE(state.blocks[0].alive[7]);
   for (int point = 0; point < 20; ++point) ensemble.Set("x0", point, 3.0);
-  ExpectSameBitsAfter(ensemble, 20, 60);  // all of them
+  ExpectSameBitsAfter(ensemble, 20, 60);  // All points fail.
 }
 
 TEST(Checkpoint, KeepsWhereTheInputsAre) {
@@ -115,7 +115,7 @@ TEST(Checkpoint, KeepsWhereTheInputsAre) {
     ensemble.specification.input_delays_s(point, 0) = 0.07 * point;
   }
   ExpectSameBitsAfter(ensemble, 20, 60);
-  ensemble.Drive("force", StepInput{1, 1.9}, 3);  // where the checkpoint is
+  ensemble.Drive("force", StepInput{1, 1.9}, 3);  // jumps exactly at the checkpoint
   ExpectSameBitsAfter(ensemble, 20, 60);
 }
 
@@ -152,7 +152,7 @@ TEST(Checkpoint, CostsNoAccuracy) {
       const double x = Oscillator{1, 0, 30, 1, 0}.Free(times_s[i]);
       worst = std::max(worst, std::abs(y(0, static_cast<Eigen::Index>(2 * i)) - x));
     }
-    // Ten restarts on the way, and no more of the local errors than without (a few hundred).
+    // The ten restarts on the way add no more local errors than a run without them (a few hundred).
     EXPECT_LT(worst, 300 * tolerance);
   }
 }

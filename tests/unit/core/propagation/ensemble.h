@@ -1,6 +1,6 @@
 #pragma once
 
-// An ensemble of a built-in model for tests: parameters by name, one value a point.
+// Makes ensembles of a built-in model for tests: parameters by name, one value a point.
 
 #include <memory>
 #include <utility>
@@ -43,7 +43,7 @@ struct Ensemble {
   void Set(const char* parameter, double value) {
     specification.parameters.col(*Description().FindParameter(parameter)).setConstant(value);
   }
-  // u(t) = amplitude · shape(t) for all points.
+  // Sets u(t) = amplitude · shape(t) for all points.
   void Drive(const char* input, InputSpecification specified, double amplitude) {
     const int index = *Description().FindInput(input);
     inputs[index] = Signal(std::move(specified));
@@ -53,7 +53,7 @@ struct Ensemble {
   const ModelDescription& Description() const { return specification.model->description(); }
   int points() const { return static_cast<int>(specification.parameters.rows()); }
 
-  // The outputs at these times, points × (outputs · times).
+  // Returns the outputs at these times, points × (outputs · times).
   Matrix Propagate(const std::vector<double>& times_s) {
     EnsemblePropagator propagator(specification, &inputs);
     return Advance(propagator, times_s);

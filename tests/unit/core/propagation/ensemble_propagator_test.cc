@@ -15,12 +15,12 @@
 namespace polyest::internal {
 namespace {
 
-// A step adds at most the tolerance, relative to each state's own amplitude, to displacement and
-// velocity; the free motion does not magnify it. No test here takes more than 500 steps, so that
-// the global error, relative to the amplitude, stays below
+// The bound on the global error relative to the amplitude, in tolerances. A step adds at most the
+// tolerance, relative to each state's own amplitude, to displacement and velocity. The free motion
+// does not magnify it, and no test here takes more than 500 steps.
 constexpr double kMaxErrorsInTolerances = 1000;
 
-// Oscillators of 0.8 to 1 Hz, lightly damped; every third one starts at x = 0.
+// Makes oscillators of 0.8 to 1 Hz, lightly damped; every third one starts at x = 0.
 Oscillator Slow(int point) {
   return {1 + 0.003 * point, 0.1 + 0.002 * point, 30.0 + 0.1 * point, point % 3 == 0 ? 0.0 : 1.0,
           1.0};
@@ -73,7 +73,7 @@ TEST(EnsemblePropagator, GainsAccuracyInProportionToTheTolerance) {
     Ensemble ensemble = SlowOscillators(8, tolerance);
     return WorstErrorOfSlow(ensemble.Propagate(times_s), times_s);
   };
-  // Local errors in proportion to the tolerance, steps in proportion to its fifth root.
+  // The local errors are proportional to the tolerance, the steps to its fifth root.
   EXPECT_LT(error(1e-8), 1e-2 * error(1e-5));
   EXPECT_LT(error(1e-11), 1e-2 * error(1e-8));
 }
@@ -138,11 +138,11 @@ TEST(EnsemblePropagator, IntegratesUpToAJumpWithTheLeftAndFromItWithTheRightValu
     const Matrix y = ensemble.Propagate(times_s);
     EXPECT_TRUE(ensemble.failures.empty());
     for (size_t i = 0; i < times_s.size(); ++i) {
-      // x = F/k (1 − cos ω(t − t*)), ẍ = F/m cos ω(t − t*) from t* on
+      // The response from t* on is x = F/k (1 − cos ω(t − t*)), ẍ = F/m cos ω(t − t*).
       const double tau = times_s[i] - jump_s;
       const double x = tau < 0 ? 0 : force_n / oscillator.k * (1 - std::cos(w * tau));
       const double a = tau < 0 ? 0 : force_n / oscillator.m * std::cos(w * tau);
-      // An input that is wrong over a part of the one step at the jump would show with 1e-3.
+      // A wrong input over part of the one step at the jump would show as 1e-3.
       EXPECT_NEAR(y(1, 2 * i), x, 1e-6) << times_s[i];
       EXPECT_NEAR(y(1, 2 * i + 1), a, 2e-5) << times_s[i];
     }
@@ -153,7 +153,8 @@ TEST(EnsemblePropagator, SeesABumpFromRestHoweverFewTheSamples) {
   const Oscillator oscillator{2, 0, 50, 0, 0};
   const double w = std::sqrt(oscillator.k / oscillator.m);
   const double big_w = std::numbers::pi / 0.2;
-  // x = F (sin Ωτ − Ω/ω sin ωτ)/(m (ω² − Ω²)) under the bump, from both ends of it afterwards
+  // The response under the bump is x = F (sin Ωτ − Ω/ω sin ωτ)/(m (ω² − Ω²)). After it, the
+  // responses that start at both ends add.
   const auto response = [&](double tau) {
     return tau < 0 ? 0
                    : 10 * (std::sin(big_w * tau) - big_w / w * std::sin(w * tau)) /
@@ -169,7 +170,7 @@ TEST(EnsemblePropagator, SeesABumpFromRestHoweverFewTheSamples) {
       const std::vector<double> times_s = TimesUntil(1.4, step_s);
       const Matrix x = ensemble.Propagate(times_s);
       for (size_t i = 0; i < times_s.size(); ++i) {
-        // A half sine is a sine from its beginning and the same sine from its end, added.
+        // A half sine is a sine from its beginning plus the same sine from its end.
         const double tau = times_s[i] - 0.5;
         const double exact = tau <= 0.2 ? response(tau) : response(tau) + response(tau - 0.2);
         EXPECT_NEAR(x(0, i), exact, 1e-6) << times_s[i];
@@ -236,8 +237,8 @@ TEST(EnsemblePropagator, KeepsTheAccuracyOfOneFastPointAmongManySlowOnes) {
 }
 
 TEST(EnsemblePropagator, KeepsThePointsOfSmallAmplitudeAsAccurateAsTheOthers) {
-  // A hundredth of the others' amplitude: their common largest magnitude would let through errors
-  // a hundred times as large in proportion.
+  // The amplitude is a hundredth of the others'. If all points shared one largest magnitude, errors
+  // a hundred times as large in proportion would pass.
   Ensemble ensemble = SlowOscillators(8, 1e-6);
   const Oscillator small{1, 0, 400, 0.01, 0};
   Set(ensemble, 5, small);
@@ -248,7 +249,7 @@ TEST(EnsemblePropagator, KeepsThePointsOfSmallAmplitudeAsAccurateAsTheOthers) {
   }
 }
 
-// A stiff oscillator: the fast mode decays in a microsecond, the slow one as e^{−t}.
+// Tests a stiff oscillator: the fast mode decays in a microsecond, the slow one as e^{−t}.
 class StiffOscillators : public ::testing::TestWithParam<IntegrationMethod> {};
 
 TEST_P(StiffOscillators, AreFollowedInFewSteps) {

@@ -1,4 +1,5 @@
-// The stiff integrator with the derivatives of the equations themselves against differences.
+// Compares the stiff integrator with the exact derivatives of the equations to one with
+// differences.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,7 @@
 namespace polyest::internal {
 namespace {
 
-// Another model that counts how often it is asked, with or without its derivatives.
+// Wraps another model, with or without its derivatives, and counts how often each is asked for.
 class Counted final : public StateSpaceModel {
  public:
   Counted(std::shared_ptr<const StateSpaceModel> model, bool exact)
@@ -49,7 +50,7 @@ class Counted final : public StateSpaceModel {
 Matrix Propagate(const std::shared_ptr<const Counted>& model) {
   EnsembleSpecification specification;
   specification.model = model;
-  // mu, v_0, x_0
+  // The columns are mu, v_0, x_0.
   specification.parameters.resize(3, 3);
   specification.parameters << 100, 0, 2, 300, 0, 2, 1000, 0, 1.5;
   specification.outputs = {0};
@@ -73,8 +74,8 @@ TEST(ExactJacobian, GivesTheSameForTheVanDerPolOscillatorWithFewerEvaluations) {
   const auto differences = std::make_shared<Counted>(*equations, false);
   const Matrix with = Propagate(exact);
   const Matrix without = Propagate(differences);
-  // Both solve the same corrector's equation; what is left of it differs within the tolerance of
-  // each step, of which there are hundreds.
+  // Both solve the same equation of the corrector. The remaining error differs within the tolerance
+  // of each step, and there are hundreds of steps.
   EXPECT_LT((with - without).cwiseAbs().maxCoeff(), 1e-5);
   EXPECT_GT(exact->jacobians(), 0);
   EXPECT_EQ(differences->jacobians(), 0);
@@ -85,14 +86,14 @@ TEST(ExactJacobian, GivesTheSameForTheVanDerPolOscillatorWithFewerEvaluations) {
 }
 
 TEST(ExactJacobian, FallsBackToDifferencesWhereADerivativeIsInfinite) {
-  // ẋ = −√x stays at 0, where its derivative is −∞.
+  // The solution of ẋ = −√x stays at 0, where the derivative of the right-hand side is −∞.
   const auto equations = MakeEquationModel(
       {.states = {{"x", "-sqrt(x)"}, {"y", "-rate*(y - 1)"}}, .outputs = {{"x", "x"}}});
   ASSERT_TRUE(equations.ok()) << equations.status();
   const auto model = std::make_shared<Counted>(*equations, true);
   EnsembleSpecification specification;
   specification.model = model;
-  specification.parameters.resize(1, 3);  // rate, x_0, y_0
+  specification.parameters.resize(1, 3);  // The columns are rate, x_0, y_0.
   specification.parameters << 1e4, 0, 0;
   specification.outputs = {0};
   specification.integration.method = IntegrationMethod::kStiff;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The oracle: closed forms of m ẍ + c ẋ + k x = u.
+// The oracle for oscillators: closed forms of m ẍ + c ẋ + k x = u.
 
 #include <cmath>
 #include <tuple>
@@ -16,7 +16,7 @@ struct Oscillator {
   double x0 = 0;
   double v0 = 0;
 
-  // Free motion; under- or overdamped.
+  // Returns the free motion, under- or overdamped.
   double Free(double t) const {
     const double d = c / (2 * m);
     const double square = k / m - d * d;
@@ -24,14 +24,15 @@ struct Oscillator {
       const double w = std::sqrt(square);
       return std::exp(-d * t) * (x0 * std::cos(w * t) + (v0 + d * x0) / w * std::sin(w * t));
     }
-    // x = A e^{s1 t} + B e^{s2 t}, the slow root without cancellation: s1 s2 = k/m
+    // The motion is x = A e^{s1 t} + B e^{s2 t}. The slow root comes from s1 s2 = k/m, without
+    // cancellation.
     const double s2 = -d - std::sqrt(-square);
     const double s1 = k / m / s2;
     const double b = (v0 - s1 * x0) / (s2 - s1);
     return (x0 - b) * std::exp(s1 * t) + b * std::exp(s2 * t);
   }
 
-  // State after τ under u = u0 + rate · τ, without damping (c = 0):
+  // Returns the state after τ under u = u0 + rate · τ, without damping (c = 0):
   //   x = u/k + C cos ωτ + D sin ωτ.
   std::pair<double, double> UnderRamp(double x, double v, double u0, double rate,
                                       double tau) const {
@@ -42,7 +43,7 @@ struct Oscillator {
             rate / k + w * (big_d * std::cos(w * tau) - big_c * std::sin(w * tau))};
   }
 
-  // x at the knots' times under an input through these knots, held or linear between them.
+  // Returns x at the knots' times, under an input that is held or linear between these knots.
   std::vector<double> ThroughKnots(const std::vector<double>& time_s,
                                    const std::vector<double>& value, bool hold) const {
     std::vector<double> displacement{x0};

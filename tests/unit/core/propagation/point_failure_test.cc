@@ -13,7 +13,7 @@ namespace {
 
 const std::vector<double> kTimes = TimesUntil(4, 0.1);
 
-// Softening springs k − |k3| x² whose potential has a ridge at x = √(k/|k3|).
+// Makes softening springs k − |k3| x², whose potential has a ridge at x = √(k/|k3|).
 Ensemble SofteningSprings(int points) {
   Ensemble ensemble("duffing", points, {"x", "v"});
   ensemble.Set("c", 0);
@@ -23,9 +23,9 @@ Ensemble SofteningSprings(int points) {
   return ensemble;
 }
 
-// From x0 beyond the ridge the motion reaches infinity at a finite time,
+// Returns the finite time at which the motion from x0 beyond the ridge reaches infinity,
 //   t* = ∫_{x0}^∞ dx/√((x⁴ − x0⁴)/2 − (x² − x0²)),
-// here by the midpoint rule after x = x0/(1 − s²), which takes away the root at x0.
+// by the midpoint rule after x = x0/(1 − s²), which removes the root at x0.
 double BlowUpTime(double x0) {
   double sum = 0;
   constexpr int kCells = 20'000;
@@ -62,14 +62,14 @@ TEST_P(PointFailures, LeaveTheOthersAsAccurateAsWithoutThem) {
   const Matrix without = ensemble.Propagate(kTimes);
   EXPECT_TRUE(ensemble.failures.empty());
   ensemble.Set("x0", 3, 2.0);
-  ensemble.Set("x0", 19, 3.0);  // the padding copies it
+  ensemble.Set("x0", 19, 3.0);  // The padding copies it.
   const Matrix with = ensemble.Propagate(kTimes);
   ASSERT_EQ(ensemble.failures.size(), 2u);
   EXPECT_EQ(ensemble.failures[0].point, 3);
   EXPECT_EQ(ensemble.failures[1].point, 19);
   for (int point = 0; point < 20; ++point) {
     if (point == 3 || point == 19) continue;
-    // Both have their own errors of some hundred steps of 1e-8.
+    // Both solutions have their own errors of some hundred steps of 1e-8.
     EXPECT_LT((with - without).row(point).cwiseAbs().maxCoeff(), 1e-6) << point;
   }
 }
@@ -123,7 +123,7 @@ TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
   EXPECT_GT(omega(1, 1), 0);
 }
 
-// x″ = −x, but the derivative of a point is not a number once t passes its time of death.
+// Follows x″ = −x, but the derivative of a point is NaN once t passes its time of death.
 class Mortal final : public StateSpaceModel {
  public:
   const ModelDescription& description() const override { return description_; }
@@ -169,7 +169,7 @@ TEST_P(PointFailures, SpareTheHealthyWhenOthersStopBeingDefined) {
   ASSERT_EQ(propagator.failures().size(), 2u);
   EXPECT_EQ(propagator.failures()[0].point, 3);
   EXPECT_EQ(propagator.failures()[1].point, 7);
-  // The healthy follow cos t to well within what 1e-7 a step adds up to.
+  // The healthy points follow cos t well within the sum of 1e-7 a step.
   EXPECT_NEAR(outputs(0, 1), std::cos(2.0), 1e-4);
 }
 
