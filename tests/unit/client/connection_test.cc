@@ -56,7 +56,7 @@ TEST(DaemonConnection, NeedsACertificateWithItsKey) {
               HasSubstr("must be given together"));
 }
 
-// As gRPC 1.51 words them.
+// Makes the status as gRPC 1.51 words it.
 absl::Status NoConnection(const std::string& reason) {
   return absl::UnavailableError(
       "failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:1: " + reason);
@@ -81,7 +81,7 @@ TEST(ConnectionHint, IsNotGivenWhereTlsIsNotTheReason) {
   const absl::Status refused = NoConnection("Failed to connect to remote host: Connection refused");
   EXPECT_EQ(WithConnectionHint(refused, std::nullopt), refused);
   EXPECT_EQ(WithConnectionHint(refused, ClientTls{}), refused);
-  // Of a connection that there was.
+  // The connection existed and then closed.
   EXPECT_EQ(WithConnectionHint(absl::UnavailableError("Socket closed"), std::nullopt),
             absl::UnavailableError("Socket closed"));
 }

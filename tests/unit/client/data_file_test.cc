@@ -27,7 +27,7 @@ absl::StatusOr<v1::Measurements> ReadAll(const std::string& text,
   return reader->Read(std::numeric_limits<int64_t>::max());
 }
 
-// What a file that is no good is answered with.
+// Returns the message with which a bad file is refused.
 std::string ErrorOf(const std::string& text, const DataColumns& columns = kMeasuredOnly) {
   const auto data = ReadAll(text, columns);
   EXPECT_EQ(data.status().code(), absl::StatusCode::kInvalidArgument) << text;
@@ -209,7 +209,7 @@ TEST(ColumnsOf, AreMeasuredOutputsAndStreamedInputs) {
   EXPECT_THAT(columns.streamed, ElementsAre("road"));
 }
 
-// What is refused of a file of which all good lines are read.
+// Holds the good lines of a file and the refusals of the bad ones.
 struct Sieved {
   absl::StatusOr<v1::Measurements> data;
   std::vector<std::string> refusals;
@@ -238,7 +238,7 @@ TEST(DataReader, GoesOnAfterABadLineIfAsked) {
                           HasSubstr("data.csv:7: column run: \"x\""),
                           HasSubstr("data.csv:8: the row has 2 cells")));
   ASSERT_TRUE(sieved.data.ok()) << sieved.data.status();
-  // Of a row that is refused nothing is left.
+  // The result keeps nothing of a refused row.
   EXPECT_THAT(sieved.data->time_s(), ElementsAre(0, 3, 6));
   EXPECT_THAT(sieved.data->run(), ElementsAre(0, 0, 1));
   EXPECT_THAT(sieved.data->channels(0).values(), ElementsAre(1, 4, 8));

@@ -1,4 +1,4 @@
-// The examples that are shipped can be read.
+// Checks that the shipped examples can be read.
 
 #include <gtest/gtest.h>
 

@@ -24,7 +24,8 @@ using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// A daemon with one session, which takes batches by the contract's rules and breaks on demand.
+// Plays a daemon with one session, which takes batches by the contract's rules and breaks on
+// demand.
 class FakeDaemon : public v1::SessionService::Service {
  public:
   using Stream =
@@ -58,7 +59,7 @@ class FakeDaemon : public v1::SessionService::Service {
     v1::StreamMeasurementsRequest request;
     int taken = 0;
     while (stream->Read(&request)) {
-      if (request.sequence() == 0) continue;  // only says how often estimates are wanted
+      if (request.sequence() == 0) continue;  // It only says how often estimates are wanted.
       if (request.sequence() != last_sequence + 1) {
         return {grpc::StatusCode::INVALID_ARGUMENT, "not the next batch"};
       }
@@ -78,17 +79,17 @@ class FakeDaemon : public v1::SessionService::Service {
     return grpc::Status::OK;
   }
 
-  int breaks = 0;  // so many connections break after three batches
+  int breaks = 0;  // the number of connections that break after three batches
   int acknowledge_every = 1;
   std::atomic<bool> lost = false;
-  std::atomic<int> absences = 0;        // so often GetSession does not reach it
-  std::optional<grpc::Status> refusal;  // of the first streams,
-  int refusals = 1;                     // so many
-  std::string authorization;            // asked for; empty: none
+  std::atomic<int> absences = 0;        // how often GetSession does not reach the daemon
+  std::optional<grpc::Status> refusal;  // the answer to the first streams
+  int refusals = 1;                     // how many streams are refused
+  std::string authorization;            // what the daemon asks for; empty: nothing
   std::atomic<int64_t> last_sequence = 0;
   std::atomic<int64_t> acknowledged = 0;
   std::atomic<int> connections = 0;
-  std::vector<double> times;  // taken
+  std::vector<double> times;  // of the batches taken
 
  private:
   bool Knows(const grpc::ServerContext& context) const {
@@ -125,7 +126,7 @@ class MeasurementStreamTest : public ::testing::Test {
     return batch;
   }
 
-  // Batches at 1, 2 … count.
+  // Sends batches at 1, 2 … count.
   static absl::Status SendBatches(MeasurementStream& stream, int count) {
     for (int i = 1; i <= count; ++i) {
       if (absl::Status status = stream.Send(Batch(i)); !status.ok()) return status;
@@ -231,12 +232,12 @@ TEST_F(MeasurementStreamTest, GivesUpWhenTheDaemonStaysAway) {
   ASSERT_TRUE(stream.Open().ok());
   daemon_.Stop();
   absl::Status status = SendBatches(stream, 100);
-  // A call that is cut off ends CANCELLED, one that finds nobody UNAVAILABLE.
+  // A call that is cut off ends with CANCELLED, one that finds no daemon with UNAVAILABLE.
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(told_.size(), 3);
 }
 
-// RESOURCE_EXHAUSTED with an ErrorInfo, and a RetryInfo if there is a delay.
+// Makes RESOURCE_EXHAUSTED with an ErrorInfo, and with a RetryInfo if there is a delay.
 grpc::Status Exhausted(const std::string& message, int delay_ms) {
   rpc::Status status;
   status.set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -260,7 +261,7 @@ grpc::Status Exhausted(const std::string& message, int delay_ms) {
 
 TEST_F(MeasurementStreamTest, HoldsOutWhileTheDaemonHasNoRoomAndSaysSo) {
   daemon_.refusal = Exhausted("the disk is full", 2);
-  daemon_.refusals = 25;  // more than it would try to reach a daemon that is away
+  daemon_.refusals = 25;  // more than the attempts to reach a daemon that is away
   std::vector<std::chrono::milliseconds> delays;
   options_.wait = [&](std::chrono::milliseconds delay) {
     delays.push_back(delay);
@@ -272,13 +273,13 @@ TEST_F(MeasurementStreamTest, HoldsOutWhileTheDaemonHasNoRoomAndSaysSo) {
   const auto last = stream.Finish();
   ASSERT_TRUE(last.ok()) << last.status();
   EXPECT_THAT(daemon_.times, ElementsAreArray(Times(10)));
-  // Once for each delay, and not again while the longest lasts.
+  // The stream reports each delay once, and not again while the longest lasts.
   EXPECT_EQ(std::adjacent_find(told_.begin(), told_.end()), told_.end());
   ASSERT_LT(told_.size(), 26u);
   EXPECT_EQ(told_.front(),
             "the daemon cannot accept batches now (the disk is full); trying again in 0.002 s");
   EXPECT_EQ(told_.back(), "the daemon accepts batches again");
-  // Never before the daemon has asked for it, ever longer, up to the longest.
+  // The delays begin at the one that the daemon asked for and grow up to the longest.
   EXPECT_EQ(delays.front(), std::chrono::milliseconds(2));
   EXPECT_EQ(delays.back(), options_.max_delay);
 }
@@ -305,7 +306,7 @@ TEST_F(MeasurementStreamTest, DoesNotWaitWhenItIsToldNotTo) {
 
 class RotatedTokenTest : public MeasurementStreamTest {
  protected:
-  // Streams with the token "one", which the daemon has exchanged for "two" when it breaks.
+  // Streams with the token "one"; the daemon has exchanged it for "two" when the connection breaks.
   absl::Status Stream() {
     daemon_.authorization = "Bearer one";
     daemon_.breaks = 1;

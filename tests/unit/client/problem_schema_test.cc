@@ -1,4 +1,4 @@
-// The schema for editors takes what polyest takes, and sees common mistakes.
+// Checks that the schema for editors accepts what polyest accepts, and finds common mistakes.
 
 #include "proto/problem_schema.h"
 
@@ -33,8 +33,8 @@ Value Parse(const std::string& json) {
   return value;
 }
 
-// JSON Schema draft-07 as far as the schema of problems uses it; a keyword that it does not know is
-// an error. Answers with the first thing wrong, or nothing.
+// Validates by JSON Schema draft-07, as far as the schema of problems uses it. An unknown keyword
+// is an error. Returns the first thing wrong, or nothing.
 class Validator {
  public:
   explicit Validator(const std::string& schema) : root_(Parse(schema).struct_value()) {}
@@ -65,7 +65,7 @@ class Validator {
     }
     if (keyword == "minimum") return value.number_value() >= rule.number_value() ? "" : path;
     if (keyword == "required") return CheckRequired(rule, value, path);
-    if (keyword == "properties") return "";  // with additionalProperties
+    if (keyword == "properties") return "";  // is handled with additionalProperties
     if (keyword == "additionalProperties") return CheckMembers(rule, schema, value, path);
     if (keyword == "items") return CheckItems(rule, value, path);
     if (keyword == "not") return Check(rule.struct_value(), value, path).empty() ? path : "";

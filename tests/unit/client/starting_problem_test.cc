@@ -21,7 +21,7 @@ TEST(StartingProblem, IsValidForEveryModel) {
     EXPECT_EQ(problem->inputs_size(), description.inputs.size());
     EXPECT_EQ(problem->measured_size(), description.outputs.size());
     EXPECT_GE(problem->uncertain_size(), 1);
-    // Only what has no finite default is named nowhere.
+    // A parameter is left out only if it has no finite default.
     for (const Quantity& parameter : description.parameters) {
       const bool uncertain =
           std::any_of(problem->uncertain().begin(), problem->uncertain().end(),

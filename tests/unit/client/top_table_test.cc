@@ -22,7 +22,7 @@ std::string Print(const DaemonView& now, const DaemonView* before = nullptr) {
   return out.str();
 }
 
-// The lines that a screen of that size shows.
+// Returns the lines that a screen of that size shows.
 std::vector<std::string> PrintOn(int columns, int rows, const DaemonView& now) {
   std::stringstream out;
   SetScreen(out, {.columns = columns, .rows = rows, .color = false});
@@ -43,7 +43,7 @@ DaemonView ViewOf(int64_t samples, double time_s) {
   return view;
 }
 
-// The words of the last line.
+// Returns the words of the last line.
 std::vector<std::string> LastRow(const std::string& text) {
   std::istringstream lines(text);
   std::string last;
@@ -100,7 +100,7 @@ TEST(TopTableTest, LeavesOutColumnsThatDoNotFitTheScreen) {
   for (const int columns : {40, 80, 100}) {
     const std::vector<std::string> lines = PrintOn(columns, 24, view);
     for (const std::string& line : lines) {
-      if (&line - lines.data() < 2) continue;  // the daemon's own
+      if (&line - lines.data() < 2) continue;  // These lines are about the daemon itself.
       EXPECT_LE(DisplayWidth(line), columns) << line;
     }
     EXPECT_THAT(lines[3], HasSubstr("session"));

@@ -23,7 +23,7 @@ using google::protobuf::ServiceDescriptor;
 
 constexpr char kPackage[] = "polyest.v1";
 
-// Quantities that mean nothing without a unit.
+// Lists the quantities that mean nothing without a unit.
 const std::set<std::string>& Dimensional() {
   static const std::set<std::string> words = {
       "age",   "angle",    "delay", "duration", "frequency", "interval", "length", "memory", "mass",
@@ -31,7 +31,7 @@ const std::set<std::string>& Dimensional() {
   return words;
 }
 
-// Answers of methods that are no message of their own.
+// Lists answers of methods that are resources and no messages of their own.
 const std::set<std::string>& Resources() {
   static const std::set<std::string> names = {"DaemonStatus", "Estimate",      "Model",
                                               "Operation",    "SessionRecord", "Session"};
@@ -42,7 +42,7 @@ std::string NameOf(const std::string& full_name) {
   return std::string(absl::StripPrefix(full_name, absl::StrCat(kPackage, ".")));
 }
 
-// "ModelService" → "model_service".
+// Turns "ModelService" into "model_service".
 std::string Snake(const std::string& name) {
   std::string snake;
   for (const char c : name) {
@@ -72,7 +72,7 @@ bool IsReal(const FieldDescriptor& field) {
          field.cpp_type() == FieldDescriptor::CPPTYPE_FLOAT;
 }
 
-// Whether a field says when it may be left out, or who sets it.
+// Returns whether a field's comment says when it may be left out, or who sets it.
 bool SaysPresence(const std::string& comment) {
   for (const char* const word : {"Required", "Default", "May be empty", "Output only"}) {
     if (absl::StrContains(comment, word)) return true;
@@ -80,7 +80,7 @@ bool SaysPresence(const std::string& comment) {
   return false;
 }
 
-// Whether the message, or one that it is declared in, says that the daemon sets all of it.
+// Returns whether the message, or one that it is declared in, says that the daemon sets all of it.
 bool IsOutput(const Descriptor* message) {
   for (; message != nullptr; message = message->containing_type()) {
     if (absl::StrContains(CommentOf(*message), "Output only")) return true;
@@ -151,7 +151,7 @@ void ContractStyle::CheckField(const FieldDescriptor& field) {
   if (IsInteger(field) && !field.is_repeated() && is_plural) {
     NoteUnlessExcepted(name, "is a count without _count in its name");
   }
-  // Of a oneof's members one is set; the oneof says so.
+  // A oneof says itself that one of its members is set.
   if (field.real_containing_oneof() == nullptr && !IsOutput(field.containing_type()) &&
       !SaysPresence(CommentOf(field))) {
     Note(name, "says neither Required, Default, May be empty nor Output only");

@@ -1,6 +1,6 @@
 #pragma once
 
-// The style of polyest.v1, as rules over its descriptors.
+// Checks the style of polyest.v1, as rules over its descriptors.
 
 #include <google/protobuf/descriptor.h>
 
@@ -13,17 +13,16 @@ namespace polyest::internal {
 // Walks through files that were read with their comments and notes what breaks a rule.
 class ContractStyle {
  public:
-  // A field that a rule would rename or forbid and that stays, by its full name without the
-  // package.
+  // The fields that a rule would rename or forbid and that stay, by full name without the package.
   using Exceptions = std::set<std::string>;
 
   explicit ContractStyle(Exceptions exceptions) : exceptions_(std::move(exceptions)) {}
 
   void Check(const google::protobuf::FileDescriptor& file);
 
-  // "Session.idle_time: …", one for each breach.
+  // Returns a line for each breach: "Session.idle_time: …".
   const std::vector<std::string>& breaches() const { return breaches_; }
-  // Exceptions that no rule has asked for.
+  // Returns the exceptions that no rule has asked for.
   Exceptions Unused() const;
 
  private:

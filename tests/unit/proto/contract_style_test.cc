@@ -1,4 +1,4 @@
-// polyest.v1 keeps to its style, and the rules find what breaks them.
+// Checks that polyest.v1 keeps to its style, and that the rules find what breaks them.
 
 #include "tests/unit/proto/contract_style.h"
 
@@ -19,11 +19,11 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Names in problem files and in estimates as JSON, on which scripts rely: they stay as they are,
-// also where a rule would rename them.
+// Lists the names in problem files and in estimates as JSON on which scripts rely. They stay, even
+// if a rule would rename them.
 const ContractStyle::Exceptions& NamesThatScriptsRelyOn() {
   static const ContractStyle::Exceptions names = {
-      // "time" and the counts of an estimate.
+      // The next ones are "time" and the counts of an estimate.
       "Estimate.time", "Estimate.samples", "ChannelEstimate.samples", "ChannelEstimate.outliers",
       "ExpansionSummary.terms", "ExpansionSummary.points", "ExpansionSummary.reexpansions",
       "ExpansionSummary.trajectories",
@@ -32,7 +32,7 @@ const ContractStyle::Exceptions& NamesThatScriptsRelyOn() {
   return names;
 }
 
-// Files with their comments, as protoc reads them.
+// Reads files with their comments, as protoc does.
 class Files {
  public:
   Files(const std::filesystem::path& root, const std::string& names) {
@@ -77,7 +77,7 @@ TEST(ContractStyle, IsThatOfEveryFile) {
   EXPECT_THAT(style.Unused(), IsEmpty());
 }
 
-// What the rules say of a file that has this in it.
+// Returns what the rules find in a file with this body.
 std::vector<std::string> BreachesOf(const std::string& body) {
   const TestFolder folder;
   std::filesystem::create_directories(folder / "polyest/v1");
@@ -130,7 +130,7 @@ TEST(ContractStyle, WantsACommentOnEverything) {
                            "Thing.Kind: ", "Thing.KIND_UNSPECIFIED: ", "SomeService: ", "Do: "}) {
     EXPECT_THAT(breaches, testing::Contains(std::string(name) + "has no comment"));
   }
-  EXPECT_THAT(breaches, SizeIs(9));  // and the name, which says no presence
+  EXPECT_THAT(breaches, SizeIs(9));  // The ninth: Thing.name says no presence.
 }
 
 void ExpectBreach(const std::string& field, const std::string& breach) {
