@@ -13,8 +13,8 @@ UncertainParameter Normal(const char* name) {
   return UncertainParameter::Normal(name, 0, 1).value();
 }
 
-// Of a Gaussian posterior with covariance C: J_p − min J = ½ (θ_i − θ̂_i)²/C_ii, and the others are
-// at θ̂_j + C_ij/C_ii (θ_i − θ̂_i).
+// The oracle is a Gaussian posterior with covariance C: J_p − min J = ½ (θ_i − θ̂_i)²/C_ii, and the
+// others are at θ̂_j + C_ij/C_ii (θ_i − θ̂_i).
 TEST(CostProfile, OfALinearProblemIsTheParabolaOfTheMarginalVariance) {
   const double noise = 0.3, z = 1.5;
   const auto estimator =
@@ -47,7 +47,8 @@ TEST(CostProfile, OfALinearProblemIsTheParabolaOfTheMarginalVariance) {
   }
 }
 
-// Only the sum is measured: the profile of the mismatch is flat, and the other parameter makes up.
+// The data measure only the sum: the profile of the mismatch is flat, and the other parameter makes
+// up for the change.
 TEST(CostProfile, IsFlatWhereParametersTradeOff) {
   const auto uniform = [](const char* name) {
     return UncertainParameter::Uniform(name, -1, 1).value();
@@ -59,7 +60,7 @@ TEST(CostProfile, IsFlatWhereParametersTradeOff) {
   ASSERT_EQ(profiles.profiles.size(), 1u);
   const CostProfile& profile = profiles.profiles.front();
   EXPECT_EQ(profile.parameter, "b");
-  // a + b = 0.2 with a ≤ 1: b from −0.8 to 1.
+  // The sum a + b = 0.2 with a ≤ 1 allows b from −0.8 to 1.
   for (Eigen::Index k = 0; k < profile.value.size(); ++k) {
     if (profile.value[k] < -0.79) continue;
     EXPECT_NEAR(profile.mismatch[k], 0, 1e-6);
@@ -70,7 +71,8 @@ TEST(CostProfile, IsFlatWhereParametersTradeOff) {
   EXPECT_GT(profile.value.maxCoeff(), 0.95);
 }
 
-// b asks for more than its prior allows: the profile starts at the bound, and a is best there.
+// The data ask for a larger b than its prior allows: the profile starts at the bound, with the best
+// a for it.
 TEST(CostProfile, StartsAtABoundOfThePrior) {
   const auto uniform = [](const char* name) {
     return UncertainParameter::Uniform(name, -1, 1).value();
@@ -94,7 +96,7 @@ TEST(CostProfile, StartsAtABoundOfThePrior) {
   EXPECT_NEAR(profile.value[profile.value.size() - 1], 1, 1e-6);
   for (Eigen::Index k = 0; k < profile.value.size(); ++k) {
     const double b = profile.value[k];
-    // a = 0.7 − b is free to be exact.
+    // The other parameter is free to take the exact a = 0.7 − b.
     EXPECT_NEAR(profile.mismatch[k], std::pow((1.1 - b) / 0.1, 2) / 2, 1e-6);
     EXPECT_NEAR(profile.at(k, 0), 0.7 - b, 1e-5);
   }
@@ -109,7 +111,7 @@ TEST(CostProfile, OfOneParameterIsTheCostItself) {
     EXPECT_NEAR(profile.mismatch[k], std::pow((0.5 - a * a) / 0.1, 2) / 2,
                 1e-9 * (1 + profile.mismatch[k]));
   }
-  // Both minima are on it.
+  // The profile contains both minima.
   EXPECT_LT(profile.value[0], -0.7);
   EXPECT_GT(profile.value[profile.value.size() - 1], 0.7);
 }

@@ -32,7 +32,8 @@ Problem ProblemOf(EquationSpecification equations, std::vector<UncertainParamete
   return problem;
 }
 
-// x = x_0 + a t, x_0 ~ N(0, 2²), a ~ N(1, 3²), x measured with σ = 0.5; its rate v = a is not.
+// Makes x = x_0 + a t, x_0 ~ N(0, 2²), a ~ N(1, 3²), with x measured with σ = 0.5. The rate v = a
+// is not measured.
 Problem Line() {
   Problem problem = ProblemOf({.states = {{"x", "a"}}, .outputs = {{"v", "a"}, {"x", "x"}}},
                               {Normal("x_0", 0, 2), Normal("a", 1, 3)});
@@ -40,7 +41,7 @@ Problem Line() {
   return problem;
 }
 
-// Posterior covariance of (x_0, a) of the line after samples of x at the times with σ = 0.5.
+// Returns the posterior covariance of (x_0, a) after samples of x at these times with σ = 0.5.
 Eigen::Matrix2d LineCovariance(const std::vector<double>& time_s) {
   Eigen::Matrix2d precision = Eigen::Vector2d(1.0 / 4, 1.0 / 9).asDiagonal();
   for (const double t : time_s) {
@@ -50,7 +51,7 @@ Eigen::Matrix2d LineCovariance(const std::vector<double>& time_s) {
   return precision.inverse();
 }
 
-// ½ log₂ of prior over posterior determinant.
+// Returns ½ log₂ of prior over posterior determinant.
 double LineBits(const Eigen::Matrix2d& covariance) {
   return 0.5 * std::log2(4 * 9 / covariance.determinant());
 }
@@ -82,8 +83,8 @@ TEST(ExperimentDesign, OfALinearModelIsKalmansUpdate) {
 }
 
 TEST(ExperimentDesign, TakesTheBestTimesOneAfterTheOther) {
-  // The last time tells most of x_0 + a t; beside it the first tells most of x_0; then the last
-  // but one, by the determinants of all choices below.
+  // The last time tells most about x_0 + a t, and beside it the first tells most about x_0. The
+  // last but one comes next, by the determinants of all choices below.
   const ExperimentDesign design = Design(Line(), 2, 0.5, 3);
   ASSERT_EQ(design.samples.size(), 3u);
   std::vector<double> chosen;
@@ -110,7 +111,7 @@ TEST(ExperimentDesign, TakesTheBestTimesOneAfterTheOther) {
 }
 
 TEST(ExperimentDesign, ComparesOutputsAloneAndTogether) {
-  // v = a with σ = 0.1 at five times tells a alone: precision 1/9 + 5/0.01.
+  // The output v = a with σ = 0.1 at five times tells a alone: its precision is 1/9 + 5/0.01.
   const ExperimentDesign design = Design(Line(), 2, 0.5, 3, {{"v", {.absolute = 0.1}}});
   ASSERT_EQ(design.outputs.size(), 2u);
   const OutputGain& x = design.outputs[0];
@@ -132,7 +133,7 @@ TEST(ExperimentDesign, ComparesOutputsAloneAndTogether) {
 }
 
 TEST(ExperimentDesign, AssumesOnePercentOfTheRangeForNoiseThatIsNotKnown) {
-  // v = a, between −5 and 7.
+  // The range of v = a is between −5 and 7.
   const ExperimentDesign design = Design(Line(), 2, 0.5);
   ASSERT_EQ(design.outputs.size(), 2u);
   EXPECT_NEAR(design.outputs[1].noise, 0.12, 1e-9);
@@ -155,8 +156,8 @@ TEST(ExperimentDesign, PlansAllOutputsWhenNoneIsMeasured) {
 }
 
 TEST(ExperimentDesign, AveragesOverThePriorWhereTheModelIsNotLinear) {
-  // y = a², a ~ N(1, 0.2²), σ = 0.1: the mean of ½ log₂(1 + (2 a · 0.2/0.1)²). The oracle is
-  // midpoint quadrature; 64 draws of Halton's sequence err by about a hundredth.
+  // The gain for y = a², a ~ N(1, 0.2²), σ = 0.1 is the mean of ½ log₂(1 + (2 a · 0.2/0.1)²). The
+  // oracle is midpoint quadrature; 64 draws of Halton's sequence err by about a hundredth.
   Problem problem = ProblemOf({.outputs = {{"y", "a^2"}}}, {Normal("a", 1, 0.2)});
   problem.measured = {{"y", {.absolute = 0.1}}};
   const ExperimentDesign design = Design(problem, 1, 1, 1);
@@ -185,7 +186,7 @@ TEST(ExperimentDesign, ChoosesNoTimesThatAddNothing) {
       ProblemOf({.states = {{"x", "a"}}, .outputs = {{"x", "x"}}}, {Normal("a", 1, 1)});
   problem.measured = {{"x", {.absolute = 0.1}}};
   const ExperimentDesign design = Design(problem, 1, 0.5, 10);
-  ASSERT_EQ(design.samples.size(), 2u);  // not t = 0
+  ASSERT_EQ(design.samples.size(), 2u);  // t = 0 is not among them.
   EXPECT_EQ(design.samples[0].time_s, 1);
   EXPECT_EQ(design.samples[1].time_s, 0.5);
 }
@@ -260,7 +261,7 @@ TEST(ExperimentDesign, EndsOnAStopRequest) {
             absl::StatusCode::kCancelled);
 }
 
-// Samples of the line with x_0 = 1, a = 2.
+// Returns the estimate from samples of the line with x_0 = 1, a = 2.
 Estimate LineEstimate(const ResolvedProblem& problem, const std::vector<double>& time_s) {
   const auto estimator = EstimatorAccess::Make(problem).value();
   Samples samples;
@@ -293,7 +294,7 @@ TEST(EstimateAsPrior, MakesGainsOfOneExperimentAndTheNextAddUp) {
   options.step_s = 1;
   const double first = DesignExperiment(problem, options, {})->gain.bits;
   const double second = DesignExperiment(next, options, {})->gain.bits;
-  // Both times all of t = 0, 1, 2 is sampled. The curvature is exact to rounding here.
+  // Both experiments sample all of t = 0, 1, 2. The curvature is exact to rounding here.
   EXPECT_NEAR(first + second, LineBits(LineCovariance({0, 1, 2, 0, 1, 2})), 1e-4);
 }
 
@@ -303,7 +304,8 @@ TEST(EstimateAsPrior, StaysWithinTheBounds) {
   const ResolvedProblem before = Resolve(problem);
   const ResolvedProblem wide = WithEstimateAsPrior(before, LineEstimate(before, {0.1})).value();
   EXPECT_EQ(wide.prior().parameters()[1].germ.family, GermFamily::kTruncatedNormal);
-  // At a bound mean + scale · germ rounds, to half a unit in the last place of its terms, below 4.
+  // The rounding of mean + scale · germ at a bound is half a unit in the last place of its terms,
+  // which are below 4.
   constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
   for (const double score : {-30.0, 30.0}) {
     EXPECT_GE(wide.prior().OfScore(1, score), -kRounding);

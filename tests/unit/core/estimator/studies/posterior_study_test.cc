@@ -13,7 +13,8 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// y = a + 2b = 1.5 ± 0.3 with standard normal priors: the Gaussian of precision I + hhᵀ/σ².
+// Measures y = a + 2b = 1.5 ± 0.3 with standard normal priors. The posterior is the Gaussian of
+// precision I + hhᵀ/σ².
 struct Linear {
   Eigen::Vector2d h{1, 2};
   double z = 1.5, noise = 0.3;
@@ -44,7 +45,8 @@ TEST(Posterior, OfALinearProblemIsTheClosedForm) {
     EXPECT_NEAR(marginal.quantiles[0], linear.mean[i] - 1.95996 * sd, 0.015 * sd);
     EXPECT_NEAR(marginal.quantiles[1], linear.mean[i], 0.01 * sd);
     EXPECT_NEAR(marginal.quantiles[2], linear.mean[i] + 1.95996 * sd, 0.015 * sd);
-    // Quasi-random points fill a bin more evenly than √N of its 65536 · 0.04 · 1.1⁻¹ or so.
+    // A bin holds about 65536 · 0.04 · 1.1⁻¹ points. Quasi-random points fill it more evenly than
+    // to their √N.
     ASSERT_THAT(marginal.density.value, SizeIs(100));
     for (int k = 0; k < 100; ++k) {
       const double u = (marginal.density.value[k] - linear.mean[i]) / sd;
@@ -66,9 +68,9 @@ TEST(Posterior, HasAJointDensityWhoseMarginalsAreTheParameters) {
   ASSERT_EQ(joint.density.rows(), 30);
   ASSERT_EQ(joint.density.cols(), 30);
   const double cell = (joint.first[1] - joint.first[0]) * (joint.second[1] - joint.second[0]);
-  // 0.1 % of each parameter lies outside.
+  // The joint density leaves out 0.1 % of each parameter.
   EXPECT_NEAR(joint.density.sum() * cell, 1, 0.0025);
-  // The valley a + 2b = 1.5 is in it: the covariance of the density's cells is negative.
+  // The density contains the valley a + 2b = 1.5: the covariance of its cells is negative.
   double covariance = 0;
   for (int i = 0; i < 30; ++i) {
     for (int k = 0; k < 30; ++k) {
@@ -79,7 +81,8 @@ TEST(Posterior, HasAJointDensityWhoseMarginalsAreTheParameters) {
   EXPECT_NEAR(covariance, linear.covariance(0, 1), 0.03 * std::abs(linear.covariance(0, 1)));
 }
 
-// 10,000 equally weighted samples: four standard errors of a mean, and of a standard deviation.
+// The bounds for 10,000 equally weighted samples are four standard errors of a mean and of a
+// standard deviation.
 TEST(Posterior, GivesOutSamples) {
   const Linear linear;
   PosteriorOptions options;
@@ -110,7 +113,7 @@ TEST(Posterior, AgreesWithTheEstimate) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kNonGaussian));
 }
 
-// Where the Gaussian of one minimum must not stand for the posterior.
+// Uses problems in which the Gaussian of one minimum must not stand for the posterior.
 TEST(Posterior, IsOfMarkovChainsWhereItIsNotNearlyGaussian) {
   const auto uniform = UncertainParameter::Uniform("a", -1, 1).value();
   struct {

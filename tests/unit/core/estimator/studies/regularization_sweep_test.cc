@@ -17,13 +17,13 @@ UncertainParameter Normal(const char* name) {
   return UncertainParameter::Normal(name, 0, 1).value();
 }
 
-// The paper's expansion, over the whole prior.
+// Gives the problem the paper's expansion, over the whole prior.
 Problem Fixed(Problem problem) {
   problem.expansion.adaptive = false;
   return problem;
 }
 
-// One output y = h·θ measured once with unit normal priors, |h|² = h², noise σ:
+// The problem has one output y = h·θ measured once, with unit normal priors, |h|² = h², noise σ:
 //   θ̂ = h z/(h² + α²σ²),  covariance (α² + h hᵀ/σ²)⁻¹, no direction above the prior's 1,
 //   p(z | α²) = N(z; 0, σ² + h²/α²),  γ = h²/(h² + α²σ²).
 TEST(RegularizationSweep, OfALinearProblemIsItsClosedForm) {
@@ -65,17 +65,17 @@ TEST(RegularizationSweep, OfALinearProblemIsItsClosedForm) {
       EXPECT_NEAR(point.std_dev[i], std::sqrt(along * share + across * (1 - share)), 1e-6);
     }
   }
-  // z² = σ² + h²/α² is where the evidence is greatest, and by chance where the discrepancy is met:
+  // The evidence is greatest where z² = σ² + h²/α². The discrepancy is met there too, by chance:
   // (α²σ²/(h² + α²σ²))² z²/σ² = 1 − γ = α²σ²/(h² + α²σ²).
   const double best = h2 / (z * z - variance);
   EXPECT_TRUE(sweep.evidence.determined);
   EXPECT_NEAR(sweep.evidence.regularization, best, 1e-3 * best);
   EXPECT_TRUE(sweep.discrepancy.determined);
   EXPECT_NEAR(sweep.discrepancy.regularization, best, 1e-3 * best);
-  EXPECT_FALSE(sweep.l_curve.determined);  // the datum can be met exactly
+  EXPECT_FALSE(sweep.l_curve.determined);  // The datum can be met exactly.
 }
 
-// An adapted expansion is where the posterior is, which a heavy prior leaves.
+// An adapted expansion lies where the posterior is. A heavy prior pulls the estimate out of it.
 TEST(RegularizationSweep, LeavesOutWeightsThatPullTheEstimateOutOfTheExpansion) {
   const double noise = 0.01;
   const std::vector<double> values(20, 2.5);
@@ -85,9 +85,9 @@ TEST(RegularizationSweep, LeavesOutWeightsThatPullTheEstimateOutOfTheExpansion) 
   const RegularizationSweep sweep = estimator->CurrentRegularizationSweep(options).value();
   ASSERT_GT(sweep.points.size(), 16u);
   EXPECT_LT(sweep.points.front().regularization, 1.001e-4);
-  EXPECT_LT(sweep.points.back().regularization, 1e7);  // its θ̂ would be 0.1
+  EXPECT_LT(sweep.points.back().regularization, 1e7);  // The θ̂ of that weight would be 0.1.
   for (const RegularizationPoint& point : sweep.points) {
-    // J′ = N (y − z) y/σ² + α² a = 0 with y = e^a, by Newton's method.
+    // The oracle solves J′ = N (y − z) y/σ² + α² a = 0 with y = e^a by Newton's method.
     const double weight = 20 / (noise * noise);
     double a = std::log(2.5);
     for (int i = 0; i < 50; ++i) {
@@ -159,7 +159,7 @@ Estimate EstimateBy(RegularizationMode mode, double noise, const std::vector<dou
   return Processed(problem, values)->CurrentEstimate().value();
 }
 
-// s = 1/σ = 10, one z = 2: α² = s²/(s² z² − 1), θ̂ = s² z/(s² + α²).
+// The datum z = 2 with s = 1/σ = 10 gives α² = s²/(s² z² − 1) and θ̂ = s² z/(s² + α²).
 TEST(EstimateWithARule, TakesTheWeightAndReportsTheBias) {
   const double expected = 100.0 / 399;
   for (const RegularizationMode mode :

@@ -44,7 +44,7 @@ UncertainParameter Normal(const char* name, double mean, double std_dev) {
   return UncertainParameter::Normal(name, mean, std_dev).value();
 }
 
-// x = x0 + a t with x0 ~ N(0, 2²), a ~ N(1, 3²), x measured with σ = 0.5.
+// Makes x = x0 + a t with x0 ~ N(0, 2²), a ~ N(1, 3²), and x measured with σ = 0.5.
 Problem Line() {
   Problem problem = ProblemOf({.states = {{"x", "a"}}, .outputs = {{"x", "x"}}},
                               {Normal("x_0", 0, 2), Normal("a", 1, 3)});
@@ -53,8 +53,8 @@ Problem Line() {
 }
 
 TEST(Sensitivity, HasTheClosedFormOfAPolynomialOfUniformParameters) {
-  // With a = ½ + u and b = ½ + v, y = a + 2 b + a b = const + 3/2 u + 5/2 v + u v, where u and v
-  // have variance 1/12: V = (27 + 75 + 1)/144. Order 3 holds it exactly.
+  // The output for a = ½ + u and b = ½ + v is y = a + 2 b + a b = const + 3/2 u + 5/2 v + u v. The
+  // variance of u and v is 1/12, so that V = (27 + 75 + 1)/144. Order 3 represents it exactly.
   const SensitivityAnalysis result = Analyze(
       ProblemOf({.outputs = {{"y", "a + 2*b + a*b"}}}, {Uniform("a", 0, 1), Uniform("b", 0, 1)}));
   ASSERT_EQ(result.outputs.size(), 1u);
@@ -76,7 +76,8 @@ TEST(Sensitivity, HasTheClosedFormOfAPolynomialOfUniformParameters) {
 }
 
 TEST(Sensitivity, HasTheClosedFormOfAProductOfNormalAndGammaParameters) {
-  // V = μ_b² σ_a² + μ_a² σ_b² + σ_a² σ_b² with a ~ N(2, 1), b ~ Gamma(4, 0.5): μ_b = 2, σ_b = 1.
+  // The variance is V = μ_b² σ_a² + μ_a² σ_b² + σ_a² σ_b² with a ~ N(2, 1), b ~ Gamma(4, 0.5): μ_b
+  // = 2, σ_b = 1.
   const SensitivityAnalysis result =
       Analyze(ProblemOf({.outputs = {{"y", "a*b"}}},
                         {Normal("a", 2, 1), UncertainParameter::Gamma("b", 4, 0.5, 0).value()}));
@@ -101,7 +102,7 @@ TEST(Sensitivity, OfAPureInteractionIsAllTotalAndNothingAlone) {
 }
 
 TEST(Sensitivity, ChangesOverTime) {
-  // V = 4 + 9 t²
+  // The variance is V = 4 + 9 t².
   const SensitivityAnalysis result = Analyze(Line(), 2, 0.5);
   EXPECT_THAT(result.time_s, ElementsAre(0, 0.5, 1, 1.5, 2));
   const OutputSensitivity& x = result.outputs[0];
@@ -115,21 +116,21 @@ TEST(Sensitivity, ChangesOverTime) {
 }
 
 TEST(Activity, IsTheShareOfTheVarianceOverTime) {
-  // ∫ 4 dt = 8 and ∫ 9 t² dt = 24 over 2 s; the trapezoidal rule errs by h²/12 · 2 · 9 · 2 at h =
-  // 0.01.
+  // The integrals are ∫ 4 dt = 8 and ∫ 9 t² dt = 24 over 2 s. The trapezoidal rule errs by h²/12 ·
+  // 2 · 9 · 2 at h = 0.01.
   const SensitivityAnalysis result = Analyze(Line(), 2, 0.01);
   ASSERT_EQ(result.activity.size(), 2u);
   EXPECT_EQ(result.activity[0].parameter, "a");
   EXPECT_NEAR(result.activity[0].share, 0.75, 1e-4);
   EXPECT_NEAR(result.activity[1].share, 0.25, 1e-4);
-  // σ_a t/σ = 3 · 2/0.5 at the end, σ_x0/σ = 2/0.5
+  // The peaks are σ_a t/σ = 3 · 2/0.5 at the end and σ_x0/σ = 2/0.5.
   EXPECT_NEAR(result.activity[0].peak_to_noise, 12, 1e-6);
   EXPECT_NEAR(result.activity[1].peak_to_noise, 4, 1e-6);
 }
 
 TEST(Activity, WeighsOutputsByTheirNoise) {
-  // p = 2 a is measured four times as exactly, in its own unit, as q = 1000 b: (2/1)² to
-  // (1000/2000)²
+  // The output p = 2 a is measured four times as exactly, in its own unit, as q = 1000 b. The
+  // shares are as (2/1)² to (1000/2000)².
   Problem problem = ProblemOf({.outputs = {{"p", "2*a"}, {"q", "1000*b"}}},
                               {Normal("a", 0, 1), Normal("b", 0, 1)});
   problem.measured = {{"p", {.absolute = 1}}, {"q", {.absolute = 2000}}};
@@ -142,7 +143,7 @@ TEST(Activity, DoesNotDependOnTheUnitsOfOutputsThatAreNotMeasured) {
   const auto shares = [](const char* p, const char* q) {
     const SensitivityAnalysis result = Analyze(
         ProblemOf({.outputs = {{"p", p}, {"q", q}}}, {Normal("a", 1, 1), Normal("b", 1, 0.3)}));
-    // 1 % of mean ± 2 standard deviations
+    // The noise is 1 % of the range mean ± 2 standard deviations.
     EXPECT_NEAR(result.outputs[0].noise[0], 0.04 * result.outputs[0].standard_deviation[0], 1e-12);
     return std::vector<double>{result.activity[0].share, result.activity[1].share};
   };
@@ -202,7 +203,7 @@ TEST(Sensitivity, SaysThatNoPointsAreLeftToShowTheError) {
 }
 
 TEST(Sensitivity, SaysThatTrajectoriesFailed) {
-  // Where a passes 1.8, x is infinite soon after 0.5 s.
+  // The output x becomes infinite soon after 0.5 s where a passes 1.8.
   const Problem problem = ProblemOf(
       {.states = {{"x", "a + if(a > 1.8 && t > 0.5, 1e4*x^2, 0)"}}, .outputs = {{"x", "x"}}},
       {Uniform("a", 1, 2)});

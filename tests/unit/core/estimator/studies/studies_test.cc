@@ -13,8 +13,9 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// dx/dt = a + u, x(0) = x0, outputs x and 2x: everything about it is a closed form. Where a passes
-// `limit` the derivative gains 1000 x² at t = 1, so that x is infinite within a millisecond.
+// The model dx/dt = a + u, x(0) = x0, with outputs x and 2x, has closed forms for everything. If a
+// passes `limit`, the derivative gains 1000 x² at t = 1, so that x is infinite within a
+// millisecond.
 class Ramp : public StateSpaceModel {
  public:
   Ramp() {
@@ -46,7 +47,7 @@ class Ramp : public StateSpaceModel {
   ModelDescription description_;
 };
 
-// a uniform on [1, 3]; x measured with σ = 0.5.
+// Makes the problem with a uniform on [1, 3] and x measured with σ = 0.5.
 Problem RampProblem() {
   Problem problem;
   problem.model = std::make_shared<Ramp>();
@@ -87,11 +88,11 @@ TEST(PropagatePrior, HasTheClosedFormOfALinearModel) {
   EXPECT_EQ(x.unit, "m");
   for (int k = 0; k < 5; ++k) {
     const double t = result.time_s[static_cast<size_t>(k)];
-    // x = a t; the integrator is exact on it but for rounding
+    // The integrator is exact on x = a t, except for rounding.
     EXPECT_NEAR(x.mean[k], 2 * t, 1e-9);
     EXPECT_NEAR(x.standard_deviation[k], t / std::sqrt(3.0), 1e-9);
     EXPECT_NEAR(x.residual[k], 0, 1e-9);
-    // 10,000 low-discrepancy draws: about a thousandth
+    // The error of 10,000 low-discrepancy draws is about a thousandth.
     EXPECT_NEAR(x.quantiles(k, 0), 1.05 * t, 2e-3);
     EXPECT_NEAR(x.quantiles(k, 1), 2 * t, 2e-3);
     EXPECT_NEAR(x.quantiles(k, 2), 2.95 * t, 2e-3);
@@ -116,7 +117,7 @@ TEST(PropagatePrior, AnswersTheOutputsAskedForAndAllIfNoneIsMeasured) {
 
 TEST(PropagatePrior, DoesNotDependOnTheNumberOfTimesAskedForAtOnce) {
   PropagationOptions fine = UntilTwo();
-  fine.step_s = 1.0 / 256;  // several chunks
+  fine.step_s = 1.0 / 256;  // This makes several chunks.
   const ResolvedProblem problem = Resolve(RampProblem());
   const Propagation result = PropagatePrior(problem, fine, {}).value();
   ASSERT_EQ(result.time_s.size(), 513u);
@@ -133,21 +134,21 @@ TEST(PropagatePrior, DensitiesHaveUnitArea) {
   ASSERT_EQ(density.value.size(), 20);
   const double width = density.value[1] - density.value[0];
   EXPECT_NEAR(density.density.sum() * width, 1, 1e-12);
-  // a t is uniform on [2, 6]
+  // The output a t is uniform on [2, 6].
   EXPECT_NEAR(density.density.maxCoeff(), 0.25, 0.01);
   EXPECT_NEAR(density.density.minCoeff(), 0.25, 0.01);
 }
 
 TEST(PropagatePrior, LeavesOutPointsThatFailWhileEnoughRemain) {
   Problem problem = RampProblem();
-  problem.fixed["limit"] = 2.6;  // of the 12 values of a two lie above it
+  problem.fixed["limit"] = 2.6;  // Two of the 12 values of a lie above it.
   const Propagation result = PropagatePrior(Resolve(problem), UntilTwo(), {}).value();
   EXPECT_EQ(result.failures.size(), 2u);
   for (const PointFailure& failure : result.failures) {
     EXPECT_GT(failure.time_s, 0.9);
     EXPECT_FALSE(failure.reason.empty());
   }
-  // The model is linear: what is left still determines it.
+  // The model is linear, so that the remaining points still determine it.
   EXPECT_NEAR(result.outputs[0].mean[4], 4, 1e-6);
   EXPECT_NEAR(result.outputs[0].standard_deviation[4], 2 / std::sqrt(3.0), 1e-6);
 }
@@ -279,7 +280,7 @@ TEST(CostGrid, TakesTheNoiseFromTheLargestSampleSoFar) {
   CostGridOptions options;
   options.points = 3;
   const CostGrid grid = EvaluateCostGrid(Resolve(problem), samples, options, {}).value();
-  // σ = 0.2, 0.4, 0.4; a = 2
+  // The noise is σ = 0.2, 0.4, 0.4, and a = 2.
   EXPECT_NEAR(grid.mismatch(1, 0), 0.5 * (25 + 225 + 25), 1e-6);
 }
 
@@ -292,7 +293,8 @@ TEST(CostGrid, TakesStreamedInputsFromTheSamples) {
   CostGridOptions options;
   options.points = 3;
   const CostGrid grid = EvaluateCostGrid(Resolve(problem), samples, options, {}).value();
-  // u = 2t: x = a t + t²; at a = 2 the data are met exactly, at a = 3 missed by t.
+  // The input u = 2t gives x = a t + t². The data are met exactly at a = 2 and missed by t at a =
+  // 3.
   EXPECT_NEAR(grid.mismatch(1, 0), 0, 1e-8);
   EXPECT_NEAR(grid.mismatch(2, 0), 0.5 * (1 + 4) / 0.25, 1e-6);
 }
@@ -311,12 +313,12 @@ TEST(CostGrid, OverTwoParametersHasTheFirstDownTheRows) {
   EXPECT_THAT(grid.parameters, ElementsAre("x0", "a"));
   EXPECT_TRUE(grid.axes[0].isApprox(Vector::LinSpaced(5, -1, 1)));
   EXPECT_TRUE(grid.axes[1].isApprox(Vector::LinSpaced(5, 1, 3)));
-  // x = x0 + (a + ½) t at x0 = −½, a = 3
+  // The output is x = x0 + (a + ½) t at x0 = −½, a = 3.
   const double expected =
       (std::pow(1.2 + 0.5 - 1.75, 2) + std::pow(2.5 + 0.5 - 3.5, 2) + std::pow(3.9 + 0.5 - 7, 2)) /
       (2 * 0.25);
   EXPECT_NEAR(grid.mismatch(1, 4), expected, 1e-7);
-  // beta(2, 2) is 0 at its bounds.
+  // The density of beta(2, 2) is 0 at its bounds.
   EXPECT_EQ(grid.prior(0, 2), kInfinity);
   EXPECT_EQ(grid.total(4, 2), kInfinity);
   EXPECT_TRUE(std::isfinite(grid.total(1, 0)));
