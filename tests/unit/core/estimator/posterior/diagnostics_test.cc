@@ -1,4 +1,4 @@
-// What an estimate warns of.
+// Tests the warnings of an estimate.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarAboveTheNoise) {
   for (int k = 1; k <= 40; ++k) times.push_back(0.073 * k);
   const Samples samples = InitialVelocityRecord(times, 1.1, 0.02);
   const Estimate estimate = EstimateOf(InitialVelocityProblem(Velocity(0, 2), 0.002), samples);
-  // The ratio is 10 to the sampling error of 40 residuals, 4/√80 = 45 %.
+  // The ratio is 10, within the sampling error of 40 residuals, 4/√80 = 45 %.
   const std::string message = Message(estimate, DiagnosticCode::kModelMisfit);
   EXPECT_THAT(message, HasSubstr("output x: residuals are"));
   EXPECT_NEAR(std::sqrt(estimate.channels[0].chi_squared / 40), 10, 4.5);
@@ -59,7 +59,7 @@ TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarAboveTheNoise) {
                    DiagnosticCode::kModelMisfit));
 }
 
-// Of 200 residuals at a fifth of the noise χ² is 8, to be told from 200 ± 20.
+// The χ² of 200 residuals at a fifth of the noise is 8, to be told from 200 ± 20.
 TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarBelowTheNoise) {
   std::vector<double> times;
   for (int k = 1; k <= 200; ++k) times.push_back(0.073 * k);
@@ -72,7 +72,7 @@ TEST(Diagnostics, NameAnOutputWhoseResidualsAreFarBelowTheNoise) {
                    DiagnosticCode::kModelMisfit));
 }
 
-// y = a².
+// Estimates a from samples of y = a².
 struct Square {
   static constexpr int kStates = 0;
   static constexpr int kParameters = 1;
@@ -106,7 +106,7 @@ TEST(Diagnostics, NameTheOtherMinimum) {
   EXPECT_NEAR(std::abs(estimate.parameters[0].map), 0.8, 1e-3);
   EXPECT_THAT(Message(estimate, DiagnosticCode::kMultipleMinima),
               HasSubstr(estimate.parameters[0].map > 0 ? "a = -0.8" : "a = 0.8"));
-  // Both pieces are in the posterior.
+  // The range covers both pieces of the posterior.
   EXPECT_NEAR(estimate.parameters[0].lower95, -0.8, 0.05);
   EXPECT_NEAR(estimate.parameters[0].upper95, 0.8, 0.05);
 }
@@ -127,7 +127,7 @@ TEST(Diagnostics, SayThatAFixedExpansionIsInaccurateAndHoldTheTruth) {
   }
 }
 
-// ẍ = −x − k3 x³ from x = 1: runs away in finite time where k3 < −1.
+// Makes ẍ = −x − k3 x³ from x = 1, which runs away in finite time where k3 < −1.
 Problem SofteningSpring() {
   Problem problem;
   problem.model = *FindBuiltinModel("duffing");
@@ -162,7 +162,7 @@ TEST(Diagnostics, DescribeTrajectoriesThatCouldNotBeIntegrated) {
   ExpectFinite(estimate);
 }
 
-// The part of the prior that runs away is left behind when the expansion moves.
+// The expansion leaves behind the part of the prior that runs away when it moves.
 TEST(Diagnostics, SurviveTrajectoriesThatCouldNotBeIntegrated) {
   std::vector<double> times;
   for (int k = 1; k <= 60; ++k) times.push_back(0.1 * k);
@@ -186,7 +186,7 @@ TEST(Diagnostics, OfABatchedRecordNameTheSameFailures) {
   ExpectSame(testing::EstimateInBatches(problem, record, 1), whole);
 }
 
-// Too few trajectories from the first sample on.
+// Too few trajectories survive from the first sample on.
 TEST(Diagnostics, OfAModelThatFailsEverywhereAreRefusedWithTheReason) {
   Problem problem = SofteningSpring();
   problem.uncertain = {UncertainParameter::Uniform("k3", -4, -2).value()};

@@ -1,4 +1,4 @@
-// Estimates whose exact value is known.
+// Tests estimates whose exact value is known.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,12 +13,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kNoise = 0.02;      // m
-constexpr double kParticles = 2000;  // of an estimate; worth at least half that, posterior_test.cc
+constexpr double kNoise = 0.02;  // m
+// of an estimate, worth at least half that many (posterior_test.cc)
+constexpr double kParticles = 2000;
 
 std::vector<double> InformativeTimes() { return {0, 0.13, 0.31, 0.71, 1.2, 1.77}; }
 
-// Σ a z/σ² and Σ a²/σ² of x = a v0, a = sin(2πt)/2π: in v0 the mismatch is ½ I v0² − S v0 + const.
+// Holds Σ a z/σ² and Σ a²/σ² of x = a v0, a = sin(2πt)/2π. The mismatch in v0 is ½ I v0² − S v0 +
+// const.
 struct Sums {
   double s = 0;
   double information = 0;
@@ -44,7 +46,7 @@ void ExpectGaussian(const ParameterEstimate& parameter, const Sums& exact) {
   EXPECT_NEAR(parameter.std_dev, exact.std_dev(), 1e-4 * exact.std_dev());
   const double standard_error = exact.std_dev() / std::sqrt(kParticles / 2);
   EXPECT_NEAR(parameter.mean, exact.best(), 4 * standard_error);
-  // Quantiles of 2.5 %: √(p (1 − p)/N)/density, density φ(1.96)/s = 0.0584/s.
+  // The error of a 2.5 % quantile is √(p (1 − p)/N)/density, with the density φ(1.96)/s = 0.0584/s.
   const double quantile_error = 4 * std::sqrt(0.025 * 0.975) / 0.0584 * standard_error;
   EXPECT_NEAR(parameter.lower95, exact.best() - 1.959964 * exact.std_dev(), quantile_error);
   EXPECT_NEAR(parameter.upper95, exact.best() + 1.959964 * exact.std_dev(), quantile_error);
@@ -78,7 +80,8 @@ TEST(Estimates, OfALinearProblemWithAUniformPriorAreLeastSquares) {
   EXPECT_THAT(estimate.diagnostics, ::testing::IsEmpty());
 }
 
-// J = ½ I (v0 − v̂)² − log(1 − ξ²), v0 = 1 + ξ/2: J′ = 0 by Newton's method.
+// The oracle is the root of J′ for J = ½ I (v0 − v̂)² − log(1 − ξ²), v0 = 1 + ξ/2, by Newton's
+// method.
 TEST(Estimates, OfALinearProblemWithThePapersPriorBalanceBoth) {
   const double noise = 0.05;
   const Samples samples = InitialVelocityRecord(InformativeTimes(), 1.115, noise);
@@ -92,7 +95,8 @@ TEST(Estimates, OfALinearProblemWithThePapersPriorBalanceBoth) {
     xi -= slope / curvature;
   }
   const double std_dev = 0.5 / std::sqrt(curvature);
-  EXPECT_GT(std::abs(1 + 0.5 * xi - exact.best()), 0.05 * std_dev);  // the prior does pull
+  // The prior does pull the estimate.
+  EXPECT_GT(std::abs(1 + 0.5 * xi - exact.best()), 0.05 * std_dev);
   EXPECT_NEAR(estimate.parameters[0].map, 1 + 0.5 * xi, 1e-4 * std_dev);
   EXPECT_NEAR(estimate.parameters[0].std_dev, std_dev, 1e-4 * std_dev);
   EXPECT_NEAR(estimate.parameters[0].prior_std_dev, std::sqrt(0.05), 1e-12);
@@ -115,7 +119,7 @@ TEST(Estimates, WithoutDataAreThePrior) {
   }
 }
 
-// x(0) = 0 whatever v0 is.
+// The sample says nothing, because x(0) = 0 for every v0.
 TEST(Estimates, FromDataThatSayNothingAreThePrior) {
   for (const UncertainParameter& v0 : {Uniform(0.5, 1.5), PapersBeta()}) {
     const Samples samples = InitialVelocityRecord({0}, 1.115, kNoise);
@@ -124,12 +128,13 @@ TEST(Estimates, FromDataThatSayNothingAreThePrior) {
     EXPECT_NEAR(parameter.mean, 1, 4 * parameter.prior_std_dev / std::sqrt(kParticles / 2));
     EXPECT_NEAR(parameter.std_dev, parameter.prior_std_dev, 1e-9);
     EXPECT_THAT(Message(estimate, DiagnosticCode::kNotIdentified), HasSubstr("v0"));
-    EXPECT_FALSE(Has(estimate, DiagnosticCode::kUndersampled));  // one time is no sampling
+    // One sample time cannot undersample.
+    EXPECT_FALSE(Has(estimate, DiagnosticCode::kUndersampled));
   }
 }
 
-// Figure 4: two samples a period, each on a zero crossing; noise 1 % of each and 0.1 % of the
-// largest.
+// Figure 4 has two samples a period, each on a zero crossing. The noise is 1 % of each value and
+// 0.1 % of the largest.
 TEST(Estimates, FromFigureFoursSamplesAreThePriorAndSayWhy) {
   Problem problem = InitialVelocityProblem(PapersBeta(), 0);
   problem.measured[0].noise = {.absolute = 0, .relative = 0.01, .relative_to_max = 0.001};
@@ -144,7 +149,7 @@ TEST(Estimates, FromFigureFoursSamplesAreThePriorAndSayWhy) {
   EXPECT_THAT(Message(estimate, DiagnosticCode::kUndersampled), HasSubstr("v0"));
 }
 
-// Only k/m is measured: ω̄ is known to σ/√N, along the valley nothing is.
+// The data measure only k/m: ω̄ is known to σ/√N, and nothing is known along the valley.
 TEST(Estimates, KeepTheValleyOfMassAndStiffness) {
   constexpr double kOmega = 2 * std::numbers::pi;
   Problem problem;
@@ -170,15 +175,15 @@ TEST(Estimates, KeepTheValleyOfMassAndStiffness) {
   const ParameterEstimate& k = estimate.parameters[1];
   const double relative = 1e-4 / std::sqrt(11) / 1.01;
   EXPECT_NEAR(std::sqrt(k.map / m.map) / mean, 1, 0.1 * relative);
-  // d log ω = ½ (dk/k − dm/m)
+  // The error of ω follows from d log ω = ½ (dk/k − dm/m).
   const double variance = 0.25 * (estimate.covariance(1, 1) / (k.map * k.map) -
                                   2 * estimate.covariance(0, 1) / (k.map * m.map) +
                                   estimate.covariance(0, 0) / (m.map * m.map));
   EXPECT_NEAR(std::sqrt(variance) / relative, 1, 0.1);
-  // In units of the prior's half widths, 5 % and 20 %, the valley's direction is (4, 1)/√17.
+  // The direction of the valley is (4, 1)/√17 in units of the prior's half widths, 5 % and 20 %.
   EXPECT_NEAR(m.contraction, 4 / std::sqrt(17), 0.02);
-  // The posterior of m is ∝ m on its prior's range. Quantiles of 2.5 %:
-  // 4 √(0.025 · 0.975/1000) × 20 kg.
+  // The posterior of m is ∝ m on its prior's range. The error of the 2.5 % quantiles is 4 √(0.025 ·
+  // 0.975/1000) × 20 kg.
   const auto quantile = [](double p) {
     return std::sqrt(190.0 * 190 + p * (210.0 * 210 - 190.0 * 190));
   };
@@ -191,7 +196,7 @@ TEST(Estimates, KeepTheValleyOfMassAndStiffness) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kExpansionInaccurate));
 }
 
-// The model starts again with every run; what the runs say adds up.
+// The model starts again with every run, and the information of the runs adds up.
 TEST(Estimates, FromSeveralRunsHoldTheInformationOfAll) {
   Samples samples = InitialVelocityRecord(InformativeTimes(), 1.115, kNoise, 1);
   const Samples second = InitialVelocityRecord({0.2, 0.7, 2.3}, 1.115, kNoise, 2);
@@ -218,13 +223,13 @@ TEST(Estimates, LeaveMissingSamplesOut) {
   EXPECT_EQ(estimate.channels[0].samples, 4);
 }
 
-// A hundred samples over ten periods with noise 10⁻⁶ of the signal: at the default tolerance the
-// integration errs by more than the standard deviation.
+// The record has a hundred samples over ten periods with noise 10⁻⁶ of the signal. At the default
+// tolerance the integration would err by more than the standard deviation.
 TEST(Estimates, OfAPreciseRecordDoNotShowTheIntegration) {
   const double noise = 1e-6;
   std::vector<double> times;
   for (int k = 1; k <= 100; ++k) times.push_back(0.0973 * k);
-  const Samples samples = InitialVelocityRecord(times, 7, noise);  // x within 1.1 m
+  const Samples samples = InitialVelocityRecord(times, 7, noise);  // x stays within 1.1 m.
   const Sums exact = SumsOf(samples, noise);
   Problem problem = InitialVelocityProblem(Uniform(5, 9), noise);
   const Estimate estimate = EstimateOf(problem, samples);

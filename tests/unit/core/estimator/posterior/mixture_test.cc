@@ -1,5 +1,5 @@
-// Posteriors in several pieces, each with an expansion of its own. The oracle is e^{−J} on a fine
-// grid over each piece, J from the closed form of the model.
+// Tests posteriors in several pieces, each with an expansion of its own. The oracle is e^{−J} on a
+// fine grid over each piece, with J from the closed form of the model.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,7 +55,7 @@ Samples Record(const std::function<double(double)>& y, double step_s, int count,
 using Output = std::function<double(const Vector& theta, double t)>;
 using LogPrior = std::function<double(const Vector& theta)>;
 
-// −log density of θ, up to a constant.
+// Returns −log density of θ, up to a constant.
 double ExactCost(const Samples& samples, const Output& y, const LogPrior& prior,
                  const Vector& theta) {
   double sum = -prior(theta);
@@ -71,8 +71,8 @@ struct Piece {
   Vector mean, std_dev;
 };
 
-// Midpoint rule of 100 cells an axis over ±6 standard deviations about the piece's map: its error
-// is of the order of (0.12)²/24 of a standard deviation.
+// Integrates by the midpoint rule with 100 cells an axis over ±6 standard deviations about the
+// piece's map. The error is of the order of (0.12)²/24 of a standard deviation.
 Piece ByQuadrature(const ComponentEstimate& about,
                    const std::function<double(const Vector&)>& cost) {
   constexpr int kCells = 100;
@@ -117,8 +117,8 @@ double LogNormal(double x, double mean, double std_dev) {
   return -0.5 * std::pow((x - mean) / std_dev, 2);
 }
 
-// The frequency tells a² and not its sign; the prior favours one. A phase that grows with time is
-// more than any one polynomial over both signs follows.
+// Makes a problem whose frequency tells a² and not its sign; the prior favours one. No single
+// polynomial over both signs follows a phase that grows with time.
 Case OfASign(const char* name, double prior_mean, int rows) {
   return {name,
           TextProblem("cos((5 + a^2) * t)",
@@ -143,8 +143,8 @@ Case OfASignBesideADamping() {
           }};
 }
 
-// Sampled once a second, w and 6π − w with the phase of the other sign are one: which it is, the
-// prior of the phase says.
+// Makes a problem with aliases. When sampled once a second, w is the same as 6π − w with the phase
+// of the other sign; only the prior of the phase tells which it is.
 Case OfAnAlias() {
   return {"alias",
           TextProblem("cos(w * t + p)",
@@ -160,8 +160,8 @@ Case OfAnAlias() {
 
 class MixtureAccuracy : public ::testing::TestWithParam<Case> {};
 
-// Weights: a bridge of 8,192 draws beside as many has a relative error of about 10⁻², and as much
-// is due to what the expansions are off by.
+// The bound covers the weights. A bridge between 8,192 draws of each piece has a relative error of
+// about 10⁻², and the errors of the expansions add as much.
 TEST_P(MixtureAccuracy, IsThatOfQuadratureOnTheModel) {
   constexpr double kMaxError = 0.03;
   const Case& one = GetParam();
@@ -214,7 +214,7 @@ TEST(Mixture, IsWhatOneExpansionDoesNotServe) {
   Case one = OfASign("", 0.15, 400);
   one.problem.expansion.adaptive = false;
   EXPECT_TRUE(Has(EstimateOf(one.problem, one.samples), DiagnosticCode::kExpansionInaccurate));
-  // As long as it does, there is none.
+  // The early samples need no mixture, because one expansion serves them.
   const Estimate early = EstimateOf(one.problem, Rows(one.samples, 0, 10));
   EXPECT_THAT(early.components, IsEmpty());
 }
@@ -249,7 +249,7 @@ TEST(Mixture, IsDrawnFromByItsWeights) {
   EXPECT_NEAR(posterior.marginals[0].mean, estimate.parameters[0].mean, 0.01);
 }
 
-// Both signs fit the record alike, whatever is thought of the noise: the weights are those of the
+// Both signs fit the record alike under every noise model. The weights are therefore those of the
 // prior at ±0.8, e^{0.8·0.15·2/0.7²} to one.
 TEST(Mixture, WeighsItsPiecesAlikeWhateverIsUnknownOfTheNoise) {
   for (const NoiseModel& noise :
@@ -346,7 +346,7 @@ TEST(Mixture, IsTheSameToTheBitThroughAnyStops) {
   ExpectSameMixture(estimator->CurrentEstimate().value(), EstimateOf(one.problem, one.samples));
 }
 
-// x″ = −(5 + a²)² x by integration, on several threads.
+// The model integrates x″ = −(5 + a²)² x on several threads.
 TEST(Mixture, IsTheSameToTheBitForAnyNumberOfThreads) {
   Case one = OfASign("", 0.15, 150);
   EquationSpecification equations;
@@ -367,9 +367,9 @@ TEST(Mixture, IsTheSameToTheBitForAnyNumberOfThreads) {
   ExpectSameMixture(estimate_with(3), with_one);
 }
 
-// A little beside the frequency tells the signs apart, in time: each sample has 0.016 ÷ 0.1 of its
-// noise to say so, N of them ½ N (0.16)² of the cost, which is 14, a weight of 10⁻⁶, from N = 1,100
-// on.
+// A small term beside the frequency tells the signs apart in time. It makes a difference of 0.016 ÷
+// 0.1 of its noise in each sample, which adds ½ N (0.16)² to the cost over N samples. This is 14, a
+// weight of 10⁻⁶, from N = 1,100 on.
 TEST(Mixture, DropsAFalseMinimumThatLosesItsWeight) {
   const Problem problem = TextProblem("cos((5 + a^2) * t) + 0.01 * a",
                                       {UncertainParameter::Normal("a", 0, 0.7).value()}, 4);
@@ -398,7 +398,7 @@ TEST(Mixture, DropsAFalseMinimumThatLosesItsWeight) {
   }
 }
 
-// 5 + cos 4a has six pieces over 3π/2 (two of them at its ends).
+// The output 5 + cos 4a gives six pieces over 3π/2 (two of them at its ends).
 TEST(Mixture, FollowsTheHeaviestAndSaysThatThereAreMore) {
   const Problem problem =
       TextProblem("cos((5 + 0.5 * cos(4 * a)) * t)",
@@ -418,7 +418,7 @@ TEST(Mixture, IsNotMadeOfOnePiece) {
   EXPECT_THAT(EstimateOf(testing::OscillatorProblem(3), record).components, IsEmpty());
 }
 
-// b − a² in the frequency: the posterior is a banana that gets ever thinner.
+// The frequency holds b − a²: the posterior is a banana that gets ever thinner.
 TEST(Mixture, IsNotMadeOfABanana) {
   const Problem problem = TextProblem("cos((5 + b - a^2) * t)",
                                       {UncertainParameter::Normal("a", 0, 0.5).value(),
@@ -431,7 +431,7 @@ TEST(Mixture, IsNotMadeOfABanana) {
   }
 }
 
-// Only k/m shows: a valley through the whole prior.
+// The data show only k/m: the posterior is a valley through the whole prior.
 TEST(Mixture, IsNotMadeOfAValley) {
   const Problem problem = TextProblem("cos(sqrt(k / m) * t)",
                                       {UncertainParameter::Uniform("k", 20, 40).value(),

@@ -1,6 +1,6 @@
-// Noise of unknown size, correlated noise and gross errors. The oracle is the same record estimated
-// with its noise known; standard deviations of what is learned are those of a sample variance,
-// σ/√(2N), and of a lag-1 correlation, √((1 − a²)/N).
+// Tests noise of unknown size, correlated noise and gross errors. The oracle is the same record
+// estimated with its noise known. The standard deviation of a learned noise level is that of a
+// sample variance, σ/√(2N), and of a learned lag-1 correlation √((1 − a²)/N).
 
 #include "core/estimator/posterior/noise_learning.h"
 
@@ -25,12 +25,12 @@ using testing::kOscillatorRate;
 constexpr double kTrueK = 40.3, kTrueC = 0.21;
 
 struct Disturbance {
-  double correlation = 0;   // of successive samples' noise
-  double gross_errors = 0;  // part of the samples
+  double correlation = 0;   // of the noise of successive samples
+  double gross_errors = 0;  // the share of the samples
   double noise = kOscillatorNoise;
 };
 
-// The oscillator for so many seconds. Gross errors are up to ± the amplitude.
+// Returns a record of the oscillator of this duration. Gross errors are up to ± the amplitude.
 Samples Record(double duration_s, const Disturbance& disturbance, uint64_t seed = 2) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -58,7 +58,8 @@ Problem ProblemWith(const NoiseModel& noise, bool adaptive = true) {
 
 double TimeConstant(double correlation) { return -1 / kOscillatorRate / std::log(correlation); }
 
-// Both parameters within `shift` standard deviations of the oracle's, theirs within `ratio`.
+// Expects both parameters within `shift` standard deviations of the oracle's, and their standard
+// deviations within `ratio`.
 void ExpectNear(const Estimate& estimate, const Estimate& oracle, double shift, double ratio) {
   for (size_t i = 0; i < 2; ++i) {
     const ParameterEstimate& p = estimate.parameters[i];
@@ -75,7 +76,8 @@ TEST(UnknownScale, IsLearnedWithTheParameters) {
   const auto samples = static_cast<double>(record.rows());
   EXPECT_NEAR(estimate.channels[0].noise_std_dev, kOscillatorNoise,
               3 / std::sqrt(2 * samples) * kOscillatorNoise);
-  // White noise has the same minimum whatever its scale; the uncertainty goes with the scale found.
+  // The minimum under white noise does not depend on its scale; the uncertainty is proportional to
+  // the scale found.
   ExpectNear(estimate, known, 0.03, 3 / std::sqrt(2 * samples));
   EXPECT_NEAR(estimate.channels[0].chi_squared, 400, 8);
   EXPECT_EQ(estimate.diagnostics.size(), 0u);
@@ -97,7 +99,7 @@ TEST(UnknownScale, IsFoundOverManyOrdersOfMagnitude) {
   }
 }
 
-// The standard deviation of a Student's t: what N − n degrees of freedom leave of N.
+// The uncertainty is the standard deviation of a Student's t with N − n of N degrees of freedom.
 TEST(UnknownScale, WidensTheUncertaintyOfAShortRecord) {
   const Samples record = Record(1.5, {});
   const Estimate known = EstimateOf(ProblemWith({.absolute = kOscillatorNoise}), record);
@@ -120,7 +122,7 @@ TEST(UnknownScale, SaysThatItHasNotBeenLearnedFromFewSamples) {
   const Estimate estimate = EstimateOf(ProblemWith({.unknown = true}), Record(0.5, {}));
   EXPECT_THAT(Message(estimate, DiagnosticCode::kNoiseNotLearned),
               HasSubstr("too few samples (10)"));
-  EXPECT_GT(estimate.channels[0].noise_std_dev, 1);  // the signal's size
+  EXPECT_GT(estimate.channels[0].noise_std_dev, 1);  // about the size of the signal
   ExpectFinite(estimate);
 }
 
@@ -163,8 +165,8 @@ TEST(CorrelatedNoise, WidensTheUncertaintyWhenItIsKnown) {
   const Estimate estimate = EstimateOf(ProblemWith(correlated), record);
   EXPECT_THAT(Message(overconfident, DiagnosticCode::kCorrelatedResiduals), HasSubstr("0.8"));
   EXPECT_EQ(estimate.diagnostics.size(), 0u);
-  // The noise's power at the oscillator's frequency ω is (1 − a²)/(1 + a² − 2 a cos ωΔt) of that of
-  // white noise: 2.6, its root 1.6.
+  // The power of the noise at the oscillator's frequency ω is (1 − a²)/(1 + a² − 2 a cos ωΔt) times
+  // that of white noise: 2.6, with the root 1.6.
   const double ratio = estimate.parameters[0].std_dev / overconfident.parameters[0].std_dev;
   const double cosine = std::cos(std::sqrt(kTrueK) / kOscillatorRate);
   EXPECT_NEAR(ratio, std::sqrt(0.36 / (1 + 0.64 - 1.6 * cosine)), 0.05 * ratio);
@@ -182,8 +184,9 @@ TEST(CorrelatedNoise, IsLearnedWithItsSize) {
       EstimateOf(ProblemWith({.unknown = true, .correlation = NoiseCorrelation::kUnknown}), record);
   const double found = std::exp(-1 / kOscillatorRate / estimate.channels[0].noise_time_constant_s);
   EXPECT_NEAR(found, a, 3 * std::sqrt((1 - a * a) / 400));
-  // The uncertainty goes with the noise's power at the oscillator's frequency: innovations known to
-  // 1/√(2N) = 3.5 %, |1 − a e^{iω}| to 3.8 % by that of a. Three times both.
+  // The uncertainty follows the power of the noise at the oscillator's frequency. The innovations
+  // are known to 1/√(2N) = 3.5 %, and |1 − a e^{iω}| to 3.8 % through the error of a. The bound is
+  // three times both.
   ExpectNear(estimate, oracle, 0.15, 0.16);
 }
 
@@ -193,14 +196,15 @@ TEST(CorrelatedNoise, IsTakenForWhiteWhileItIs) {
   const Estimate white = EstimateOf(ProblemWith(noise), record);
   noise.correlation = NoiseCorrelation::kUnknown;
   const Estimate estimate = EstimateOf(ProblemWith(noise), record);
-  // What is left of the correlation at the end, r < 2/√N, is marginalized: it changes the weights
-  // by as much.
+  // The correlation that is left at the end, r < 2/√N, is marginalized and changes the weights by
+  // as much.
   ExpectNear(estimate, white, 0.1, 0.1);
 }
 
 class GrossErrors : public ::testing::TestWithParam<OutlierHandling> {};
 
-// 5 % of the samples replaced: without help the estimate is off by many standard deviations.
+// The record has 5 % of its samples replaced. Without help the estimate is off by many standard
+// deviations.
 TEST_P(GrossErrors, LeaveTheAnswerWhereItWas) {
   const Samples clean = Record(20, {});
   Samples record = clean;
@@ -218,10 +222,12 @@ TEST_P(GrossErrors, LeaveTheAnswerWhereItWas) {
   const Estimate estimate = EstimateOf(ProblemWith(robust), record);
   EXPECT_GT(std::abs(misled.parameters[0].map - oracle.parameters[0].map),
             5 * oracle.parameters[0].std_dev);
-  // An M-estimator of efficiency e is √(1/e − 1) from least squares on the same samples: 0.28 for
-  // Student's t, 0.23 for Huber, who is also pulled by what say the gross errors keep.
+  // The distance of an M-estimator of efficiency e from least squares on the same samples is √(1/e
+  // − 1): 0.28 for Student's t, 0.23 for Huber. Huber is also pulled by the influence that the
+  // gross errors keep.
   ExpectNear(estimate, oracle, GetParam() == OutlierHandling::kStudentT ? 0.84 : 1.5, 0.15);
-  // Beside them the good samples with less than half their weight: |u| > √6 and |u| > 2·1.345.
+  // The count also includes good samples with less than half their weight: |u| > √6 and |u| >
+  // 2·1.345.
   const double good = 380 * (GetParam() == OutlierHandling::kStudentT ? 0.0143 : 0.0071);
   EXPECT_NEAR(static_cast<double>(estimate.channels[0].outliers), replaced + good,
               3 * std::sqrt(good) + 2);
@@ -235,7 +241,7 @@ TEST(RecordWithoutGrossErrors, LosesLittleByLookingForThem) {
   NoiseModel noise{.absolute = kOscillatorNoise};
   const Estimate plain = EstimateOf(ProblemWith(noise), record);
   noise.outliers = OutlierHandling::kStudentT;
-  // By its efficiency of 0.926 the standard deviation is 4 % more.
+  // The efficiency of 0.926 makes the standard deviation 4 % larger.
   ExpectNear(EstimateOf(ProblemWith(noise), record), plain, 0.84, 0.1);
 }
 

@@ -20,7 +20,7 @@ Prior Normals(int dimension) {
   return Prior(parameters);
 }
 
-// The whole prior, as far as pieces are concerned: a box of ±4 standard deviations.
+// Returns a box of ±4 standard deviations, which is the whole prior as far as pieces are concerned.
 ExpansionDesign WideDesign(int dimension) {
   ExpansionDesign design;
   design.region = Region::WholePrior(dimension);
@@ -39,7 +39,8 @@ std::vector<Matrix> PiecesOf(const Cost& cost, int particles = 1000) {
   return FindPieces(cost, design, drawn.etas);
 }
 
-// What a² = 1 with a noise of 0.1 leaves: a = ±1, each with a standard deviation of 0.05.
+// Makes the data a² = 1 with a noise of 0.1, which leave a = ±1, each with a standard deviation of
+// 0.05.
 std::vector<Measurement> SquareOfTheFirst() {
   return {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.1}};
 }
@@ -62,7 +63,7 @@ TEST(PosteriorPieces, AreFourWhereTwoSignsAreNotObserved) {
   const std::vector<Matrix> pieces = PiecesOf(CostOf(Normals(2), measurements));
   ASSERT_EQ(pieces.size(), 4U);
   for (const Matrix& piece : pieces) {
-    // All of a piece's particles have the signs of its mean.
+    // The particles of a piece all have the signs of its mean.
     for (int j = 0; j < 2; ++j) {
       const double sign = piece.col(j).mean() > 0 ? 1 : -1;
       EXPECT_GT((sign * piece.col(j)).minCoeff(), 0);
@@ -77,14 +78,14 @@ TEST(PosteriorPieces, AreOneOfAGaussian) {
   }
 }
 
-// b = a² along ±2: a banana whose straight chord has a density of nothing.
+// The data b = a² make a banana along ±2. The density on its straight chord is practically zero.
 TEST(PosteriorPieces, AreOneOfABanana) {
   const Cost cost =
       CostOf(Normals(2), {{[](const Vector& xi) { return xi[1] - xi[0] * xi[0]; }, -1, 0.05}});
   EXPECT_EQ(PiecesOf(cost).size(), 1U);
 }
 
-// a b = 1, of which the prior leaves two branches; each is a piece, though a curved valley.
+// The data a b = 1 have two branches under the prior; each is one piece, though a curved valley.
 TEST(PosteriorPieces, AreTheBranchesOfAHyperbola) {
   const Cost cost = CostOf(Normals(2), {{[](const Vector& xi) { return xi[0] * xi[1]; }, 1, 0.02}});
   const std::vector<Matrix> pieces = PiecesOf(cost);
@@ -92,13 +93,13 @@ TEST(PosteriorPieces, AreTheBranchesOfAHyperbola) {
   EXPECT_LT(pieces[0].col(0).mean() * pieces[1].col(0).mean(), 0);
 }
 
-// a = b to 10⁻⁴: a thousandth as wide as long.
+// The data a = b to 10⁻⁴ make a valley a thousandth as wide as long.
 TEST(PosteriorPieces, AreOneOfAValley) {
   const Cost cost = CostOf(Normals(2), {{[](const Vector& xi) { return xi[0] - xi[1]; }, 0, 1e-4}});
   EXPECT_EQ(PiecesOf(cost).size(), 1U);
 }
 
-// Two minima with a saddle of 3 between them: far less than what separates.
+// The saddle between the two minima is 3 high, far less than what separates pieces.
 TEST(PosteriorPieces, AreOneWhereALowSaddleJoinsTwoMinima) {
   const Cost cost = CostOf(Normals(1), {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.4}});
   EXPECT_EQ(PiecesOf(cost).size(), 1U);

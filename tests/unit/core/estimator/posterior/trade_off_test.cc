@@ -1,4 +1,4 @@
-// Combinations of parameters that are known where the parameters are not.
+// Tests combinations of parameters that are known although the parameters are not.
 
 #include "core/estimator/posterior/trade_off.h"
 
@@ -18,7 +18,8 @@ using ::testing::HasSubstr;
 
 constexpr int kDraws = 4'000;
 
-// Draws of a, spread by 20 %, and of b = known(a) but for 0.1 %.
+// Finds the trade-offs between draws of a, spread by 20 %, and of b = known(a) with a spread of 0.1
+// %.
 template <class Function>
 std::vector<TradeOff> TradeOffsOf(Function known, const std::string& unit,
                                   Verdict verdict = Verdict::kNotIdentified) {
@@ -50,7 +51,7 @@ TEST(TradeOffs, AreTheCombinationThatIsKnown) {
 }
 
 TEST(TradeOffs, AddOnlyWhatHasTheSameUnit) {
-  // Positive, 20 % of 10 being far from 40.
+  // The complement is positive, because 20 % of 10 is far from 40.
   const auto complement = [](double a) { return 40 - a; };
   const auto same = TradeOffsOf(complement, "kg");
   ASSERT_EQ(same.size(), 1u);
@@ -62,7 +63,7 @@ TEST(TradeOffs, AreNotLookedForAmongIdentifiedParameters) {
   EXPECT_TRUE(TradeOffsOf([](double a) { return 3 * a; }, "s", Verdict::kIdentified).empty());
 }
 
-// Free vibration tells the frequency, not stiffness and mass.
+// A free vibration tells the frequency, but neither stiffness nor mass.
 TEST(TradeOffs, ExplainTheValleyOfStiffnessAndMass) {
   Problem problem = InitialVelocityProblem(UncertainParameter::Normal("k", 4, 1).value(), 0.001);
   problem.uncertain.push_back(UncertainParameter::Normal("m", 0.1, 0.005).value());
