@@ -1,4 +1,4 @@
-// Snapshots that are cut off, changed, or of something else: each is refused by name, and none
+// Checks that snapshots which are cut off, changed, or of something else are refused by name. None
 // crashes an estimator or leaves anything in it.
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Everything that may be wrong with a snapshot, on a problem made small.
+// Tries everything that may be wrong with a snapshot, on a problem made small.
 class BadSnapshot : public ::testing::Test {
  protected:
   BadSnapshot() : problem_(OscillatorProblem()), samples_(OscillatorRecord(40)) {
@@ -31,7 +31,7 @@ class BadSnapshot : public ::testing::Test {
     estimate_ = session.Current();
   }
 
-  // Of an estimator to which the samples have been appended.
+  // Restores an estimator to which the samples have been appended.
   absl::Status Restored(const EstimatorSnapshot& snapshot, const Problem& problem) const {
     const auto estimator = MakeEstimator(problem);
     EXPECT_TRUE(estimator->Append(samples_).ok());
@@ -41,7 +41,7 @@ class BadSnapshot : public ::testing::Test {
     return Restored({good_.rows, state}, problem_);
   }
 
-  // With a checksum that is right.
+  // Appends the correct checksum.
   static std::string Sealed(std::string body) {
     const auto checksum =
         static_cast<uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size()));
@@ -62,7 +62,7 @@ TEST_F(BadSnapshot, IsRefusedWhenCutOff) {
   ASSERT_TRUE(Restored(Sealed(Body())).ok());
   for (size_t size = 0; size < good_.state.size(); size += 1 + size / 20) {
     EXPECT_TRUE(absl::IsDataLoss(Restored(good_.state.substr(0, size)))) << size;
-    // The same where the checksum is right.
+    // A cut snapshot is also refused when its checksum is correct.
     EXPECT_TRUE(absl::IsDataLoss(Restored(Sealed(Body().substr(0, size))))) << size;
   }
 }
@@ -75,8 +75,8 @@ TEST_F(BadSnapshot, IsRefusedWithAnyByteChanged) {
   }
 }
 
-// Even one who seals what has been changed makes nothing crash or take the memory: sizes without
-// bounds, indices out of range, numbers that are none.
+// A changed snapshot with a correct checksum must neither crash nor exhaust the memory. It may hold
+// sizes without bounds, indices out of range, and NaN or infinity.
 TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
   std::mt19937_64 random(3);
   int refused = 0;
@@ -93,7 +93,7 @@ TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
     const auto estimator = MakeEstimator(problem_);
     ASSERT_TRUE(estimator->Append(samples_).ok());
     const absl::Status status = estimator->Restore({good_.rows, Sealed(body)});
-    if (status.ok()) {  // whatever it says now
+    if (status.ok()) {  // The content may be anything.
       estimator->Process().IgnoreError();
       estimator->CurrentEstimate().status().IgnoreError();
       continue;
@@ -135,7 +135,7 @@ TEST_F(BadSnapshot, IsOneOfAnotherProblem) {
 
 TEST_F(BadSnapshot, IsOneOfAnotherVersion) {
   std::string body = Body();
-  // After cereal's mark of endianness, the size of the name and the name.
+  // The version follows cereal's mark of endianness, the size of the name and the name.
   const size_t version = 1 + 8 + std::string("polyest estimator").size();
   ASSERT_EQ(body[version], static_cast<char>(kSnapshotVersion));
   body[version] = static_cast<char>(kSnapshotVersion + 1);

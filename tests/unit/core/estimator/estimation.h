@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of estimates share: the oscillator of the paper's (26) with its closed form, and
+// Helps the tests of estimates: the oscillator of the paper's (26) with its closed form, and
 // comparisons of whole estimates.
 
 #include <gtest/gtest.h>
@@ -16,12 +16,12 @@
 
 namespace polyest::internal {
 
-// x(t) of v0 = 1 m/s: x = v0 sin(2πt)/2π.
+// Returns x(t) for v0 = 1 m/s: x = v0 sin(2πt)/2π.
 inline double UnitResponse(double time_s) {
   return std::sin(2 * std::numbers::pi * time_s) / (2 * std::numbers::pi);
 }
 
-// The paper's oscillator with v0 unknown, x measured.
+// Makes the problem of the paper's oscillator with v0 unknown and x measured.
 inline Problem InitialVelocityProblem(UncertainParameter v0, double noise) {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -31,7 +31,7 @@ inline Problem InitialVelocityProblem(UncertainParameter v0, double noise) {
   return problem;
 }
 
-// x at the times given, of the v0 given, with white noise.
+// Returns x at the given times for the given v0, with white noise.
 inline Samples InitialVelocityRecord(const std::vector<double>& time_s, double v0, double noise,
                                      uint64_t seed = 1) {
   std::mt19937_64 generator(seed);
@@ -58,7 +58,7 @@ inline Estimate EstimateOf(const Problem& problem, const Samples& samples) {
   return estimator->CurrentEstimate().value();
 }
 
-// The message of the diagnostic, or nothing.
+// Returns the message of the diagnostic, or nothing.
 inline std::string Message(const Estimate& estimate, DiagnosticCode code) {
   for (const Diagnostic& diagnostic : estimate.diagnostics) {
     if (diagnostic.code == code) return diagnostic.message;
@@ -69,7 +69,7 @@ inline bool Has(const Estimate& estimate, DiagnosticCode code) {
   return !Message(estimate, code).empty();
 }
 
-// Every number of an estimate in a fixed order.
+// Returns every number of an estimate in a fixed order.
 inline std::vector<double> NumbersOf(const Estimate& estimate) {
   std::vector<double> all;
   for (const ParameterEstimate& p : estimate.parameters) {

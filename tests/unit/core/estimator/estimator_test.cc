@@ -1,4 +1,4 @@
-// The estimator as a stream: what must not change its answers, and what it refuses.
+// Tests the estimator as a stream: what must not change its answers, and what it refuses.
 
 #include "polyest/estimator.h"
 
@@ -26,7 +26,7 @@ Samples TenSeconds() {
   return testing::OscillatorRecord(10, 3, truth);
 }
 
-// The estimate of TenSeconds, order 3, in one piece.
+// Returns the estimate of TenSeconds with order 3, computed in one piece.
 const Estimate& Undisturbed() {
   static const Estimate estimate =
       EstimateInBatches(testing::OscillatorProblem(3), TenSeconds(), 1000);
@@ -48,7 +48,7 @@ TEST(Estimator, IsTheSameBitsForAnyBatches) {
   }
 }
 
-// 80 points are two blocks of the ensemble, so that threads have something to share.
+// The 80 points make two blocks of the ensemble, so that threads have work to share.
 TEST(Estimator, IsTheSameBitsForAnyThreads) {
   Problem problem = testing::OscillatorProblem(3);
   problem.expansion.points_per_term = 8;
@@ -104,7 +104,7 @@ TEST(Estimator, ReachesTheSameBitsThroughAnyStops) {
   EXPECT_EQ(store->rows(), 200);
   int stops = 0;
   absl::Status status = absl::CancelledError("");
-  // One more read each time, so that every step is reached and every second one disturbed.
+  // Each round reads once more, so that every step is reached and every second one is disturbed.
   for (int reads = 1; absl::IsCancelled(status) && reads < 100; ++reads) {
     status = estimator->Process(store->StopAfter(reads));
     if (absl::IsCancelled(status)) ++stops;
@@ -132,7 +132,8 @@ TEST(Estimator, IsNotChangedByABatchItRefused) {
   ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
 }
 
-// x of the forced oscillator, the force a triangle wave with its knots at the samples.
+// Makes a problem that measures x of the forced oscillator. The force is a triangle wave with its
+// knots at the samples.
 Problem ForcedProblem(InputSpecification force) {
   Problem problem = testing::OscillatorProblem(3);
   problem.inputs = {{"force", std::move(force)}};
@@ -148,7 +149,8 @@ Samples StreamedForceRecord() {
   for (int k = 0; k < static_cast<int>(record.rows()); ++k) {
     record.columns[1].value.push_back(Triangle(k));
   }
-  // Of the forced oscillator with the same unknowns, from a fine run of the model itself.
+  // The record is that of the forced oscillator with the same unknowns, from a fine run of the
+  // model itself.
   TableInput table{.time_s = record.time_s, .value = record.columns[1].value};
   Problem exact = ForcedProblem(table);
   exact.integration.relative_tolerance = 1e-12;
@@ -206,8 +208,9 @@ TEST_P(StreamedCurve, IsTheSameAsATableOfItsKnots) {
   const TableInput table{streamed.time_s, streamed.columns[1].value, GetParam()};
   const Estimate a = EstimateInBatches(ForcedProblem(StreamedInput{GetParam()}), streamed, 1000);
   const Estimate b = EstimateInBatches(ForcedProblem(table), measured, 1000);
-  // A table lets the integrator step over the samples, a stream does not. The error allowed to a
-  // step is 1e-5 of the noise, and steps are a few hundred: to a percent of a standard deviation.
+  // The integrator steps over the samples of a table, but not over those of a stream. A step may
+  // err by 1e-5 of the noise and there are a few hundred, so that the estimates agree to a percent
+  // of a standard deviation.
   for (size_t i = 0; i < 2; ++i) {
     const ParameterEstimate& p = a.parameters[i];
     EXPECT_NEAR(p.map, b.parameters[i].map, 1e-2 * p.std_dev);

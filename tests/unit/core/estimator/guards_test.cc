@@ -1,4 +1,4 @@
-// What must not pass for knowledge, and what must be refused before it does harm.
+// Tests what must not pass for knowledge, and what must be refused before it does harm.
 
 #include <gmock/gmock.h>
 
@@ -11,11 +11,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Sampled where x = 0 whatever v0 is.
+// The samples are taken where x = 0 for every v0.
 const std::vector<double> kZeroCrossings = {0.5, 1.0, 1.5, 2.0};
 
-// The curvature of these priors at their modes is larger than 1/variance; without information from
-// the data that is not knowledge.
+// The curvature of these priors at their modes is larger than 1/variance. Without information from
+// the data this must not count as knowledge.
 TEST(Verdicts, DoNotTakeTheSharpModeOfASkewedPriorForKnowledge) {
   for (const UncertainParameter& v0 : {*UncertainParameter::Gamma("v0", 1.05, 0.2, 0.5),
                                        *UncertainParameter::Gamma("v0", 2, 0.2, 0),
@@ -49,7 +49,7 @@ TEST(EstimatorGuards, RefusesASampleThatWouldDrownTheOthersInRounding) {
   EXPECT_TRUE(estimator->Append(good).ok());
 }
 
-// A disk that is full at the second batch and not at its repeat.
+// Acts as a disk that is full at the second batch and not at its repeat.
 class FailingOnceStore final : public SampleStore {
  public:
   int64_t rows() const override { return samples_.rows(); }

@@ -1,6 +1,6 @@
-// Parameters that each run has for itself. The oracle is linear: y = a t + b, a shared and b of
-// each run, normal priors and noise, where the posterior is that of least squares with the prior
-// as further rows.
+// Tests parameters that each run has for itself. The oracle is linear: y = a t + b with a shared
+// and b of each run, and with normal priors and noise. The posterior is that of least squares with
+// the prior as additional rows.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ Problem LineProblem() {
                      kNoise);
 }
 
-// Lines of slope 0.7 with offsets 2, −3 and 4.
+// Returns samples of lines of slope 0.7 with offsets 2, −3 and 4.
 Samples ThreeLines() {
   std::mt19937_64 generator(5);
   std::normal_distribution<double> normal(0, kNoise);
@@ -55,7 +55,7 @@ struct Exact {
   Matrix covariance;
 };
 
-// Of b[0], a, b[1], b[2].
+// Returns the posterior of b[0], a, b[1], b[2].
 Exact LeastSquaresWithPrior(const Samples& samples) {
   const int place[] = {0, 2, 3};
   Matrix information = Vector{{1.0 / 9, 1.0 / 4, 1.0 / 9, 1.0 / 9}}.asDiagonal();
@@ -86,8 +86,8 @@ TEST(PerRun, AgreesWithLeastSquaresOverAllRuns) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     SCOPED_TRACE(parameter.name);
     const double std_dev = std::sqrt(exact.covariance(i, i));
-    // The expansion of a linear output is exact up to the rounding of its fit, which its residual
-    // adds to the noise.
+    // The expansion of a linear output is exact up to the rounding of its fit. Its residual adds
+    // that rounding to the noise.
     EXPECT_NEAR(parameter.map, exact.mean[i], 1e-4 * std_dev);
     EXPECT_NEAR(parameter.std_dev, std_dev, 1e-4 * std_dev);
     EXPECT_NEAR(parameter.mean, exact.mean[i], 0.03 * std_dev);
@@ -116,7 +116,7 @@ TEST(PerRun, HowARecordIsCutIntoBatchesDoesNotMatter) {
 TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   const auto estimator = MakeEstimator(LineProblem());
   EXPECT_EQ(EstimatorAccess::ProblemOf(*estimator).max_runs(),
-            11);  // a and 11 of b are 12
+            11);  // a and 11 values of b make 12.
   Samples samples;
   samples.time_s = {0, 0};
   samples.run = {0, 11};
@@ -144,7 +144,7 @@ TEST(PerRun, ACorrelationIsOfParametersOfOneKind) {
               HasSubstr("correlations[0]: only one of a and b is per run"));
   problem.uncertain[1].per_run = true;
   const ResolvedProblem both = ResolvedProblem::Make(problem, 2).value();
-  // Rows of F F^T: b[0], a[0], b[1], a[1].
+  // The rows of F F^T belong to b[0], a[0], b[1], a[1].
   const Matrix correlation = both.prior().factor() * both.prior().factor().transpose();
   EXPECT_NEAR(correlation(0, 1), 0.5, 1e-12);
   EXPECT_NEAR(correlation(2, 3), 0.5, 1e-12);
@@ -167,12 +167,12 @@ TEST(PerRun, TheNextExperimentKnowsOnlyWhatIsShared) {
   const ResolvedProblem next =
       WithEstimateAsPrior(problem, EstimateOf(LineProblem(), samples)).value();
   const Exact exact = LeastSquaresWithPrior(samples);
-  EXPECT_NEAR(next.prior().StandardDeviation()[0], 3, 1e-12);  // b
+  EXPECT_NEAR(next.prior().StandardDeviation()[0], 3, 1e-12);  // of b
   EXPECT_NEAR(next.prior().StandardDeviation()[1], std::sqrt(exact.covariance(1, 1)), 1e-4);
 }
 
-// The sign of a does not show, and no expansion over both signs follows exp(−a² t) within so little
-// noise: each has an expansion of its own, which then takes the runs that follow.
+// The data do not tell the sign of a, and no expansion over both signs follows exp(−a² t) within so
+// little noise. Each sign has an expansion of its own, which then takes the runs that follow.
 TEST(PerRun, ThePiecesOfAPosteriorTakeNewRunsEach) {
   Problem problem = TextProblem("exp(-a^2*t) + b",
                                 {UncertainParameter::Uniform("a", -2, 2).value(),
@@ -205,8 +205,8 @@ TEST(PerRun, ThePiecesOfAPosteriorTakeNewRunsEach) {
   }
 }
 
-// −log of the posterior density is a parabola along any line, with the curvature 1/σ² of the
-// conditional density.
+// The oracle is −log of the posterior density: a parabola along any line, with the curvature 1/σ²
+// of the conditional density.
 TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
   const Samples samples = ThreeLines();
   CostGridOptions options;
@@ -216,7 +216,7 @@ TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
       EvaluateCostGrid(ResolvedProblem::Make(LineProblem()).value(), samples, options, {});
   ASSERT_TRUE(grid.ok()) << grid.status();
   const double step = grid->axes[0][6] - grid->axes[0][5];
-  const double information = 1.0 / 9 + 5 / (kNoise * kNoise);  // run 2 has five samples
+  const double information = 1.0 / 9 + 5 / (kNoise * kNoise);  // Run 2 has five samples.
   EXPECT_NEAR(grid->total(4, 0) - 2 * grid->total(5, 0) + grid->total(6, 0),
               information * step * step, 1e-6 * information * step * step);
 }

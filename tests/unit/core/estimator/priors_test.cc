@@ -1,4 +1,4 @@
-// Estimates under lognormal, truncated normal and correlated priors, against closed forms and
+// Compares estimates under lognormal, truncated normal and correlated priors with closed forms and
 // quadrature of the exact posterior.
 
 #include <gmock/gmock.h>
@@ -18,7 +18,8 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-constexpr double kIndependent = 1000;  // particles that 2000 are worth at least, posterior_test.cc
+// 2000 particles are worth at least this many (posterior_test.cc).
+constexpr double kIndependent = 1000;
 const double kMeanError = 4 / std::sqrt(kIndependent);  // in deviations
 const double kQuantileError = 4 * std::sqrt(0.025 * 0.975 / kIndependent) / 0.0584;  // of a normal
 
@@ -26,7 +27,7 @@ UncertainParameter Normal(const char* name, double mean, double std_dev) {
   return UncertainParameter::Normal(name, mean, std_dev).value();
 }
 
-// The oscillator with x = x0 cos 2πt + v0 sin(2πt)/2π, x0 and v0 normal and correlated.
+// Makes the oscillator with x = x0 cos 2πt + v0 sin(2πt)/2π, x0 and v0 normal and correlated.
 Problem PairProblem(double rho, double noise) {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -49,7 +50,7 @@ struct Gaussian {
   Matrix covariance;
 };
 
-// (P⁻¹ + AᵀA/σ²)⁻¹ and its mean, P the prior's covariance.
+// Returns the covariance (P⁻¹ + AᵀA/σ²)⁻¹ and its mean, with P the prior's covariance.
 Gaussian ExactPair(double rho, double noise, const Samples& samples) {
   const auto rows = static_cast<Eigen::Index>(samples.rows());
   Matrix a(rows, 2);
@@ -73,7 +74,7 @@ void ExpectPair(const Estimate& estimate, const Gaussian& exact) {
   for (int i = 0; i < 2; ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     const double deviation = std::sqrt(exact.covariance(i, i));
-    // The integration's tolerance, 10⁻⁷ of x, is less than 10⁻⁴ of a standard deviation here.
+    // The tolerance of the integration, 10⁻⁷ of x, is less than 10⁻⁴ of a standard deviation here.
     EXPECT_NEAR(parameter.map, exact.mean[i], 1e-3 * deviation);
     EXPECT_NEAR(parameter.std_dev, deviation, 1e-3 * deviation);
     EXPECT_NEAR(parameter.mean, exact.mean[i], kMeanError * deviation);
@@ -95,7 +96,7 @@ TEST(CorrelatedPriors, GiveTheGaussianPosteriorOfALinearProblem) {
   }
 }
 
-// x(0) = x0 alone is measured: v0 is known as far as the correlation tells.
+// The data measure x(0) = x0 alone: v0 is known as far as the correlation tells.
 TEST(CorrelatedPriors, TellOfOneWhatIsMeasuredOfTheOther) {
   const Samples samples = At({0}, {0.45});
   const Estimate estimate = EstimateOf(PairProblem(0.95, 0.001), samples);
@@ -125,7 +126,7 @@ TEST(CorrelatedPriors, OfOtherFamiliesAreWhatAnEstimateWithoutDataIs) {
     EXPECT_NEAR(parameter.mean, parameter.prior_mean, kMeanError * parameter.prior_std_dev);
     EXPECT_EQ(parameter.verdict, Verdict::kNotIdentified);
   }
-  // 95 % of a uniform density on [0, 2]; its quantiles' standard error is √(p(1 − p)/N)/½.
+  // The density is uniform on [0, 2]; the standard error of its quantiles is √(p(1 − p)/N)/½.
   EXPECT_NEAR(estimate.parameters[1].lower95, 0.05,
               4 * std::sqrt(0.025 * 0.975 / kIndependent) * 2);
   EXPECT_NEAR(estimate.parameters[1].upper95, 1.95,
@@ -133,7 +134,8 @@ TEST(CorrelatedPriors, OfOtherFamiliesAreWhatAnEstimateWithoutDataIs) {
   ExpectFinite(estimate);
 }
 
-// x = v0 a, a = sin(2πt)/2π: with measurements z the mismatch is ½ I (v0 − v̂)² + const.
+// Holds the likelihood of x = v0 a, a = sin(2πt)/2π: with measurements z the mismatch is ½ I (v0 −
+// v̂)² + const.
 struct Likelihood {
   double best;
   double information;
@@ -153,8 +155,9 @@ struct Moments {
   double mean, std_dev;
 };
 
-// Of θ(ξ) under ρ(ξ) e^{−½ I (θ − best)²}, by the trapezoidal rule on [lower, upper], which is
-// exact to rounding where both ends vanish and to step² otherwise.
+// Returns the moments of θ(ξ) under ρ(ξ) e^{−½ I (θ − best)²}, by the trapezoidal rule on [lower,
+// upper]. The rule is exact to rounding if the integrand vanishes at both ends, and to step²
+// otherwise.
 Moments ExactMoments(const Prior& prior, const Likelihood& likelihood, double lower, double upper) {
   constexpr int kSteps = 200'000;
   double sums[3] = {0, 0, 0};
@@ -182,7 +185,8 @@ TEST(LognormalPriors, GiveTheExactPosteriorsMeanAndItsModeInLogarithms) {
   const Likelihood likelihood = LikelihoodOf(samples, noise);
   const Moments exact = ExactMoments(Prior({v0}), likelihood, -8, 8);
   EXPECT_NEAR(parameter.mean, exact.mean, kMeanError * exact.std_dev);
-  // J = ½ I (θ − v̂)² + ½ ξ², θ = e^{μ + σξ}: J′ = I (θ − v̂) σθ + ξ = 0 by bisection.
+  // The mode minimizes J = ½ I (θ − v̂)² + ½ ξ² with θ = e^{μ + σξ}. Bisection solves J′ = I (θ −
+  // v̂) σθ + ξ = 0.
   double low = -8, high = 8;
   for (int i = 0; i < 100; ++i) {
     const double xi = 0.5 * (low + high), theta = v0.ToParameter(xi);
@@ -191,7 +195,7 @@ TEST(LognormalPriors, GiveTheExactPosteriorsMeanAndItsModeInLogarithms) {
   }
   const double theta = v0.ToParameter(low);
   EXPECT_NEAR(parameter.map, theta, 1e-2 * exact.std_dev);
-  // J″ = I σ²θ (2θ − v̂) + 1; then the moments of a lognormal.
+  // The curvature is J″ = I σ²θ (2θ − v̂) + 1; the moments are then those of a lognormal.
   const double curvature =
       likelihood.information * v0.scale * v0.scale * theta * (2 * theta - likelihood.best) + 1;
   const double variance = v0.scale * v0.scale / curvature;
@@ -205,7 +209,7 @@ TEST(LognormalPriors, AreWhatAnEstimateFromNothingIs) {
   Problem problem = InitialVelocityProblem(v0, 0.02);
   problem.expansion.order = 5;
   for (const bool measured : {false, true}) {
-    // x(0) = 0 whatever v0 is.
+    // The sample says nothing, because x(0) = 0 for every v0.
     const Estimate estimate = measured ? EstimateOf(problem, At({0}, {0.01}))
                                        : MakeEstimator(problem)->CurrentEstimate().value();
     const ParameterEstimate& parameter = estimate.parameters[0];
@@ -220,7 +224,8 @@ TEST(LognormalPriors, AreWhatAnEstimateFromNothingIs) {
 
 TEST(TruncatedNormalPriors, GiveTheExactPosterior) {
   const double noise = 0.05;
-  const Samples samples = At({0.13, 0.31, 0.71}, {0.005, 0.01, -0.02});  // little more than nothing
+  // These say little more than nothing.
+  const Samples samples = At({0.13, 0.31, 0.71}, {0.005, 0.01, -0.02});
   const UncertainParameter v0 = UncertainParameter::TruncatedNormal("v0", 0.2, 0.5, 0).value();
   const Estimate estimate = EstimateOf(InitialVelocityProblem(v0, noise), samples);
   const ParameterEstimate& parameter = estimate.parameters[0];
@@ -229,7 +234,7 @@ TEST(TruncatedNormalPriors, GiveTheExactPosterior) {
   const Moments exact = ExactMoments(prior, likelihood, prior.lower()[0], 9);
   EXPECT_NEAR(parameter.mean, exact.mean, kMeanError * exact.std_dev);
   EXPECT_GE(parameter.lower95, 0);
-  // Two normal densities cut at 0: the mode is the precision-weighted mean.
+  // The mode of the product of two normal densities cut at 0 is the precision-weighted mean.
   const double precision = likelihood.information + 4;
   const double mode = (likelihood.information * likelihood.best + 4 * 0.2) / precision;
   ASSERT_GT(mode, 0);
@@ -237,7 +242,8 @@ TEST(TruncatedNormalPriors, GiveTheExactPosterior) {
 }
 
 TEST(TruncatedNormalPriors, LeaveTheBoundToTheDataToBeBlamedFor) {
-  // Densest at its lower bound: the estimate lies there though no data ask for it.
+  // The prior is densest at its lower bound, so that the estimate lies there although no data ask
+  // for it.
   const UncertainParameter v0 = UncertainParameter::TruncatedNormal("v0", -1, 1, 0).value();
   const Problem problem = InitialVelocityProblem(v0, 0.01);
   const Estimate silent = MakeEstimator(problem)->CurrentEstimate().value();
@@ -273,7 +279,7 @@ TEST(CorrelatedPriors, GiveACostGridTheirDensity) {
   EXPECT_GT(grid.axes[0].minCoeff(), 0);
   for (int i = 0; i < 5; ++i) {
     for (int j = 0; j < 5; ++j) {
-      // Scores −4, −2 … 4; −log of the density of the germs is zᵀP⁻¹z/2 + log 2π.
+      // The scores are −4, −2 … 4; −log of the density of the germs is zᵀP⁻¹z/2 + log 2π.
       const double u = 2 * i - 4, v = 2 * j - 4;
       const double quadratic = (u * u - 2 * 0.9 * u * v + v * v) / (1 - 0.81);
       EXPECT_NEAR(grid.prior(i, j), 0.5 * quadratic + std::log(kTwoPi), 1e-9);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Records, and estimators that keep their snapshots of them.
+// Makes records, and estimators that keep their snapshots of them.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace polyest::internal {
 inline constexpr double kStep = 0.05;
 inline constexpr int kInterval = 32;
 
-// Equally spaced rows from t = 0 of so many runs, an output with white noise.
+// Returns equally spaced rows of several runs from t = 0, of an output with white noise.
 inline Samples Record(const std::string& output, const std::function<double(double t)>& y,
                       double noise, int rows, int runs = 1) {
   std::mt19937_64 generator(7);
@@ -37,7 +37,7 @@ inline Samples Record(const std::string& output, const std::function<double(doub
   return samples;
 }
 
-// An estimator that keeps its last snapshot.
+// Holds an estimator and its last snapshot.
 struct Session {
   explicit Session(const Problem& problem, int threads = 1) {
     EstimatorOptions options;
@@ -63,7 +63,7 @@ struct Session {
   std::vector<int64_t> rows;  // of all snapshots
 };
 
-// m ẍ + c ẋ + k x = force, k and x0 uncertain, x measured.
+// Makes m ẍ + c ẋ + k x = force with k and x0 uncertain and x measured.
 inline Problem OscillatorProblem(double noise = 0.02) {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");

@@ -1,5 +1,5 @@
-// Estimators restored from a snapshot. The oracle is the estimator that was not interrupted: every
-// number of every later estimate is the same to the bit.
+// Tests estimators restored from a snapshot. The oracle is the estimator that was not interrupted:
+// every number of every later estimate is the same to the bit.
 
 #include "core/estimator/snapshot.h"
 
@@ -35,11 +35,11 @@ std::vector<double> AllNumbersOf(const Estimate& estimate) {
 }
 
 struct Outcome {
-  std::vector<Estimate> estimates;  // undisturbed, one a batch
-  int restored = 0;                 // how often from a snapshot
+  std::vector<Estimate> estimates;  // of the undisturbed estimator, one a batch
+  int restored = 0;                 // how often one was restored from a snapshot
 };
 
-// The record in batches; after every one the estimator is given up and restored from the latest
+// Feeds the record in batches. After each, the estimator is given up and restored from the latest
 // snapshot, on one thread and two by turns.
 Outcome ExpectSameBitsThroughRestarts(Problem problem, const Samples& samples, size_t batch = 45) {
   problem.integration.samples_between_checkpoints = kInterval;
@@ -66,7 +66,7 @@ Outcome ExpectSameBitsThroughRestarts(Problem problem, const Samples& samples, s
       EXPECT_GT(session.rows.front(), latest.rows);
       latest = session.last;
     }
-    // Bytes and all: a snapshot of a restored estimator is the one of the undisturbed.
+    // A snapshot of the restored estimator is, byte for byte, the one of the undisturbed.
     EXPECT_EQ(latest.rows, undisturbed.last.rows);
     EXPECT_TRUE(latest.state == undisturbed.last.state) << end;
   }
@@ -164,7 +164,8 @@ TEST(Snapshot, HoldsWhereTheRunsAre) {
 }
 
 TEST(Snapshot, HoldsWhichTrajectoriesHaveFailed) {
-  // ẋ = k x² reaches infinity at t = 1/(k x0): that of the larger k within the record.
+  // The solution of ẋ = k x² reaches infinity at t = 1/(k x0), which lies within the record for the
+  // larger k.
   Problem problem;
   EquationSpecification equations;
   equations.states = {{"x", "k * x^2"}};
@@ -199,8 +200,8 @@ TEST(Snapshot, HoldsAStiffModel) {
   }
 }
 
-// m ẍ + k x = force from rest: x = k⁻¹ F (1 − cos ωt) for a step, which the linear input has from
-// its first knot on; two runs of it.
+// Makes m ẍ + k x = force from rest in two runs: x = k⁻¹ F (1 − cos ωt) for a step. The linear
+// input has this step from its first knot on.
 Problem DrivenProblem(Interpolation interpolation) {
   Problem problem = OscillatorProblem(0.02);
   problem.fixed = {{"m", 1}, {"c", 0}, {"x0", 0}};
@@ -221,7 +222,7 @@ TEST(Snapshot, FindsTheStreamedInputsInTheRows) {
        {Interpolation::kHold, Interpolation::kLinear, Interpolation::kCubic,
         Interpolation::kShapePreserving}) {
     Samples samples = DrivenRecord(80);
-    // Not quite constant, so that the knots count.
+    // The force is not quite constant, so that the knots count.
     for (size_t k = 0; k < samples.rows(); ++k) {
       samples.columns[1].value[k] += 0.01 * std::sin(static_cast<double>(k * k));
     }
@@ -238,7 +239,7 @@ TEST(Snapshot, FindsTheStreamedInputsOfLongBeforeWhereTheyAreDelayed) {
 TEST(Snapshot, ServesManyTrajectories) {
   Problem problem = OscillatorProblem();
   problem.uncertain.push_back(UncertainParameter::Uniform("v0", -0.5, 0.5).value());
-  problem.expansion.points_per_term = 5;  // 20 terms: two blocks
+  problem.expansion.points_per_term = 5;  // 20 terms make two blocks.
   ExpectSameBitsThroughRestarts(problem, OscillatorRecord(100));
 }
 

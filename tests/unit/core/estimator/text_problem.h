@@ -1,7 +1,7 @@
 #pragma once
 
-// Problems whose one output is an expression of the parameters, constant in time: with linear ones
-// everything has a closed form.
+// Makes problems whose one output is an expression of the parameters, constant in time. With linear
+// expressions everything has a closed form.
 
 #include <string>
 #include <utility>
@@ -23,7 +23,7 @@ inline Problem TextProblem(const std::string& output, std::vector<UncertainParam
   return problem;
 }
 
-// An estimator that has taken the values.
+// Returns an estimator that has processed the values.
 inline std::unique_ptr<Estimator> Processed(const Problem& problem,
                                             const std::vector<double>& values) {
   Samples samples;

@@ -1,4 +1,4 @@
-// The order of an expansion that chooses it: no more than is needed, enough where it is needed.
+// Tests expansions of automatic order: no more than is needed, enough where it is needed.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kNoise = 0.4;
 
-// So few and poor samples of exp(sin(3 a)) that the posterior stays as wide as the prior, over
-// which no cubic follows it.
+// Makes a problem with so few and poor samples of exp(sin(3 a)) that the posterior stays as wide as
+// the prior. No cubic follows the output over that width.
 Problem WideProblem(std::optional<int> order) {
   Problem problem =
       TextProblem("exp(sin(3*a))", {UncertainParameter::Uniform("a", -0.5, 1).value()}, kNoise);
@@ -29,7 +29,7 @@ struct Moments {
   double std_dev = 0;
 };
 
-// By the trapezoidal rule on the model itself.
+// Integrates by the trapezoidal rule on the model itself.
 Moments Exact() {
   constexpr int kNodes = 20'001;
   double mass = 0, first = 0, second = 0;
@@ -70,8 +70,8 @@ TEST(AutomaticOrder, StaysWhereTheFirstOrderIsEnough) {
   EXPECT_EQ(estimate.expansion.order, 3);
 }
 
-// Thirteen periods over the prior are more than a polynomial of order 9 follows; all of them have
-// values that the data allow.
+// The output has thirteen periods over the prior, more than a polynomial of order 9 follows. The
+// data allow values in all of them.
 TEST(AutomaticOrder, SaysWhenNothingAffordableSuffices) {
   Problem problem =
       TextProblem("sin(40*a)", {UncertainParameter::Uniform("a", -1, 1).value()}, 0.2);
@@ -81,7 +81,8 @@ TEST(AutomaticOrder, SaysWhenNothingAffordableSuffices) {
   ExpectFinite(estimate);
 }
 
-// y = sum of theta_i cos(i t): linear, so that least squares with the prior's rows is exact.
+// The output y = sum of theta_i cos(i t) is linear, so that least squares with the prior's rows is
+// exact.
 class TwelveParameters : public ::testing::TestWithParam<double> {};
 
 TEST_P(TwelveParameters, AreEstimatedAsByLeastSquares) {

@@ -30,23 +30,23 @@ ResolvedProblem TwoUniforms() {
                      3);
 }
 
-// An expansion over the box of half widths (0.2, 0.3) about (0.8, 0): its first axis ends at Ω's
-// upper bound.
+// Returns an expansion over the box of half widths (0.2, 0.3) about (0.8, 0). Its first axis ends
+// at Ω's upper bound.
 ExpansionDesign AtTheBound(const ResolvedProblem& problem) {
   const Vector centre = Eigen::Vector2d(0.8, 0);
   const Matrix axes = Eigen::Vector2d(0.2, 0.3).asDiagonal();
   return DesignForRegion(problem, {3, 1}, Region(centre, axes), centre);
 }
 
-// 1,000 particles about the middle, `at_edge` of them moved to `edge`.
+// Returns 1,000 particles about the middle, with `at_edge` of them moved to `edge`.
 Matrix ParticlesWith(int at_edge, const Eigen::RowVector2d& edge) {
   Matrix etas = 0.5 * UnitCubePoints(PointSet::kHalton, 2, 1000).array() - 0.25;
   etas.topRows(at_edge).rowwise() = edge;
   return etas;
 }
 
-// The radical inverses in base 2 of 1 … 12, through the distribution of Beta(2, 2) on [−1, 1],
-// F(ξ) = ½ + ¾ ξ − ¼ ξ³.
+// The oracle is the radical inverses in base 2 of 1 … 12, mapped through the distribution of
+// Beta(2, 2) on [−1, 1], F(ξ) = ½ + ¾ ξ − ¼ ξ³.
 TEST(DesignForPrior, HasThePapersTwelvePointsForSixTerms) {
   const ResolvedProblem problem =
       ProblemWith({UncertainParameter::Beta("v0", 2, 2, 0.5, 1.5).value()}, 5);
@@ -71,7 +71,7 @@ TEST(DesignForPrior, TrustsAnUnboundedGermBetweenItsOuterThousandths) {
   EXPECT_NEAR(design.lower[0], -3.090232306167814, 1e-9);  // Φ⁻¹(0.001)
   EXPECT_NEAR(design.upper[0], 3.090232306167814, 1e-9);
   EXPECT_EQ(design.lower[1], 0);
-  // Gamma(2): 1 − F(x) = (1 + x) e^{−x}.
+  // The oracle for Gamma(2) is 1 − F(x) = (1 + x) e^{−x}.
   EXPECT_NEAR((1 + design.upper[1]) * std::exp(-design.upper[1]), 0.001, 1e-9);
 }
 
@@ -115,7 +115,8 @@ TEST(DesignForRegion, DrawsPointsIntoThePrior) {
       continue;
     }
     ++drawn;
-    // On the bound but for 1e-12 of the way, and on the line from the point to `inside`.
+    // The point moves to the bound, except for 1e-12 of the way, on the line from the point to
+    // `inside`.
     EXPECT_NEAR(xis.row(q).cwiseAbs().maxCoeff(), 1, 1e-12);
     const Eigen::Vector2d step = xis.row(q).transpose() - inside;
     const Eigen::Vector2d whole = plain.row(q).transpose() - inside;
@@ -141,8 +142,8 @@ TEST(RegionOfParticles, HoldsAllParticlesWithAThirdToSpare) {
     EXPECT_NEAR(etas.col(j).maxCoeff(), 0.75, 0.02);
     EXPECT_NEAR(etas.col(j).minCoeff(), -0.75, 0.02);
   }
-  // Along the principal axes: the valley between the first two is 10⁻³ as wide as long, a box along
-  // the parameters themselves would have their product.
+  // The box lies along the principal axes. The valley between the first two parameters is 10⁻³ as
+  // wide as long; a box along the parameters themselves would have the product of their widths.
   EXPECT_LT(region.Volume(), 0.01 * 0.3 * 0.3 * 15);
 }
 

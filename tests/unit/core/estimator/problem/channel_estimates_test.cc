@@ -1,5 +1,6 @@
-// Gain, delay and offset of an input's channel and the offset of an output's, uncertain like any
-// parameter of the model. The truth is a run of the model with these values at a tight tolerance.
+// Tests gain, delay and offset of an input's channel and the offset of an output's, which are
+// uncertain like any parameter of the model. The truth is a run of the model with these values at a
+// tight tolerance.
 
 #include <gmock/gmock.h>
 
@@ -56,7 +57,7 @@ TEST(ChannelParameters, AreEstimatedLikeAnyOther) {
   const Estimate estimate = EstimateOf(ChannelProblem(), record);
   for (size_t i = 0; i < truth.size(); ++i) {
     const ParameterEstimate& parameter = estimate.parameters[i];
-    // Four standard deviations: a false alarm in 10⁴ seeds.
+    // The bound is four standard deviations, which gives a false alarm in 10⁴ seeds.
     EXPECT_NEAR(parameter.map, truth[i], 4 * parameter.std_dev) << parameter.name;
     EXPECT_EQ(parameter.verdict, Verdict::kIdentified) << parameter.name;
     EXPECT_LT(parameter.contraction, 0.1) << parameter.name;

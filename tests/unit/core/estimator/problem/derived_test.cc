@@ -1,4 +1,4 @@
-// Parameters tied to others by expressions.
+// Tests parameters tied to others by expressions.
 
 #include <gmock/gmock.h>
 
@@ -84,7 +84,7 @@ TEST(DerivedParameters, ThatAreNotFiniteAreAFailedTrajectory) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("only 0 of"));
 }
 
-// Both springs tied: the sum of the forces tells one stiffness, which two alone would leave open.
+// Both springs are tied. The sum of the forces tells one stiffness, but would leave two open.
 TEST(DerivedParameters, TieWhatTheDataCannotTellApart) {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -99,7 +99,7 @@ TEST(DerivedParameters, TieWhatTheDataCannotTellApart) {
     record.columns[0].value.push_back(
         testing::OscillatorDisplacement(40, 0.1, record.time_s.back()));
   }
-  // The motion depends on k/m and c/m alone: nothing is left to learn of m.
+  // The motion depends on k/m and c/m alone, so that nothing is learned about m.
   const Estimate estimate = EstimateOf(problem, record);
   EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kNotIdentified);
   EXPECT_NEAR(estimate.channels[0].chi_squared, 0, 1e-6);

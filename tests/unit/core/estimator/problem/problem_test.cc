@@ -179,7 +179,7 @@ TEST(ResolvedProblem, NeedsMorePointsThanTermsToAdapt) {
   EXPECT_TRUE(ResolvedProblem::Make(fixed).ok());
 }
 
-// A tensor grid is of the prior alone: the moved expansion has pointsPerTerm points a term.
+// A tensor grid serves the prior alone: the moved expansion has pointsPerTerm points a term.
 TEST(ResolvedProblem, NeedsMorePointsThanTermsToAdaptAfterATensorGridToo) {
   EXPECT_THAT(Refusal([](Problem& p) {
                 p.expansion.points = PointSet::kGaussTensor;

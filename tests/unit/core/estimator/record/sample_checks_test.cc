@@ -30,7 +30,7 @@ using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// x and v measured, the force streamed.
+// Makes a problem with x and v measured and the force streamed.
 ResolvedProblem StreamedProblem() {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -70,7 +70,8 @@ TEST_F(SampleChecksTest, PlaceValuesByTheProblemsOrderWithNanWhereMissing) {
   EXPECT_EQ(RowNoise(checked, 1)[1], 0);
 }
 
-// σ = absolute + relative |z| + relative_to_max max |z| up to the sample itself.
+// The noise is σ = absolute + relative |z| + relative_to_max max |z|, with the maximum up to the
+// sample itself.
 TEST_F(SampleChecksTest, GiveNoiseWithTheMaximumSoFar) {
   const CheckedSamples checked = checks_.Check(ThreeRows()).value();
   EXPECT_DOUBLE_EQ(RowNoise(checked, 0)[0], 0.1 + 0.01 * 1 + 0.001 * 1);
@@ -98,7 +99,8 @@ TEST_F(SampleChecksTest, IgnoreTheValueOfAMissingSample) {
   const CheckedSamples checked = checks_.Check(samples).value();
   EXPECT_TRUE(std::isnan(RowValues(checked, 1)[0]));
   EXPECT_EQ(RowNoise(checked, 1)[0], 0);
-  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);  // 3 was not measured
+  // The value 3 was not measured.
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);
 }
 
 TEST_F(SampleChecksTest, KeepTheNoiseAboveZero) {
@@ -115,7 +117,8 @@ TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {
   earlier.time_s = {0, 0.5, 0.75};
   earlier.columns[0].value = {1, 1, 1};
   const CheckedSamples checked = checks_.Check(earlier).value();
-  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 + 0.001);  // not the 3 of the batch before
+  // without the 3 of the batch before
+  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 + 0.001);
 }
 
 TEST_F(SampleChecksTest, TakeRunsThatBeginAgainAtZero) {
@@ -124,7 +127,7 @@ TEST_F(SampleChecksTest, TakeRunsThatBeginAgainAtZero) {
   samples.time_s = {0, 5, 0};
   Take(samples);
   Samples next = ThreeRows();
-  next.run = {1, 3, 3};  // a run without samples may be left out
+  next.run = {1, 3, 3};  // A run without samples may be left out.
   next.time_s = {1, 0, 1};
   EXPECT_TRUE(checks_.Check(next).ok());
 }
@@ -203,7 +206,7 @@ TEST_F(SampleChecksTest, RefuseRunsThatDecrease) {
   samples.time_s = {0, 1, 2};
   Take(samples);
   Samples next = ThreeRows();
-  next.time_s = {3, 4, 5};  // run 0 where none is given
+  next.time_s = {3, 4, 5};  // The rows belong to run 0 if none is given.
   EXPECT_EQ(Refusal(next), "row 0, column run: 0 after 1; runs start at 0 and never decrease");
 }
 

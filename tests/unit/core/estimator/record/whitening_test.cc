@@ -1,5 +1,5 @@
-// Oracle: the inverse of the Cholesky factor of the noise's covariance, which whitens any Gaussian
-// noise, and for this one must be the same thing sample by sample.
+// Compares the whitening with the inverse of the Cholesky factor of the noise's covariance, which
+// whitens any Gaussian noise. For this noise it must equal the whitening sample by sample.
 
 #include "core/estimator/record/whitening.h"
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kTimeConstant = 0.3;
 
-// One channel at irregular times with a noise that changes, one sample missing.
+// Holds one channel at irregular times, with a noise that changes and one sample missing.
 struct Record {
   Record() {
     const double times[] = {0.1, 0.15, 0.4, 0.41, 1.0, 1.2};
@@ -56,7 +56,7 @@ TEST(Whitening, IsThatOfTheCholeskyFactor) {
 
   Whitening whitening({{scale, kTimeConstant, true}}, 2);
   whitening.BeginRun();
-  // In two pieces.
+  // The whitening takes the block in two pieces.
   whitening.Apply(0, 4, record.block, record.outputs.leftCols(4));
   whitening.Apply(4, 2, record.block, record.outputs.rightCols(2));
   for (int i = 0; i < 5; ++i) {
