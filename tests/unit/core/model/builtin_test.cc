@@ -1,4 +1,4 @@
-// The equations of the built-in models at a single point (Real = double).
+// Tests the equations of the built-in models at a single point (Real = double).
 
 #include <gtest/gtest.h>
 
@@ -58,8 +58,8 @@ Parameters<Equations> Defaults() {
   return parameters;
 }
 
-// The energy identities below hold exactly; what is left is the rounding of a few dozen operations
-// on terms of the size `scale`.
+// Returns the rounding error of a few dozen operations on terms of the size `scale`. The energy
+// identities below hold exactly except for it.
 double Rounding(double scale) { return 1e-14 * scale; }
 
 TEST(MassSpringDamper, StartsAtItsInitialStates) {
@@ -67,7 +67,7 @@ TEST(MassSpringDamper, StartsAtItsInitialStates) {
 }
 
 TEST(MassSpringDamper, ObeysNewtonsLaw) {
-  // m 2, c 3, k 5 at x 7, v 11 under 100 N: a = (100 − 33 − 35)/2.
+  // The acceleration for m 2, c 3, k 5 at x 7, v 11 under 100 N is a = (100 − 33 − 35)/2.
   const Parameters<MassSpringDamper> parameters = {2, 3, 5, 0, 0};
   EXPECT_EQ((Derivatives<MassSpringDamper>({7, 11}, parameters, {100})),
             (std::array<double, 2>{11, 16}));
@@ -78,7 +78,7 @@ TEST(MassSpringDamper, ObeysNewtonsLaw) {
 TEST(MassSpringDamper, LosesToTheDamperWhatTheForceDoesNotGive) {
   const double m = 0.7, c = 0.3, k = 12.5, x = -0.4, v = 1.3, force = 2.1;
   const auto [dx, dv] = Derivatives<MassSpringDamper>({x, v}, {m, c, k, 0, 0}, {force});
-  // d/dt (½ m v² + ½ k x²) = force v − c v²
+  // The energy changes by d/dt (½ m v² + ½ k x²) = force v − c v².
   EXPECT_NEAR(m * v * dv + k * x * dx, force * v - c * v * v, Rounding(10));
 }
 
@@ -92,7 +92,7 @@ TEST(MassSpringFrequency, IsTheRootOfStiffnessOverMass) {
 }
 
 TEST(LinearTwoState, HasThePapersDerivatives) {
-  // (57) at x₁ 1, x₂ 10, θ 100, u₁ 1000, u₂ 10000.
+  // The expected values are (57) at x₁ 1, x₂ 10, θ 100, u₁ 1000, u₂ 10000.
   EXPECT_EQ((Derivatives<LinearTwoState>({1, 10}, {100, 0, 0}, {1000, 10000})),
             (std::array<double, 2>{1108, 10081}));
   EXPECT_EQ((Initial<LinearTwoState>({7, 8, 9})), (std::array<double, 2>{8, 9}));
@@ -103,7 +103,7 @@ TEST(LinearTwoState, HasThePapersDerivatives) {
 TEST(LinearTwoState, HidesThetaInTheDifference) {
   for (const double theta : {-8.0, 0.0, 64.0}) {
     const auto [dx1, dx2] = Derivatives<LinearTwoState>({2, 5}, {theta, 0, 0}, {4, 3});
-    // ẏ = −3 y + u₁ − u₂ with y = x₁ − x₂, whatever θ
+    // The difference y = x₁ − x₂ satisfies ẏ = −3 y + u₁ − u₂ for every θ.
     EXPECT_EQ(dx1 - dx2, -3 * (2 - 5) + 4 - 3);
   }
 }
@@ -114,14 +114,15 @@ TEST(RollPlane2Dof, StartsAtItsInitialStates) {
 }
 
 TEST(RollPlane2Dof, BalancesForcesAndMoments) {
-  // M 4, I 2, L 4, k1 3, k2 5; x₁ − u₁ = 2, x₂ − u₂ = −2, so F₁ = 6, F₂ = −10.
+  // The values are M 4, I 2, L 4, k1 3, k2 5, and x₁ − u₁ = 2, x₂ − u₂ = −2, so that F₁ = 6, F₂ =
+  // −10.
   const auto [dx1, dx2, dv1, dv2] =
       Derivatives<RollPlane2Dof>({3, -1, 0.5, 0.25}, {4, 2, 4, 3, 5, 0, 0, 0, 0}, {1, 1});
   EXPECT_EQ(dx1, 0.5);
   EXPECT_EQ(dx2, 0.25);
-  // M (ẍ₁ + ẍ₂)/2 = −(F₁ + F₂) = 4
+  // The sum of forces is M (ẍ₁ + ẍ₂)/2 = −(F₁ + F₂) = 4.
   EXPECT_EQ(4 * (dv1 + dv2) / 2, 4);
-  // I (ẍ₂ − ẍ₁)/L = (L/2) (F₁ − F₂) = 32
+  // The moment is I (ẍ₂ − ẍ₁)/L = (L/2) (F₁ − F₂) = 32.
   EXPECT_EQ(2 * (dv2 - dv1) / 4, 32);
 }
 
@@ -130,7 +131,7 @@ TEST(RollPlane2Dof, ConservesEnergyOnFixedFeet) {
   const auto [M, I, L, k1, k2, x1_0, x2_0, v1_0, v2_0] = p;
   const double x1 = 0.02, x2 = -0.05, v1 = 0.7, v2 = 0.4;
   const auto [dx1, dx2, dv1, dv2] = Derivatives<RollPlane2Dof>({x1, x2, v1, v2}, p, {0, 0});
-  // d/dt of ½ M ((v₁ + v₂)/2)² + ½ I ((v₂ − v₁)/L)² + ½ k₁ x₁² + ½ k₂ x₂²
+  // The power is d/dt of ½ M ((v₁ + v₂)/2)² + ½ I ((v₂ − v₁)/L)² + ½ k₁ x₁² + ½ k₂ x₂².
   const double power = M * (v1 + v2) / 2 * (dv1 + dv2) / 2 + I * (v2 - v1) / L * (dv2 - dv1) / L +
                        k1 * x1 * dx1 + k2 * x2 * dx2;
   EXPECT_NEAR(power, 0, Rounding(k1 * std::abs(x1 * v1) + k2 * std::abs(x2 * v2)));
@@ -139,8 +140,8 @@ TEST(RollPlane2Dof, ConservesEnergyOnFixedFeet) {
 TEST(RollPlane2Dof, HeavesAndRollsAtTheFrequenciesOfARigidBar) {
   const Parameters<RollPlane2Dof> p = Defaults<RollPlane2Dof>();
   const double M = p[0], I = p[1], L = p[2], k = p[3];
-  // Heave x₁ = x₂: ω² = 2 k/M. Roll x₁ = −x₂: two springs of stiffness k on arms L/2, so the
-  // stiffness in roll is k L²/2 and ω² = k L²/(2 I).
+  // The heave x₁ = x₂ has ω² = 2 k/M. The roll x₁ = −x₂ works on two springs of stiffness k on arms
+  // L/2, so that its stiffness is k L²/2 and ω² = k L²/(2 I).
   const auto heave = Derivatives<RollPlane2Dof>({1, 1, 0, 0}, p, {0, 0});
   const auto roll = Derivatives<RollPlane2Dof>({1, -1, 0, 0}, p, {0, 0});
   const double heave_squared = 2 * k / M, roll_squared = k * L * L / (2 * I);
@@ -161,7 +162,8 @@ TEST(RollPlane2Dof, HidesItsInertiaWhenBothSidesMoveAlike) {
     EXPECT_NEAR(derivatives[2], heave, Rounding(10 * heave));
     EXPECT_NEAR(derivatives[3], heave, Rounding(10 * heave));
   }
-  // Driven unlike on the two sides, the inertia counts: F₁ − F₂ = −0.1 k, the roll a tenth.
+  // The inertia counts when the two sides are driven differently: F₁ − F₂ = −0.1 k, and ten times
+  // the inertia gives a tenth of the roll.
   const double roll = 0.1 * light[3] * light[2] * light[2] / (2 * light[1]);  // ẍ₁ − ẍ₂
   const auto quick = Derivatives<RollPlane2Dof>(states, light, {0.3, 0.2});
   const auto slow = Derivatives<RollPlane2Dof>(states, heavy, {0.3, 0.2});
@@ -170,8 +172,8 @@ TEST(RollPlane2Dof, HidesItsInertiaWhenBothSidesMoveAlike) {
 }
 
 TEST(Duffing, HasTheDerivativesOfAPolynomialSpring) {
-  // m 2, c 3, k 5, k2 7, k3 11, offset 13 at x 2, v 1 under 106 N:
-  // a = (106 + 13 − 3 − 10 − 28 − 88)/2.
+  // The acceleration for m 2, c 3, k 5, k2 7, k3 11, offset 13 at x 2, v 1 under 106 N is a = (106
+  // + 13 − 3 − 10 − 28 − 88)/2.
   const Parameters<Duffing> parameters = {2, 3, 5, 7, 11, 13, 17, 19};
   EXPECT_EQ((Derivatives<Duffing>({2, 1}, parameters, {106})), (std::array<double, 2>{1, -5}));
   EXPECT_EQ((Initial<Duffing>(parameters)), (std::array<double, 2>{17, 19}));
@@ -188,13 +190,13 @@ TEST(Duffing, LosesToTheDamperWhatTheForceDoesNotGive) {
   const double m = 0.8, c = 0.2, k = 1.5, k2 = -0.7, k3 = 2.5, offset = 0.3;
   const double x = -0.9, v = 1.7, force = 0.6;
   const auto [dx, dv] = Derivatives<Duffing>({x, v}, {m, c, k, k2, k3, offset, 0, 0}, {force});
-  // d/dt (½ m v² + ½ k x² + ⅓ k2 x³ + ¼ k3 x⁴ − offset x) = force v − c v²
+  // The energy changes by d/dt (½ m v² + ½ k x² + ⅓ k2 x³ + ¼ k3 x⁴ − offset x) = force v − c v².
   const double power = m * v * dv + (k * x + k2 * x * x + k3 * x * x * x - offset) * dx;
   EXPECT_NEAR(power, force * v - c * v * v, Rounding(10));
 }
 
 TEST(Pendulum, FallsFromTheHorizontalWithGravity) {
-  // θ = π/2, ω = −2: ω̇ = −9 + 2·0.5 + 4·0.25
+  // The values θ = π/2, ω = −2 give ω̇ = −9 + 2·0.5 + 4·0.25.
   const auto [dtheta, domega] =
       Derivatives<Pendulum>({std::numbers::pi / 2, -2}, {9, 0.5, 0.25, 0, 0});
   EXPECT_EQ(dtheta, -2);
@@ -207,7 +209,7 @@ TEST(Pendulum, IsSlowedByBothDampingsInEitherDirection) {
   const double g_over_l = 9.81, c = 0.2, c2 = 0.4, theta = 2.5;
   for (const double omega : {1.6, -1.6}) {
     const auto [dtheta, domega] = Derivatives<Pendulum>({theta, omega}, {g_over_l, c, c2, 0, 0});
-    // d/dt (½ ω² − (g/ℓ) cos θ) = −c ω² − c2 |ω|³
+    // The energy changes by d/dt (½ ω² − (g/ℓ) cos θ) = −c ω² − c2 |ω|³.
     const double power = omega * domega + g_over_l * std::sin(theta) * dtheta;
     EXPECT_NEAR(power, -c * omega * omega - c2 * std::pow(std::abs(omega), 3), Rounding(10));
   }

@@ -39,7 +39,8 @@ const ModelDescription& Describe(const std::string& name) {
   return FindBuiltinModel(name).value()->description();
 }
 
-// The names and numbers below are the documentation's table of built-in models; 1 Hz springs.
+// The names and numbers below are those of the documentation's table of built-in models. Springs
+// are at 1 Hz.
 const double kOmegaSquared = std::pow(2 * std::numbers::pi, 2);
 
 TEST(Catalogue, ListsTheModelsInTheOrderOfTheDocumentation) {
@@ -88,7 +89,7 @@ TEST(Catalogue, EveryQuantityHasAUnitAMeaningAndADefault) {
         EXPECT_FALSE(quantity.unit.empty());
         EXPECT_FALSE(quantity.meaning.empty());
         EXPECT_EQ(quantity.meaning.find('\n'), std::string::npos);
-        // Infinite friction is a linear tyre; nothing else is infinite.
+        // Only the friction is infinite, which makes a linear tyre.
         const bool unbounded = description.name == "bicycle" && quantity.name == "mu";
         EXPECT_EQ(std::isfinite(quantity.default_value), !unbounded);
         EXPECT_FALSE(std::isnan(quantity.default_value));

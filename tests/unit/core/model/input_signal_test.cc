@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = std::numbers::pi;
-// A few roundings of sin's argument, which stays below 100 here.
+// The bound is a few roundings of sin's argument, which stays below 100 here.
 constexpr double kRounding = 1e-13;
 
 InputSignal Make(InputSpecification specification) {
@@ -33,7 +33,7 @@ double FromTheLeft(const InputSignal& signal, double time_s) {
   return signal.Shape(std::nextafter(time_s, -kInfinity));
 }
 
-// Every break of the signal after the time given.
+// Returns every break of the signal after the given time.
 std::vector<double> Breaks(const InputSignal& signal, double time_s) {
   std::vector<double> breaks;
   while ((time_s = signal.NextBreak(time_s)) < kInfinity) breaks.push_back(time_s);
@@ -160,7 +160,7 @@ TEST(StreamedInput, FollowsTheKnotsAppended) {
 
   signal.Append(0, 5);
   EXPECT_EQ(signal.Shape(-1), 5);
-  EXPECT_EQ(signal.Shape(3), 5);  // the last value stands until more is known
+  EXPECT_EQ(signal.Shape(3), 5);  // The last value holds until more is known.
 
   signal.Append(2, 9);
   EXPECT_EQ(signal.Shape(0.5), 6);
@@ -185,7 +185,7 @@ TEST(StreamedInput, BeginsANewRunWhenCleared) {
   signal.Append(2, 9);
   signal.Clear();
   EXPECT_EQ(signal.Shape(1), 0);
-  signal.Append(1, 3);  // earlier than the last knot of the run before
+  signal.Append(1, 3);  // earlier than the last knot of the previous run
   EXPECT_EQ(signal.Shape(0), 3);
   EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{1}));
 }

@@ -1,4 +1,4 @@
-// The curves through the knots of a sampled signal.
+// Tests the curves through the knots of a sampled signal.
 
 #include "core/model/interpolation.h"
 
@@ -37,7 +37,7 @@ TEST(SplineSlope, IsExactOnCubicsAtUnevenKnots) {
 
 TEST(SplineSlope, OfFewKnotsIsThatOfTheParabolaTheLineAndTheConstant) {
   const std::vector<double> t = {0, 1, 3};
-  const std::vector<double> parabola = {2, 3, 11};  // 2 + t²
+  const std::vector<double> parabola = {2, 3, 11};  // follows 2 + t²
   for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(SplineSlope(t, parabola, k), 2 * t[k], 1e-14);
   EXPECT_EQ(SplineSlope(std::span(t).first(2), std::span(parabola).first(2), 0), 1);
   EXPECT_EQ(SplineSlope(std::span(t).first(1), std::span(parabola).first(1), 0), 0);
@@ -57,7 +57,7 @@ InputSignal Table(std::vector<double> time_s, std::vector<double> value, Interpo
   return *InputSignal::Make(TableInput{std::move(time_s), std::move(value), curve, 1});
 }
 
-// The largest error of sin 2πt, sampled n times a second, away from the ends.
+// Returns the largest error of sin 2πt, sampled n times a second, away from the ends.
 double WorstError(int n, Interpolation curve) {
   std::vector<double> time_s, value;
   for (int k = 0; k <= 4 * n; ++k) {
@@ -72,8 +72,8 @@ double WorstError(int n, Interpolation curve) {
   return worst;
 }
 
-// Halving the step divides the error by 2⁴ for a curve of third degree, 2² for a straight one and
-// 2 for steps: the orders of convergence.
+// The orders of convergence are these: halving the step divides the error by 2⁴ for a curve of
+// third degree, by 2² for a straight one and by 2 for steps.
 TEST(Interpolation, ConvergesWithItsOrder) {
   EXPECT_NEAR(WorstError(20, Interpolation::kCubic) / WorstError(40, Interpolation::kCubic), 16, 2);
   EXPECT_NEAR(WorstError(20, Interpolation::kLinear) / WorstError(40, Interpolation::kLinear), 4,
@@ -124,7 +124,8 @@ TEST_P(SmoothCurve, HasContinuousSlopes) {
     EXPECT_EQ(signal.Shape(t), std::sin(t));
     const double left = (signal.Shape(t) - signal.Shape(t - h)) / h;
     const double right = (signal.Shape(t + h) - signal.Shape(t)) / h;
-    // Second derivatives of up to about 20 (between knots 0.05 apart) times h.
+    // The slopes differ by h times the second derivatives, which are up to about 20 (between knots
+    // 0.05 apart).
     EXPECT_NEAR(left, right, 1e-4);
   }
 }
@@ -146,7 +147,7 @@ TEST_P(SmoothCurve, IsTheSameBitsWhenStreamed) {
   for (size_t k = 0; k < kUneven.size(); ++k) {
     streamed.Append(kUneven[k], value[k]);
     if (k < ahead) continue;
-    // Settled up to knot k − ahead, whatever follows.
+    // The curve is settled up to knot k − ahead, whatever follows.
     const double t = kUneven[k - ahead] - 0.01;
     EXPECT_EQ(streamed.Shape(t), table.Shape(t));
   }

@@ -19,7 +19,7 @@
 namespace polyest::internal {
 namespace {
 
-// Positive numbers that differ in every row and column, in (0.5, 2.5).
+// Returns positive numbers that differ in every row and column, in (0.5, 2.5).
 Eigen::ArrayXXd Varied(Eigen::Index rows, Eigen::Index columns, double phase) {
   return Eigen::ArrayXXd::NullaryExpr(rows, columns, [phase](Eigen::Index i, Eigen::Index j) {
     return 1.5 + std::sin(0.7 * static_cast<double>(i) + 2.3 * static_cast<double>(j) + phase);
@@ -33,8 +33,8 @@ std::array<double, kColumns> Row(const Eigen::ArrayXXd& block, Eigen::Index row)
   return values;
 }
 
-// The same formula in the same order: they differ by where the compiler fuses a product with a sum,
-// a rounding or so of the largest term, which here is below 100.
+// Expects the same formula in the same order. Results differ only where the compiler fuses a
+// product with a sum: by about a rounding of the largest term, which here is below 100.
 template <size_t kColumns>
 void ExpectRow(const Eigen::ArrayXXd& block, Eigen::Index row,
                const std::array<double, kColumns>& expected) {
@@ -53,7 +53,7 @@ class LaneModelOf : public ::testing::Test {
   LaneModel<Equations> model_;
   Eigen::ArrayXXd parameters_ = Varied(kRows, Equations::kParameters, 0);
   Eigen::ArrayXXd states_ = Varied(kRows, Equations::kStates, 1) - 1.5;
-  // Positive: a bicycle rolls forwards.
+  // The inputs are positive, because a bicycle rolls forwards.
   Eigen::ArrayXXd inputs_ = Varied(kRows, Equations::kInputs, 2);
 };
 
@@ -109,8 +109,8 @@ TYPED_TEST(LaneModelOf, GivesEveryPointTheOutputsOfASinglePoint) {
   }
 }
 
-// A block of rows within a larger array: its columns are further apart than its number of rows,
-// and its first row need not be aligned for vectors.
+// The block is a part of the rows of a larger array. Its columns are further apart than its number
+// of rows, and its first row need not be aligned for vectors.
 TYPED_TEST(LaneModelOf, WorksOnPartOfALargerBlockAndWritesNothingElse) {
   constexpr Eigen::Index kFirst = 3, kMore = 8;
   const Eigen::Index rows = this->kRows, larger = rows + kMore;

@@ -1,5 +1,5 @@
-// The vehicle models at a single point (Real = double): balances that hold exactly, linear systems
-// read off by differences, and closed forms of vehicle dynamics.
+// Tests the vehicle models at a single point (Real = double): balances that hold exactly, linear
+// systems obtained by differences, and closed forms of vehicle dynamics.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -56,7 +56,7 @@ class ModelAtAPoint {
     return outputs.at(static_cast<size_t>(description_.FindOutput(output).value()));
   }
 
-  // ∂ẋ/∂x by central differences; the step is in the states' own units.
+  // Returns ∂ẋ/∂x by central differences; the step is in the states' own units.
   Matrix Jacobian(const States& at, const Inputs& inputs, double step) const {
     Matrix jacobian(Equations::kStates, Equations::kStates);
     for (size_t j = 0; j < at.size(); ++j) {
@@ -80,12 +80,12 @@ using RollPlane = ModelAtAPoint<RollPlane4Dof>;
 using Quarter = ModelAtAPoint<QuarterCar>;
 using SingleTrack = ModelAtAPoint<Bicycle>;
 
-// Of a few dozen operations on terms of the size `scale`.
+// Returns the rounding error of a few dozen operations on terms of the size `scale`.
 double Rounding(double scale) { return 1e-13 * scale; }
 
 constexpr double kGravity = 9.81;
 
-// Far from rest in every state.
+// The car is far from rest in every state.
 constexpr RollPlane::States kMoving = {0.03, -0.02, 0.01, 0.015, 0.4, -0.7, 0.2, 0.5};
 
 TEST(RollPlane4Dof, StartsAtItsInitialStates) {
@@ -95,15 +95,15 @@ TEST(RollPlane4Dof, StartsAtItsInitialStates) {
   EXPECT_THAT(car.InitialStates(), testing::ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
 }
 
-// Oracle: the documentation's 1.18, 2.71, 9.01 and 9.08 Hz, to the digits that it gives.
+// The oracle is the documentation's 1.18, 2.71, 9.01 and 9.08 Hz, to the digits that it gives.
 TEST(RollPlane4Dof, HasTheModesOfTheDocumentation) {
   RollPlane car;
   car["c_f"] = 0;
-  // k3 d³ is below 10⁻⁷ of k d at a step of 10⁻⁴ m.
+  // The force k3 d³ is below 10⁻⁷ of k d at a step of 10⁻⁴ m.
   const Eigen::VectorXcd eigenvalues = car.Jacobian({}, {0, 0}, 1e-4).eigenvalues();
   std::vector<double> frequencies_hz;
   for (const std::complex<double>& eigenvalue : eigenvalues) {
-    EXPECT_NEAR(eigenvalue.real(), 0, 1e-6);  // undamped
+    EXPECT_NEAR(eigenvalue.real(), 0, 1e-6);  // The modes are undamped.
     if (eigenvalue.imag() > 0) frequencies_hz.push_back(eigenvalue.imag() / (2 * std::numbers::pi));
   }
   EXPECT_THAT(frequencies_hz, testing::UnorderedElementsAre(testing::DoubleNear(1.18, 0.005),
@@ -112,7 +112,7 @@ TEST(RollPlane4Dof, HasTheModesOfTheDocumentation) {
                                                             testing::DoubleNear(9.08, 0.005)));
 }
 
-// T and V are the header's, written down again.
+// The energies T and V are the header's, written down again.
 TEST(RollPlane4Dof, LosesToFrictionWhatTheRoadDoesNotGive) {
   RollPlane car;
   car["m_a"] = 220;
@@ -123,11 +123,11 @@ TEST(RollPlane4Dof, LosesToFrictionWhatTheRoadDoesNotGive) {
   EXPECT_EQ((std::array{dx1, dx2, dxt1, dxt2}), (std::array{v1, v2, vt1, vt2}));
   const double delta = 0.4 / 1.524;
   const double v_a = (1 - delta) * v1 + delta * v2, a_a = (1 - delta) * a1 + delta * a2;
-  // dT/dt
+  // The power begins as dT/dt.
   double power = 580 * (v1 + v2) / 2 * (a1 + a2) / 2 +
                  63.3316 * (v2 - v1) * (a2 - a1) / (1.524 * 1.524) + 220 * v_a * a_a +
                  36.26 * (vt1 * at1 + vt2 * at2);
-  // dV/dt at a standing road, and the friction's loss
+  // The loop adds dV/dt at a standing road to the power, and sums the loss to friction.
   double friction = 0;
   const double travel[] = {x1 - xt1, x2 - xt2}, rate[] = {v1 - vt1, v2 - vt2};
   const double tyre[] = {road[0] - xt1, road[1] - xt2}, wheel[] = {vt1, vt2};
@@ -171,15 +171,15 @@ TEST(RollPlane4Dof, HeavesWithAMassAtItsCentreLikeAHeavierBar) {
   const RollPlane::Inputs road = {0.02, -0.01};
   const auto a = loaded.Derivatives(kMoving, road), b = heavier.Derivatives(kMoving, road);
   EXPECT_NEAR(a[4] + a[5], b[4] + b[5], Rounding(1000));
-  EXPECT_NEAR(a[5] - a[4], b[5] - b[4], Rounding(1000));  // and rolls like it
+  EXPECT_NEAR(a[5] - a[4], b[5] - b[4], Rounding(1000));  // It also rolls like the other.
 }
 
-// Steiner: at the end of the bar the point mass is as if fixed to that corner.
+// The point mass at the end of the bar acts, by Steiner's theorem, as if fixed to that corner.
 TEST(RollPlane4Dof, CarriesAMassAtItsEndThereAlone) {
   RollPlane car;
   car["m_a"] = 200;
   car["d"] = 0;
-  // Newton's law for the whole bar and its moments about the centre.
+  // The equations are Newton's law for the whole bar and the balance of moments about the centre.
   const auto d = car.Derivatives(kMoving, {0, 0});
   const double travel1 = 0.02, travel2 = -0.035, rate1 = 0.2, rate2 = -1.2;
   const double F1 = 19357.2 * travel1 + 1e5 * std::pow(travel1, 3) + 142.14 * std::tanh(10 * rate1);
@@ -245,11 +245,12 @@ TEST(QuarterCar, LosesToTheDamperWhatTheRoadDoesNotGive) {
   EXPECT_EQ(car.Output("travel_rate", {zs, zu, vs, vu}, {road}), rate);
 }
 
-// Oracle: zs/road = kt c/D, zu/road = kt (ms s² + c)/D, D = (ms s² + c)(mu s² + c + kt) − c²,
-// c = cs s + ks, from below the body's mode (1.2 Hz) to above the wheel's (9.5 Hz).
+// The oracle is zs/road = kt c/D, zu/road = kt (ms s² + c)/D with D = (ms s² + c)(mu s² + c + kt) −
+// c² and c = cs s + ks. The frequencies go from below the body's mode (1.2 Hz) to above the wheel's
+// (9.5 Hz).
 TEST(QuarterCar, HasTheTransferFunctionsOfItsEquations) {
   Quarter car;
-  // Linear: differences over a step of 1 are exact but for rounding.
+  // The model is linear, so that differences over a step of 1 are exact except for rounding.
   const Matrix A = car.Jacobian({}, {0}, 1);
   const auto unit = car.Derivatives({}, {1});
   const Eigen::VectorXcd b = Eigen::Map<const Vector>(unit.data(), 4).cast<std::complex<double>>();
@@ -261,7 +262,7 @@ TEST(QuarterCar, HasTheTransferFunctionsOfItsEquations) {
     const std::complex<double> D = (290.0 * s * s + c) * (59.0 * s * s + c + 190000.0) - c * c;
     const std::complex<double> body = 190000.0 * c / D;
     const std::complex<double> wheel = 190000.0 * (290.0 * s * s + c) / D;
-    // The condition number of the resolvent, about 10⁶, times a rounding.
+    // The bound is the condition number of the resolvent, about 10⁶, times a rounding.
     EXPECT_LT(std::abs(response(0) - body), 1e-9 * std::abs(body)) << hz;
     EXPECT_LT(std::abs(response(1) - wheel), 1e-9 * std::abs(wheel)) << hz;
   }
@@ -274,7 +275,7 @@ TEST(Bicycle, StartsAtItsInitialStates) {
   EXPECT_THAT(car.InitialStates(), testing::ElementsAre(2, 3));
 }
 
-// The equilibrium of a steady turn, by Newton's method from straight ahead.
+// Returns the equilibrium of a steady turn, by Newton's method from straight ahead.
 SingleTrack::States SteadyTurn(const SingleTrack& car, double vx, double delta) {
   SingleTrack::States states = {0, 0};
   for (int i = 0; i < 20; ++i) {
@@ -287,20 +288,20 @@ SingleTrack::States SteadyTurn(const SingleTrack& car, double vx, double delta) 
   return states;
 }
 
-// Oracle: r/δ = vx/(L + K vx²), K = m/L (lr/Cf − lf/Cr); what small angles leave out is of the
-// order δ².
+// The oracle is r/δ = vx/(L + K vx²), K = m/L (lr/Cf − lf/Cr). The approximation of small angles
+// leaves out terms of the order δ².
 TEST(Bicycle, TurnsWithTheClassicalYawGain) {
   SingleTrack car;
   const double K = 1500 / 2.6 * (1.4 / 80000 - 1.2 / 90000), delta = 1e-4;
-  EXPECT_GT(K, 0);  // understeering
+  EXPECT_GT(K, 0);  // The car understeers.
   for (const double vx : {1.0, 10.0, 30.0, 60.0}) {
     const auto [vy, r] = SteadyTurn(car, vx, delta);
     EXPECT_NEAR(r / delta, vx / (2.6 + K * vx * vx), 1e-6 * vx) << vx;
-    // No v̇y in a steady turn: ay = vx r.
+    // A steady turn has v̇y = 0, so that ay = vx r.
     EXPECT_NEAR(car.Output("ay", {vy, r}, {vx, delta}), vx * r, 1e-9 * vx);
     EXPECT_EQ(car.Output("beta", {vy, r}, {vx, delta}), std::atan2(vy, vx));
   }
-  // The gain is largest at the characteristic speed √(L/K), and half the neutral car's.
+  // The gain is largest at the characteristic speed √(L/K), where it is half the neutral car's.
   const double characteristic = std::sqrt(2.6 / K);
   const auto gain = [&](double vx) { return SteadyTurn(car, vx, delta)[1] / delta; };
   EXPECT_NEAR(gain(characteristic), characteristic / 2.6 / 2, 1e-5);
@@ -333,7 +334,7 @@ TEST(Bicycle, GoesStraightAheadUnsteered) {
   EXPECT_THAT(SingleTrack().Derivatives({0, 0}, {20, 0}), testing::Each(0.0));
 }
 
-// Newton and Euler at angles that are not small.
+// The oracle is the laws of Newton and Euler at angles that are not small.
 TEST(Bicycle, ResolvesTheFrontForceAlongTheSteeredWheel) {
   SingleTrack car;
   const double vx = 5, delta = 0.6, vy = 1.5, r = 0.8;
@@ -349,7 +350,7 @@ TEST(Bicycle, IsExactlyLinearWithoutAFrictionLimit) {
   limited["mu"] = 1e9;
   const SingleTrack::States states = {1.5, 0.8};
   const auto a = unlimited.Derivatives(states, {5, 0.6}), b = limited.Derivatives(states, {5, 0.6});
-  EXPECT_EQ(a, b);  // (C α/(10⁹ Fz))² is below a rounding of 1
+  EXPECT_EQ(a, b);  // (C α/(10⁹ Fz))² is below a rounding of 1.
   EXPECT_TRUE(std::isfinite(a[0]) && std::isfinite(a[1]));
 }
 
@@ -359,8 +360,8 @@ TEST(Bicycle, NeverPassesItsFrictionLimit) {
   for (const double vy : {-50.0, -3.0, -0.1, 0.0, 0.1, 3.0, 50.0}) {
     EXPECT_LT(std::abs(car.Output("ay", {vy, 0}, {1, 0})), 0.8 * kGravity) << vy;
   }
-  // Sliding sideways all but at the limit: C α/(mu Fz) is about 19 at α = π/2, and
-  // 1 − 1/√(1 + 19⁻²) = 0.0014.
+  // The car slides sideways almost at the limit: C α/(mu Fz) is about 19 at α = π/2, and 1 − 1/√(1
+  // + 19⁻²) = 0.0014.
   EXPECT_NEAR(car.Output("ay", {-1e6, 0}, {1, 0}), 0.8 * kGravity, 0.002 * 0.8 * kGravity);
 }
 
@@ -370,7 +371,7 @@ TEST(Bicycle, StartsToSlideWithTheTyresStiffness) {
   const SingleTrack::States states = {1e-4, 0};
   const double a = grippy.Derivatives(states, {20, 0})[0],
                b = linear.Derivatives(states, {20, 0})[0];
-  // ½ (C α/(mu Fz))² = ½ (0.4/6337)² = 2·10⁻⁹
+  // The relative difference is ½ (C α/(mu Fz))² = ½ (0.4/6337)² = 2·10⁻⁹.
   EXPECT_NEAR(a / b, 1, 1e-8);
   EXPECT_LT(std::abs(a), std::abs(b));
 }
@@ -399,12 +400,12 @@ TEST(Lanes, AreNanAloneWhereTheSpeedIsNotPositive) {
   for (int i = 0; i < kLanes; ++i) EXPECT_EQ(rates.row(i).isFinite().all(), i != 3) << i;
 }
 
-// 1 − 2/(e^{2x} + 1) to a few roundings of 1.
+// The oracle is 1 − 2/(e^{2x} + 1), to a few roundings of 1.
 TEST(Lanes, HaveAHyperbolicTangent) {
   const Lane x = {-1e300, -19.0, -0.5, 0.0, 1e-9, 0.3, 21.0, 1e300};
   const Lane tangent = Tanh(x);
   for (int i = 0; i < kLanes; ++i) EXPECT_NEAR(tangent[i], std::tanh(x[i]), 5e-16) << x[i];
-  EXPECT_EQ(tangent[3], 0);  // at rest there is no friction at all
+  EXPECT_EQ(tangent[3], 0);  // There is no friction at all at rest.
 }
 
 }  // namespace

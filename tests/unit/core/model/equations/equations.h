@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of equation models share.
+// Helps the tests of equation models.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ inline std::shared_ptr<const StateSpaceModel> MakeOrFail(const EquationSpecifica
   return *std::move(model);
 }
 
-// All that is wrong with the equations.
+// Returns everything that is wrong with the equations.
 inline std::vector<std::string> Messages(const EquationSpecification& equations) {
   std::vector<std::string> messages;
   for (const absl::Status& problem : CheckEquations(equations)) {
@@ -31,7 +31,7 @@ inline std::vector<std::string> Messages(const EquationSpecification& equations)
   return messages;
 }
 
-// Numbers that differ in every row and column, in (−1, 1).
+// Returns numbers that differ in every row and column, in (−1, 1).
 inline Eigen::ArrayXXd Varied(Eigen::Index rows, Eigen::Index columns, double phase) {
   return Eigen::ArrayXXd::NullaryExpr(rows, columns, [phase](Eigen::Index i, Eigen::Index j) {
     return std::sin(0.7 * static_cast<double>(i) + 2.3 * static_cast<double>(j) + phase);

@@ -1,4 +1,4 @@
-// Every message that the equations of a user can bring about, and the limits.
+// Tests every message that the equations of a user can cause, and the limits.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-// The only message about an output y with that text.
+// Returns the only message about an output y with that text.
 std::string ErrorOf(const std::string& text) {
   const auto messages =
       Messages({.outputs = {{"y", text}}, .tables = {{"f", {{0, 1}, {}, {0, 1}}}}});
@@ -28,7 +28,7 @@ std::string ErrorOf(const std::string& text) {
 
 struct Wrong {
   const char* text;
-  const char* message;  // after "model.equations.outputs.y: "
+  const char* message;  // follows "model.equations.outputs.y: "
 };
 
 const Wrong kWrong[] = {
@@ -256,7 +256,7 @@ TEST(EquationLimits, BoundTheNumbersOfEverything) {
   }
 }
 
-// A chain of intermediates that would be of exponential size if it were written out.
+// The chain of intermediates would have exponential size if it were written out.
 TEST(EquationLimits, LetSharedExpressionsGrowLinearly) {
   EquationSpecification equations = Output("a99");
   equations.intermediates["a0"] = "x + 1";
@@ -282,7 +282,7 @@ TEST(EquationLimits, BoundTheDistinctOperations) {
   EXPECT_THAT(StatusOf(equations).message(), HasSubstr("20000 different operations"));
 }
 
-// Values that are needed once more when all have been computed, 600 for each pair of outputs.
+// The equations need values again after all have been computed, 600 for each pair of outputs.
 TEST(EquationLimits, BoundTheValuesAtOnce) {
   EquationSpecification equations;
   const auto add = [&equations](int outputs) {

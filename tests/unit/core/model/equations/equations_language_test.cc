@@ -1,5 +1,5 @@
-// What the language means: precedence, every function against the standard library's, pieces and
-// what is not a number, derivatives of everything.
+// Tests the meaning of the language: precedence, every function against the standard library's,
+// piecewise expressions, NaN, and derivatives of everything.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// A model with the states a, b, c, with dc/dt the expression, at many points: its values and its
-// derivatives with respect to a, b and c.
+// Evaluates a model with the states a, b, c and with dc/dt the expression, at many points: its
+// values and its derivatives with respect to a, b and c.
 class Expression {
  public:
   explicit Expression(const std::string& text)
@@ -30,7 +30,7 @@ class Expression {
     return derivatives.col(2);
   }
 
-  // Column s: with respect to state s.
+  // Returns the slopes; column s is with respect to state s.
   Eigen::ArrayXXd Slopes(const Eigen::ArrayXXd& states) const {
     Eigen::ArrayXXd jacobian(states.rows(), 9), slopes(states.rows(), 3);
     model_->StateJacobian(0, states, Parameters(states), none_, jacobian);
@@ -152,8 +152,9 @@ const UnaryFunction kUnaryFunctions[] = {
     {"ceil", [](double x) { return std::ceil(x); }, [](double) { return 0.0; }, -9, 9},
 };
 
-// A few units in the last place: of the library's functions one, of Eigen's exp two, of the tanh
-// three, of the slopes' formulas some more, where 1 − x² takes away up to a digit.
+// The bound is a few units in the last place: one for the library's functions, two for Eigen's exp,
+// three for the tanh, and some more for the formulas of the slopes, in which 1 − x² loses up to a
+// digit.
 TEST(EquationLanguage, HasTheFunctionsOfTheStandardLibraryAndTheirDerivatives) {
   constexpr Eigen::Index kPoints = 800;
   for (const UnaryFunction& function : kUnaryFunctions) {

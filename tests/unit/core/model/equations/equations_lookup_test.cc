@@ -1,4 +1,4 @@
-// Lookup tables against closed forms.
+// Compares lookup tables with closed forms.
 
 #include <gtest/gtest.h>
 
@@ -41,7 +41,7 @@ TEST(LinearTable, IsExactOnLinesAndGoesThroughItsValues) {
   }
   for (const double x : kUneven) EXPECT_NEAR(bent.Value(x, 0), x * x, 1e-15);
   EXPECT_NEAR(bent.Value(0.35, 0), 0.35 * 0.7, 1e-15);
-  // At a knot the slope to its right, (1.21 − 0.49)/0.4.
+  // The slope at a knot is the one to its right, (1.21 − 0.49)/0.4.
   EXPECT_NEAR(bent.SlopeX(0.7, 0), 1.8, 1e-13);
 }
 
@@ -61,8 +61,8 @@ TEST(AnyTable, KeepsItsEndValuesOutside) {
 
 // A function that is a natural spline on the knots of the table is its own interpolant.
 TEST(SplineTable, IsExactOnTheSplinesOfItsOwnKnots) {
-  // s'' is piecewise linear with 0 at the ends: the hat at 0.5 on the knots 0, 0.5, 1, integrated
-  // twice: x³/3 up to 0.5, then (1 − x)³/3 + x/2 − 1/4.
+  // The second derivative s'' is piecewise linear with 0 at the ends. It is the hat at 0.5 on the
+  // knots 0, 0.5, 1; integrated twice it gives x³/3 up to 0.5, then (1 − x)³/3 + x/2 − 1/4.
   const auto hat = [](double x) {
     return x < 0.5 ? x * x * x / 3 : (1 - x) * (1 - x) * (1 - x) / 3 + x / 2 - 0.25;
   };
@@ -74,8 +74,8 @@ TEST(SplineTable, IsExactOnTheSplinesOfItsOwnKnots) {
   }
 }
 
-// |f − s| ≤ 5/384 h⁴ max|f⁗| inside for the complete spline; the natural one is as good where f''
-// vanishes at the ends, as of the sine on [0, π].
+// The error of the complete spline is |f − s| ≤ 5/384 h⁴ max|f⁗| inside. The natural spline is as
+// good where f'' vanishes at the ends, as it does for the sine on [0, π].
 TEST(SplineTable, ConvergesWithTheFourthPowerOfTheStep) {
   double last = 0;
   for (const int cells : {8, 16, 32}) {

@@ -1,5 +1,5 @@
-// Equation models against the same models in C++, and what a model promises: its description, the
-// same bits for a point in any place, exact derivatives.
+// Compares equation models with the same models in C++, and tests what a model promises: its
+// description, the same bits for a point in any place, exact derivatives.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +21,8 @@ EquationSpecification Duffing() {
           .inputs = {"force"}};
 }
 
-// The columns of the text model's alphabetical quantities in the order of the other model's.
+// Returns the columns of the text model's alphabetical quantities in the order of the other
+// model's.
 Eigen::ArrayXXd Arrange(const Eigen::ArrayXXd& values, const std::vector<Quantity>& from,
                         const std::vector<Quantity>& to,
                         const std::map<std::string, std::string>& renamed = {}) {
@@ -39,7 +40,8 @@ Eigen::ArrayXXd Arrange(const Eigen::ArrayXXd& values, const std::vector<Quantit
   return arranged;
 }
 
-// The same formula up to the order of operations: a few roundings of the largest term, below 100.
+// Expects the same formula up to the order of operations: a few roundings of the largest term,
+// below 100.
 void ExpectSame(const StateSpaceModel& text, const StateSpaceModel& other,
                 const std::map<std::string, std::string>& initial) {
   const ModelDescription& a = text.description();
@@ -82,7 +84,7 @@ TEST(EquationModel, AgreesWithTheBuiltInPendulum) {
              {{"theta_0", "theta0"}, {"omega_0", "omega0"}});
 }
 
-// Forces of 1e5 N of which rounding leaves 1e-11 N, over masses down to 36 kg.
+// The forces are 1e5 N, of which rounding leaves 1e-11 N, over masses down to 36 kg.
 TEST(EquationModel, AgreesWithAHalfCarWrittenByHand) {
   const auto text = MakeOrFail(bench::HalfCarEquations());
   ASSERT_NE(text, nullptr);
@@ -90,7 +92,7 @@ TEST(EquationModel, AgreesWithAHalfCarWrittenByHand) {
   const std::vector<Quantity>& order = text->description().states;
   const std::vector<Quantity>& car_order = car.description().states;
   const Eigen::ArrayXXd states = Varied(64, 8, 1);
-  const Eigen::ArrayXXd parameters = Varied(64, 2, 2) * 0.3 + 1;  // m_a, d
+  const Eigen::ArrayXXd parameters = Varied(64, 2, 2) * 0.3 + 1;  // of m_a, d
   const Eigen::ArrayXXd inputs = Varied(64, 2, 3);
   const Eigen::ArrayXXd text_states = Arrange(states, car_order, order);
   Eigen::ArrayXXd all_parameters = Eigen::ArrayXXd::Zero(64, 10);
@@ -144,7 +146,7 @@ TEST(EquationModel, DescribesItself) {
   EXPECT_TRUE(parameter("x_0").has_default);
   EXPECT_EQ(parameter("x_0").default_value, 0);
   EXPECT_EQ(parameter("kc").unit, "");
-  // Nobody gave it: it follows from the expression.
+  // The unit follows from the expression; the problem does not give it.
   EXPECT_EQ(description.outputs[0].unit, "m/s^2");
   EXPECT_EQ(description.outputs[1].unit, "m");
 }
@@ -177,7 +179,7 @@ TEST(EquationModel, KnowsTheTimeAndUsesInitialValuesAsParameters) {
   EXPECT_TRUE((outputs.col(1) == 4).all());
 }
 
-// Every function that is not exact, so that a difference between ways of computing it would show.
+// Lists every function that is not exact, so that different ways of computing it would show.
 EquationSpecification Everything() {
   return {.states = {{"x", "exp(-x^2)*sin(w*v + t) + tanh(x)^1.3 - f(x) + g(x, v)"},
                      {"v", "log(2 + x)/sqrt(k + v^2) + cosh(v) + hypot(x, v) + atan2(v, x)"}},
@@ -221,7 +223,8 @@ TEST(EquationModel, WorksOnPartOfALargerBlockAndWritesNothingElse) {
   EXPECT_TRUE((rates.bottomRows(kLarger - kFirst - kRows) == -99).all());
 }
 
-// ∂f/∂x of the Duffing oscillator, states v, x: ∂v̇/∂v = −c/m, ∂v̇/∂x = −(k + 2 k2 x + 3 k3 x²)/m.
+// The oracle is ∂f/∂x of the Duffing oscillator with the states v, x: ∂v̇/∂v = −c/m, ∂v̇/∂x = −(k +
+// 2 k2 x + 3 k3 x²)/m.
 TEST(EquationModel, HasTheExactJacobianOfTheDuffingOscillator) {
   const auto model = MakeOrFail(Duffing());
   ASSERT_NE(model, nullptr);
@@ -244,7 +247,7 @@ TEST(EquationModel, HasTheExactJacobianOfTheDuffingOscillator) {
 }
 
 // Central differences with a step h = 1e-5 err by h²/6 of the third derivatives, here below 100,
-// and by 1e-11 of rounding.
+// and by a rounding of 1e-11.
 TEST(EquationModel, HasAJacobianThatAgreesWithDifferences) {
   const auto model = MakeOrFail(Everything());
   ASSERT_NE(model, nullptr);

@@ -1,5 +1,5 @@
-// Tens of thousands of mutated texts, the same ones each time: each is refused with a message or
-// becomes a model that can be evaluated. tests/fuzz does this without end, where there is Clang.
+// Tries tens of thousands of mutated texts, the same ones each time. Each is refused with a message
+// or becomes a model that can be evaluated. tests/fuzz does this without end, where there is Clang.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,8 @@ const char* const kPieces[] = {"(",  ")",  ",",    "+",   "-",  "*",     "/",   
                                "v",  "a",  "sin(", "if(", "f(", "g(",    "t",   "pi",
                                " ",  "\n", "\xff", "x_0", "^2", "^0.5",  "1/0", "max("};
 
-// Platform-independent, unlike std::uniform_int_distribution.
+// Returns a number below the bound, the same on every platform, unlike
+// std::uniform_int_distribution.
 size_t Below(std::mt19937_64& random, size_t bound) { return random() % bound; }
 
 std::string Mutate(std::string text, std::mt19937_64& random) {

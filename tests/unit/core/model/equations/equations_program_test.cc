@@ -1,4 +1,4 @@
-// The graph shares what is common, and the program computes it once.
+// Checks that the graph shares common subexpressions, and that the program computes them once.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace polyest::internal::equations {
 namespace {
 
-// Expressions of the variables a, b, c, d.
+// Compiles expressions of the variables a, b, c, d.
 class Shared {
  public:
   explicit Shared(const std::vector<std::string>& texts) {
@@ -60,7 +60,8 @@ TEST(EquationGraph, MakesOneNodeOfWhatMeansTheSame) {
 }
 
 TEST(EquationProgram, ComputesCommonSubexpressionsOnce) {
-  // k x + c v, its quotient, sine and the sum: the second expression adds one instruction.
+  // The instructions are a product, a product with a sum, a quotient and a sine. The second
+  // expression adds one.
   EXPECT_EQ(Shared({"sin(a*b + c*d)/d"}).Instructions(), 4);
   EXPECT_EQ(Shared({"sin(a*b + c*d)/d", "sin(d*c + b*a)/d + a"}).Instructions(), 5);
   EXPECT_EQ(Shared({"exp(a) + exp(a)*b + exp(a)*c"}).Instructions(), 3);
@@ -79,7 +80,7 @@ TEST(EquationProgram, ReusesRegistersThatAreNoLongerNeeded) {
   std::string sum = "a";
   for (int i = 0; i < 100; ++i) sum += " + sin(" + std::to_string(i + 1) + "*b)";
   const Program program = Shared({sum}).Compile();
-  // A hundred sines and sums, and all products but that with 1.
+  // The program has a hundred sines and sums, and all products except that with 1.
   EXPECT_EQ(program.instructions(), 299);
   EXPECT_LE(program.registers(), 3);
 }

@@ -1,4 +1,4 @@
-// Units of equations: what goes together, what does not, and what is not known.
+// Tests units of equations: which go together, which do not, and which are not known.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// An output y with that text; x in m, v in m/s, F in N, m in kg, angle in rad, turn in deg, w in
-// mm; z of unknown unit.
+// Makes an output y with that text. The units are m for x, m/s for v, N for F, kg for m, rad for
+// angle, deg for turn, mm for w; that of z is unknown.
 EquationSpecification Output(const std::string& text, const std::string& unit) {
   EquationSpecification equations = {
       .outputs = {{"y", text}},
