@@ -1,4 +1,4 @@
-// What a folder of FMUs offers, and what of it is refused.
+// Tests which FMUs of a folder are offered, and which are refused.
 
 #include "core/fmu/catalogue.h"
 
@@ -35,7 +35,7 @@ class FmuFolder : public testing::Test {
                                folder_ / (as + ".fmu"),
                                std::filesystem::copy_options::overwrite_existing);
   }
-  // An archive with these entries, the last a symbolic link if so wanted.
+  // Makes an archive with these entries, the last a symbolic link if asked.
   std::filesystem::path Zip(const std::string& name,
                             const std::vector<std::pair<std::string, std::string>>& entries,
                             bool link = false) {
@@ -79,7 +79,7 @@ TEST_F(FmuFolder, ShowsWhatAnFmuHas) {
     EXPECT_THAT(Names(model.inputs), ElementsAre("force"));
     EXPECT_THAT(Names(model.outputs), ElementsAre("x", "v", "a"));
     const Quantity& mass = model.parameters[0];
-    EXPECT_EQ(mass.unit, "kg");  // of its declared type
+    EXPECT_EQ(mass.unit, "kg");  // from its declared type
     EXPECT_EQ(mass.meaning, "mass");
     EXPECT_EQ(mass.default_value, 0.1);
     EXPECT_EQ(model.parameters[1].unit, "N.s/m");

@@ -1,4 +1,4 @@
-// Events of Model Exchange against closed forms.
+// Compares events of Model Exchange with closed forms.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kG = 9.81;
 
-// The height of a ball let go at h0 that keeps the part e of its speed at each impact.
+// Returns the height of a ball that is let go at h0 and keeps the part e of its speed at each
+// impact.
 double BallHeight(double h0, double e, double time_s) {
   const double fall_s = std::sqrt(2 * h0 / kG);
   if (time_s < fall_s) return h0 - kG * time_s * time_s / 2;
@@ -41,9 +42,9 @@ TEST_P(Ball, BouncesAsTheClosedFormSays) {
   for (int point = 0; point < 3; ++point) {
     for (size_t k = 0; k < times_s.size(); ++k) {
       const double e = restitutions[static_cast<size_t>(point)];
-      // A parabola is integrated exactly but for the low orders a start begins with: local errors
-      // of at most 1e-7 of heights up to 3 m and speeds up to 8 m/s over 1.5 s, some dozens of
-      // them.
+      // A parabola is integrated exactly, except for the low orders with which a start begins. Some
+      // dozens of local errors of at most 1e-7 remain, of heights up to 3 m and speeds up to 8 m/s
+      // over 1.5 s.
       EXPECT_NEAR(heights(point, static_cast<Eigen::Index>(k)),
                   BallHeight(1 + point, e, times_s[k]), 50 * 8e-7)
           << "point " << point << " at " << times_s[k];
@@ -66,8 +67,8 @@ TEST_P(Ball, ThatNeverRestsFailsWhereItsEventsAccumulate) {
   EXPECT_EQ(ensemble.failures[0].point, 0);
   EXPECT_THAT(ensemble.failures[0].reason, testing::HasSubstr("accumulate"));
   // All bounces together take t_1 (1 + e)/(1 − e). Bounces lower than the local errors of some ten
-  // steps, 1e-7 of the first height each, are lost in them: those begin at v = √(2 g 1e-6 m) and
-  // would take 2 v/(g (1 − e)) together.
+  // steps, 1e-7 of the first height each, are lost in these errors. The lost bounces begin at v =
+  // √(2 g 1e-6 m) and would take 2 v/(g (1 − e)) together.
   const double end_s = std::sqrt(2 / kG) * 1.7 / 0.3;
   EXPECT_NEAR(ensemble.failures[0].time_s, end_s, 2 * std::sqrt(2 * kG * 1e-6) / (kG * 0.3));
   EXPECT_TRUE(std::isfinite(heights(0, 0)));
@@ -96,9 +97,9 @@ TEST_P(Switch, TurnsAtTheTimesThatTheFmuNames) {
   for (int point = 0; point < 2; ++point) {
     const double period_s = point == 0 ? 0.3 : 0.25;
     for (size_t k = 0; k < times_s.size(); ++k) {
-      // A triangle: up for one period, down for the next.
+      // The output is a triangle: up for one period, down for the next.
       const double phase_s = std::remainder(times_s[k], 2 * period_s);
-      // A straight line is exact for every method; times are summed up with rounding errors.
+      // A straight line is exact for every method; the sums of times carry rounding errors.
       EXPECT_NEAR(x(point, static_cast<Eigen::Index>(k)), std::abs(phase_s), 1e-12);
     }
   }

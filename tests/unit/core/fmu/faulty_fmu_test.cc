@@ -1,4 +1,4 @@
-// FMUs that fail: at single points, or altogether; and what is left of them, which is nothing.
+// Tests FMUs that fail, at single points or altogether. They must leave nothing behind.
 
 #include <absl/cleanup/cleanup.h>
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ constexpr bool kSanitized = true;
 constexpr bool kSanitized = false;
 #endif
 
-// Temporary files go to a folder of the test's own, in which nothing may be left.
+// Puts temporary files into a folder of the test's own, in which nothing may remain.
 class FaultyFmu : public testing::Test {
  protected:
   FaultyFmu() {
@@ -47,7 +47,7 @@ class FaultyFmu : public testing::Test {
     EXPECT_TRUE(std::filesystem::is_empty(temporary_)) << "a folder is left";
   }
 
-  // Why the simulation of one point as a whole is lost.
+  // Returns why the simulation of one point as a whole is lost.
   std::string Error(const char* fault, double time_s, const WorkerLimits& limits = {},
                     const Stop& stop = Stop()) {
     absl::Status status;
@@ -101,7 +101,7 @@ TEST_F(FaultyFmu, WithoutAFunctionIsRefused) {
               HasSubstr("has no function fmi2DoStep"));
 }
 
-// Three points, of which the middle one fails at 0.3 s, or before it when a step led there.
+// Propagates three points. The middle one fails at 0.3 s, or earlier if a step led there.
 void ExpectOneFailure(const char* fmu, const char* fault, const char* reason,
                       bool sees_ahead = false) {
   SCOPED_TRACE(fmu);
@@ -113,7 +113,7 @@ void ExpectOneFailure(const char* fmu, const char* fault, const char* reason,
   EXPECT_EQ(ensemble.failures[0].point, 1);
   EXPECT_THAT(ensemble.failures[0].reason, HasSubstr(reason));
   EXPECT_LE(ensemble.failures[0].time_s, 0.3);
-  // A straight line is exact but for rounding.
+  // A straight line is exact, except for rounding.
   EXPECT_NEAR(x(0, 1), 0.8, 1e-12);
   if (!sees_ahead) {
     EXPECT_NEAR(x(1, 0), 0.2, 1e-12);
@@ -125,7 +125,8 @@ void ExpectOneFailure(const char* fmu, const char* fault, const char* reason,
 TEST_F(FaultyFmu, ThatReportsAnErrorAtOnePointLosesThatPointOnly) {
   ExpectOneFailure("faulty_cs2", "error_at", "reported an error while doing a step");
   ExpectOneFailure("faulty_cs2", "error_at", "the test wants it");
-  // After an error nothing may be asked of an instance, though the error came of a long step only.
+  // An instance must not be asked for anything after an error, even if only a long step caused the
+  // error.
   ExpectOneFailure("faulty_me2", "error_at", "the test wants it", /*sees_ahead=*/true);
 }
 
@@ -176,10 +177,10 @@ TEST_F(FaultyFmu, EndsWithAProcessThatDies) {
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM);
-  // The worker: it ends though its FMU hangs.
+  // The worker ends although its FMU hangs.
   EXPECT_GT(waitpid(-1, &status, 0), 0);
   prctl(PR_SET_CHILD_SUBREAPER, 0);
-  // The dead process's folder is there until the next one is made.
+  // The folder of the dead process remains until the next one is made.
   EXPECT_FALSE(std::filesystem::is_empty(temporary_));
   {
     FmuEnsemble ensemble("oscillator_me2", 1, {"x"});

@@ -1,6 +1,6 @@
 #pragma once
 
-// Ensembles of the tests' FMUs: parameters by name, one value a point.
+// Makes ensembles of the tests' FMUs: parameters by name, one value a point.
 
 #include <memory>
 #include <string>
@@ -24,7 +24,7 @@ inline std::vector<double> TimesUntil(double end_s, double step_s) {
   return times_s;
 }
 
-// All parameters at their defaults, all inputs 0.
+// Holds an ensemble with all parameters at their defaults and all inputs 0.
 struct FmuEnsemble {
   FmuEnsemble(std::shared_ptr<const Model> model, int points, std::vector<const char*> outputs) {
     specification.model = std::move(model);
@@ -59,7 +59,7 @@ struct FmuEnsemble {
   const ModelDescription& Description() const { return specification.model->description(); }
   int points() const { return static_cast<int>(specification.parameters.rows()); }
 
-  // The outputs at these times, points × (outputs · times).
+  // Returns the outputs at these times, points × (outputs · times).
   absl::StatusOr<Matrix> TryPropagate(const std::vector<double>& times_s,
                                       const Stop& stop = Stop()) {
     EnsemblePropagator propagator(specification, &inputs);

@@ -1,4 +1,4 @@
-// Inputs of FMUs: streamed knots, delays and offsets, and what a Co-Simulation makes of them.
+// Tests inputs of FMUs: streamed knots, delays and offsets, and how a Co-Simulation holds them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ FmuEnsemble Oscillator(std::shared_ptr<const Model> model) {
 FmuEnsemble BuiltIn() { return Oscillator(*FindBuiltinModel("mass_spring_damper")); }
 FmuEnsemble Fmu(const char* name) { return Oscillator(*TestFmus().Find(name)); }
 
-// Knots appended between calls as data come in.
+// Appends knots between calls, as data come in.
 Matrix Stream(FmuEnsemble& ensemble, Interpolation interpolation) {
   ensemble.Drive("force", StreamedInput{.interpolation = interpolation}, 3);
   EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
@@ -48,7 +48,7 @@ TEST(FmuInputs, StreamAsThoseOfTheBuiltIn) {
     FmuEnsemble fmu = Fmu("oscillator_me2");
     FmuEnsemble built_in = BuiltIn();
     const Matrix difference = Stream(fmu, interpolation) - Stream(built_in, interpolation);
-    // The same steps but for rounding.
+    // The steps are the same, except for rounding.
     EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
   }
 }
@@ -77,10 +77,10 @@ TEST_P(CoSimulationInputs, AreHeldAtTheMiddleOfEachStep) {
   }
   const std::vector<double> times_s = TimesUntil(2, 0.1);
   const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
-  // Held at u(t + h/2) instead of u(t), the force is wrong by −u'(t + h/2) s at t + h/2 + s, whose
-  // impulse over a step of h is 0 and whose moment is |u'| h³/12: as a displacement of the force's
-  // impulse in time it leaves |u'| h²/12 a second in v, with |u'| = 3 · 2π · 0.5, over 2 s. Held at
-  // u(t) it would be |u'| h/2, 6000 times as much.
+  // A force held at u(t + h/2) instead of u(t) is wrong by −u'(t + h/2) s at t + h/2 + s. The
+  // impulse of this error over a step of h is 0, and its moment is |u'| h³/12. As a displacement of
+  // the force's impulse in time, the error leaves |u'| h²/12 a second in v, with |u'| = 3 · 2π ·
+  // 0.5, over 2 s. A force held at u(t) would leave |u'| h/2, 6000 times as much.
   const double h = 1e-3;
   const double slope = 3 * 2 * M_PI * 0.5;
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 10 * slope * h * h / 12 * 2);
@@ -94,7 +94,7 @@ TEST_P(CoSimulationInputs, JumpBetweenTheSteps) {
     ensemble->Drive("force", StepInput{.time_s = 0.33333}, 3);
   }
   const Matrix difference = fmu.Propagate({0.3, 0.5, 1}) - built_in.Propagate({0.3, 0.5, 1});
-  // A communication point at the jump leaves nothing but the error of the FMU's own steps.
+  // A communication point at the jump leaves only the error of the FMU's own steps.
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-9);
 }
 

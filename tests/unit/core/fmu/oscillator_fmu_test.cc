@@ -1,4 +1,4 @@
-// The oscillator as an FMU of either version and kind beside the built-in one.
+// Compares the oscillator as an FMU of either version and kind with the built-in one.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace polyest::internal {
 namespace {
 
-// 70 points: two blocks, the second not full.
+// The 70 points make two blocks, the second not full.
 constexpr int kPoints = 70;
 
 FmuEnsemble Oscillators(std::shared_ptr<const Model> model) {
@@ -39,8 +39,8 @@ TEST_P(ModelExchangeOscillator, FollowsTheBuiltInToRoundingErrors) {
   built_in.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
   const std::vector<double> times_s = TimesUntil(5, 0.05);
   const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
-  // The same integrator takes the same steps; rounding errors of 1e-16 grow over some 1000 steps.
-  // Accelerations are up to 60.
+  // The same integrator takes the same steps. Rounding errors of 1e-16 grow over some 1000 steps,
+  // and accelerations are up to 60.
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
 }
 
@@ -65,9 +65,9 @@ TEST_P(CoSimulationOscillator, FollowsTheBuiltInToTheErrorOfItsOwnSteps) {
   built_in.specification.integration.relative_tolerance = 1e-11;
   const std::vector<double> times_s = TimesUntil(5, 0.05);
   const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
-  // Classical Runge–Kutta on x' = iωx makes the relative error ω^5 h^4 t/120 by the time t; with
-  // ω ≤ √(50/0.8) = 7.9 rad/s, h = 1 ms, t = 5 s and an amplitude of x of at most 1.1, and ω times
-  // that of v and ω² times that of a. The damping adds as much again at most.
+  // Classical Runge–Kutta on x' = iωx has the relative error ω^5 h^4 t/120 by the time t. Here ω ≤
+  // √(50/0.8) = 7.9 rad/s, h = 1 ms and t = 5 s. The amplitude of x is at most 1.1, that of v is ω
+  // times and that of a ω² times as large. The damping at most doubles the error.
   const double omega = std::sqrt(50 / 0.8);
   const double error = 2 * 1.1 * std::pow(omega, 5) * 1e-12 * 5 / 120;
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), omega * omega * error);

@@ -1,4 +1,4 @@
-// How a worker's end is told.
+// Tests how the end of a worker is reported.
 
 #include "core/fmu/worker_process.h"
 
