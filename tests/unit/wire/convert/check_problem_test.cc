@@ -1,4 +1,4 @@
-// All that is wrong with a problem is said at once.
+// Checks that all errors of a problem are reported at once.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

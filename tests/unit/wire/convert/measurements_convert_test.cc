@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-// Three rows of x and v; v misses the second.
+// Returns three rows of x and v; v lacks the second.
 v1::Measurements ThreeRows() {
   v1::Measurements measurements;
   for (const double time : {0.1, 0.2, 0.1}) measurements.add_time_s(time);

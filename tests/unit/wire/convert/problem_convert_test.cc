@@ -20,7 +20,7 @@ std::string MessageOf(const v1::Problem& problem) {
   return std::string(resolved.status().message());
 }
 
-// The message for a problem with one field of SmallProblem replaced.
+// Returns the message for a problem with one field of SmallProblem replaced.
 std::string MessageWith(const std::string& json) {
   v1::Problem problem = SmallProblem();
   const v1::Problem change = ProblemFromJson(json);
@@ -88,8 +88,8 @@ TEST(ToProblem, KnowsEveryPrior) {
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   const Vector mean = resolved->prior().Mean();
   const Vector std_dev = resolved->prior().StandardDeviation();
-  // Closed forms: (a+b)/2, (b−a)/√12; μ, σ; lower + width α/(α+β), width √(αβ/(α+β+1))/(α+β);
-  // shift + scale·shape, scale √shape.
+  // The closed forms are (a+b)/2, (b−a)/√12; μ, σ; lower + width α/(α+β), width
+  // √(αβ/(α+β+1))/(α+β); shift + scale·shape, scale √shape.
   EXPECT_DOUBLE_EQ(mean[0], 40);
   EXPECT_DOUBLE_EQ(std_dev[0], 20 / std::sqrt(12.0));
   EXPECT_DOUBLE_EQ(mean[1], 0.2);

@@ -10,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-// The limit that a problem exceeds; empty: none.
+// Returns the limit that a problem exceeds; empty: none.
 std::string Exceeded(const v1::Problem& problem, const ProblemLimits& limits) {
   const auto resolved = ToProblem(problem, {}, limits);
   if (resolved.ok()) return "";
@@ -36,7 +36,7 @@ TEST(ProblemLimits, BoundParameters) {
 }
 
 TEST(ProblemLimits, BoundStates) {
-  // Of mass_spring_damper: displacement and velocity.
+  // The states of mass_spring_damper are displacement and velocity.
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.states = 2}), "");
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.states = 1}), "--max-states");
 }
@@ -45,23 +45,23 @@ TEST(ProblemLimits, BoundThePointsOfAGivenOrder) {
   v1::Problem problem = TwoUnknowns();
   problem.mutable_expansion()->set_order(3);
   problem.mutable_expansion()->set_points_per_term(3);
-  // Ten terms in two parameters.
+  // Order 3 has ten terms in two parameters.
   EXPECT_EQ(Exceeded(problem, {.points = 30}), "");
   EXPECT_EQ(Exceeded(problem, {.points = 29}), "--max-points");
   problem.mutable_expansion()->set_points(v1::ExpansionOptions::GAUSS_TENSOR);
   problem.mutable_expansion()->set_points_per_term(1.2);
-  // (3 + 1)².
+  // The tensor grid has (3 + 1)² points.
   EXPECT_EQ(Exceeded(problem, {.points = 16}), "");
   EXPECT_EQ(Exceeded(problem, {.points = 15}), "--max-points");
 }
 
 TEST(ProblemLimits, BoundThePointsOfTheHighestOrderThatIsTakenByItself) {
-  // Order 9 in two parameters: 55 terms.
+  // The highest order is 9: 55 terms in two parameters.
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.points = 110}), "");
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.points = 109}), "--max-points");
   v1::Problem fixed = TwoUnknowns();
   fixed.mutable_expansion()->set_adaptive(false);
-  // Order 3.
+  // The highest order is 3.
   EXPECT_EQ(Exceeded(fixed, {.points = 20}), "");
   EXPECT_EQ(Exceeded(fixed, {.points = 19}), "--max-points");
 }
@@ -78,7 +78,7 @@ TEST(ProblemLimits, BoundTheParametersThatComeWithRuns) {
   EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
   batch.add_run(2);
   EXPECT_EQ(RefusalOf(CheckRuns(limits, *resolved, batch))->limit, "--max-parameters");
-  // Past what the core bears, and past what a number holds, the core says so.
+  // The core itself refuses more runs than it can bear, and more than a number holds.
   for (const int run : {1'000, std::numeric_limits<int>::max()}) {
     batch.set_run(2, run);
     EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());

@@ -203,7 +203,7 @@ TEST(AnalyzeSensitivity, AnswersRowsOfTimesByParameters) {
   EXPECT_EQ(x.name(), "x");
   ASSERT_EQ(x.total_size(), 6);
   ASSERT_EQ(x.first_order_size(), 6);
-  // V = 4 + 9 t²
+  // The variance is V = 4 + 9 t².
   EXPECT_NEAR(x.total(2), 4.0 / 13, 1e-9);
   EXPECT_NEAR(x.first_order(5), 36.0 / 40, 1e-9);
   EXPECT_EQ(x.residual_size(), 3);
@@ -253,7 +253,7 @@ TEST(DesignExperiment, AnswersForTheProblemsOwnInputs) {
   ASSERT_EQ(response->candidates_size(), 1);
   const auto& own = response->candidates(0);
   EXPECT_EQ(own.name(), "");
-  // x = a t at t = 1 and 2: precision ¼ + 1 + 4.
+  // The output is x = a t at t = 1 and 2, which gives the precision ¼ + 1 + 4.
   EXPECT_NEAR(own.gain().bits(), 0.5 * std::log2(4 * 5.25), 1e-7);
   EXPECT_NEAR(own.gain().std_dev(0), 1 / std::sqrt(5.25), 1e-7);
   ASSERT_EQ(own.outputs_size(), 2);
@@ -295,7 +295,7 @@ TEST(DesignExperiment, StartsFromWhatHasBeenMeasured) {
   x.add_values(3);
   const auto response = ComputeExperimentDesign(request, 1, {});
   ASSERT_TRUE(response.ok()) << response.status();
-  // Precision ¼ + 4 now, 5 more then.
+  // The precision is ¼ + 4 now, and 5 more then.
   EXPECT_NEAR(response->parameters(0).mean(), (0.25 * 1 + 2 * 3) / 4.25, 0.02);
   EXPECT_NEAR(response->parameters(0).std_dev(), 1 / std::sqrt(4.25), 1e-3);
   EXPECT_NEAR(response->candidates(0).gain().std_dev(0), 1 / std::sqrt(9.25), 1e-3);
