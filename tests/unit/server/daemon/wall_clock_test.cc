@@ -1,4 +1,4 @@
-// Time is measured with clocks that nobody can set. The clock on the wall is for showing.
+// Checks that time is measured with clocks that nobody can set. The wall clock is only for showing.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace polyest::internal {
 namespace {
 
-// The file of every line that asks the clock on the wall.
+// Returns the file of every line that asks the wall clock.
 std::vector<std::string> Uses() {
   const std::regex clock(
       R"(system_clock|CLOCK_REALTIME|gettimeofday|absl::Now\(|GetCurrentTime\(\)|[^_\w.>]time\((nullptr|NULL|0|&)|high_resolution_clock)");

@@ -128,7 +128,7 @@ TEST(Executor, CountsATaskUntilNothingIsLeftOfIt) {
   std::promise<std::pair<int, int>> counts;
   Executor executor(OneLane(1, 1));
   const auto count = [&](void*) { counts.set_value({executor.accepted(), executor.waiting()}); };
-  // The pointer goes with the task that holds it, and counts then.
+  // The captured pointer is destroyed with the task, and its deleter counts then.
   const absl::Status accepted =
       executor.Submit(kLane, [held = std::shared_ptr<void>(nullptr, count)] {});
   ASSERT_TRUE(accepted.ok()) << accepted;

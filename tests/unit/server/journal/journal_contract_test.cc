@@ -1,4 +1,4 @@
-// What every journal does.
+// Tests what every journal does.
 
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
@@ -187,7 +187,7 @@ TEST_P(JournalContractTest, TellsWhoReadsOrAppendsThatASessionIsNotThere) {
     for (const int64_t after : {0, 1}) {
       EXPECT_TRUE(absl::IsNotFound(journal_->ReadBatches(session, after, take)));
     }
-    // Whether the batch would follow or not.
+    // The batches are refused whether they would follow or not.
     for (const int64_t sequence : {1, 2, 3}) {
       EXPECT_TRUE(absl::IsNotFound(Append(Entry(session, sequence, 1))));
     }
@@ -215,7 +215,8 @@ TEST_P(JournalContractTest, HasTheLatestSnapshotOfBatchesThatItKeeps) {
   const std::string state("a\0b", 3);
   journal_->SaveSnapshot(number, {1, 1, "first"});
   journal_->SaveSnapshot(number, {1, 1, state});
-  ASSERT_TRUE(Append(Entry(number, 2, 2)).ok());  // in order: so the snapshots are there
+  // Writes are in order, so that the snapshots are there.
+  ASSERT_TRUE(Append(Entry(number, 2, 2)).ok());
   const auto snapshot = *journal_->ReadSnapshot(number);
   ASSERT_TRUE(snapshot.has_value());
   EXPECT_EQ(snapshot->state, state);

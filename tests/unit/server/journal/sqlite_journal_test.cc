@@ -21,7 +21,7 @@ namespace {
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
-// What whoever may do with a file or folder.
+// Returns who may do what with a file or folder.
 fs::perms ModeOf(const std::string& path) { return fs::status(path).permissions(); }
 constexpr fs::perms kOpenFolder = fs::perms(0755);
 constexpr fs::perms kOpenFile = fs::perms(0644);
@@ -71,7 +71,7 @@ class SqliteJournalTest : public testing::Test {
     text << std::ifstream(file_, std::ios::binary).rdbuf();
     return text.str();
   }
-  // Refused with these words, the file as it was.
+  // Expects a refusal with these words that leaves the file as it was.
   void ExpectRefused(absl::StatusCode code, const std::string& words) {
     const std::string before = Read();
     const absl::Status refused = Open();
@@ -189,7 +189,8 @@ TEST_F(SqliteJournalTest, ReadsNothingOfADeletedSessionWhoseBatchesAreStillToBeR
   ASSERT_TRUE(Open().ok());
   const int64_t number = Create("sessions/a");
   for (const int64_t sequence : {1, 2, 3}) ASSERT_TRUE(Append(number, sequence).ok());
-  // As in the midst of the removal, which goes on only when the journal is opened again.
+  // The file is as in the middle of the removal, which goes on only when the journal is opened
+  // again.
   Change(
       "DELETE FROM session; DELETE FROM batch WHERE sequence = 1; "
       "INSERT INTO deleted VALUES (" +
@@ -210,13 +211,13 @@ TEST_F(SqliteJournalTest, RefusesWhatDoesNotFitOnTheDiskAndKeepsTheRest) {
   EXPECT_EQ(last.code(), absl::StatusCode::kResourceExhausted) << last;
   EXPECT_GT(kept, 10);
   EXPECT_EQ(*CountBatches(number), kept);
-  // Deleting makes room.
+  // A deletion makes room.
   const int64_t other = Create("sessions/b");
   EXPECT_EQ(Append(other, 1, 20'000).code(), absl::StatusCode::kResourceExhausted);
   ASSERT_TRUE(journal_->Delete(number).ok());
   ASSERT_TRUE(Open(/*max_mb=*/1).ok());
   absl::Status again;
-  // The batches of a deleted session go a few at a time, in the background.
+  // The batches of a deleted session are removed a few at a time, in the background.
   for (int i = 0; i < 1'000; ++i) {
     again = Append(other, 1, 20'000);
     if (again.ok()) break;
@@ -249,7 +250,7 @@ TEST_F(SqliteJournalTest, TellsOfEachCommitBeforeThoseWhoWaitForIt) {
   EXPECT_EQ(commits[1].writes, 1u);
   EXPECT_TRUE(commits[1].outcome.ok());
   EXPECT_GT(commits[1].duration.count(), 0);
-  journal_ = nullptr;  // it tells until its end
+  journal_ = nullptr;  // reports commits until its end
 }
 
 TEST_F(SqliteJournalTest, ForgetsAnImportThatWasNotFinished) {
@@ -268,7 +269,7 @@ TEST_F(SqliteJournalTest, KeepsTheWriteAheadLogShort) {
   const auto log_size = [&] { return fs::file_size(file_ + "-wal"); };
   int64_t sequence = 1;
   while (log_size() < 15'000'000) ASSERT_TRUE(Append(number, sequence++, 5'000).ok());
-  // Once it has passed 16 MB, another thread copies it into the file while batches go on.
+  // Another thread copies the log into the file once it has passed 16 MB, while batches go on.
   while (log_size() > 15'000'000 && sequence < 50'000) {
     ASSERT_TRUE(Append(number, sequence++, 100).ok());
   }
@@ -289,7 +290,7 @@ TEST_F(SqliteJournalTest, IsMadeForItsOwnerOnlyWhateverTheUmask) {
 TEST_F(SqliteJournalTest, IsClosedToOthersWhereAnOlderVersionLeftItOpen) {
   ASSERT_TRUE(Open().ok());
   const int64_t session = Create("sessions/a");
-  // As after a crash: the log is still there.
+  // The files are as after a crash: the log is still there.
   const TestFolder folder;
   const std::string copy = folder / "copy";
   fs::copy(folder_.path(), copy);

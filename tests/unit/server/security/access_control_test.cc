@@ -34,7 +34,7 @@ TEST_F(AccessControlTest, KnowsTheCallerByTheToken) {
   EXPECT_EQ(caller->name, "bert");
   EXPECT_EQ(caller->tenant, "engines");
   EXPECT_EQ(caller->role, Role::kAdmin);
-  // RFC 7235: the scheme's case does not matter.
+  // The case of the scheme does not matter (RFC 7235).
   EXPECT_TRUE(Authorize("bearer " + reader_.secret, "ListModels").ok());
 }
 
@@ -47,7 +47,7 @@ TEST_F(AccessControlTest, AsksForAToken) {
   }
   EXPECT_EQ(access_->Authorize(Identification{}, "ListModels").status().code(),
             absl::StatusCode::kUnauthenticated);
-  // A certificate does not stand in for a token.
+  // A certificate does not replace a token.
   EXPECT_EQ(
       access_->Authorize(Identification{.certificate_name = "anna"}, "ListModels").status().code(),
       absl::StatusCode::kUnauthenticated);

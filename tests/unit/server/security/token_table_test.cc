@@ -42,7 +42,7 @@ TEST(TokenTable, FindsNobodyForOtherTokens) {
   EXPECT_FALSE(table->Find(rig.secret + " "));
   EXPECT_FALSE(table->Find(rig.secret.substr(0, rig.secret.size() - 1)));
   EXPECT_FALSE(table->Find(MakeToken()));
-  // The digest, which the file shows, is no token.
+  // The digest, which the file shows, is not a token.
   EXPECT_FALSE(table->Find(ToHex(DigestOf(rig.secret))));
 }
 
@@ -94,7 +94,7 @@ TEST(TokenTable, SaysWhichFileCannotBeRead) {
 }
 
 TEST(Token, HasTheDigestOfTheStandard) {
-  // FIPS 180-2, appendix B.1.
+  // The digest is that of FIPS 180-2, appendix B.1.
   EXPECT_EQ(ToHex(DigestOf("abc")),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }

@@ -11,12 +11,12 @@ TEST(CallStop, CountsTheTimeThatRemains) {
   EXPECT_EQ(CallStop::Duration(Seconds(0)), std::chrono::milliseconds(500));
   EXPECT_EQ(CallStop::Duration(Seconds(86'400)),
             std::chrono::hours(24) + std::chrono::milliseconds(500));
-  // A deadline that has passed.
+  // The deadline has passed.
   EXPECT_EQ(CallStop::Duration(Seconds(-2)), std::chrono::milliseconds(-1'500));
 }
 
 TEST(CallStop, HasNoDeadlineWhereThatIsFartherThanItsClockGoes) {
-  // The longest that a call can ask for, in hours.
+  // The duration is the longest that a call can ask for, in hours.
   EXPECT_EQ(CallStop::Duration(Seconds(int64_t{99'999'999} * 3'600)), std::nullopt);
   EXPECT_EQ(CallStop::Duration(gpr_inf_future(GPR_TIMESPAN)), std::nullopt);
 }

@@ -10,7 +10,7 @@ namespace {
 using Policy = EstimateSchedule::Policy;
 using std::chrono::milliseconds;
 
-// Any moment; the schedule looks at differences only.
+// The start may be any moment; the schedule looks at differences only.
 constexpr EstimateSchedule::Clock::time_point kStart{std::chrono::hours(1)};
 
 TEST(EstimateSchedule, IsDueAfterEveryBatchUnlessAskedOtherwise) {

@@ -15,12 +15,12 @@
 namespace polyest::internal {
 namespace {
 
-// gRPC's side of an import.
+// Plays gRPC's side of an import.
 class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest> {
  public:
   explicit Reader(ImportCall& call) : call_(call) { BindReactor(&call); }
 
-  // Waits until a record is asked for, and gives this one.
+  // Waits until the import asks for a record, and gives it this one.
   void Give(const v1::SessionRecord& record) {
     asked_.acquire();
     *request_->mutable_record() = record;
@@ -67,7 +67,7 @@ class ImportCallTest : public testing::Test {
     rows.mutable_channels(0)->add_values(0.1);
     return record;
   }
-  // Lets in everybody, or whoever has a token.
+  // Makes a context that lets in everybody, or whoever has a token.
   ServiceContext Context(const std::string& token_file = "") {
     access_ = AccessControl::Open({.token_file = token_file}).value();
     return {.executor = executor_,
@@ -88,7 +88,7 @@ class ImportCallTest : public testing::Test {
   grpc::CallbackServerContext call_;
   v1::Session imported_;
   std::unique_ptr<SessionRegistry> sessions_;
-  // Runs what it has to the end before anything else goes.
+  // The executor is destroyed first, so that it finishes its tasks while the rest still exists.
   Executor executor_{
       {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
 };

@@ -15,7 +15,7 @@ struct Stream : Drainable {
   std::function<void()> on_drain;
 };
 
-// Far enough not to matter: a test that waited for it would run into its own time limit.
+// Returns a time too far away to matter: a test that waited for it would exceed its own time limit.
 std::chrono::steady_clock::time_point Later() {
   return std::chrono::steady_clock::now() + std::chrono::hours(1);
 }

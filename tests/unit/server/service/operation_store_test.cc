@@ -7,7 +7,7 @@ namespace {
 
 class OperationStoreTest : public testing::Test {
  protected:
-  // Jobs wait in `queue_` until they are run.
+  // Starts a job, which waits in `queue_` until it is run.
   absl::StatusOr<v1::Operation> Start(const std::string& tenant = "a",
                                       const absl::Status& outcome = absl::OkStatus()) {
     return store_.Start(tenant, "ComputeEstimate", [&](v1::ComputationResult* result) {
@@ -26,7 +26,7 @@ class OperationStoreTest : public testing::Test {
     });
   }
 
-  // The store waits for its jobs at its end.
+  // Runs all jobs, because the store waits for them at its end.
   void TearDown() override { RunAll(); }
   void RunAll() {
     for (Task& task : queue_) task();
@@ -122,7 +122,7 @@ TEST_F(OperationStoreTest, MakesRoomByForgettingWhatEndedFirst) {
   EXPECT_TRUE(absl::IsNotFound(store_.Get("a", first->name()).status()));
   EXPECT_TRUE(store_.Get("a", second->name()).ok());
   ASSERT_TRUE(Start().ok());
-  // Both are under way now; another tenant has room of its own.
+  // Both operations are under way now; another tenant has room of its own.
   EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
   EXPECT_TRUE(Start("b").ok());
   RunAll();

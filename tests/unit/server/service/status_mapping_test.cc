@@ -14,7 +14,7 @@ namespace polyest::internal {
 namespace {
 
 TEST(ToGrpc, KeepsCodeAndMessageOfEveryStatus) {
-  // The two libraries number the same codes alike; that is the oracle.
+  // The oracle is that the two libraries give the same codes the same numbers.
   for (int code = 1; code <= 16; ++code) {
     const grpc::Status status = ToGrpc(absl::Status(static_cast<absl::StatusCode>(code), "why"));
     EXPECT_EQ(static_cast<int>(status.error_code()), code);
@@ -22,7 +22,7 @@ TEST(ToGrpc, KeepsCodeAndMessageOfEveryStatus) {
   }
 }
 
-// The details of one kind, by their standard name; fails when there are none.
+// Returns the details of one kind, by their standard name; fails if there are none.
 template <typename Detail>
 Detail Find(const grpc::Status& status) {
   rpc::Status detailed;

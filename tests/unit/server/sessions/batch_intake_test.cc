@@ -46,7 +46,7 @@ TEST_F(BatchIntakeTest, TakesOnlyWhatCanBeRecorded) {
     recorded = place;
     return absl::OkStatus();
   };
-  // The batch was not taken, so that it can come again.
+  // The intake did not take the batch, so that it can come again.
   ASSERT_TRUE(intake_.Take(Row(0.2), {}, record).ok());
   EXPECT_EQ(recorded.sequence, 2);
   EXPECT_EQ(intake_.Next(2)->place.sequence, 1);

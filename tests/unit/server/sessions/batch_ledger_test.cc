@@ -103,7 +103,8 @@ TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
   EXPECT_EQ(told, (std::vector{absl::StatusCode::kOk, absl::StatusCode::kResourceExhausted}));
   EXPECT_EQ(ledger_.taken().sequence, 4);
   EXPECT_EQ(ledger_.losses(), losses + 1);
-  // Whoever did not see it coming takes no more, and is told why: not that there is a gap.
+  // A writer that has not seen the loss cannot add more, and is told the reason, not that there is
+  // a gap.
   EXPECT_EQ(ledger_.Take(At(5), "", losses).code(), absl::StatusCode::kResourceExhausted);
   for (const int64_t sequence : {4, 5, 6, 7}) {
     EXPECT_EQ(ledger_.Check(sequence, "", losses, {}).status(),

@@ -1,6 +1,6 @@
 #pragma once
 
-// An observer that counts what it is told.
+// Counts what an observer is told.
 
 #include <vector>
 

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 
 constexpr int64_t kMebibyte = 1 << 20;
 
-// Waits until the housekeeper has looked at the memory so many times more.
+// Waits until the housekeeper has looked at the memory a number of times more.
 class Looks {
  public:
   int64_t Look() {
@@ -74,7 +74,7 @@ TEST_F(HousekeeperTest, UnloadsSessionsNotYetIdleForLongWhileMemoryIsShort) {
   EXPECT_TRUE(first->loaded());
   EXPECT_TRUE(second->loaded());
   looks_.Set(kMebibyte + 1);
-  // One at a look, on the strand, before the next look but one.
+  // The housekeeper unloads one session at a look, on the strand, before the next look but one.
   while (first->loaded() || second->loaded()) looks_.Wait(1);
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int64_t kSegment = JournalStore::kSegmentRows;
 
-// Two runs' worth of rows, of a noise that depends on the largest sample so far.
+// Makes a problem with two channels whose noise depends on the largest sample so far.
 ResolvedProblem TwoChannels() {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
@@ -44,8 +44,8 @@ void ExpectSameBits(const RowBlock& actual, const RowBlock& expected) {
   EXPECT_EQ(actual.run_ended, expected.run_ended);
 }
 
-// Gives the same batches to a journal, to the store and to one that keeps all in memory, which is
-// the oracle.
+// Gives the same batches to a journal, to the store and to a store that keeps all in memory, which
+// is the oracle.
 class JournalStoreTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -64,7 +64,7 @@ class JournalStoreTest : public testing::Test {
     for (int i = 0; i < rows; ++i, ++row_) {
       batch.add_time_s(0.01 * row_);
       batch.add_run(run);
-      // Grows, so that the noise of a row tells which rows went before.
+      // The values grow, so that the noise of a row tells which rows went before.
       x.add_values((row_ + 1) * std::sin(row_));
       if (row_ % 7 == 3) x.add_missing(i);
       force.add_values(row_);
@@ -120,7 +120,8 @@ TEST_F(JournalStoreTest, HoldsFewRowsInMemoryHoweverManyThereAre) {
     Append(100);
     store_.Release(sequence_);
   }
-  // The one that is added to and the two used last, each with up to a batch more.
+  // The store holds the segment that is added to and the two used last, each with up to a batch
+  // more.
   EXPECT_LE(store_.rows_in_memory(), 3 * (kSegment + 100));
   ExpectRead(0, 50'000);
   EXPECT_LE(store_.rows_in_memory(), 3 * (kSegment + 100));
@@ -130,7 +131,7 @@ TEST_F(JournalStoreTest, HoldsWhatTheJournalDoesNotKeepYet) {
   while (store_.rows() < 3 * kSegment) Append(100);
   store_.Release(0);
   EXPECT_EQ(store_.rows_in_memory(), store_.rows());
-  // One batch less than the first segment has.
+  // The journal keeps one batch less than the first segment has.
   store_.Release(kSegment / 100);
   EXPECT_EQ(store_.rows_in_memory(), store_.rows());
 }

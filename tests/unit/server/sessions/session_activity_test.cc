@@ -30,7 +30,7 @@ TEST(SessionActivity, ComparesMeasuredWithComputedSecondsSinceItIsInMemory) {
   activity.OnUnloaded();
   activity.OnLoaded(5, 120);
   EXPECT_EQ(activity.Summarize().real_time_factor, 0);
-  // What was computed before counts for all the time there is.
+  // The time computed before unloading still counts in the total.
   EXPECT_EQ(activity.Summarize().compute_s, 4);
 }
 
@@ -38,7 +38,7 @@ TEST(SessionActivity, CountsEstimatesAndTellsNewReexpansions) {
   SessionActivity activity;
   EXPECT_EQ(activity.OnEstimate(2), 2);
   EXPECT_EQ(activity.OnEstimate(5), 3);
-  // An estimator that was made anew begins anew.
+  // A new estimator begins to count anew.
   EXPECT_EQ(activity.OnEstimate(1), 0);
   EXPECT_EQ(activity.Summarize().estimates, 3);
   EXPECT_EQ(activity.Summarize().reexpansions, 1);

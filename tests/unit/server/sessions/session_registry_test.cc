@@ -14,7 +14,7 @@
 namespace polyest::internal {
 namespace {
 
-// What the strand does of a call that adds a batch.
+// Adds a batch as the strand does for a call.
 absl::StatusOr<v1::Acknowledgement> Add(const std::shared_ptr<Session>& session, int64_t sequence,
                                         const v1::Measurements& batch) {
   const absl::Status loaded = session->Load({});
@@ -34,7 +34,7 @@ class SessionRegistryTest : public testing::Test {
     return names;
   }
 
-  // The head of a session without batches, which is all of it.
+  // Returns the head of a session without batches, which is its whole import.
   static v1::ImportSessionRequest ImportOf(const std::string& id) {
     v1::ImportSessionRequest request;
     request.set_session_id(id);
@@ -155,7 +155,7 @@ TEST_F(SessionRegistryTest, HasASessionThatTakesTheNameOfOneJustBeingDeleted) {
   ASSERT_TRUE(session.ok()) << session.status();
   EXPECT_NE(*session, old);
   EXPECT_TRUE(Add(*session, 1, Rows({0.1})).ok());
-  // It counts once.
+  // The session counts once.
   EXPECT_TRUE(StatusOfCreate("b").ok());
   EXPECT_EQ(RefusalOf(StatusOfCreate("c"))->limit, "--max-sessions");
 }
@@ -164,7 +164,7 @@ TEST_F(SessionRegistryTest, ListsInTheOrderOfNamesFromAnyPlace) {
   for (const char* id : {"c", "a", "b"}) ASSERT_TRUE(StatusOfCreate(id).ok());
   EXPECT_THAT(NamesAfter("", 2), testing::ElementsAre("sessions/a", "sessions/b"));
   EXPECT_THAT(NamesAfter("sessions/b", 2), testing::ElementsAre("sessions/c"));
-  // The place need not be there any more.
+  // The list may continue after a name that no longer exists.
   ASSERT_TRUE(registry_->Delete("t", "sessions/b").ok());
   EXPECT_THAT(NamesAfter("sessions/b", 2), testing::ElementsAre("sessions/c"));
 }
@@ -225,7 +225,7 @@ TEST_F(SessionRegistryTest, CountsNoRowsThatWereRefused) {
   const auto a = *registry_->Get("t", "sessions/a");
   EXPECT_FALSE(Add(a, 1, Rows({0.2, 0.1})).ok());
   journal_.Fail(absl::ResourceExhaustedError("full"));
-  EXPECT_TRUE(Add(a, 1, Rows({0.1, 0.2})).ok());  // and is not kept
+  EXPECT_TRUE(Add(a, 1, Rows({0.1, 0.2})).ok());  // The batch is not kept.
   journal_.Fail(absl::OkStatus());
   EXPECT_TRUE(Add(a, 1, Rows({0.1, 0.2})).ok());
 }
@@ -235,7 +235,7 @@ TEST_F(SessionRegistryTest, TakesOnlyProblemsWithinItsLimits) {
   limits_.problem.states = 1;
   Open();
   EXPECT_EQ(RefusalOf(StatusOfCreate("after"))->limit, "--max-states");
-  // What is there stays.
+  // An existing session remains usable.
   EXPECT_TRUE(Add(*registry_->Get("t", "sessions/before"), 1, Rows({0.1})).ok());
 }
 
@@ -244,7 +244,7 @@ TEST_F(SessionRegistryTest, LoadsNothingWhileMemoryIsShortAndGoesOnWithWhatIsLoa
   const auto a = *registry_->Get("t", "sessions/a");
   resident_bytes_ = (1 << 20) + 1;
   EXPECT_EQ(RefusalOf(StatusOfCreate("b"))->limit, "--max-memory-mb");
-  // Who asks for it to go on with it learns that it is there.
+  // A writer that creates the session in order to go on with it learns that it exists.
   EXPECT_EQ(StatusOfCreate("a").code(), absl::StatusCode::kAlreadyExists);
   EXPECT_TRUE(Add(a, 1, Rows({0.1})).ok());
   a->Unload();

@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-// Undamped enough: x = v0/ω sin ωt at ω = 2π, near v0 = 1.
+// Returns samples of a nearly undamped motion: x = v0/ω sin ωt at ω = 2π, near v0 = 1.
 v1::Measurements Batch(std::initializer_list<double> times) {
   v1::Measurements batch;
   auto& x = *batch.add_channels();
@@ -36,7 +36,7 @@ class SessionTest : public testing::Test {
     ASSERT_TRUE(number.ok()) << number.status();
     Restart();
   }
-  // As after the end of the daemon: what is left is the journal.
+  // Acts as if the daemon had ended: only the journal remains.
   void Restart() {
     session_ = std::make_shared<Session>(SessionServices{executor_, journal_, models_, limits_},
                                          journal_.Heads()->front());
@@ -46,21 +46,21 @@ class SessionTest : public testing::Test {
     if (!loaded.ok()) return loaded;
     return session_->Add(sequence, batch);
   }
-  // What is known so far of whether the batch is kept.
+  // Returns what is known so far of whether the batch is kept.
   std::shared_ptr<std::optional<absl::Status>> Kept(int64_t sequence) {
     auto kept = std::make_shared<std::optional<absl::Status>>();
     session_->WhenKept(sequence, losses_, [kept](const absl::Status& status) { *kept = status; });
     return kept;
   }
 
-  // The test's own thread is the strand here: nothing else touches the session.
+  // The test's own thread acts as the strand: nothing else touches the session.
   FaultyJournal journal_;
   Executor executor_{
       {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
   ModelLibrary models_;
   SessionLimits limits_{.batch_rows = 4, .rows = 6};
   std::shared_ptr<Session> session_;
-  uint64_t losses_ = 0;  // that whoever asks for Kept has seen
+  uint64_t losses_ = 0;  // The number of losses that the caller of Kept has seen.
 };
 
 TEST_F(SessionTest, AcknowledgesBatchesAndCountsTheirValues) {
@@ -263,7 +263,7 @@ TEST_F(SessionTest, AcknowledgesABatchOnlyWhenItIsKept) {
   EXPECT_FALSE(first->has_value() || second->has_value());
   EXPECT_EQ(session_->Describe().last_sequence(), 0);
   EXPECT_TRUE(watcher->estimates.empty());
-  // Neither is it out of use, nor a repeat answered early.
+  // The session is still in use, and a repeat is not answered early.
   session_->Unload();
   EXPECT_TRUE(session_->loaded());
   ASSERT_TRUE(Add(1, Batch({0.1})).ok());
@@ -305,10 +305,10 @@ TEST_F(SessionTest, RefusesWhatFollowsALostBatchWithTheLossAndItsDelayNotAsAGap)
   ASSERT_TRUE(session_->Add(2, Batch({0.2}), losses).ok());
   journal_.Fail(full);
   journal_.Release();
-  // The stream has sent this one before it could hear of the loss.
+  // The stream has sent this batch before it could hear of the loss.
   EXPECT_EQ(session_->Add(3, Batch({0.3}), losses).status(), full);
   EXPECT_EQ(session_->Add(3, Batch({0.3})).status(), full);
-  // Nor does it help when the strand has loaded the session again meanwhile.
+  // The batch is refused even after the strand has loaded the session again.
   ASSERT_TRUE(session_->Load({}).ok());
   EXPECT_EQ(session_->Add(3, Batch({0.3}), losses).status(), full);
   EXPECT_EQ(session_->Add(2, Batch({0.2}), losses).status(), full);
@@ -338,7 +338,7 @@ TEST_F(SessionTest, GoesOnFromASnapshotToTheSameBits) {
   EXPECT_LT(snapshot->rows, 5'000);
   Restart();
   EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
-  // One that cannot be read is not needed.
+  // An unreadable snapshot is not needed.
   snapshot->state.resize(snapshot->state.size() / 2);
   journal_.SaveSnapshot(number, *snapshot);
   Restart();

@@ -44,7 +44,7 @@ TEST(StoredRows, ForgetASessionOnceHoweverItsBatchesEnd) {
   ASSERT_TRUE(rows.Take(1, "a", 6).ok());
   ASSERT_TRUE(rows.Take(2, "a", 3).ok());
   rows.Forget(1);
-  rows.Release(1, 6);  // of a batch that was under way
+  rows.Release(1, 6);  // from a batch that was under way
   rows.Forget(1);
   EXPECT_EQ(rows.OfTenant("a"), 3);
 }

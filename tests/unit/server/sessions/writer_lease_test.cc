@@ -32,7 +32,7 @@ TEST_F(WriterLeaseTest, GoesToTheSameWriterOnAnotherConnectionWhichTheFirstIsTol
   ASSERT_TRUE(lease_.Claim(second_, "rig").ok());
   EXPECT_EQ(first_->replaced, 1);
   EXPECT_EQ(second_->replaced, 0);
-  // The first one's end is nothing to the second.
+  // The end of the first writer does not affect the second.
   EXPECT_FALSE(lease_.Release(first_.get()));
   EXPECT_TRUE(lease_.is_held());
 }
@@ -40,7 +40,7 @@ TEST_F(WriterLeaseTest, GoesToTheSameWriterOnAnotherConnectionWhichTheFirstIsTol
 TEST_F(WriterLeaseTest, IsForNobodyOnceClosed) {
   ASSERT_TRUE(lease_.Claim(first_, "rig").ok());
   EXPECT_EQ(lease_.Close(), first_);
-  EXPECT_EQ(first_->closed, 0);  // that is the session's to tell
+  EXPECT_EQ(first_->closed, 0);  // The session tells it.
   EXPECT_EQ(lease_.Claim(second_, "rig"), absl::NotFoundError("sessions/a has been deleted"));
   EXPECT_TRUE(lease_.Release(first_.get()));
   EXPECT_EQ(lease_.Close(), nullptr);

@@ -82,7 +82,7 @@ TEST(GrpcLogTest, FindsWhyAHandshakeFailed) {
   EXPECT_EQ(FailedHandshake("Using polling engine: epoll1"), "");
 }
 
-// What a scrape shows of a family: the sum over its series, of a histogram the count.
+// Returns what a scrape shows of a family: the sum over its series, or a histogram's count.
 double Total(const Metrics& metrics, const std::string& name) {
   for (const auto& family : metrics.collectable()->Collect()) {
     if (family.name != name) continue;
