@@ -24,7 +24,7 @@ TEST(LogEvidence, OfAGaussianIsItsNormalization) {
     const LogDensity density = [](const Matrix& points, Vector& values) {
       values = 40 - 0.5e6 * points.rowwise().squaredNorm().array();
     };
-    // log ∫ e^{40 − r²/2s²} = 40 + n/2 log 2π + n log s
+    // The oracle is log ∫ e^{40 − r²/2s²} = 40 + n/2 log 2π + n log s
     const double exact = 40 + n * (0.5 * std::log(2 * std::numbers::pi) + std::log(1e-3));
     EXPECT_NEAR(LogEvidence(density, draws, Equal(20'000)), exact, 0.01) << n;
   }

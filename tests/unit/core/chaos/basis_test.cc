@@ -100,7 +100,7 @@ TEST(Basis, OfOrderTenIsOrthonormalInOneDimension) {
 
 TEST(Basis, ManyPointsAgreeWithOneAtATime) {
   const Basis basis(FourFamilies(), 4);
-  // below, at and beyond the number of points taken at a time
+  // The counts are below, at and beyond the number of points taken at a time
   for (const int count : {1, 7, 128, 300}) {
     const Matrix points = CollocationPoints(PointSet::kHalton, basis.germs(), 4, count).value();
     Matrix values;

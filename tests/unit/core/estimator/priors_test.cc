@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-// 2000 particles are worth at least this many (posterior_test.cc).
+// The 2000 particles are worth at least this many (posterior_test.cc).
 constexpr double kIndependent = 1000;
 const double kMeanError = 4 / std::sqrt(kIndependent);  // in deviations
 const double kQuantileError = 4 * std::sqrt(0.025 * 0.975 / kIndependent) / 0.0584;  // of a normal
@@ -224,7 +224,7 @@ TEST(LognormalPriors, AreWhatAnEstimateFromNothingIs) {
 
 TEST(TruncatedNormalPriors, GiveTheExactPosterior) {
   const double noise = 0.05;
-  // These say little more than nothing.
+  // The samples say little more than nothing.
   const Samples samples = At({0.13, 0.31, 0.71}, {0.005, 0.01, -0.02});
   const UncertainParameter v0 = UncertainParameter::TruncatedNormal("v0", 0.2, 0.5, 0).value();
   const Estimate estimate = EstimateOf(InitialVelocityProblem(v0, noise), samples);

@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr double kNoise = 0.02;  // m
-// of an estimate, worth at least half that many (posterior_test.cc)
+// The particles of an estimate are worth at least half their number (posterior_test.cc).
 constexpr double kParticles = 2000;
 
 std::vector<double> InformativeTimes() { return {0, 0.13, 0.31, 0.71, 1.2, 1.77}; }
@@ -128,7 +128,7 @@ TEST(Estimates, FromDataThatSayNothingAreThePrior) {
     EXPECT_NEAR(parameter.mean, 1, 4 * parameter.prior_std_dev / std::sqrt(kParticles / 2));
     EXPECT_NEAR(parameter.std_dev, parameter.prior_std_dev, 1e-9);
     EXPECT_THAT(Message(estimate, DiagnosticCode::kNotIdentified), HasSubstr("v0"));
-    // One sample time cannot undersample.
+    // The record has only one time, which is no sampling.
     EXPECT_FALSE(Has(estimate, DiagnosticCode::kUndersampled));
   }
 }

@@ -117,7 +117,7 @@ TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {
   earlier.time_s = {0, 0.5, 0.75};
   earlier.columns[0].value = {1, 1, 1};
   const CheckedSamples checked = checks_.Check(earlier).value();
-  // without the 3 of the batch before
+  // The maximum leaves out the 3 of the batch before.
   EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 + 0.001);
 }
 
