@@ -160,8 +160,8 @@ Case OfAnAlias() {
 
 class MixtureAccuracy : public ::testing::TestWithParam<Case> {};
 
-// The bound covers the weights. A bridge between 8,192 draws of each piece has a relative error of
-// about 10⁻², and the errors of the expansions add as much.
+// The bound covers the weights. Bridge sampling with 8,192 draws beside as many has a relative
+// error of about 10⁻², and the errors of the expansions add as much.
 TEST_P(MixtureAccuracy, IsThatOfQuadratureOnTheModel) {
   constexpr double kMaxError = 0.03;
   const Case& one = GetParam();
