@@ -1,5 +1,5 @@
-// Whether what polyest says of its uncertainty is true: campaigns with a truth drawn from the
-// prior, each estimated without knowing it. Over many campaigns
+// Tests whether polyest's uncertainties are true. Each campaign draws a truth from the prior and
+// estimates it without knowing it. Over many campaigns
 //   - 95 % intervals must hold the truth 95 times in 100,
 //   - (truth − posterior mean)/posterior standard deviation must have standard deviation 1,
 //   - the truth's rank among draws of the posterior must be uniform (Talts et al. 2018), by
@@ -25,7 +25,7 @@
 namespace polyest::internal::calibration {
 namespace {
 
-// One value a parameter and campaign.
+// The results of all campaigns, one value a parameter and campaign.
 struct Outcomes {
   std::vector<double> errors;  // (truth − mean)/standard deviation
   std::vector<double> ranks;   // in [0, 1]
@@ -45,7 +45,7 @@ struct Outcomes {
   }
 };
 
-// P(D > d) of Kolmogorov's distribution with Stephens' correction for finite samples.
+// Returns P(D > d) of Kolmogorov's distribution with Stephens' correction for finite samples.
 double KolmogorovProbability(std::vector<double> ranks) {
   std::ranges::sort(ranks);
   const auto n = static_cast<double>(ranks.size());
@@ -88,7 +88,7 @@ void Print(const std::string& rig, const char* length, const char* noise, int ca
   std::fflush(stdout);
 }
 
-// Parameters of one campaign are not independent: standard errors count campaigns.
+// Tests the limits. Standard errors count campaigns: the parameters of one are not independent.
 bool WithinLimits(const Outcomes& all, double campaigns) {
   const double coverage = std::max(0.02, 3 * std::sqrt(0.95 * 0.05 / campaigns));
   const double deviation = std::max(0.05, 3 / std::sqrt(2 * campaigns));

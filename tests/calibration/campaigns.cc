@@ -48,7 +48,7 @@ Rig RollPlane() {
   return rig;
 }
 
-// The outputs of a problem at the truth, rows × channels.
+// Returns the outputs of a problem at the truth, rows × channels.
 Matrix Simulate(const Problem& problem, const Vector& truth, const std::vector<double>& times_s) {
   Problem exact = problem;
   exact.integration.relative_tolerance = 1e-11;

@@ -15,7 +15,8 @@ enum class Noise { kWhite, kUnknown, kCorrelated };
 inline constexpr Noise kNoises[] = {Noise::kWhite, Noise::kUnknown, Noise::kCorrelated};
 const char* NameOf(Noise noise);
 
-// A rig: what is estimated and from which rows. The problem's noise is white and known.
+// A rig: the parameters to estimate and the rows to estimate them from. The problem's noise is
+// white and known.
 struct Rig {
   std::string name;
   Problem problem;
@@ -30,8 +31,8 @@ struct Campaign {
   Samples record;
 };
 
-// A function of its arguments alone. Correlated noise is of unknown size and time constant, the
-// latter three intervals.
+// Returns a campaign that depends on the arguments alone. Correlated noise has an unknown size and
+// an unknown time constant, which is three intervals.
 Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed);
 
 }  // namespace polyest::internal::calibration

@@ -1,5 +1,5 @@
-// A whole model, and tied parameters, made of arbitrary bytes: none may crash it, hang it or make
-// it ask for more memory than its limits allow.
+// Makes whole models, and tied parameters, of arbitrary bytes. None may crash the library, hang it
+// or make it ask for more memory than its limits allow.
 //
 // Each line of the input is an entry of the specification, by its first character:
 //   s name=text   a state          o name=text   an output     i name=text   an intermediate
@@ -85,7 +85,7 @@ void Evaluate(const polyest::StateSpaceModel& model) {
   model.InitialStates(parameters, states);
 }
 
-// The intermediates once more, as parameters tied to others.
+// Ties parameters by the expressions of the intermediates.
 void Tie(const EquationSpecification& equations) {
   const auto expressions = polyest::internal::Expressions::Make("derived", equations.intermediates,
                                                                 {"k1", "m", "u.delay"});

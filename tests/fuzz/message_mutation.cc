@@ -11,7 +11,7 @@
 namespace polyest::internal {
 namespace {
 
-// Of a string that grows by mutation.
+// The greatest length of a string that grows by mutation.
 constexpr size_t kLongestText = 256;
 
 template <typename Value, size_t kCount>
@@ -19,7 +19,7 @@ Value Any(const Value (&values)[kCount], size_t chosen) {
   return values[chosen % kCount];
 }
 
-// Set a field, or an element of a repeated field where index is not negative.
+// Sets a field, or an element of a repeated field if `index` is not negative.
 #define POLYEST_SET_FIELD(Kind, value)                       \
   (index < 0 ? reflection.Set##Kind(&message, &field, value) \
              : reflection.SetRepeated##Kind(&message, &field, index, value))
@@ -58,7 +58,7 @@ void MessageMutation::Mutate(Message& message) {
   }
 }
 
-// One that is set, mostly.
+// Returns a field, mostly one that is set.
 const MessageMutation::Field* MessageMutation::ChooseField(const Message& message) {
   std::vector<const Field*> fields;
   message.GetReflection()->ListFields(message, &fields);
@@ -130,7 +130,7 @@ void MessageMutation::AddElement(Message& message, const Field& field) {
     case Field::CPPTYPE_BOOL:
       return reflection.AddBool(&message, &field, Choose(2) == 0);
     default:
-      return;  // no others in the service
+      return;  // the service has no fields of other types
   }
 }
 
@@ -150,7 +150,7 @@ void MessageMutation::MutateElement(Message& message, const Field& field, int in
     case Field::CPPTYPE_ENUM:
       return POLYEST_SET_FIELD(EnumValue, Enumerator(field));
     default:
-      return;  // no others in the service
+      return;  // the service has no fields of other types
   }
 }
 

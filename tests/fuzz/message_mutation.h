@@ -14,24 +14,25 @@ namespace polyest::internal {
 
 class MessageMutation {
  public:
-  // Changes bytes in place and gives their new number, as LLVMFuzzerMutate.
+  // Changes bytes in place and returns their new number, as LLVMFuzzerMutate does.
   using MutateBytes = size_t (*)(uint8_t* data, size_t size, size_t most);
 
   MessageMutation(uint32_t seed, MutateBytes mutate_bytes)
       : random_(seed), mutate_bytes_(mutate_bytes) {}
 
-  // What strings and messages may be set to as well as to anything else. The message must stay.
+  // Learns values that strings and messages may later be set to, beside random ones. The message
+  // must outlive the object.
   void Learn(const google::protobuf::Message& message);
 
-  // One field of the message, or of a message in it.
+  // Changes one field of the message or of a message in it.
   void Mutate(google::protobuf::Message& message);
 
-  // To a copy of one of its type that was learnt, if there is one.
+  // Sets the message to a copy of a learnt one of its type, if there is one.
   void Replace(google::protobuf::Message& message);
 
   void MutateBytesOf(std::string& bytes);
 
-  // 0 … count − 1; count > 0.
+  // Returns a number in 0 … count − 1; requires count > 0.
   size_t Choose(size_t count) { return random_() % count; }
 
  private:

@@ -86,7 +86,7 @@ void OpenRpc::CheckStatus(const grpc::Status& status) const {
   const grpc::StatusCode code = status.error_code();
   const bool fault = code == grpc::StatusCode::INTERNAL || code == grpc::StatusCode::UNKNOWN ||
                      code == grpc::StatusCode::DATA_LOSS;
-  // gRPC itself refuses what it cannot parse as INTERNAL.
+  // gRPC itself refuses with INTERNAL a request that it cannot parse.
   if (!fault || !well_formed_) return;
   std::fprintf(stderr, "%s: code %d: %s\n", call_.method->name().c_str(), static_cast<int>(code),
                status.error_message().c_str());

@@ -1,6 +1,6 @@
 #pragma once
 
-// One call of a script, from the client's side: bytes out and bytes in.
+// Makes one call of a script as a client: sends and receives bytes.
 
 #include <grpcpp/client_context.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -16,13 +16,13 @@
 
 namespace polyest::internal {
 
-// Has ended when it goes: the destructor cancels it and waits.
+// A call of a script. The destructor cancels it and waits for its end.
 class OpenRpc final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   OpenRpc(grpc::GenericStub& stub, const ScriptCall& call, std::chrono::milliseconds deadline);
   ~OpenRpc() override;
 
-  // Until it has ended or, if the service may answer for ever, for a moment.
+  // Waits for the end of the call, or only for a moment if the service may answer for ever.
   void Await();
 
   void OnReadDone(bool ok) override;
@@ -31,8 +31,8 @@ class OpenRpc final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::Byt
 
  private:
   void WriteNext();
-  // An answer is a message of its type, and what is wrong with a request is never the daemon's
-  // fault.
+  // Checks that each answer is a message of its type, and that no bad request is called the
+  // daemon's fault.
   void CheckAnswer();
   void CheckStatus(const grpc::Status& status) const;
 
@@ -40,7 +40,7 @@ class OpenRpc final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::Byt
   grpc::ClientContext context_;
   grpc::ByteBuffer answer_;
   std::vector<grpc::ByteBuffer> requests_;
-  bool well_formed_ = true;  // the requests
+  bool well_formed_ = true;  // whether all requests are
   size_t written_ = 0;
 
   std::mutex mutex_;

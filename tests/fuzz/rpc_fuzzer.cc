@@ -1,6 +1,6 @@
-// Arbitrary requests to every call of the service, several in a row and on streams, against a
-// daemon in the same process: none may crash it, hang it, make it answer with a fault of its own,
-// or leave anything behind. An input is a script, see rpc_script.h.
+// Sends arbitrary requests to every call of the service, several in a row and on streams, to a
+// daemon in the same process. None may crash it, hang it, make it answer with a fault of its own,
+// or leave anything behind. An input is a script (rpc_script.h).
 
 #include <google/protobuf/stubs/logging.h>
 #include <grpcpp/create_channel.h>
@@ -31,12 +31,12 @@ namespace polyest::internal {
 namespace {
 
 constexpr size_t kMaxCalls = 12;
-// What is computed for one call. Whoever does not stop at it holds up the next input, until
-// libFuzzer finds that it hangs.
+// The time limit of the computation for one call. A computation that does not stop at it delays the
+// next input until libFuzzer reports a hang.
 constexpr std::chrono::milliseconds kDeadline{100};
 
-// A daemon that keeps nothing on disk, with one thread for each kind of call, so that what happens
-// is the same every time.
+// A daemon that keeps nothing on disk. It has one thread for each kind of call, so that each run of
+// an input is the same.
 class Server {
  public:
   Server() {
@@ -70,7 +70,7 @@ class Server {
   }
 
  private:
-  // The next input finds the daemon as this one did.
+  // Brings the daemon back to its first state for the next input.
   void Clean() {
     AwaitCalls();
     DeleteOperations();
@@ -108,7 +108,7 @@ class Server {
     }
   }
 
-  // One call in each lane of the executor comes after all that were cancelled there.
+  // Waits for all cancelled calls, by one more call in each lane of the executor.
   void AwaitCalls() {
     grpc::ClientContext of_models, of_sessions;
     v1::ListModelsResponse models;
@@ -127,7 +127,7 @@ class Server {
   std::unique_ptr<v1::OperationService::Stub> operations_;
 };
 
-// Another call, with a request of nothing, or one that is there once more.
+// Adds a call, with an empty request or a copy of one in the script.
 void AddCall(RpcScript& script, MessageMutation& mutation) {
   const auto methods = FuzzedMethods();
   ScriptCall call{.method = methods[mutation.Choose(methods.size())], .requests = {}};
@@ -151,7 +151,7 @@ void MutateCall(RpcScript& script, MessageMutation& mutation) {
       call.cancelled = !call.cancelled;
       return;
     case 3:
-      // On the wire from here on.
+      // The request is kept as bytes from here on.
       request.bytes = request.Wire();
       request.message = nullptr;
       return mutation.MutateBytesOf(request.bytes);
@@ -191,13 +191,13 @@ std::string MutateScript(std::string_view text, unsigned seed) {
 }  // namespace
 }  // namespace polyest::internal
 
-// OpenSSL keeps the errors of a thread where the leak sanitizer does not look.
+// Hides OpenSSL's list of errors of a thread: the leak sanitizer does not see the pointer to it.
 extern "C" const char* __lsan_default_suppressions() { return "leak:CRYPTO_zalloc"; }
 
 extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t most, unsigned seed) {
   const std::string text =
       polyest::internal::MutateScript({reinterpret_cast<const char*>(data), size}, seed);
-  // Too long to be kept whole: as the bytes that it is.
+  // Changes the raw bytes of an input that is too long to be kept whole.
   if (text.size() > most || seed % 16 == 0) return LLVMFuzzerMutate(data, size, most);
   std::memcpy(data, text.data(), text.size());
   return text.size();

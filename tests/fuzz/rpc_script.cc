@@ -34,7 +34,7 @@ ScriptRequest ParseRequest(const MethodDescriptor& method, bool as_bytes, std::s
   return request;
 }
 
-// By its name, which no two services share.
+// Returns the method of a name; no two services share one.
 const MethodDescriptor* FindMethod(std::string_view name) {
   for (const MethodDescriptor* const method : FuzzedMethods()) {
     if (method->name() == name) return method;
@@ -42,7 +42,7 @@ const MethodDescriptor* FindMethod(std::string_view name) {
   return nullptr;
 }
 
-// One head line (without its end) and what is below it.
+// Parses one head line (without its end) and the body below it.
 void ParsePart(std::string_view head, std::string_view body, RpcScript& script) {
   const bool as_bytes = head.front() == '=';
   const bool cancelled = head.back() == '!';

@@ -1,6 +1,6 @@
 #pragma once
 
-// Calls to the service, one after the other, as text that a person can read and write:
+// A script: calls to the service, one after the other, as text that a person can read and write.
 //
 //   >CreateSession                     a call, and its request in protobuf's text format
 //   session_id: "a" problem { … }
@@ -22,9 +22,9 @@
 
 namespace polyest::internal {
 
-// One of the two.
+// A request, either as a message or as bytes.
 struct ScriptRequest {
-  std::unique_ptr<google::protobuf::Message> message;  // null: bytes
+  std::unique_ptr<google::protobuf::Message> message;  // null if the request is bytes
   std::string bytes;
 
   std::string Wire() const;
@@ -38,12 +38,12 @@ struct ScriptCall {
 
 using RpcScript = std::vector<ScriptCall>;
 
-// Of all services.
+// Returns the methods of all services.
 std::vector<const google::protobuf::MethodDescriptor*> FuzzedMethods();
 std::unique_ptr<google::protobuf::Message> MakeMessage(const google::protobuf::Descriptor& type);
 
-// What can be read of it: a line that names no method ends the request before it, and a request
-// breaks off at its first error.
+// Parses as much of the text as possible. A line that names no method ends the request before it,
+// and a request ends at its first error.
 RpcScript ParseScript(std::string_view text);
 std::string PrintScript(const RpcScript& script);
 

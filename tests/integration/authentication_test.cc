@@ -1,4 +1,4 @@
-// Every method × every caller.
+// Tests every method with every kind of caller.
 
 #include <absl/strings/match.h>
 
@@ -71,7 +71,7 @@ TEST_F(AuthenticationTest, LetsAReaderRead) { ExpectByRole(reader_.secret, Role:
 TEST_F(AuthenticationTest, LetsAWriterWrite) { ExpectByRole(writer_.secret, Role::kWriter); }
 TEST_F(AuthenticationTest, LetsAnAdminDoEverything) { ExpectByRole(admin_.secret, Role::kAdmin); }
 
-// A request about sessions/rig, as bytes; none for methods that are not about a session.
+// Returns a request about sessions/rig, as bytes; nothing if the method is not about a session.
 std::optional<std::string> AboutTheRig(const std::string& method) {
   const auto& descriptor = *FindMethod(method).input_type();
   const bool by_name =
@@ -109,11 +109,11 @@ TEST_F(AuthenticationTest, HidesTheSessionsOfATenantFromOthers) {
     EXPECT_EQ(CallRaw(channel, MethodPath(method), other_.secret, *request).error_code(),
               StatusCode::NOT_FOUND);
   }
-  EXPECT_GE(methods, 15);  // those of today: the loop does look at sessions
+  EXPECT_GE(methods, 15);  // the number of today: the loop does look at sessions
   std::string list;
   EXPECT_TRUE(CallRaw(channel, MethodPath("ListSessions"), other_.secret, "", &list).ok());
   EXPECT_EQ(list, "");
-  // Names are the tenant's own.
+  // Each tenant has session names of its own.
   EXPECT_TRUE(
       CallRaw(channel, MethodPath("CreateSession"), other_.secret, create.SerializeAsString())
           .ok());
@@ -145,7 +145,7 @@ TEST_F(AuthenticationTest, TakesNoConnectionWithoutTlsAndLogsIt) {
   const auto logged = [this] {
     return absl::StrContains(daemon_->Errors(), "a connection failed in its TLS handshake");
   };
-  // The client may hear of the end of its connection just before the log does.
+  // The client may notice the end of its connection just before the log does.
   for (int attempt = 0; attempt < 100 && !logged(); ++attempt) {
     ExpectNoConnection(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
   }
@@ -206,7 +206,7 @@ TEST(ClientCertificate, MakesAnAdminOfItsHolderWhereThereAreNoTokens) {
   }
 }
 
-// The daemon's one line and exit status.
+// Returns the one line that the daemon writes, and checks its exit status.
 std::string Refusal(const std::vector<std::string>& arguments, int exit_status) {
   DaemonProcess daemon(arguments);
   EXPECT_EQ(daemon.ReadLine(), "");

@@ -1,4 +1,4 @@
-// What the command answers, in this process and by a daemon.
+// Tests the command's answers, computed in this process and by a daemon.
 
 #include <gmock/gmock.h>
 
@@ -19,7 +19,7 @@ using ::testing::StartsWith;
 
 class AnswersTest : public CommandTest {
  protected:
-  // The same command in this process and by a daemon.
+  // Runs a command in this process and with a daemon, and compares the answers.
   void ExpectSameAnswer(const std::vector<std::string>& arguments) {
     const Finished local = Run(arguments);
     ASSERT_EQ(local.exit_status, 0) << local.err;
