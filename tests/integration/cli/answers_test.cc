@@ -183,7 +183,8 @@ INSTANTIATE_TEST_SUITE_P(
             {{"m", 42.5}, {"k1", 11300}, {"s", 1.17}, {"y.delay", 0.0073}, {"force.offset", 21}}}),
     [](const auto& record) { return std::string(record.param.name); });
 
-// The integrator takes the same steps, so that what is left is rounding.
+// Compares a model as text with the built-in one. The integrator takes the same steps, so that only
+// rounding differs.
 TEST_F(CommandTest, EstimatesTheSameFromAModelAsText) {
   const std::string text = File("text.json", R"({
     "model": {"equations": {"states": {"x": "v", "v": "-(k*x + c*v)/m"}, "outputs": {"x": "x"},
@@ -231,7 +232,7 @@ TEST_F(CommandTest, RanksTheParametersThatMatter) {
   v1::ComputeSensitivityResponse response;
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(run.out, &response).ok()) << run.out;
   ASSERT_EQ(response.activity_size(), 2);
-  // What the README says of it.
+  // The README says so.
   EXPECT_EQ(response.activity(0).parameter(), "k");
   EXPECT_NEAR(response.activity(0).share(), 0.99, 0.01);
   EXPECT_EQ(response.activity(1).parameter(), "c");
@@ -259,7 +260,7 @@ v1::ComputeExperimentDesignResponse DesignOf(const Finished& run) {
   return response;
 }
 
-// The inputs of forced.json at a tenth of its frequency, and at its own.
+// Compares the inputs of forced.json at a tenth of their frequency and at their own frequency.
 TEST_F(CommandTest, RanksTheInputsOfANextExperiment) {
   const std::string slow = File("slow.json", R"({
     "model": {"builtin": "mass_spring_damper"},
@@ -277,8 +278,9 @@ TEST_F(CommandTest, RanksTheInputsOfANextExperiment) {
   EXPECT_NEAR(response.parameters(0).std_dev(), 0.05, 1e-12);
 }
 
-// The demonstration record's own parameters are somewhere in the prior, and its curvature hangs on
-// its noise: the mean over the prior is near what it turns out to be, not equal.
+// Compares the promised uncertainty with that of the estimate. The promise is a mean over the
+// prior; the estimate depends on the record's own parameters and noise. The two are near each
+// other, not equal.
 TEST_F(CommandTest, PromisesOfARecordWhatItsEstimateThenHas) {
   const auto design = DesignOf(Run({"design", Example("oscillator.json"), "--until", "2", "--step",
                                     "0.05", "--format", "json"}));
@@ -295,7 +297,7 @@ TEST_F(CommandTest, DesignsAfterWhatHasBeenMeasured) {
   const std::string data = File("data.csv", DemoRows(100));
   const auto after = DesignOf(
       Run({"design", Example("oscillator.json"), data, "--until", "5", "--format", "json"}));
-  // What the estimate says of the same record is what is known beforehand.
+  // The design starts from the knowledge that the estimate of this record gives.
   const Finished run = Run({"estimate", Example("oscillator.json"), data, "--format", "json"});
   const v1::Estimate estimate = ParseEstimate(run.out);
   for (int i = 0; i < 2; ++i) {
@@ -304,7 +306,8 @@ TEST_F(CommandTest, DesignsAfterWhatHasBeenMeasured) {
     EXPECT_NEAR(after.parameters(i).std_dev(), estimate.parameters(i).std_dev(),
                 1e-3 * estimate.parameters(i).std_dev());
   }
-  // As many samples again: both standard deviations fall by about √2, a bit in all.
+  // The experiment doubles the number of samples: both standard deviations fall by about √2, a gain
+  // of one bit in all.
   EXPECT_NEAR(after.candidates(0).gain().bits(), 1, 0.1);
   EXPECT_EQ(after.candidates(0).diagnostics_size(), 0);
 }
@@ -317,7 +320,7 @@ TEST_F(CommandTest, PrintsOneCsvRowAPointOfTheCost) {
   const auto lines = Lines(run.out);
   ASSERT_THAT(lines, SizeIs(4));
   EXPECT_EQ(lines[0], "k,mismatch,prior,total");
-  // The prior's bounds, but for rounding.
+  // The table ends at the prior's bounds, but for rounding.
   EXPECT_NEAR(std::stod(lines[1]), 31.584, 1e-9);
   EXPECT_NEAR(std::stod(lines[3]), 47.376, 1e-9);
 }
@@ -370,7 +373,7 @@ TEST_F(CommandTest, PrintsOneCsvRowAValueOfAProfile) {
   const auto lines = Lines(run.out);
   ASSERT_THAT(lines, SizeIs(6));
   EXPECT_EQ(lines[0], "parameter,value,total,mismatch,prior,k,c");
-  EXPECT_THAT(lines[3], StartsWith("c,0.230"));  // the middle one, the minimum
+  EXPECT_THAT(lines[3], StartsWith("c,0.230"));  // the middle row is the minimum
 }
 
 TEST_F(CommandTest, PrintsOneCsvRowAWeightOfARegularizationAndDrawsIt) {

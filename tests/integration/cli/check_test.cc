@@ -1,4 +1,4 @@
-// What `polyest check`, `init` and `schema` say.
+// Tests the output of `polyest check`, `init` and `schema`.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ constexpr char kProblem[] = R"({
 
 class CheckTest : public CommandTest {
  protected:
-  // The warnings about data for the problem above.
+  // Returns the warnings about data for the problem above.
   std::string Warnings(const std::string& data) {
     const Finished run = Run({"check", File("p.json", kProblem), File("d.csv", data)});
     EXPECT_EQ(run.exit_status, 0) << run.err;

@@ -1,4 +1,4 @@
-// A daemon under whose feet the clock of the machine is set.
+// Tests a daemon while the clock of its machine is set.
 
 #include <gmock/gmock.h>
 #include <stdlib.h>
@@ -18,7 +18,8 @@ constexpr int64_t kJumpS = 400 * 86'400;
 
 class ClockTest : public CommandTest {
  protected:
-  // libfaketime reads the offset out of a file, again for each look at the clock.
+  // Starts a daemon under libfaketime, which reads its offset from a file at each look at the
+  // clock.
   std::unique_ptr<DaemonProcess> StartDaemon() {
     SetClock("+0");
     const std::vector<std::pair<const char*, std::string>> variables = {
@@ -33,7 +34,7 @@ class ClockTest : public CommandTest {
   }
   void SetClock(const std::string& offset) const { File("clock", offset + "\n"); }
 
-  // A new session of the daemon, as it says itself.
+  // Creates a session and returns the daemon's answer.
   static v1::Session Created(Client& client) {
     v1::CreateSessionRequest create;
     *create.mutable_session()->mutable_problem() = *ReadProblemFile(Example("oscillator.json"));

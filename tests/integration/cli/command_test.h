@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of the command share: its programs, files and a daemon.
+// The fixture of the command's tests: its programs, files and a daemon.
 
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ class CommandTest : public ::testing::Test {
   }
   ~CommandTest() override { std::filesystem::remove_all(folder_); }
 
-  // Writes a file into a folder of the test's own; its path.
+  // Writes a file into the test's own folder and returns its path.
   std::string File(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
@@ -73,7 +73,7 @@ class CommandTest : public ::testing::Test {
     return std::string(POLYEST_SOURCE_DIR) + "/client/examples/" + name;
   }
 
-  // The first rows of the demonstration record, with its header.
+  // Returns the first rows of the demonstration record, with its header.
   static std::string DemoRows(int rows) {
     std::ifstream in(Example("oscillator.csv"));
     std::string text;

@@ -1,4 +1,4 @@
-// What the command says to bad usage, bad input and bad connections.
+// Tests the command's errors for bad usage, bad input and bad connections.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
@@ -30,14 +30,14 @@ constexpr char kData[] = "t,x\n0.1,0.8\n0.2,0.3\n";
 
 class ErrorsTest : public CommandTest {
  protected:
-  // A problem like the good one, but for one text.
+  // Returns the good problem with one text replaced.
   static std::string Changed(const std::string& from, const std::string& to) {
     const std::string problem = absl::StrReplaceAll(kProblem, {{from, to}});
     EXPECT_NE(problem, kProblem);
     return problem;
   }
 
-  // Estimates in this process; the one line of its error.
+  // Runs an estimate in this process and returns its one line of error.
   std::string Refused(const std::string& problem, const std::string& data) {
     const Finished run = Run({"estimate", File("problem.json", problem), File("data.csv", data)});
     return OneLine(run, 2);
@@ -51,7 +51,7 @@ class ErrorsTest : public CommandTest {
     return run.err;
   }
 
-  // No server is there: it was, and has gone.
+  // Returns the address of a server that has gone, so that none is there.
   static std::string GoneAddress() {
     DaemonProcess daemon;
     return daemon.address();
@@ -131,7 +131,7 @@ TEST_F(ErrorsTest, TheDaemonSaysTheSame) {
 
 TEST_F(ErrorsTest, AMessageTooLarge) {
   DaemonProcess daemon({"--max-message-mb", "1"});
-  // Two doubles a row: a little more than 1 MiB.
+  // Each row has two doubles: the record is a little longer than 1 MiB.
   std::string data = "t,x\n";
   for (int i = 1; i <= 70'000; ++i) absl::StrAppend(&data, i, ",0\n");
   const std::string problem = File("p.json", kProblem);
@@ -193,7 +193,7 @@ TEST_F(ErrorsTest, AServerThatCannotBeReached) {
 
 TEST_F(ErrorsTest, ADeadlineThatPasses) {
   DaemonProcess daemon;
-  // Nearly as many numbers as an answer may have: no daemon computes them in a millisecond.
+  // The answer has nearly as many numbers as allowed: no daemon computes them in a millisecond.
   EXPECT_THAT(OneLine(Run({"propagate", File("p.json", kProblem), "--until", "700", "--step",
                            "0.001", "--server", daemon.address(), "--deadline", "0.001"}),
                       3),

@@ -1,6 +1,6 @@
-// What `polyest explain` says of the three cases that the paper has for it: sections 3.4 to 3.6.
-// The records are the means of what the priors predict: without noise, and near to the truth at the
-// priors' centres.
+// Tests `polyest explain` on the paper's three cases, sections 3.4 to 3.6. The records are the
+// means of the priors' predictions: they have no noise, and their truth is near the priors'
+// centres.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -23,8 +23,8 @@ constexpr char kOneMass[] = R"({
 
 class ExplainTest : public CommandTest {
  protected:
-  // The explanation of a record of `outputs`, as the problem predicts them; by that of `as`, if it
-  // is given, for which the record has a column of ones too.
+  // Returns the explanation of a record of `outputs`, as the problem predicts them. If `as` is
+  // given, that problem explains the record, which then has a column of ones too.
   std::string Explain(const std::string& problem, const std::vector<std::string>& outputs,
                       const std::string& as = "", const std::string& ones = "") {
     const std::string file = File("problem.json", problem);

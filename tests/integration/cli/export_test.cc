@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 class ExportTest : public CommandTest {
  protected:
-  // The demonstration record, streamed into the session `monday`.
+  // Streams the demonstration record into the session `monday`.
   void SetUp() override {
     const Finished run = Run({"stream", Example("oscillator.json"), "-", "--server",
                               daemon_.address(), "--session", "monday", "--format", "jsonl"},
@@ -23,7 +23,7 @@ class ExportTest : public CommandTest {
     arguments.insert(arguments.end(), {"--server", daemon_.address()});
     return Run(arguments);
   }
-  // What a stream that goes on from there ends with.
+  // Continues the stream of a session and returns its last estimate.
   std::string LastEstimateOf(const std::string& session) const {
     const Finished run = Run({"stream", Example("oscillator.json"), "-", "--server",
                               daemon_.address(), "--session", session, "--format", "jsonl"},

@@ -1,4 +1,4 @@
-// FMUs of a folder, in this process and by a daemon.
+// Tests FMUs of a folder, in this process and in a daemon.
 
 #include <gmock/gmock.h>
 
@@ -15,7 +15,7 @@ using ::testing::IsEmpty;
 
 class FmuCommandTest : public CommandTest {
  protected:
-  // The demonstration's problem with this model.
+  // Returns the demonstration's problem with this model.
   std::string Problem(const std::string& model) const {
     return File("problem.json", R"({"model": )" + model + R"(, "fixed": {"m": 1.0, "x0": 1.0},
       "uncertain": [{"name": "k", "uniform": {"lower": 31.584, "upper": 47.376}},
@@ -28,7 +28,8 @@ class FmuCommandTest : public CommandTest {
     EXPECT_EQ(run.exit_status, 0) << run.err;
     return ParseEstimate(run.out);
   }
-  // The largest difference of the estimates from the built-in model's, in standard deviations.
+  // Returns the largest difference from the estimates of the built-in model, in standard
+  // deviations.
   double Difference(const std::string& fmu) {
     const v1::Estimate with_fmu = Estimate(R"({"fmu": ")" + fmu + R"("})");
     double largest = 0;
@@ -50,8 +51,9 @@ TEST_F(FmuCommandTest, EstimatesAsTheBuiltInModelWhereTheIntegratorIsOurs) {
 }
 
 TEST_F(FmuCommandTest, EstimatesAsTheBuiltInModelToTheErrorOfTheFmusOwnSteps) {
-  // Steps of 1 ms of fourth order err by ω⁵ h⁴ t/120 = 4e-10 m at ω = 6.4 rad/s over 5 s: 4e-8 of
-  // the noise of one sample, and the integrator of the built-in model by some 1e-7 m, 1e-5 of it.
+  // The FMU's steps of 1 ms of fourth order err by ω⁵ h⁴ t/120 = 4e-10 m at ω = 6.4 rad/s over 5 s,
+  // which is 4e-8 of the noise of one sample. The built-in model's integrator errs by some 1e-7 m,
+  // 1e-5 of the noise.
   EXPECT_LT(Difference("oscillator_cs2"), 1e-3);
   EXPECT_LT(Difference("oscillator_cs3"), 1e-3);
 }

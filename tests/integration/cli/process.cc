@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-// In the child, between fork and exec.
+// Runs in the child, between fork and exec.
 [[noreturn]] void Become(char* const* arguments, int input, int output, int errors) {
   dup2(input, STDIN_FILENO);
   dup2(output, STDOUT_FILENO);
@@ -28,7 +28,7 @@ namespace {
 }  // namespace
 
 Process::Process(const std::vector<std::string>& arguments) {
-  // A program that ends before it has read its input must not end the test.
+  // SIGPIPE is ignored: a program that ends before it has read its input must not end the test.
   signal(SIGPIPE, SIG_IGN);
   std::array<int, 2> input{};
   std::array<int, 2> output{};
