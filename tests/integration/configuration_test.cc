@@ -1,4 +1,4 @@
-// Flag before environment before file before default.
+// Tests the order of precedence: flag, environment, file, default.
 
 #include <gmock/gmock.h>
 
@@ -19,7 +19,8 @@ class ConfigurationTest : public testing::Test {
     return file_;
   }
 
-  // The daemon's limit of sessions, as it says itself where it is passed.
+  // Returns the daemon's limit of sessions: the number that a client can create, or 10 if that is
+  // less.
   static int MaxSessions(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"--listen", "127.0.0.1:0"});
     DaemonProcess daemon(arguments);
@@ -92,7 +93,7 @@ TEST_F(ConfigurationTest, NamesAVariableThatIsMisspelledAndTheNearest) {
                   "POLYESTD_COLOUR: no option has this variable; polyestd --help lists the "
                   "options\n");
   }
-  // As Kubernetes sets it beside a service of the name.
+  // Kubernetes sets this variable beside a service called polyestd.
   const Variable variable("POLYESTD_SERVICE_HOST", "10.0.0.1");
   EXPECT_EQ(MaxSessions({"--max-sessions", "1"}), 1);
 }

@@ -40,8 +40,8 @@ inline v1::Problem Oscillator() {
   })");
 }
 
-// Rows [first, last) of its record, 20 a second: the closed solution for k = 40.66, c = 0.17 and a
-// ripple in the place of noise.
+// Returns rows [first, last) of the oscillator's record, 20 a second: the closed solution for k =
+// 40.66, c = 0.17 and a ripple in the place of noise.
 inline v1::Measurements OscillatorRows(int first, int last) {
   constexpr double kDecay = 0.17 / 2;
   const double omega = std::sqrt(40.66 - kDecay * kDecay);
@@ -78,7 +78,7 @@ class DaemonTest : public testing::Test {
     status_ = v1::StatusService::NewStub(channel_);
   }
 
-  // The estimate from the whole record at once.
+  // Returns the estimate from the whole record at once.
   v1::Estimate EstimateAtOnce(int rows) {
     grpc::ClientContext context;
     v1::ComputeEstimateRequest request;
@@ -152,7 +152,7 @@ class ClientStream {
   }
   bool SendRequest(const v1::StreamMeasurementsRequest& request) { return stream_->Write(request); }
   bool Read(v1::StreamMeasurementsResponse& response) { return stream_->Read(&response); }
-  // The next response, which must be an acknowledgement of this batch.
+  // Reads the next response, which must be an acknowledgement of this batch.
   void ExpectAcknowledgement(int64_t sequence) {
     v1::StreamMeasurementsResponse response;
     ASSERT_TRUE(Read(response)) << Finish().error_message();
@@ -176,8 +176,8 @@ class ClientStream {
       stream_;
 };
 
-// Equal in every bit but the number of the batch. The one map of an estimate has no order of its
-// own, so it is compared by the message's fields.
+// Returns the estimate as bytes, without the number of the batch. The serialization is
+// deterministic, because the one map of an estimate has no order of its own.
 inline std::string WithoutSequence(v1::Estimate estimate) {
   estimate.clear_sequence();
   std::string bytes;

@@ -14,23 +14,23 @@ namespace polyest::internal {
 
 class DaemonProcess {
  public:
-  // Starts it with these arguments, and with a data folder of its own unless they name one; nothing
-  // is waited for.
+  // Starts the daemon with these arguments, and with its own data folder unless they name one.
+  // Waits for nothing.
   explicit DaemonProcess(std::vector<std::string> arguments);
-  // Kills it if it still runs.
+  // Kills the daemon if it still runs.
   ~DaemonProcess();
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
 
-  // The next line of its stdout, without the end of line; empty at the end.
+  // Returns the next line of stdout without its end; empty at the end of the output.
   std::string ReadLine();
-  // HOST:PORT out of its first line.
+  // Returns HOST:PORT from the first line.
   std::string ReadAddress();
   void Signal(int number);
   pid_t pid() const { return pid_; }
-  // Its exit status, or −(signal) that ended it.
+  // Returns the exit status, or −(signal) if a signal ended the daemon.
   int Wait();
-  // Everything it wrote to stderr so far.
+  // Returns everything that the daemon has written to stderr so far.
   std::string Errors();
 
  private:

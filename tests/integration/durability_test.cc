@@ -1,5 +1,5 @@
-// What an engineer relies on: whatever happens to the daemon and to the network, every batch that
-// was acknowledged is there, none is there twice, and the estimates are those of an undisturbed
+// Tests what an engineer relies on. Whatever happens to the daemon and to the network, every
+// acknowledged batch is stored, none is stored twice, and the estimates are those of an undisturbed
 // run, to the last bit.
 
 #include <signal.h>
@@ -24,7 +24,7 @@ constexpr int kRowsABatch = 4;
 
 std::string SessionName(int session) { return "sessions/rig-" + std::to_string(session); }
 
-// Each session has a record of its own.
+// Returns a batch of a session; each session has a record of its own.
 v1::Measurements Batch(int session, int batch) {
   const int first = kRowsABatch * batch;
   v1::Measurements rows = OscillatorRows(first, first + kRowsABatch);
@@ -41,7 +41,7 @@ v1::Estimate EstimateOf(const std::string& address, const std::string& session) 
   return estimate.ok() ? *estimate : v1::Estimate();
 }
 
-// Eight writers that stream a record each and come back whenever they lose the daemon.
+// Eight writers. Each streams a record and comes back whenever it loses the daemon.
 class Campaign {
  public:
   Campaign(std::string address, int batches)
@@ -59,7 +59,7 @@ class Campaign {
     }
   }
 
-  // In the background.
+  // Starts the writers in the background.
   void Start() {
     for (int session = 0; session < kSessions; ++session) {
       writers_.emplace_back([this, session] { Write(session); });
@@ -69,7 +69,7 @@ class Campaign {
     for (auto& writer : writers_) writer.join();
     writers_.clear();
   }
-  // Waits until so many more batches are acknowledged, or all are.
+  // Waits until `more` more batches are acknowledged, or all are.
   void AwaitAcknowledgements(int64_t more) {
     const int64_t enough = std::min<int64_t>(total_ + more, kSessions * batches_);
     for (int64_t now = total_; now < enough; now = total_) total_.wait(now);
@@ -101,7 +101,7 @@ class Campaign {
     }
     if (status.ok()) status = stream.Finish().status();
     EXPECT_TRUE(status.ok()) << status;
-    // A writer that gave up must not leave the test waiting.
+    // The batches of a writer that gave up count as done, so that the test does not wait for them.
     total_ += batches_ - last;
     total_.notify_all();
   }
@@ -113,7 +113,7 @@ class Campaign {
   std::vector<std::thread> writers_;
 };
 
-// No more and no fewer batches than were sent, and the estimates of a daemon left in peace.
+// Expects the sent batches, no more and no fewer, and the estimates of an undisturbed daemon.
 void ExpectUndisturbed(const Campaign& campaign, const std::string& address) {
   DaemonProcess peaceful({"--listen", "127.0.0.1:0", "--durability", "memory"});
   const std::string peaceful_address = peaceful.ReadAddress();
@@ -180,7 +180,7 @@ TEST(Durability, NothingIsLostOrCountedTwiceOverANetworkThatCutsDelaysAndRepeats
   proxy.SetHostile(true);
   campaign.Start();
   campaign.AwaitAcknowledgements(kSessions * 100);
-  // The last estimates may come through in peace.
+  // The network is left in peace for the last estimates.
   proxy.SetHostile(false);
   campaign.Join();
   EXPECT_GT(proxy.harm().cut, 20);

@@ -44,7 +44,7 @@ class ExportTest : public DaemonTest {
     EXPECT_TRUE(status.ok()) << status.error_message();
     return response;
   }
-  // A session of three batches, exported.
+  // Returns an exported session of three batches.
   std::vector<v1::SessionRecord> Exported() {
     EXPECT_TRUE(Create("rig").ok());
     for (const int batch : {1, 2, 3}) {
@@ -72,7 +72,7 @@ TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   EXPECT_EQ(imported.last_sequence(), 3);
   EXPECT_EQ(imported.sample_count(), 30);
   EXPECT_EQ(WithoutSequence(Estimate("sessions/copy")), WithoutSequence(Estimate("sessions/rig")));
-  // It goes on as the first one would.
+  // The copy continues as the first session would.
   EXPECT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
   EXPECT_TRUE(Add("sessions/copy", 2, OscillatorRows(10, 20)).ok());
 }

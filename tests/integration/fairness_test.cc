@@ -1,4 +1,4 @@
-// Long computations of some do not keep others waiting.
+// Tests that long computations of some clients do not keep others waiting.
 
 #include <future>
 
@@ -12,7 +12,8 @@ class OneThreadTest : public DaemonTest {
   OneThreadTest() : DaemonTest({"--threads", "1"}) {}
 };
 
-// Order 8 in four unknowns is 495 terms and a thousand trajectories, over 20,000 rows.
+// Returns a long request: order 8 in four unknowns is 495 terms and a thousand trajectories, over
+// 20,000 rows.
 v1::ComputeEstimateRequest LongRequest() {
   v1::ComputeEstimateRequest request;
   *request.mutable_subject()->mutable_experiment()->mutable_problem() = ProblemFromJson(R"({
@@ -74,7 +75,7 @@ TEST_F(OneSecondTest, EndsARequestThatIsComputedForLonger) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(status.error_message(),
             "the request was computed for 1 s, the longest that one may be (--max-compute-s)");
-  // The caller's own deadline is another matter.
+  // The caller's own deadline gives another error.
   grpc::ClientContext hurried;
   hurried.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(100));
   EXPECT_EQ(studies_->ComputeEstimate(&hurried, LongRequest(), &response).error_code(),

@@ -14,7 +14,7 @@ using ::testing::StartsWith;
 
 class LifecycleTest : public DaemonTest {
  protected:
-  // A call of a service whose messages are not compiled in here, as bytes.
+  // Makes a call as bytes, to a service whose messages are not compiled in here.
   std::string CallRaw(const std::string& method, const std::string& request) {
     grpc::GenericStub stub(channel_);
     grpc::ClientContext context;
@@ -41,7 +41,7 @@ class LifecycleTest : public DaemonTest {
 };
 
 TEST_F(LifecycleTest, AnswersTheHealthCheckForAllAndForTheService) {
-  // HealthCheckRequest{service = 1}; HealthCheckResponse{status = 1 (SERVING)}.
+  // The wire format: HealthCheckRequest{service = 1}; HealthCheckResponse{status = 1 (SERVING)}.
   EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check", ""), "\x08\x01");
   const std::string service = "polyest.v1.SessionService";
   EXPECT_EQ(CallRaw("/grpc.health.v1.Health/Check",
@@ -50,7 +50,7 @@ TEST_F(LifecycleTest, AnswersTheHealthCheckForAllAndForTheService) {
 }
 
 TEST_F(LifecycleTest, TellsOfItsServicesByReflection) {
-  // ServerReflectionRequest{list_services = 7: ""}.
+  // The wire format: ServerReflectionRequest{list_services = 7: ""}.
   const std::string answer = CallRaw(
       "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", std::string("\x3a\x00", 2));
   EXPECT_THAT(answer, HasSubstr("polyest.v1.SessionService"));

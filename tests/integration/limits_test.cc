@@ -1,4 +1,5 @@
-// Every limit of a tenant, a problem or the daemon: what is over it is refused by its name.
+// Tests every limit of a tenant, a problem or the daemon: a request beyond a limit is refused by
+// the limit's name.
 
 #include <grpcpp/support/error_details.h>
 
@@ -19,7 +20,7 @@ bool Find(const grpc::Status& status, Detail& found) {
   return false;
 }
 
-// Refused for good, by this option.
+// Expects a refusal that names this option.
 void ExpectLimit(const grpc::Status& status, const std::string& option) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
   EXPECT_THAT(status.error_message(), testing::HasSubstr("(" + option + ")"));
@@ -60,7 +61,7 @@ class LimitsTest : public DaemonTest {
     v1::ComputePropagationResponse response;
     return studies_->ComputePropagation(&context, request, &response);
   }
-  // With a session, without one, and without measurements.
+  // Expects the problem to be refused with a session, without one, and without measurements.
   void ExpectProblemRefused(const std::string& option) {
     ExpectLimitForGood(Create("rig"), option);
     ExpectLimitForGood(Estimate(), option);
@@ -91,7 +92,7 @@ struct FewPointsTest : LimitsTest {
 };
 TEST_F(FewPointsTest, NamesTheLimitOfPoints) {
   ExpectProblemRefused("--max-points");
-  // Of a lower order it is let through.
+  // The limit admits a lower order.
   v1::Problem problem = Oscillator();
   problem.mutable_expansion()->set_order(3);
   EXPECT_TRUE(Create("rig", problem).ok());
@@ -109,7 +110,7 @@ TEST_F(FewRowsOfABatchTest, NamesTheLimitsOfRowsOfABatchAndOfASession) {
   EXPECT_TRUE(Add("sessions/rig", 2, OscillatorRows(3, 5)).ok());
 }
 
-// The limit of rows stored, across the sessions, deletions and restarts of a daemon.
+// Tests a limit of stored rows, across the sessions, deletions and restarts of a daemon.
 void ExpectRowsLimited(const std::string& option) {
   const TestFolder data;
   struct Served : LimitsTest {
@@ -129,7 +130,7 @@ void ExpectRowsLimited(const std::string& option) {
   }
   Served daemon(data.path(), option);
   ExpectLimitForGood(daemon.Add("sessions/b", 1, OscillatorRows(0, 6)), option);
-  // A repeat takes no room.
+  // A repeated batch needs no room.
   EXPECT_TRUE(daemon.Add("sessions/a", 1, OscillatorRows(0, 20)).ok());
   EXPECT_TRUE(daemon.Add("sessions/b", 1, OscillatorRows(0, 5)).ok());
   ASSERT_TRUE(daemon.Delete("sessions/a").ok());
@@ -138,7 +139,7 @@ void ExpectRowsLimited(const std::string& option) {
 TEST(StoredRowsTest, NamesTheLimitOfATenantsRows) { ExpectRowsLimited("--max-tenant-rows"); }
 TEST(StoredRowsTest, NamesTheLimitOfAllRows) { ExpectRowsLimited("--max-total-rows"); }
 
-// Every process has more than a MiB.
+// The limit is below the memory of any process.
 struct NoMemoryTest : LimitsTest {
   NoMemoryTest() : LimitsTest({"--max-memory-mb", "1"}) {}
 };
@@ -165,7 +166,7 @@ TEST(MemoryLimitTest, AffectsNothingThatIsAcknowledged) {
   }
   {
     Served daemon({"--data-dir", data.path(), "--max-memory-mb", "1"});
-    // Not in memory, and not let in; but there.
+    // The session is neither in memory nor let in, but it is stored.
     ExpectLimit(daemon.Add("sessions/rig", 2, OscillatorRows(20, 30)), "--max-memory-mb");
     grpc::ClientContext context;
     v1::GetSessionRequest get;

@@ -1,4 +1,4 @@
-// A daemon that listens on several addresses.
+// Tests a daemon that listens on several addresses.
 
 #include <fstream>
 

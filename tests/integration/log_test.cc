@@ -1,4 +1,4 @@
-// What the daemon logs, and the ids of requests.
+// Tests the daemon's log and the ids of requests.
 
 #include <gmock/gmock.h>
 
@@ -18,7 +18,7 @@ class LogTest : public DaemonTest {
   explicit LogTest(const std::string& format = "json")
       : DaemonTest({"--log-level", "debug", "--log-format", format}) {}
 
-  // Asks for a session under this request id; the id that comes back.
+  // Asks for a session under this request id; returns the id that comes back.
   std::string Get(const std::string& session, const std::string& id) {
     grpc::ClientContext context;
     context.AddMetadata(kRequestIdKey, id);
@@ -31,7 +31,7 @@ class LogTest : public DaemonTest {
     return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
   }
 
-  // The line of a call; without fields if there is none.
+  // Returns the log line of a call; without fields if there is none.
   google::protobuf::Struct LineOf(const std::string& request) {
     for (const auto& line : JsonLines(daemon_.Errors())) {
       if (Field(line, "request") == request) return line;
@@ -89,7 +89,7 @@ TEST_F(LogTest, IsJsonWhateverAClientSends) {
 TEST_F(LogTest, TellsNoMeasurement) {
   ASSERT_TRUE(Create("rig").ok());
   v1::Measurements rows = OscillatorRows(0, 2);
-  rows.set_time_s(0, 98765.4321);  // later than the next
+  rows.set_time_s(0, 98765.4321);  // later than the next row
   EXPECT_FALSE(Add("sessions/rig", 1, rows).ok());
   EXPECT_THAT(daemon_.Errors(), Not(HasSubstr("98765")));
 }

@@ -1,4 +1,4 @@
-// What Prometheus is told.
+// Tests the metrics that Prometheus scrapes.
 
 #include <gmock/gmock.h>
 
@@ -55,7 +55,7 @@ TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   EXPECT_EQ(ValueOf("polyest_rows_acknowledged_total", text), 10 * kBatches);
   EXPECT_EQ(ValueOf("polyest_stored_rows", text), 10 * kBatches);
   EXPECT_EQ(ValueOf("polyest_values_acknowledged_total", text), 10 * kBatches);
-  // The last of 30 rows, 20 a second from 0.05 s on, is of 1.5 s.
+  // The last of 30 rows, 20 a second from 0.05 s on, is at 1.5 s.
   EXPECT_NEAR(ValueOf("polyest_measured_seconds_total", text), 1.5, 1e-9);
   EXPECT_GT(ValueOf("polyest_computed_seconds_total", text), 0);
   EXPECT_EQ(ValueOf("polyest_acknowledgement_duration_seconds_count", text), kBatches);
@@ -68,7 +68,7 @@ TEST_F(MetricsTest, CountWhatAStreamHasBrought) {
   EXPECT_EQ(ValueOf("polyest_sessions", text), 1);
   EXPECT_EQ(ValueOf("polyest_sessions_loaded", text), 1);
   EXPECT_EQ(ValueOf("polyest_ready", text), 1);
-  // The check whether the journal can be written, the session, and one for each batch.
+  // The commits are the check that the journal can be written, the session, and each batch.
   EXPECT_EQ(ValueOf("polyest_journal_commit_duration_seconds_count", text), 2 + kBatches);
   EXPECT_EQ(ValueOf("polyest_journal_commit_failures_total", text), 0);
   EXPECT_GT(ValueOf("polyest_journal_file_bytes", text), 0);

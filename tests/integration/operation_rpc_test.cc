@@ -1,4 +1,4 @@
-// Computations that are started, polled, cancelled and forgotten.
+// Tests computations that are started, polled, cancelled and forgotten.
 
 #include <thread>
 
@@ -20,7 +20,7 @@ class OperationRpcTest : public DaemonTest {
     return request;
   }
 
-  // Takes so long that nobody sees its end.
+  // Returns a computation that takes too long to end in a test.
   static v1::StartComputationRequest Endless() {
     v1::StartComputationRequest request;
     v1::ComputePropagationRequest& propagation = *request.mutable_propagation();
@@ -50,7 +50,7 @@ class OperationRpcTest : public DaemonTest {
     return Call(&Stub::GetOperation, request, operation);
   }
 
-  // Polls until it is done.
+  // Polls the operation until it is done.
   v1::Operation Await(const std::string& name) {
     v1::Operation operation;
     do {
@@ -150,7 +150,7 @@ TEST_F(OperationRpcTest, ListsByPagesAndForgetsWhatIsDeleted) {
   EXPECT_THAT(List(), ElementsAre());
 }
 
-// The daemon stops within its time although a computation is under way.
+// Tests that the daemon stops within its time although a computation is under way.
 TEST_F(OperationRpcTest, LetsTheDaemonStop) {
   const v1::Operation started = Start(Endless());
   v1::Operation operation;

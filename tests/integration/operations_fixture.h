@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of the daemon's operation share: a scrape, log lines, variables of the
+// Functions for the tests of the daemon's operation: a scrape, log lines, variables of the
 // environment.
 
 #include <arpa/inet.h>
@@ -18,7 +18,7 @@
 
 namespace polyest::internal {
 
-// The answer to GET /metrics of 127.0.0.1:`port`, with its head; empty when there is none.
+// Returns the answer to GET /metrics of 127.0.0.1:`port`, with its head; empty if there is none.
 inline std::string Scrape(int port) {
   const int connection = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address = {};
@@ -40,7 +40,8 @@ inline std::string Scrape(int port) {
   return answer;
 }
 
-// The value of a series, as in `polyest_refusals_total{code="UNAVAILABLE"}`; NaN without it.
+// Returns the value of a series, such as `polyest_refusals_total{code="UNAVAILABLE"}`; NaN if it is
+// missing.
 inline double ValueOf(const std::string& series, const std::string& scraped) {
   std::istringstream lines(scraped);
   for (std::string line; std::getline(lines, line);) {
@@ -53,7 +54,7 @@ inline int PortOf(const std::string& address) {
   return std::stoi(address.substr(address.rfind(':') + 1));
 }
 
-// Each line of the log as JSON; a line that is not fails the test.
+// Returns each line of the log as JSON; a line that is not JSON fails the test.
 inline std::vector<google::protobuf::Struct> JsonLines(const std::string& log) {
   std::vector<google::protobuf::Struct> lines;
   std::istringstream in(log);
@@ -65,13 +66,13 @@ inline std::vector<google::protobuf::Struct> JsonLines(const std::string& log) {
   return lines;
 }
 
-// Empty where the line has no such field.
+// Returns a field of a log line; empty if the line has no such field.
 inline std::string Field(const google::protobuf::Struct& line, const std::string& name) {
   const auto found = line.fields().find(name);
   return found == line.fields().end() ? "" : found->second.string_value();
 }
 
-// Set as long as the object.
+// A variable of the environment, set as long as the object lives.
 class Variable {
  public:
   Variable(std::string name, const std::string& value) : name_(std::move(name)) {

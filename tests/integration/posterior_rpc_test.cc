@@ -1,4 +1,4 @@
-// The studies: of a session, and from measurements that are all there.
+// Tests the studies of a session and of complete measurements.
 
 #include "tests/integration/daemon_fixture.h"
 
@@ -36,7 +36,7 @@ class PosteriorRpcTest : public DaemonTest {
     return studies_->ComputeRegularizationSweep(&context, request, response);
   }
 
-  // A session that has taken rows [0, 60).
+  // Makes a session with rows [0, 60).
   void FeedSession() {
     ASSERT_TRUE(Create("rig").ok());
     ASSERT_TRUE(Add("sessions/rig", 1, OscillatorRows(0, 60)).ok());
@@ -105,7 +105,7 @@ TEST_F(PosteriorRpcTest, SweepsAreTheSameOfASessionAndFromTheMeasurementsAtOnce)
   ASSERT_GT(whole.points_size(), 10);
   for (int k = 1; k < whole.points_size(); ++k) {
     EXPECT_GT(whole.points(k).regularization(), whole.points(k - 1).regularization());
-    // More weight never meets the data better, nor strays farther from the prior.
+    // More weight neither fits the data better nor moves farther from the prior.
     EXPECT_GE(whole.points(k).cost().mismatch(), whole.points(k - 1).cost().mismatch() - 1e-6);
     EXPECT_LE(whole.points(k).cost().prior(), whole.points(k - 1).cost().prior() + 1e-6);
     EXPECT_EQ(whole.points(k).map_size(), 2);

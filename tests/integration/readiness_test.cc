@@ -1,4 +1,4 @@
-// Whether the daemon says that it can be given work.
+// Tests whether the daemon reports that it can take work.
 
 #include <gmock/gmock.h>
 #include <google/protobuf/wrappers.pb.h>
@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-// On the wire a HealthCheckRequest is a StringValue, its response an Int32Value.
+// The wire format of a HealthCheckRequest is that of a StringValue, of its response an Int32Value.
 constexpr int kServing = 1;
 constexpr int kNotServing = 2;
 
@@ -34,7 +34,7 @@ class HealthWatch {
     Next();
   }
 
-  // The next status; 0 when the watch has ended.
+  // Returns the next status; 0 if the watch has ended.
   int Read() {
     google::protobuf::Int32Value response;
     call_->Read(&response, Tag());
@@ -62,7 +62,7 @@ class ReadinessTest : public DaemonTest {
   explicit ReadinessTest(const std::vector<std::string>& arguments = {}) : DaemonTest(arguments) {}
 };
 
-// A journal of 1 MiB.
+// A daemon with a journal of at most 1 MiB.
 class FullJournalTest : public ReadinessTest {
  protected:
   FullJournalTest() : ReadinessTest({"--max-disk-mb", "1"}) {}

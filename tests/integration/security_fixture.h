@@ -1,6 +1,7 @@
 #pragma once
 
-// A daemon with TLS, client certificates and tokens, and clients of every kind.
+// The fixture of the security tests: a daemon with TLS, client certificates and tokens, and clients
+// of every kind.
 
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -23,10 +24,10 @@
 
 namespace polyest::internal {
 
-// Longer than anything here takes; passed only when it fails.
+// The time limit of every wait, longer than anything here takes; it passes only in a failed test.
 inline constexpr std::chrono::seconds kPatience{60};
 
-// By its name, which no two services share.
+// Returns the method of a name; no two services share one.
 inline const google::protobuf::MethodDescriptor& FindMethod(const std::string& name) {
   for (const google::protobuf::ServiceDescriptor* const service : Services()) {
     const auto* const method = service->FindMethodByName(name);
@@ -39,7 +40,7 @@ inline std::string MethodPath(const std::string& method) {
   return "/" + FindMethod(method).service()->full_name() + "/" + method;
 }
 
-// How a call ends, whatever its method: every kind of call looks the same on the wire. `request`
+// Makes a call and returns its status. Every kind of method looks the same on the wire. `request`
 // and `answer` are messages as bytes.
 inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
                             const std::string& token, const std::string& request = "",
@@ -76,7 +77,7 @@ inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const
   return status;
 }
 
-// The names of all methods of all services, out of the contract.
+// Returns the names of all methods of all services, from the contract.
 inline std::vector<std::string> AllMethods() {
   std::vector<std::string> names;
   for (const google::protobuf::ServiceDescriptor* const service : Services()) {
@@ -116,7 +117,7 @@ class SecureDaemonTest : public testing::Test {
     folder_.Write("daemon.key", issued.key);
   }
 
-  // A channel with connections of its own. Empty texts: no certificate.
+  // Returns a channel with its own connections. Empty texts mean no certificate.
   std::shared_ptr<grpc::Channel> Connect(const CertificateAuthority& trusted,
                                          const IssuedCertificate& own) const {
     grpc::SslCredentialsOptions options;

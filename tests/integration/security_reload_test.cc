@@ -1,4 +1,4 @@
-// Tokens and certificates that change while the daemon serves.
+// Tests tokens and certificates that change while the daemon serves.
 
 #include <signal.h>
 
@@ -39,7 +39,7 @@ class SecurityReloadTest : public SecureDaemonTest {
     ASSERT_TRUE(sessions_->CreateSession(&context, request, &session).ok());
   }
 
-  // Until it holds: each look is a call or more, so that there is no need to sleep.
+  // Waits until the condition holds. Each look makes a call or more, so that no sleep is needed.
   static bool ComesTrue(const std::function<bool()>& holds) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (!holds()) {
@@ -96,7 +96,7 @@ TEST_F(SecurityReloadTest, KeepsTheOldTokensAndWarnsOnceWhenTheNewOnesAreNoGood)
     EXPECT_EQ(ListModels(channel_, admin_.secret), StatusCode::OK);
     return daemon_->Errors().find(warning) != std::string::npos;
   }));
-  // The next reading is later than a second one of the same files would be.
+  // The daemon would have read the first files a second time before it reads these.
   Replace("tokens", Lines({writer_}));
   EXPECT_TRUE(ComesTrue(
       [&] { return ListModels(channel_, admin_.secret) == StatusCode::UNAUTHENTICATED; }));
@@ -111,7 +111,7 @@ TEST_F(SecurityReloadTest, TakesANewCertificateWithoutDroppingAStream) {
                           [](auto& message) { message.mutable_estimates()->set_only_last(true); }));
   stream.ExpectAcknowledgement(1);
 
-  // The certificate comes before its key, as files do.
+  // The certificate is replaced before its key, one file at a time.
   const CertificateAuthority next("next CA");
   const IssuedCertificate issued = next.Issue("daemon");
   Replace("daemon.pem", issued.certificate);
@@ -143,7 +143,7 @@ TEST_F(SecurityReloadTest, TakesANewClientCa) {
   EXPECT_EQ(ListModels(Connect(), reader_.secret), StatusCode::OK);
 }
 
-// With all that gRPC can be asked to trace.
+// Makes gRPC trace everything that it can.
 class SecretsTest : public SecurityReloadTest {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// What the daemon reports to the service manager, here a socket of the test's own.
+// Tests the daemon's reports to the service manager, which is a socket of the test's own.
 
 #include "server/daemon/service_manager.h"
 
@@ -16,10 +16,10 @@ namespace {
 
 using ::testing::StartsWith;
 
-// Far beyond what a report takes, on any machine.
+// The time limit of a report, far longer than one takes on any machine.
 constexpr timeval kPatience{60, 0};
 
-// $NOTIFY_SOCKET, as long as the object lives.
+// A service manager: owns the socket that $NOTIFY_SOCKET names.
 class ServiceManager {
  public:
   ServiceManager() : socket_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
@@ -33,7 +33,7 @@ class ServiceManager {
   ServiceManager(const ServiceManager&) = delete;
   ServiceManager& operator=(const ServiceManager&) = delete;
 
-  // The next report; empty when none comes.
+  // Returns the next report; empty if none comes.
   std::string Read() const {
     char buffer[1024];
     const ssize_t size = recv(socket_, buffer, sizeof(buffer), 0);

@@ -1,6 +1,6 @@
-// What the version before the services by resource has stored: `stored/journal.db` is its journal,
-// `stored/session.polyest` what its command exported, and `stored/estimate.json` its last estimate,
-// of 200 rows of client/examples/oscillator.csv in four batches.
+// Tests files stored by the version before the services by resource: `stored/journal.db` is its
+// journal, `stored/session.polyest` its command's export, and `stored/estimate.json` its last
+// estimate, of 200 rows of client/examples/oscillator.csv in four batches.
 
 #include <google/protobuf/util/delimited_message_util.h>
 
@@ -29,8 +29,9 @@ class StoredByAnOlderVersionTest : public testing::Test {
         grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
   }
 
-  // The session is as it was, goes on, and estimates what it estimated. Other machines round
-  // otherwise: a millionth is a thousandth of what the data leave open.
+  // Expects the session to be unchanged, to go on, and to give its former estimate. Rounding
+  // differs between machines: the tolerance of a millionth is a thousandth of the data's
+  // uncertainty.
   void ExpectTheSameEstimate() {
     grpc::ClientContext getting, estimating;
     v1::GetSessionRequest get;

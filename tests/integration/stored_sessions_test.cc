@@ -1,4 +1,4 @@
-// A daemon that finds many sessions in its data folder.
+// Tests a daemon that finds many sessions in its data folder.
 
 #include <chrono>
 #include <fstream>
@@ -13,11 +13,11 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kWriters = 64;  // share their commits
+constexpr int kWriters = 64;  // concurrent, so that they share commits
 
 std::string Name(int session) { return "sessions/rig-" + std::to_string(session); }
 
-// Sessions of one batch each.
+// Stores sessions of one batch each.
 void Store(const std::string& folder, int sessions) {
   auto journal = SqliteJournal::Open({.folder = folder});
   ASSERT_TRUE(journal.ok()) << journal.status();
@@ -80,7 +80,7 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
   EXPECT_GT(resident, 0);
   EXPECT_LT(resident, 1'024);
 
-  // Any of them comes back on use.
+  // Each stored session comes back when it is used.
   grpc::ClientContext context;
   v1::GetEstimateRequest get;
   get.set_session(Name(kStored / 2));
@@ -90,7 +90,7 @@ TEST(StoredSessions, TenThousandAreServedFromDiskInLittleMemory) {
   EXPECT_EQ(estimate.samples(), 20);
 }
 
-// The contract's own bound; it takes about a tenth of that.
+// The bound of two seconds is the contract's; the daemon takes about a tenth of it.
 TEST(StoredSessions, AThousandAreServedWithinTwoSecondsOfTheStart) {
   const TestFolder data;
   Store(data.path(), 1'000);

@@ -17,7 +17,7 @@ TEST_F(StreamTest, AcknowledgesEachBatchAndEndsWithTheEstimateOfTheWholeRecord) 
   ClientStream stream(*sessions_);
   v1::Estimate estimate;
   for (int batch = 0; batch < 6; ++batch) {
-    // The session is named once.
+    // The first request alone names the session.
     ASSERT_TRUE(stream.Send(batch == 0 ? "sessions/rig" : "", batch + 1,
                             OscillatorRows(10 * batch, 10 * (batch + 1))));
     stream.ExpectAcknowledgement(batch + 1);
@@ -97,7 +97,7 @@ TEST_F(StreamTest, GoesOnWhereAnEarlierStreamEnded) {
     ASSERT_TRUE(stream.Finish().ok());
   }
   ClientStream stream(*sessions_);
-  // As if its acknowledgement had been lost.
+  // The client repeats the batch, as it does after a lost acknowledgement.
   ASSERT_TRUE(stream.Send("sessions/rig", 1, OscillatorRows(0, 30)));
   stream.ExpectAcknowledgement(1);
   v1::Estimate estimate;
@@ -190,7 +190,7 @@ TEST_F(StreamTest, IsTheOnlyWriterOfItsSession) {
   while (first.Read(response)) {
   }
   ASSERT_TRUE(first.Finish().ok());
-  // Free at once for the next.
+  // The session is free at once for the next stream.
   ClientStream third(*sessions_);
   ASSERT_TRUE(third.Send("sessions/rig", 2, OscillatorRows(1, 2)));
   third.ExpectAcknowledgement(2);
@@ -204,7 +204,7 @@ TEST_F(StreamTest, FreesItsSessionWhenCancelled) {
     stream.Cancel();
     EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
   }
-  // The daemon hears of it a moment later; until then the answer is ABORTED.
+  // The daemon notices the end a moment later; until then it answers ABORTED.
   while (true) {
     ClientStream stream(*sessions_);
     stream.Send("sessions/rig", 2, OscillatorRows(1, 2));

@@ -1,5 +1,5 @@
-// All studies are the same of a session and of the experiment that it is; problems are checked, and
-// the schema is there, for every client.
+// Tests that each study of a session equals that of the same experiment, and that every client can
+// have problems checked and read the schema.
 
 #include "proto/problem_schema.h"
 #include "tests/integration/daemon_fixture.h"
@@ -23,7 +23,7 @@ class StudyRpcTest : public DaemonTest {
     ASSERT_TRUE(Add("sessions/rig", 2, OscillatorRows(10, kRows)).ok());
   }
 
-  // Asks for the study of the session and of the experiment; both answers are returned.
+  // Makes the study of the session and of the experiment; returns both answers.
   template <typename Request, typename Response>
   std::pair<Response, Response> Both(grpc::Status (v1::StudyService::Stub::*method)(
                                          grpc::ClientContext*, const Request&, Response*),

@@ -1,6 +1,6 @@
-// A daemon that runs for months: a thousand sessions come and go, and nothing is left of them. What
-// cannot be reached any more is found by the leak sanitizer in the build `asan-ubsan`; what can be
-// is found here, as memory that grows.
+// Tests a daemon that runs for months: a thousand sessions come and go and leave nothing behind.
+// The leak sanitizer in the build `asan-ubsan` finds memory that cannot be reached any more; this
+// test finds reachable memory that grows.
 
 #include <malloc.h>
 
@@ -16,7 +16,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kAtATime = 100;
-constexpr int kEstimated = 10;  // one in so many, for an estimate takes most of the time
+constexpr int kEstimated =
+    10;  // estimates one session in ten, because an estimate takes most of the time
 constexpr int kRowsABatch = 3;
 
 v1::Problem Tiny() {
@@ -43,13 +44,13 @@ class ThousandSessionsTest : public testing::Test {
     status_ = v1::StatusService::NewStub(channel);
   }
 
-  // The life of some sessions, from the first to the last call.
+  // Takes some sessions through their life, from the first call to the last.
   void LiveThrough() {
     std::vector<std::string> names(kAtATime);
     for (std::string& name : names) name = Create();
     for (int i = 0; i < kAtATime; ++i)
       Stream(names[static_cast<size_t>(i)], /*to_the_end=*/i % kEstimated == 0);
-    // The housekeeper unloads them meanwhile.
+    // The housekeeper unloads the sessions meanwhile.
     while (Status().loaded_session_count() > 0) std::this_thread::yield();
     for (const std::string& name : names) Add(name);
     for (int i = 0; i < kAtATime; i += kEstimated) Estimate(names[static_cast<size_t>(i)]);
@@ -66,7 +67,7 @@ class ThousandSessionsTest : public testing::Test {
     return session.name();
   }
 
-  // One batch; without the end the client goes away.
+  // Streams one batch. Unless `to_the_end`, the client then cancels the stream.
   void Stream(const std::string& session, bool to_the_end) {
     ClientStream stream(*sessions_);
     stream.Send(session, 1, OscillatorRows(0, kRowsABatch),
@@ -83,7 +84,7 @@ class ThousandSessionsTest : public testing::Test {
     EXPECT_TRUE(stream.Finish().ok());
   }
 
-  // Another batch, which brings the session back from disk.
+  // Adds another batch, which brings the session back from disk.
   void Add(const std::string& session) {
     grpc::ClientContext context;
     v1::AddMeasurementsRequest request;
@@ -138,7 +139,7 @@ TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
   RecordProperty("allocated_growth_bytes", std::to_string(full.allocated - half.allocated));
   RecordProperty("resident_growth_bytes", std::to_string(full.resident - half.resident));
 #if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER
-  // A sanitizer's own memory grows with what was freed.
+  // A sanitizer's own memory grows with the memory that was freed.
   EXPECT_LT(full.allocated - half.allocated, 500 * 1'000);
   EXPECT_LT(full.resident - half.resident, 500 * 16'384);
 #endif

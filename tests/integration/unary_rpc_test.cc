@@ -121,7 +121,8 @@ class SingleThreadTest : public DaemonTest {
  protected:
   SingleThreadTest() : DaemonTest({"--threads", "1", "--max-message-mb", "1"}) {}
 
-  // Hundreds of terms over thousands of rows: far more work than the deadlines below allow.
+  // Returns a request of hundreds of terms over thousands of rows, far more work than the deadlines
+  // below allow.
   v1::ComputeEstimateRequest LongWork() {
     v1::ComputeEstimateRequest request;
     *request.mutable_subject()->mutable_experiment()->mutable_problem() = ProblemFromJson(R"({
@@ -158,7 +159,7 @@ TEST_F(SingleThreadTest, AbandonsWorkWhoseDeadlineHasPassed) {
   v1::ComputeEstimateResponse response;
   EXPECT_EQ(studies_->ComputeEstimate(&context, LongWork(), &response).error_code(),
             grpc::StatusCode::DEADLINE_EXCEEDED);
-  // The one thread is free again: otherwise this would wait for the long work.
+  // The one thread is free again: this call would otherwise wait for the long work.
   EXPECT_EQ(EstimateAtOnce(5).samples(), 5);
 }
 
@@ -170,7 +171,7 @@ TEST_F(SingleThreadTest, AbandonsWorkThatIsCancelled) {
     EXPECT_EQ(studies_->ComputeEstimate(&context, request, &response).error_code(),
               grpc::StatusCode::CANCELLED);
   });
-  // A small call that does not come through shows that the long one has the thread.
+  // A small call that does not come through shows that the long call has the thread.
   while (SmallCallComesThrough(std::chrono::milliseconds(100))) {
   }
   context.TryCancel();

@@ -10,7 +10,7 @@ class Watch {
     request.set_session(session);
     reader_ = stub.WatchSession(&context_, request);
   }
-  // The sequence of the next estimate, or −1 at the end.
+  // Returns the sequence of the next estimate, or −1 at the end.
   int64_t Next() {
     v1::WatchSessionResponse response;
     return reader_->Read(&response) ? response.estimate().sequence() : -1;

@@ -7,26 +7,26 @@
 
 namespace polyest::internal {
 
-// A program of ours as a process, with pipes to its standard input and output. Its standard error
-// goes into a file without a name, which never makes it wait.
+// A polyest program as a process, with pipes to its standard input and output. Its standard error
+// goes to a file without a name, so that it never blocks the program.
 class Process {
  public:
-  // arguments[0] is the program.
+  // Starts arguments[0], the program.
   explicit Process(const std::vector<std::string>& arguments);
-  // Kills what still runs.
+  // Kills the process if it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
   void Write(const std::string& text);
   void CloseInput();
-  // The next line of output without its end; empty at the end of the output.
+  // Returns the next line of output without its end; empty at the end of the output.
   std::string ReadLine();
   std::string ReadAll();
   void Signal(int signal_number);
-  // Waits for the end; the exit status, or 128 + the signal that ended it.
+  // Waits for the end; returns the exit status, or 128 + the signal that ended the process.
   int Wait();
-  // What it wrote to its standard error so far.
+  // Returns all that the process has written to its standard error so far.
   std::string Errors() const;
 
  private:
@@ -45,7 +45,7 @@ struct Finished {
   std::string err;
 };
 
-// Runs a program to its end.
+// Runs a program and waits for its end.
 Finished RunProgram(const std::vector<std::string>& arguments, const std::string& input = "");
 
 }  // namespace polyest::internal

@@ -32,7 +32,7 @@ class SecurityTest : public CommandTest {
     return {"--tls-certificate", certificate_, "--tls-key", key_, "--tokens", tokens_};
   }
 
-  // The one line of stderr of a command that fails so.
+  // Checks the exit status of a failed command and returns its one line of stderr.
   static std::string OneLine(const Finished& finished, int exit_status) {
     EXPECT_EQ(finished.exit_status, exit_status) << finished.err;
     EXPECT_EQ(finished.out, "");
@@ -73,7 +73,7 @@ TEST_F(SecurityTest, GoesOnWithATokenThatWasRotatedUnderAStream) {
                    "jsonl"});
   process.Write(DemoRows(30));
   EXPECT_THAT(process.ReadLine(), HasSubstr("\"sequence\":\"1\""));
-  // As the runbook has it, but for the time in which both are good.
+  // The token is rotated as in the runbook, but without the time in which both tokens are valid.
   const NewToken rotated = *MakeTokenFor("rig1:chassis:writer");
   File("writer.token", rotated.secret + "\n");
   File("tokens", reader_.line + "\n" + rotated.line + "\n");
@@ -125,7 +125,7 @@ TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {
                            "--token-file", reader_file_}),
                       3),
               StartsWith("polyest: server " + daemon.address() + ": "));
-  // Named other than its certificate says.
+  // The client uses a name that is not in the daemon's certificate.
   EXPECT_THAT(OneLine(Run({"models", "--server", daemon.address(), "--tls-ca", ca_,
                            "--tls-server-name", "rig.example.org", "--token-file", reader_file_}),
                       3),

@@ -1,4 +1,4 @@
-// The commands that look at the sessions of a daemon.
+// Tests the commands that show the sessions of a daemon.
 
 #include <gmock/gmock.h>
 

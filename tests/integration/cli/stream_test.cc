@@ -1,4 +1,4 @@
-// `polyest stream` against a daemon.
+// Tests `polyest stream` against a daemon.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ class StreamTest : public CommandTest {
     return arguments;
   }
 
-  // What `estimate` makes of the first rows of the demonstration record.
+  // Returns the estimate of `polyest estimate` from the first rows of the demonstration record.
   v1::Estimate EstimateOf(int rows) const {
     const Finished run = Run({"estimate", Example("oscillator.json"),
                               File("whole.csv", DemoRows(rows)), "--format", "json"});
@@ -34,8 +34,8 @@ class StreamTest : public CommandTest {
     return ParseEstimate(run.out);
   }
 
-  // The last line, which must be an estimate, without its sequence number and what the checks on
-  // the way have cost.
+  // Returns the last line, which must be an estimate, without its sequence number and without the
+  // cost of the intermediate checks.
   static v1::Estimate LastEstimate(const std::string& lines) {
     v1::Estimate estimate = ParseEstimate(Lines(lines).back());
     estimate.clear_sequence();
@@ -76,7 +76,7 @@ TEST_F(StreamTest, DoesNotDependOnHowRowsAreCutIntoBatches) {
   ExpectSame(LastEstimate(small.out), LastEstimate(large.out));
 }
 
-// The curve of an input up to the last rows depends on there being no more.
+// Checks that the last rows arrive although their input curve depends on there being no more rows.
 TEST_F(StreamTest, TakesTheLastRowsOfASmoothInputToo) {
 #if POLYEST_THREAD_SANITIZER
   GTEST_SKIP() << "a quarter of an hour of numerics, whose threads are those of other tests";
@@ -116,7 +116,7 @@ TEST_F(StreamTest, SaysThatItResumesASessionBeforeTheDataEnd) {
   arguments.insert(arguments.begin(), POLYEST_PROGRAM);
   Process process(arguments);
   process.Write(DemoRows(60));
-  // The input stays open meanwhile.
+  // The command's input stays open meanwhile.
   Client client(daemon_.address());
   while (process.Errors().find("resumed sessions/rig-1") == std::string::npos) {
     ASSERT_TRUE(client.GetStatus({}).ok());
@@ -201,7 +201,7 @@ TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {
   EXPECT_EQ(last, Lines(undisturbed.out).back());
 }
 
-// Rows until the daemon's disk has no room for one more.
+// Adds rows until the daemon's disk has no room for another one.
 void FillDisk(Client& client, const v1::Problem& problem) {
   v1::CreateSessionRequest create;
   *create.mutable_session()->mutable_problem() = problem;
@@ -243,7 +243,7 @@ TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
 
   process.Write(DemoRows(90).substr(DemoRows(30).size()));
   process.CloseInput();
-  // Asking the daemon is what the test does meanwhile.
+  // Each look asks the daemon.
   while (process.Errors().find("cannot accept batches now") == std::string::npos) {
     ASSERT_TRUE(client.GetStatus({}).ok());
   }

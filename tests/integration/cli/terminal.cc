@@ -29,7 +29,7 @@ void SetEnvironment(const std::vector<std::string>& environment) {
   }
 }
 
-// In the program's process: takes the terminal's foreground and becomes the program.
+// Runs in the program's process: takes the terminal's foreground and becomes the program.
 [[noreturn]] void Become(char* const* arguments, int terminal,
                          const std::vector<std::string>& environment) {
   setpgid(0, 0);
@@ -44,13 +44,13 @@ void SetEnvironment(const std::vector<std::string>& environment) {
   _exit(127);
 }
 
-// In the process between: leads the terminal's session, reports the program's id and its end, and
-// stays until nobody reads the reports.
+// Runs in the process between: leads the terminal's session, reports the program's id and its end,
+// and stays until nobody reads the reports.
 [[noreturn]] void RunShell(char* const* arguments, int terminal, int reports,
                            const std::vector<std::string>& environment) {
   setsid();
   ioctl(terminal, TIOCSCTTY, 0);
-  signal(SIGTTOU, SIG_IGN);  // for a change of the foreground by a process that is not in it
+  signal(SIGTTOU, SIG_IGN);  // sent if a process outside of the foreground changes it
   const pid_t program = fork();
   if (program == 0) Become(arguments, terminal, environment);
   int status = 0;
@@ -119,7 +119,7 @@ void TerminalProcess::Type(const std::string& keys) {
 
 void TerminalProcess::Signal(int signal_number) { kill(program_, signal_number); }
 
-// Reads what there is; returns false once the program has ended and all of it is read.
+// Reads the bytes that are there; returns false once the program has ended and all is read.
 bool TerminalProcess::Fill() {
   std::array<char, 65536> bytes;
   while (true) {
@@ -150,7 +150,7 @@ std::string TerminalProcess::ReadAll() {
 }
 
 int TerminalProcess::Wait() {
-  // What is not read would make the program wait.
+  // The output is read, because a full terminal would make the program wait.
   ReadAll();
   if (!status_) status_ = ReadReport<int>(reports_);
   return WIFEXITED(*status_) ? WEXITSTATUS(*status_) : 128 + WTERMSIG(*status_);

@@ -8,7 +8,7 @@
 
 namespace polyest::internal {
 
-// A program of ours on a terminal of its own: its standard input, output and errors are a
+// A polyest program on a terminal of its own. Its standard input, output and errors are a
 // pseudo-terminal, and it is in the terminal's foreground, so that Ctrl-C reaches it. A process
 // between, in the place of a shell, keeps the terminal and its mode when the program has ended.
 class TerminalProcess {
@@ -18,11 +18,11 @@ class TerminalProcess {
     int rows = 24;
   };
 
-  // arguments[0] is the program. `environment` has "NAME=VALUE" to set besides TERM=xterm; COLUMNS
-  // and NO_COLOR are not set otherwise.
+  // Starts arguments[0], the program. `environment` has "NAME=VALUE" to set besides TERM=xterm;
+  // COLUMNS and NO_COLOR are not set otherwise.
   TerminalProcess(const std::vector<std::string>& arguments, Size size,
                   const std::vector<std::string>& environment = {});
-  // Kills what still runs.
+  // Kills the program if it still runs.
   ~TerminalProcess();
   TerminalProcess(const TerminalProcess&) = delete;
   TerminalProcess& operator=(const TerminalProcess&) = delete;
@@ -30,13 +30,13 @@ class TerminalProcess {
   // Types the keys.
   void Type(const std::string& keys);
   void Signal(int signal_number);
-  // Reads until the terminal has been sent `text`; returns all that was sent so far, also when the
+  // Reads until the terminal has been sent `text`; returns everything sent so far, also if the
   // program ends first.
   std::string ReadUntil(const std::string& text);
   std::string ReadAll();
-  // Waits for the end; returns the exit status, or 128 + the signal that ended it.
+  // Waits for the end; returns the exit status, or 128 + the signal that ended the program.
   int Wait();
-  // Returns whether keys are shown and come line by line, as a shell needs it.
+  // Returns whether keys are echoed and come line by line, as a shell needs it.
   bool InLineMode() const;
 
  private:
@@ -50,8 +50,8 @@ class TerminalProcess {
   std::string sent_;
 };
 
-// Returns the text as it stands at last: without escape sequences, carriage returns and lines that
-// were cleared.
+// Returns the text that the terminal shows in the end: without escape sequences, carriage returns
+// and cleared lines.
 std::string PlainText(const std::string& sent);
 
 }  // namespace polyest::internal

@@ -1,4 +1,4 @@
-// The command on a terminal: widths, colours, keys and progress.
+// Tests the command on a terminal: widths, colours, keys and progress.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ constexpr char kClearScreen[] = "\x1b[H\x1b[J";
 
 class TerminalTest : public CommandTest {
  protected:
-  // All that a command sends to a terminal.
+  // Returns everything that a command sends to a terminal.
   static std::string OnTerminal(std::vector<std::string> arguments, TerminalProcess::Size size,
                                 const std::vector<std::string>& environment = {}) {
     arguments.insert(arguments.begin(), POLYEST_PROGRAM);
@@ -74,7 +74,7 @@ TEST_F(TerminalTest, VerdictsHaveColoursUnlessTheyAreNotWanted) {
 
 TEST_F(TerminalTest, SaysHowFarAStreamIsAndTakesItAwayAtTheEnd) {
   DaemonProcess daemon;
-  // A pipe that gives nothing: the line comes however long that takes.
+  // The pipe gives no data, so that the progress line comes however long it takes.
   const std::string pipe = (folder_ / "pipe").string();
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   TerminalProcess stream(
@@ -90,7 +90,7 @@ TEST_F(TerminalTest, SaysHowFarAStreamIsAndTakesItAwayAtTheEnd) {
   close(writer);
   const std::string sent = stream.ReadAll();
   EXPECT_EQ(stream.Wait(), 0);
-  // Nothing is left of the line before the table.
+  // The progress line is cleared before the table.
   const std::string last_line = sent.substr(sent.rfind("sent, estimate"));
   EXPECT_THAT(last_line, HasSubstr("\r\x1b[K"));
 }
@@ -102,7 +102,7 @@ TEST_F(TerminalTest, AnEstimateInThisProcessSaysHowFarItIs) {
       {POLYEST_PROGRAM, "estimate", Example("oscillator.json"), File("long.csv", data)},
       {.columns = 100});
   EXPECT_THAT(estimate.ReadUntil(" of 300000 · "), HasSubstr(" of 300000 · "));
-  // A progress line is no answer: Ctrl-C ends the command.
+  // Ctrl-C ends the command, which has shown its progress but no answer yet.
   estimate.Signal(SIGINT);
   EXPECT_EQ(estimate.Wait(), 128 + SIGINT);
 }

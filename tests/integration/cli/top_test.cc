@@ -1,4 +1,4 @@
-// `polyest top` against a daemon.
+// Tests `polyest top` against a daemon.
 
 #include <gmock/gmock.h>
 
@@ -33,14 +33,14 @@ TEST_F(TopTest, ShowsTheDaemonAndItsSessionsOnce) {
   EXPECT_THAT(lines[0], MatchesRegex("polyestd [0-9.]+, up [0-9]+ s, .* MiB, sessions on disk"));
   EXPECT_THAT(lines[1], StartsWith("2 sessions, 2 of them loaded; "));
   EXPECT_THAT(lines[3], StartsWith("session"));
-  // 60 rows, 30 a batch, and an estimate after each.
+  // The session has 60 rows in batches of 30, and an estimate after each batch.
   EXPECT_THAT(lines[4], MatchesRegex("rig-1 +2 +60 +- +2 +[0-9]+ +[0-9.e+]+ .*"));
   EXPECT_THAT(lines[5], StartsWith("rig-2"));
   EXPECT_THAT(top.out, Not(HasSubstr("\x1b")));
 }
 
 TEST_F(TopTest, FollowsThePages) {
-  // The daemon's page has 50.
+  // The daemon's pages have 50 sessions.
   Client client(daemon_.address());
   v1::CreateSessionRequest request;
   std::ifstream in(Example("oscillator.json"));

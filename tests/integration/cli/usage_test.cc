@@ -1,4 +1,4 @@
-// What the command answers to slips in its words, and its help.
+// Tests the command's answers to misspelt words, and its help.
 
 #include <gmock/gmock.h>
 
@@ -36,7 +36,7 @@ TEST_F(UsageTest, ProposesTheNearestOption) {
             "polyest estimate --help\n");
   EXPECT_THAT(Refused({"estimate", "p.json", "d.csv", "--fromat=json"}),
               HasSubstr("did you mean \"--format\"?"));
-  // It is named before what is missing because of it.
+  // The unknown option is named before the one that is missing because of it.
   EXPECT_THAT(Refused({"stream", "p.json", "d.csv", "--sever", "rig:50051"}),
               HasSubstr("did you mean \"--server\"?"));
   EXPECT_THAT(Refused({"estimate", "p.json", "d.csv", "--banana"}),
