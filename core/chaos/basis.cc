@@ -9,8 +9,8 @@
 namespace polyest::internal {
 namespace {
 
-// Number of points that EvaluateMany evaluates at a time, so that the columns of all terms stay in
-// the cache.
+// The number of points that EvaluateMany evaluates at a time, so that the columns of all terms stay
+// in the cache.
 constexpr Eigen::Index kPointsAtATime = 128;
 
 }  // namespace
@@ -104,7 +104,7 @@ Matrix Basis::WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& we
   Vector phi(size());
   Matrix gradient(size(), n);
   EvaluateWithGradient(xi, phi, gradient);
-  // ∇²φ_s, of which row s of `second` keeps the upper triangle, by the same products.
+  // Each second[s] is ∇²φ_s, by the same products; only its upper triangle is filled.
   std::vector<Matrix> second(static_cast<size_t>(size()), Matrix::Zero(n, n));
   Matrix sum = Matrix::Zero(n, n);
   for (int s = 1; s < size(); ++s) {

@@ -45,14 +45,14 @@ class Basis {
   void EvaluateMany(const ConstMatrixRef& points, Matrix& values) const;
 
  private:
-  // The earlier terms that term s is the product of.
+  // A term φ_s, given by the earlier terms whose product it is.
   struct Term {
-    int variable;  // k, the last that occurs in it
+    int variable;  // k, the last variable that occurs in the term
     int degree;    // j_sk
     int parent;    // the term without k; 0, the constant, for a polynomial of one germ alone
     int single;    // the term P^(k)_{j_sk}; s itself when parent is 0
-    int previous;  // for such a term: P^(k) of one degree less,
-    int second;    // and of two less (−1 for degree 1)
+    int previous;  // if parent is 0: the term P^(k) of one degree less,
+    int second;    // and the one of two degrees less (−1 for degree 1)
   };
 
   void FindTerms();

@@ -27,7 +27,7 @@ double IncreasingRoot(const Function& function, double lower, double upper, doub
     if (std::abs(step) <= 1e-9 * std::min(std::abs(x), scale)) return x - step;
     (at_x.value < 0 ? lower : upper) = x;
     double next = x - step;
-    // NaN lands here too: a probability that underflowed has no slope.
+    // NaN is caught here, too: a probability that underflowed has no slope.
     if (!(next > lower && next < upper)) {
       next = std::isinf(upper) ? 2 * lower + scale : 0.5 * (lower + upper);
     }
@@ -39,7 +39,7 @@ double IncreasingRoot(const Function& function, double lower, double upper, doub
 
 }  // namespace
 
-// The C library's lgamma writes a global sign, which threads would race for.
+// Uses lgamma_r, because the C library's lgamma writes a global sign, a race between threads.
 double LogGamma(double x) {
   int sign = 0;
   return ::lgamma_r(x, &sign);
@@ -75,7 +75,7 @@ double LowerBetaQuantile(double alpha, double beta, double p) {
     const double log_density = TimesLog(alpha - 1, u) + (beta - 1) * std::log1p(-u) - log_beta;
     return {std::log(probability) - log_p, std::exp(log_density) / probability};
   };
-  // I_u ≤ u^α / (α B) since β ≥ 1, so this start is not above the root.
+  // The start is not above the root, since β ≥ 1 gives I_u ≤ u^α / (α B).
   const double start = std::exp((log_p + std::log(alpha) + log_beta) / alpha);
   const double sum = alpha + beta;
   const double scale = std::sqrt(alpha * beta / (sum + 1)) / sum;
@@ -96,7 +96,7 @@ double LowerGammaQuantile(double shape, double p) {
     const double probability = LowerIncompleteGamma(shape, x);
     return {std::log(probability) - log_p, GammaDensity(shape, x) / probability};
   };
-  // P ≤ x^a / Γ(a + 1), so this start is not above the root; the median is below the mean.
+  // The start is not above the root, since P ≤ x^a / Γ(a + 1). The median is below the mean.
   const double start = std::exp((log_p + LogGamma(shape + 1)) / shape);
   return IncreasingRoot(log_ratio, 0, shape, start, std::sqrt(shape));
 }

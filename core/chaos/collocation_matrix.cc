@@ -43,7 +43,7 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
   POLYEST_CHECK(values.rows() == points() && coefficients.rows() == terms());
   POLYEST_CHECK(coefficients.cols() == values.cols() && residual_variance.size() == values.cols());
   const int freedom = points() - terms();
-  // One column at a time: matrix-vector products need no buffers, unlike products of matrices.
+  // Matrix-vector products, one column at a time, need no buffers, unlike products of matrices.
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
     auto solution = coefficients.col(j);
     solution.noalias() = thin_q_.transpose() * values.col(j);

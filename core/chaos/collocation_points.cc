@@ -28,7 +28,7 @@ std::vector<int> FirstPrimes(int count) {
   return primes;
 }
 
-// Faure's (1992) permutation of the digits 0 … base − 1, which fixes 0.
+// Returns Faure's (1992) permutation of the digits 0 … base − 1, which fixes 0.
 std::vector<int> DigitPermutation(int base) {
   if (base == 2) return {0, 1};
   std::vector<int> permutation;
@@ -52,8 +52,8 @@ std::vector<int> Digits(int base, bool scrambled) {
   return digits;
 }
 
-// Σ_i σ(d_i) base^(−i−1) for index = Σ_i d_i base^i; σ(0) = 0. Index 1 first, then 2 …: counting
-// up costs less than the divisions that find an index's digits.
+// Computes Σ_i σ(d_i) base^(−i−1) for index = Σ_i d_i base^i, with σ(0) = 0, for the indices 1, 2,
+// … in turn. Counting up costs less than the divisions that find the digits of an index.
 class RadicalInverses {
  public:
   RadicalInverses(int base, std::vector<int> permutation)

@@ -32,7 +32,7 @@ class HyperbolicSet {
  private:
   static constexpr double kRounding = 1e-9;
 
-  // Variables from k on share what is left of p^q.
+  // Visits all degrees of the variables from k on; `left` is what the earlier ones leave of p^q.
   template <typename Visitor>
   bool VisitFrom(Eigen::Index k, double left, const Visitor& visit) {
     if (k == index_.size()) return visit(index_);

@@ -1,7 +1,7 @@
 #pragma once
 
-// The multi-indices of an expansion, which say what products of the germs' polynomials its terms
-// are. They form the hyperbolic set
+// The multi-indices of an expansion: each gives the degrees of the germs' polynomials whose product
+// is a term. They form the hyperbolic set
 //   {j : j_1^q + … + j_n^q ≤ p^q},   0 < q ≤ 1.
 // q = 1 truncates at the total degree. A smaller q leaves out products of many variables first,
 // which are the most numerous and matter least in mechanical systems (G. Blatman and B. Sudret,

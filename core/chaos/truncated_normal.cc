@@ -11,7 +11,7 @@
 namespace polyest::internal {
 namespace {
 
-// Beyond it the density underflows: e^{−38²/2} ≈ 10⁻³¹⁴.
+// The limit beyond which the density underflows: e^{−38²/2} ≈ 10⁻³¹⁴.
 constexpr double kReach = 38;
 constexpr double kPanel = 1;
 constexpr int kNodesForDensity = 20;
@@ -22,7 +22,7 @@ double Density(double x) {
   return std::exp(-0.5 * x * x) * (0.5 * std::numbers::sqrt2 * std::numbers::inv_sqrtpi);
 }
 
-// ∫_a^b φ by Gauss and Legendre, b − a ≤ kPanel.
+// Returns ∫_a^b φ by Gauss–Legendre quadrature; requires b − a ≤ kPanel.
 double PanelProbability(double a, double b) {
   static const GaussRule rule = MakeGaussRule(Germ::Uniform(), kNodesForDensity);
   const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
@@ -66,14 +66,14 @@ double NormalProbability(double a, double b) {
   if (!(a < b)) return 0;
   if (b - a <= kPanel) return PanelProbability(a, b);
   const double lower = a / std::numbers::sqrt2, upper = b / std::numbers::sqrt2;
-  // Differences within one tail, where b − a keeps them from cancelling; a sum across the middle.
+  // The result is a difference within one tail, which does not cancel, or a sum across the middle.
   if (a > 0) return 0.5 * (std::erfc(lower) - std::erfc(upper));
   if (b < 0) return 0.5 * (std::erfc(-upper) - std::erfc(-lower));
   return 0.5 * (std::erf(upper) - std::erf(lower));
 }
 
-// Newton's method on log ∫_a^ξ φ − log(p Z), an increasing concave function: from a start that is
-// not above the root every iterate stays there.
+// Applies Newton's method to log ∫_a^ξ φ − log(p Z), an increasing concave function: from a start
+// that is not above the root every iterate stays below it.
 double TruncatedNormalQuantile(double a, double b, double p) {
   POLYEST_CHECK(a < b && p > 0 && p <= 0.5);
   const double target = p * NormalProbability(a, b);
@@ -81,7 +81,7 @@ double TruncatedNormalQuantile(double a, double b, double p) {
   double xi = std::max(Eigen::numext::ndtri(target), a + target / Density(0));
   for (int step = 0; step < kMaxSteps; ++step) {
     const double probability = NormalProbability(a, xi);
-    if (!(probability > 0)) break;  // a itself, to rounding
+    if (!(probability > 0)) break;  // ξ is a, to rounding
     const double slope = Density(xi) / probability;
     const double change = std::log(target / probability) / slope;
     xi = std::min(xi + change, b);
@@ -90,8 +90,8 @@ double TruncatedNormalQuantile(double a, double b, double p) {
   return xi;
 }
 
-// p_{k+1} √b_{k+1} = (ξ − a_k) p_k − √b_k p_{k−1},  a_k = ∫ ξ p_k² ρ,  b_{k+1} makes ∫ p_{k+1}² ρ =
-// 1
+// Computes p_{k+1} √b_{k+1} = (ξ − a_k) p_k − √b_k p_{k−1} with a_k = ∫ ξ p_k² ρ and the b_{k+1}
+// that makes ∫ p_{k+1}² ρ = 1.
 RecurrenceCoefficients TruncatedNormalRecurrence(double a, double b, int count) {
   POLYEST_CHECK(a < b && count >= 1 && count <= Germ::kMaxTruncatedNormalOrder + 1);
   const Discretization measure = Discretize(a, b, count + kNodesForDensity);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The standard normal density cut to [a, b], either bound may be infinite:
+// The standard normal density cut to [a, b]; either bound may be infinite.
 //   ρ(ξ) = φ(ξ)/Z on [a, b],  φ(ξ) = e^{−ξ²/2}/√(2π),  Z = ∫_a^b φ.
 //
 // Its orthogonal polynomials have no closed form. Stieltjes' procedure on a discrete measure finds

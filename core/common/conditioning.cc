@@ -9,14 +9,14 @@
 namespace polyest::internal {
 namespace {
 
-// The singular values of an upper bidiagonal n × n matrix B without computing all of them: they are
-// the eigenvalues above 0 of the symmetric tridiagonal matrix T of size 2n that has zeros on its
+// Finds singular values of an upper bidiagonal n × n matrix B one at a time. They are the
+// eigenvalues above 0 of the symmetric tridiagonal matrix T of size 2n that has zeros on its
 // diagonal and b_11, b_12, b_22, b_23, … beside it (Golub and Kahan, 1965). By Sylvester's law of
 // inertia as many eigenvalues of T lie below x as T − x I = L D Lᵀ has negative pivots. Eigen's own
 // decompositions, which make the singular vectors as well, take the compiler five times as long.
 class BidiagonalSpectrum {
  public:
-  // `beside` are the entries of T beside its diagonal.
+  // Takes the entries of T beside its diagonal.
   explicit BidiagonalSpectrum(Vector beside)
       : beside_(std::move(beside)), size_((beside_.size() + 1) / 2) {}
 
@@ -75,7 +75,7 @@ Conditioning ConditioningOf(const Matrix& matrix) {
   }
   const BidiagonalSpectrum spectrum(std::move(beside));
   const double largest = spectrum.Find(size - 1, 0, spectrum.Bound());
-  // What rounding makes of a singular value of 0 is below this.
+  // Rounding turns a singular value of 0 into one below this.
   const double zero = static_cast<double>(size) * std::numeric_limits<double>::epsilon() * largest;
   result.rank = size - spectrum.CountBelow(zero);
   if (result.rank == size) result.number = largest / spectrum.Find(0, zero / 2, largest);

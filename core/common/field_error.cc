@@ -12,11 +12,11 @@
 namespace polyest::internal {
 namespace {
 
-// Names of the status's payloads: the path, and whether the message begins with it.
+// The names of the status's payloads: the path, and whether the message begins with it.
 constexpr char kField[] = "polyest/field";
 constexpr char kShown[] = "polyest/field-shown";
 
-// Each step as its kind, the length of its text, ':' and the text, which may hold anything.
+// Encodes each step as its kind, the length of its text, ':' and the text, which may hold anything.
 std::string Encode(const FieldPath& field) {
   std::string encoded;
   for (const FieldStep& step : field.steps()) {
@@ -39,14 +39,14 @@ FieldPath Decode(absl::string_view encoded) {
   return field;
 }
 
-// How the message begins where the path is shown.
+// Returns the beginning of a message that shows the path.
 std::string Prefix(const FieldPath& field) {
   return field.empty() ? "" : absl::StrCat(field.ToString(), ": ");
 }
 
 bool IsShown(const absl::Status& status) { return status.GetPayload(kShown).has_value(); }
 
-// A status of the same code and payloads that refuses `field`, with the same sentence.
+// Returns a status with the same code, payloads and sentence that refuses `field`.
 absl::Status WithField(const absl::Status& status, const FieldPath& field, bool shown) {
   absl::Status changed(status.code(), absl::StrCat(shown ? Prefix(field) : "", SentenceOf(status)));
   status.ForEachPayload([&changed](absl::string_view name, const absl::Cord& payload) {

@@ -1,9 +1,9 @@
 #pragma once
 
-// Refusals of a field that say which one as data, so that nobody has to read it out of a sentence.
+// Errors that refuse a field and name it as data, so that no program needs to parse a sentence.
 //
-// Such a status has the field's path as a payload, and the message "path: sentence". Whoever passes
-// it on from an inner structure to an outer one puts the outer place in front with Within(), which
+// The status has the field's path as a payload, and the message "path: sentence". Code that passes
+// the status from an inner structure to an outer one prepends the outer field with Within(), which
 // changes the path and the message together:
 //
 //   POLYEST_RETURN_IF_ERROR(Within({"measured", 0}, Validate(noise)));
@@ -23,8 +23,8 @@
 
 namespace polyest::internal {
 
-// One step of the way to a field: into a field of a structure, an element of a list, or the value
-// of a key in a map.
+// One step of a path: into a field of a structure, an element of a list, or the value of a key in a
+// map.
 class FieldStep {
  public:
   enum class Kind { kName, kIndex, kKey };
@@ -33,11 +33,11 @@ class FieldStep {
   FieldStep(std::string name) : FieldStep(Kind::kName, std::move(name)) {}
   FieldStep(std::integral auto index) : FieldStep(Kind::kIndex, std::to_string(index)) {}
   FieldStep(Kind kind, std::string text) : kind_(kind), text_(std::move(text)) {}
-  // A key is what a user wrote, and may be any text.
+  // Makes a step to a key, which a user wrote and which may be any text.
   static FieldStep Key(absl::string_view key) { return {Kind::kKey, std::string(key)}; }
 
   Kind kind() const { return kind_; }
-  // The name, the index in digits, or the key.
+  // Returns the name, the index in digits, or the key.
   const std::string& text() const { return text_; }
   bool operator==(const FieldStep&) const = default;
 
@@ -46,22 +46,22 @@ class FieldStep {
   std::string text_;
 };
 
-// The way to a field, from the structure that whoever reads it has at hand. Empty: that structure
-// itself.
+// The path to a field, from the structure that the reader has at hand. An empty path is that
+// structure itself.
 class FieldPath {
  public:
   FieldPath() = default;
   FieldPath(std::initializer_list<FieldStep> steps) : steps_(steps) {}
-  // A path that a program has written, "measured[0].noise": names and indices, no keys.
+  // Parses a path written in a program, "measured[0].noise": names and indices, no keys.
   FieldPath(absl::string_view text);
   FieldPath(const std::string& text) : FieldPath(absl::string_view(text)) {}
   FieldPath(const char* text) : FieldPath(absl::string_view(text)) {}
 
   const std::vector<FieldStep>& steps() const { return steps_; }
   bool empty() const { return steps_.empty(); }
-  // The path with another one after it.
+  // Returns this path followed by `inner`.
   FieldPath Then(const FieldPath& inner) const;
-  // "measured[0].noise.absolute"; keys stand like names.
+  // Returns the path as text, "measured[0].noise.absolute"; keys are written like names.
   std::string ToString() const;
   bool operator==(const FieldPath&) const = default;
 
@@ -69,15 +69,15 @@ class FieldPath {
   std::vector<FieldStep> steps_;
 };
 
-// Returns the refusal of a field with the message "path: sentence".
+// Returns a status that refuses a field with the message "path: sentence".
 absl::Status FieldError(absl::StatusCode code, const FieldPath& field, absl::string_view sentence);
-// The same as INVALID_ARGUMENT.
+// Returns a FieldError with the code INVALID_ARGUMENT.
 absl::Status InvalidField(const FieldPath& field, absl::string_view sentence);
-// Returns the refusal of a field whose sentence names the place in words of its own ("row 3, column
-// x: …"): the path is data only.
+// Returns a status that refuses a field whose sentence already names the place ("row 3, column x:
+// …"): the path is in the payload only.
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status);
 
-// Returns the field that a status refuses; nothing when it has none.
+// Returns the field that a status refuses; nothing if it names none.
 std::optional<FieldPath> FieldOf(const absl::Status& status);
 // Returns the message without the path in front.
 absl::string_view SentenceOf(const absl::Status& status);

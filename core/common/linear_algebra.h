@@ -1,9 +1,8 @@
 #pragma once
 
-// Decompositions of dense matrices behind plain functions, so that Eigen's templates for them are
-// compiled once and not in every source that needs one. They allocate, so no path that runs for
-// every sample may use them. They do not check that their arguments are finite, except where they
-// say so.
+// Decompositions of dense matrices as plain functions, so that Eigen's templates for them are
+// compiled once and not in every source that needs one. They allocate, so no code that runs for
+// every sample may use them. They check whether their arguments are finite only where it is stated.
 
 #include <Eigen/LU>
 
@@ -11,26 +10,28 @@
 
 namespace polyest::internal {
 
-// A = V diag(values) Vᵀ of a symmetric n × n matrix.
+// The decomposition A = V diag(values) Vᵀ of a symmetric n × n matrix.
 struct SymmetricEigen {
   Vector values;   // n, ascending
-  Matrix vectors;  // n × n, orthonormal, a column each
+  Matrix vectors;  // n × n, orthonormal columns
   bool converged = false;
 };
 
-// Reads the lower triangle of `matrix` only.
+// Decomposes a symmetric matrix; reads its lower triangle only.
 SymmetricEigen DecomposeSymmetric(const Matrix& matrix);
 // Decomposes the symmetric tridiagonal matrix with `diagonal` (n ≥ 1) and `off_diagonal` (n − 1).
 SymmetricEigen DecomposeTridiagonal(const Vector& diagonal, const Vector& off_diagonal);
 // Returns the eigenvalues alone, ascending; reads the lower triangle of `matrix` only.
 Vector SymmetricEigenvalues(const Matrix& matrix);
 
-// A = L Lᵀ of a symmetric positive definite n × n matrix; reads its lower triangle only.
+// The factor of A = L Lᵀ, a symmetric positive definite n × n matrix; reads A's lower triangle
+// only.
 class CholeskyFactor {
  public:
   explicit CholeskyFactor(const Matrix& matrix);
 
-  // Whether the matrix was positive definite to working precision; the functions below require it.
+  // Returns whether the matrix was positive definite to working precision; the functions below
+  // require it.
   bool positive_definite() const { return positive_definite_; }
   Matrix Lower() const;                          // L
   double HalfLogDeterminant() const;             // ½ log det A = Σ log L_ii
@@ -42,7 +43,8 @@ class CholeskyFactor {
   bool positive_definite_;
 };
 
-// P A = L U of a square matrix, with partial pivoting. Invertible only if Determinant() ≠ 0.
+// The factors P A = L U of a square matrix, with partial pivoting. A is invertible only if
+// Determinant() ≠ 0.
 class LuFactors {
  public:
   explicit LuFactors(const Matrix& matrix);
@@ -58,15 +60,15 @@ class LuFactors {
 
 // Returns the inverse of an invertible matrix.
 Matrix Inverse(const Matrix& matrix);
-// Returns (Aᵀ)⁻¹ right, A being invertible.
+// Returns (Aᵀ)⁻¹ right; A must be invertible.
 Vector SolveTransposed(const Matrix& matrix, const Vector& right);
-// Returns L⁻¹ right, L being the lower triangle of `lower`, whose diagonal has no zero.
+// Returns L⁻¹ right. L is the lower triangle of `lower`; its diagonal must have no zero.
 Vector SolveLower(const Matrix& lower, const Vector& right);
 Matrix SolveLower(const Matrix& lower, const Matrix& right);
 // Returns (Lᵀ)⁻¹ r for each row r of `right`; the solutions are rows, too.
 Matrix SolveLowerTransposedRows(const ConstMatrixRef& lower, const Matrix& right);
 
-// A = Q R of an m × n matrix, m ≥ n, without pivoting.
+// The factors A = Q R of an m × n matrix, m ≥ n, without pivoting.
 struct ThinQr {
   Matrix q;  // m × n, orthonormal columns
   Matrix r;  // n × n, upper triangular
@@ -75,7 +77,7 @@ ThinQr DecomposeThinQr(const Matrix& matrix);
 // Returns an orthonormal basis (m × m) whose first column is parallel to `vector` (m ≥ 1, not 0).
 Matrix OrthonormalBasisFrom(const Vector& vector);
 
-// A P = Q R with column pivoting, of an m × n matrix.
+// The factors A P = Q R of an m × n matrix, with column pivoting.
 struct PivotedQr {
   Matrix q;  // m × m; its last m − rank columns span the orthogonal complement of A's range
   Eigen::Index rank = 0;
@@ -83,10 +85,10 @@ struct PivotedQr {
 };
 PivotedQr SolveByPivotedQr(const Matrix& matrix, const Vector& right);
 
-// Rank and condition number of an m × n matrix, m ≥ n ≥ 1, by its singular values; rank 0 and +∞
-// when it has entries that are not finite.
+// The rank and condition number of an m × n matrix, m ≥ n ≥ 1, by its singular values; rank 0 and
+// +∞ if it has entries that are not finite.
 struct Conditioning {
-  Eigen::Index rank = 0;  // singular values above n ε times the largest, ε the machine's
+  Eigen::Index rank = 0;  // singular values above n ε times the largest, ε = machine precision
   double number;          // largest singular value ÷ smallest; +∞ when the rank is below n
 };
 Conditioning ConditioningOf(const Matrix& matrix);

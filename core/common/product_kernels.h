@@ -1,8 +1,8 @@
 #pragma once
 
-// Declares the kernels of Eigen's general matrix products, which product_kernels.cc compiles once:
-// otherwise every source that multiplies two matrices compiles them again, for seconds each. The
-// products themselves are written as anywhere, `a * b`.
+// Declares the kernels of Eigen's general matrix products, which product_kernels.cc compiles once.
+// Every source that multiplies two matrices would otherwise compile them again, for seconds each.
+// The products themselves are written as usual, `a * b`.
 
 #include <Eigen/Core>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which sanitizer the program is built with: each is 0 or 1. GCC and Clang say it in different
-// ways.
+// Macros that say which sanitizer the program is built with, each 0 or 1. GCC and Clang tell it in
+// different ways.
 
 #if defined(__has_feature)
 #define POLYEST_HAS_FEATURE(feature) __has_feature(feature)

@@ -1,8 +1,8 @@
 #pragma once
 
 // The Eigen names that the whole library shares. Sources of the library include this header, which
-// also says that the products' kernels are compiled elsewhere; users include polyest/types.h, since
-// they may compile for another processor.
+// also declares that the products' kernels are compiled elsewhere. Users include polyest/types.h,
+// since they may compile for another processor.
 
 #include <limits>
 
