@@ -16,7 +16,8 @@ double Variance(const Vector& values) {
   return (values.array() - mean).square().sum() / static_cast<double>(values.size() - 1);
 }
 
-// ρ_t + ρ_{t+1} summed over t = 0, 2, 4 … while positive, each no larger than the one before.
+// Returns the sum of ρ_t + ρ_{t+1} over t = 0, 2, 4 … while they are positive, each limited to the
+// one before.
 double SumOfInitialMonotoneSequence(const Vector& correlation) {
   double sum = 0;
   double last = std::numeric_limits<double>::infinity();
@@ -43,7 +44,7 @@ Matrix RankNormalized(const ConstMatrixRef& draws) {
   for (size_t first = 0; first < order.size();) {
     size_t end = first + 1;
     while (end < order.size() && value[order[end]] == value[order[first]]) ++end;
-    // Ranks first + 1 … end share their mean.
+    // The equal draws have the ranks first + 1 … end and share their mean.
     const double rank = 0.5 * static_cast<double>(first + 1 + end);
     const double score = normal.Quantile((rank - 0.375) / (static_cast<double>(count) + 0.25));
     for (; first < end; ++first) value[order[first]] = score;
@@ -82,7 +83,7 @@ double EffectiveSize(const ConstMatrixRef& normalized) {
   if (!(total > 0)) return all;
   Vector correlation(times - 1);
   for (Eigen::Index lag = 0; lag < correlation.size(); ++lag) {
-    // Mean over the chains of (1/T) Σ_t x_t x_{t+lag}.
+    // The mean over the chains of (1/T) Σ_t x_t x_{t+lag}.
     const double covariance =
         centred.topRows(times - lag).cwiseProduct(centred.bottomRows(times - lag)).sum() /
         (t * static_cast<double>(chains));

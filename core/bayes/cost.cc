@@ -8,10 +8,10 @@
 namespace polyest::internal {
 namespace {
 
-// Number of points whose matrices are computed together, so that they stay in the cache.
+// The number of points whose matrices are computed together, so that they stay in the cache.
 constexpr Eigen::Index kBlock = 128;
 
-// J_mismatch + α² J_apriori; without a weight an infinite prior term does not enter.
+// Returns J_mismatch + α² J_apriori; for α² = 0 an infinite prior term has no effect.
 double Total(double mismatch, double prior, double regularization) {
   return regularization > 0 ? mismatch + regularization * prior : mismatch;
 }
@@ -97,7 +97,7 @@ Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
 
 void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   POLYEST_CHECK(etas.cols() == dimension());
-  // Kept from call to call, so that a sampler's sweeps do not allocate.
+  // The memory is kept between calls, so that a sampler's sweeps do not allocate.
   thread_local Matrix difference;  // D = Φ − 1 φ_0ᵀ
   thread_local Matrix product;
   thread_local Matrix xis;

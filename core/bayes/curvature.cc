@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-// Tolerance within which the total curvature of a direction counts as the prior's own, and the
+// The tolerance within which a direction's total curvature counts as the prior's own, and the
 // direction as limited by the prior, so that rounding does not decide.
 constexpr double kSlack = 1e-9;
 
@@ -23,7 +23,7 @@ Curvature CovarianceFromCurvature(const ConstMatrixRef& hessian, const Prior& pr
   Vector variance = Vector::Ones(n);
   Matrix directions = Matrix::Identity(n, n);
   Curvature result;
-  // A curvature that is not finite says nothing: the prior's is kept.
+  // The prior's covariance is kept if the curvature is not finite.
   result.limited_by_prior = !scaled.allFinite();
   if (!result.limited_by_prior) {
     const SymmetricEigen eigen = DecomposeSymmetric((scaled + scaled.transpose()) / 2);

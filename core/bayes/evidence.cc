@@ -13,12 +13,12 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kPoints = 8192;  // of each density
+constexpr int kPoints = 8192;  // number of points of each density
 constexpr double kWider = 1.2;
 constexpr int kMaxIterations = 200;
-constexpr double kSettled = 1e-10;  // of log Z
+constexpr double kSettled = 1e-10;  // tolerance of log Z
 
-// N(mean, factor factorᵀ)
+// The normal density N(mean, factor factorᵀ).
 struct Gaussian {
   Vector mean;
   Matrix factor;
@@ -39,11 +39,12 @@ struct Gaussian {
   }
 };
 
-// log Z from log(p/g) at points of p and at points of g.
+// Returns log Z from log(p/g) at points of p and at points of g.
 double Bridge(const Vector& at_draws, const Vector& at_points) {
   double log_z = at_draws.mean();
   for (int i = 0; i < kMaxIterations; ++i) {
-    // With l = p/(g Z): Z ← Z · mean_g[l/(l + 1)] / mean_p[1/(l + 1)], neither of which overflows.
+    // The step, with l = p/(g Z), is Z ← Z · mean_g[l/(l + 1)] / mean_p[1/(l + 1)]; neither
+    // overflows.
     const auto logistic = [&](double log_l) { return 1 / (1 + std::exp(log_z - log_l)); };
     const double of_points = at_points.unaryExpr(logistic).mean();
     const double of_draws = 1 - at_draws.unaryExpr(logistic).mean();

@@ -9,7 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-// Coefficients that differ by less count as equal when a direction's sign is chosen.
+// The difference up to which coefficients count as equal when a direction's sign is chosen.
 constexpr double kSameSize = 1e-9;
 
 Vector WithPositiveLargest(Vector direction) {
@@ -39,8 +39,8 @@ std::vector<Direction> Directions(const ConstMatrixRef& mismatch_hessian, const 
   for (Eigen::Index i = scaled.rows() - 1; i >= 0; --i) {  // eigenvalues come in increasing order
     Direction direction;
     direction.information = std::max(0.0, eigen.values[i]);
-    // A step v of the scaled germs moves the scores by F v (D⁻¹ F D = F, D being 1 where F is not
-    // the identity).
+    // The scores move by F v for a step v of the scaled germs (D⁻¹ F D = F, since D is 1 where F is
+    // not the identity).
     Vector coefficients = eigen.vectors.col(i);
     if (prior.correlated()) coefficients = prior.ToScores(coefficients).normalized();
     direction.coefficients = WithPositiveLargest(std::move(coefficients));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Identifiability: what the data say beside the prior. The eigenvalues λ of the
+// Identifiability: the data's information compared with the prior's. The eigenvalues λ of the
 // prior-preconditioned mismatch Hessian, Lᵀ H_mismatch L with L Lᵀ = prior covariance, are the
 // data's information in the directions of the eigenvectors, in units of the prior's.
 //
@@ -21,7 +21,7 @@ namespace polyest::internal {
 // it is less than the prior's, and WEAK in between.
 inline constexpr double kIdentifiedInformation = 10;
 inline constexpr double kWeakInformation = 1;
-// Limits of contraction = posterior ÷ prior standard deviation for a parameter's verdict.
+// The limits of contraction = posterior ÷ prior standard deviation for a parameter's verdict.
 inline constexpr double kIdentifiedContraction = 0.5;
 inline constexpr double kNotIdentifiedContraction = 0.9;
 

@@ -17,10 +17,10 @@ struct Component {
 };
 constexpr std::array<Component, 2> kComponents = {{{0.85, 1.1}, {0.15, 2.0}}};
 
-// log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²}
+// Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²}.
 double LogProposal(double squared_radius, int dimension) {
   double density = 0;
-  // Relative to the widest, whose exponential vanishes last.
+  // The sum is relative to the widest component, whose exponential underflows last.
   const double widest = 0.5 * squared_radius / std::pow(kComponents.back().scale, 2);
   for (const Component& c : kComponents) {
     density += c.share * std::pow(c.scale, -dimension) *
@@ -29,8 +29,8 @@ double LogProposal(double squared_radius, int dimension) {
   return std::log(density) - widest;
 }
 
-// Standard normal points, the first share of them scaled for the first component and so on:
-// stretches of a Halton sequence are low-discrepancy points of their own.
+// Returns standard normal points, the first share of them scaled for the first component and so on.
+// Stretches of a Halton sequence are themselves low-discrepancy points.
 Matrix MixturePoints(int dimension, int points) {
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
   Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, points).value();
@@ -65,7 +65,7 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
   Eigen::Index kept = 0;
   for (Eigen::Index i = 0; i < points; ++i) {
-    // A vectorized exponential of −∞ need not be 0.
+    // The weight is tested, too: a vectorized exponential of −∞ need not be 0.
     if (!std::isfinite(costs[i]) || !(weights[i] > 0)) continue;
     etas.row(kept) = etas.row(i);
     costs[kept] = costs[i];

@@ -18,7 +18,7 @@
 namespace polyest::internal {
 
 struct WeightedDraws {
-  Matrix etas;     // draws × n, local coordinates, those of positive weight
+  Matrix etas;     // draws × n, local coordinates; only draws of positive weight
   Vector costs;    // J at each
   Vector weights;  // Σ = 1
   // 1/Σ w²; 0 if no point has a positive weight, and then there are no draws.

@@ -7,9 +7,9 @@
 namespace polyest::internal {
 namespace {
 
-// A term below this part of its largest value is rounding error.
+// The part of its largest value below which a term is rounding error.
 constexpr double kResolved = 1e-10;
-// Each leg of the L must be as long as a doubling.
+// The shortest leg of the L, a doubling.
 const double kMinLeg = std::log(2.0);
 
 // A point of the curve in logarithms; both coordinates are functions of τ = log α².
@@ -49,7 +49,7 @@ std::vector<LogPoint> ResolvedPoints(const std::vector<RegularizedMinimum>& poin
   return resolved;
 }
 
-// Curvature at b of the curve through three points, positive where an L bends:
+// Returns the curvature at b of the curve through three points, positive where an L bends:
 //   κ = (x′ y″ − x″ y′)/(x′² + y′²)^{3/2},  x = log J_mismatch, y = log prior term, ′ = d/dτ.
 double BendAt(const LogPoint& a, const LogPoint& b, const LogPoint& c) {
   const double left = b.tau - a.tau;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Choice of the regularization weight α² of (56) by the L-curve (Hansen 1992): the corner of the
+// The L-curve (Hansen 1992), which chooses the regularization weight α² of (56): the corner of the
 // curve of the prior term against the mismatch, both on logarithmic axes. Beyond the corner more
 // weight increases the mismatch, and less weight the distance from the prior's mode.
 //

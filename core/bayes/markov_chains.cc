@@ -10,9 +10,10 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kMaxTimes = 64;      // kept; when full every second is dropped
+constexpr int kMaxTimes = 64;      // times kept; when full every second is dropped
 constexpr int kFirstInterval = 2;  // sweeps from one time kept to the next
-constexpr int kFirstSweeps = 64;   // before convergence is looked at, and the least added later
+constexpr int kFirstSweeps =
+    64;  // sweeps before the first test of convergence, and the fewest added later
 constexpr Eigen::Index kMinInGroup = 8;
 
 class ChainRunner {
@@ -44,7 +45,7 @@ class ChainRunner {
       Judge();
       const double effective = result_.effective_size.minCoeff();
       if (effective >= options_.effective_size || done >= options_.max_sweeps) break;
-      // Raises the number of sweeps in proportion, and a little more.
+      // The number of sweeps rises in proportion to the missing effective size, and a little more.
       const double more = 1.1 * done * (options_.effective_size / effective - 1);
       sweeps = done + static_cast<int>(std::clamp(more, static_cast<double>(kFirstSweeps),
                                                   static_cast<double>(options_.max_sweeps - done)));
@@ -62,7 +63,7 @@ class ChainRunner {
       }
       times_ /= 2;
       interval_ *= 2;
-      return;  // this one is the odd one out
+      return;  // drops this time, too, which has an odd index
     }
     etas_.middleRows(times_ * chains_, chains_) = state_.etas;
     costs_.segment(times_ * chains_, chains_) = state_.costs;

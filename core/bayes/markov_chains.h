@@ -14,16 +14,16 @@ namespace polyest::internal {
 
 struct ChainOptions {
   int groups = 4;                  // ≥ 2
-  double effective_size = 20'000;  // asked for, of every quantity
-  int max_sweeps = 250;            // moves of every particle, at most
-  uint64_t seed = 1;               // the draws are a function of the arguments alone
+  double effective_size = 20'000;  // asked for every quantity
+  int max_sweeps = 250;            // greatest number of moves of each particle
+  uint64_t seed = 1;               // the draws depend on the arguments alone
 };
 
 struct Chains {
-  // Draws × n, ordered by time: rows t C … t C + C − 1 are the C particles at time t.
+  // The draws (draws × n), ordered by time: rows t C … t C + C − 1 are the C particles at time t.
   Matrix etas;
   Vector costs;
-  // One entry per quantity (convergence.h).
+  // The diagnostics, one entry per quantity (convergence.h).
   Vector r_hat;
   Vector effective_size;
 };

@@ -15,10 +15,10 @@
 namespace polyest::internal {
 namespace {
 
-// Replaces +∞ for the solver: far above any other value once the function is scaled.
+// The value that replaces +∞ for the solver, far above any other value of the scaled function.
 constexpr double kHuge = 1e20;
 constexpr double kActive = UnitProblem::kActive;
-// Largest number of times that SLSQP is restarted from its result with fresh curvature.
+// The largest number of times that SLSQP is restarted from its result with fresh curvature.
 constexpr int kMaxRestarts = 8;
 constexpr int kMaxNewtonSteps = 6;
 
@@ -51,7 +51,7 @@ std::string InWords(int code) {
   }
 }
 
-// NLopt's callback for the function.
+// The data of NLopt's callback for the function.
 struct Callback {
   UnitProblem* problem;
   nlopt::opt* solver;
@@ -67,7 +67,7 @@ double CallFunction(const std::vector<double>& u, std::vector<double>& gradient,
   return std::min(value, kHuge);
 }
 
-// … and for all constraints at once: rows u − bounds ≤ 0, the gradient row-major.
+// Evaluates all constraints at once: rows u − bounds ≤ 0, the gradient row-major.
 void CallConstraints(unsigned count, double* result, unsigned n, const double* u, double* gradient,
                      void* data) {
   const UnitProblem& problem = *static_cast<UnitProblem*>(data);
@@ -83,7 +83,6 @@ struct Run {
   int code = nlopt::FAILURE;
 };
 
-// Runs SLSQP once.
 Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions& options) {
   std::vector<double> u(start.data(), start.data() + start.size());
   Run run{start};
@@ -122,8 +121,8 @@ Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions&
   return run;
 }
 
-// Orthonormal basis of the directions that keep the constraints active at u: of those whose
-// multiplier is positive, so that leaving them would raise the function.
+// Returns an orthonormal basis of the directions that keep the constraints active at u that have a
+// positive multiplier: leaving those would raise the function.
 Matrix FreeDirections(const UnitProblem& problem, const Vector& u, const Vector& gradient) {
   const Eigen::Index n = u.size();
   std::vector<Vector> normals;  // outward
@@ -151,8 +150,8 @@ Matrix FreeDirections(const UnitProblem& problem, const Vector& u, const Vector&
   return Matrix::Identity(n, n);
 }
 
-// Zᵀ ∇²f Z by central differences of the gradient along the columns of Z; infinite where f is not
-// finite or where the box leaves no room for them.
+// Returns Zᵀ ∇²f Z by central differences of the gradient along the columns of Z; infinite where f
+// is not finite or where the box leaves no room for the differences.
 Matrix ReducedHessian(UnitProblem& problem, const Vector& u, const Matrix& z) {
   constexpr double kStep = 1e-5;
   Matrix hessian(z.cols(), z.cols());
@@ -173,10 +172,10 @@ Matrix ReducedHessian(UnitProblem& problem, const Vector& u, const Matrix& z) {
 
 enum class Polish { kConverged, kSaddle, kUnsure };
 
-// Newton's method from the gradient alone on the free directions: near a minimum differences of
-// values are rounding long before the gradient is. At a saddle `u` is moved down from it.
+// Applies Newton's method, by the gradient alone, in the free directions: near a minimum rounding
+// spoils differences of values long before it spoils the gradient. Moves `u` down from a saddle.
 Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector& u) {
-  constexpr double kFlat = 1e-13;  // × the largest curvature: no curvature at all
+  constexpr double kFlat = 1e-13;  // × the largest curvature: less counts as no curvature
   constexpr double kKick = 1e-3;
   Vector gradient(u.size());
   double value = problem.Value(u, &gradient);
@@ -193,7 +192,8 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector
       return Polish::kSaddle;
     }
     if (curvature[0] <= kFlat * largest) return Polish::kUnsure;
-    // p = −Z (Zᵀ H Z)⁻¹ Zᵀ g; the decrement gᵀ Z (Zᵀ H Z)⁻¹ Zᵀ g is what a full step gains, twice
+    // The step is p = −Z (Zᵀ H Z)⁻¹ Zᵀ g; the decrement gᵀ Z (Zᵀ H Z)⁻¹ Zᵀ g is twice a full step's
+    // gain.
     const Matrix root = z * eigen.vectors * curvature.cwiseSqrt().cwiseInverse().asDiagonal();
     const Vector p = -root * (root.transpose() * gradient);
     if (p.cwiseAbs().maxCoeff() <= options.relative_step) return Polish::kConverged;
@@ -203,8 +203,8 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector
     const double decrement = (root.transpose() * gradient).squaredNorm();
     const double next_decrement = (root.transpose() * next_gradient).squaredNorm();
     if (!std::isfinite(next_value) || !(next_decrement < decrement)) {
-      // The gradient cannot improve any more: converged if the digits of the value do not show what
-      // a full step would gain.
+      // The gradient cannot improve any more. The point has converged if a full step's gain is
+      // below the rounding of the value.
       return decrement <= 1e-14 * std::abs(value) ? Polish::kConverged : Polish::kUnsure;
     }
     u = next;
@@ -214,8 +214,8 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector
   return Polish::kUnsure;
 }
 
-// The first point on the way from the start to the middle of the box at which f is finite, and
-// the function scaled so that its steepest slope there is 1.
+// Returns the first point on the way from the start to the middle of the box at which f is finite.
+// Scales the function so that its steepest slope there is 1.
 Vector PrepareStart(UnitProblem& problem, const Vector& start) {
   const Vector centre = problem.Project(Vector::Constant(start.size(), 0.5));
   Vector gradient(start.size());
@@ -229,7 +229,7 @@ Vector PrepareStart(UnitProblem& problem, const Vector& start) {
   return start;
 }
 
-// A point that missed a bound by rounding is put on it, unless f is infinite there.
+// Returns the point, put on the bounds that it missed by rounding unless f is infinite there.
 Vector OnBounds(UnitProblem& problem, const Vector& u) {
   constexpr double kRounding = 1e-12;
   Vector snapped = u;
@@ -295,7 +295,7 @@ std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix
     const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Minimum& other) {
       return ((minimum.point - other.point).cwiseAbs().array() <= tolerance.array()).all();
     });
-    // A run that gave up is no minimum, unless it is the lowest there is.
+    // A run that gave up is not a minimum, unless its value is the lowest.
     if (!known && (distinct.empty() || minimum.converged)) distinct.push_back(std::move(minimum));
   }
   return distinct;

@@ -23,7 +23,7 @@ struct MinimizationProblem {
 
 struct MinimizerOptions {
   double relative_step = 1e-10;  // ends when every |Δx_i| ≤ relative_step × (upper_i − lower_i)
-  int max_evaluations = 500;     // a start
+  int max_evaluations = 500;     // for each start
   // Two minima count as one if every |Δx_i| ≤ same_point × (upper_i − lower_i).
   double same_point = 1e-3;
 };
@@ -32,14 +32,14 @@ struct Minimum {
   Vector point;
   double value = 0;
   bool converged = false;
-  int code = 0;        // NLopt's own
-  std::string reason;  // in words
+  int code = 0;        // NLopt's return code
+  std::string reason;  // the code in words
   int evaluations = 0;
 };
 
 // Returns the distinct minima found from the starts (rows of `starts`), lowest first; at least one.
-// A start outside the box or the constraints is moved inside. Deterministic. On a stop request
-// returns the minima found so far with converged = false.
+// A start outside the box or the constraints is moved inside. The result is deterministic. On a
+// stop request returns the minima found so far with converged = false.
 std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
                                 const MinimizerOptions& options, const Stop& stop);
 

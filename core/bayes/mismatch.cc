@@ -10,12 +10,12 @@
 namespace polyest::internal {
 namespace {
 
-// Floor of residuals, at the level of rounding, which keeps the logarithms finite.
+// The floor of mean squared residuals, at the level of rounding, which keeps the logarithms finite.
 constexpr double kMinMeanSquare = 1e-24;
 constexpr double kMaxCorrelation = 1 - 1e-12;
 
-// J of a channel as a function of A = χ² and D = Σ (u_k − u_{k−1})², with B = A − D/2 and r = B/A,
-// and its derivatives.
+// The J of a channel as a function of A = χ² and D = Σ (u_k − u_{k−1})², and its derivatives; B = A
+// − D/2 and r = B/A.
 struct Likelihood {
   double value = 0;
   double by_a = 0, by_d = 0;
@@ -60,7 +60,7 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
     l.value -= 0.5 * b * r;
     l.by_a += -r + 0.5 * r * r;  // ∂B/∂A = 1
     l.by_d += 0.5 * r;           // ∂B/∂D = −½
-    // second derivatives of −½ B²/A with B = A − D/2 are those of −½ (A − D + D²/4A)
+    // The second derivatives of −½ B²/A with B = A − D/2 are those of −½ (A − D + D²/4A).
     l.by_aa += -0.25 * d * d / (a * a * a);
     l.by_ad += 0.25 * d / (a * a);
     l.by_dd += -0.25 / a;
@@ -68,7 +68,8 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
   return l;
 }
 
-// `factor` multiplies N and accounts for the degrees of freedom that parameters have spent.
+// Evaluates a channel; `factor` multiplies N and accounts for the degrees of freedom that
+// parameters have spent.
 Likelihood Evaluate(const ChannelSums& channel, double chi_squared, double differences,
                     double factor = 1) {
   return Evaluate(factor * channel.Degrees(), chi_squared, differences, channel.scale_unknown,
@@ -112,7 +113,7 @@ double Mismatch::Evaluate(const ConstVectorRef& d) const {
 }
 
 double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
-  // of a χ²: 2 (G d − b)
+  // The gradient of a χ² is 2 (G d − b).
   double value = known_.ChiSquaredWithGradient(d, gradient) / 2;
   gradient /= 2;
   Vector by_samples(d.size()), by_differences(d.size());

@@ -1,6 +1,7 @@
 #pragma once
 
-// J_mismatch over several measured channels; noise of unknown size or correlation is marginalized.
+// The J_mismatch of several measured channels; noise of unknown size or correlation is
+// marginalized.
 //
 // With u_k the residuals of a channel's N samples in units of its working noise (whitened with its
 // working correlation), χ² = Σ u_k² and r = Σ u_k u_{k−1} ÷ Σ u_k² their lag-1 correlation, all

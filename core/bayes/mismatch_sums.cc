@@ -29,7 +29,7 @@ void MismatchSums::Add(const MismatchSums& other) {
 }
 
 double MismatchSums::ChiSquared(const ConstVectorRef& d) const {
-  // dᵀ G d − 2 bᵀ d + w; a sum of squares, so that below 0 is rounding
+  // The χ² is dᵀ G d − 2 bᵀ d + w; as a sum of squares it is below 0 only by rounding.
   return std::max(0.0, d.dot(g_ * d) - 2 * b_.dot(d) + w_);
 }
 

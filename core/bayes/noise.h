@@ -1,6 +1,6 @@
 #pragma once
 
-// How samples are weighed whose noise has outliers (polyest/noise.h).
+// The weights of samples whose noise has outliers (polyest/noise.h).
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,9 @@ inline double OutlierWeight(OutlierHandling outliers, double u) {
   return 1;
 }
 
-// Reweighting keeps neither the variance of an estimate nor the sum of squares what they are for
-// plain least squares. With Gaussian noise, and R = VarianceFactor·σ²/w for a sample,
+// Returns the factor of a sample's variance. Reweighting keeps neither the variance of an estimate
+// nor the sum of squares as they are in plain least squares. With Gaussian noise, and R =
+// VarianceFactor·σ²/w for a sample,
 //   Σ c cᵀ/R is the inverse of the asymptotic covariance E[ψ²]/E[ψ′]², ψ = w u,
 //   Σ e²/R is DegreesFactor·N in the mean
 // (Huber, Robust Statistics, 1981, §3.2; the numbers by quadrature over the normal density).
@@ -54,9 +55,9 @@ inline double DegreesFactor(OutlierHandling outliers) {
   return 1;
 }
 
-// Returns what ½ OutlierWeight(u) u² lacks of −log of the density behind the weight, at u and up to
-// a constant: of the t density ½ (ν + 1) log(1 + u²/ν), of Huber's k |u| − ½ k² where |u| > k and
-// ½ u² else.
+// Returns −log of the density behind the weight minus ½ OutlierWeight(u) u², at u and up to a
+// constant. For the t density −log is ½ (ν + 1) log(1 + u²/ν), for Huber's k |u| − ½ k² where |u| >
+// k and ½ u² elsewhere.
 inline double LackOfWeight(OutlierHandling outliers, double u) {
   switch (outliers) {
     case OutlierHandling::kNone:
@@ -70,7 +71,7 @@ inline double LackOfWeight(OutlierHandling outliers, double u) {
   return 0;
 }
 
-// Whether anything of the noise is to be learned from the record.
+// Returns whether any property of the noise is to be learned from the record.
 inline bool IsLearned(const NoiseModel& noise) {
   return noise.unknown || noise.correlation == NoiseCorrelation::kUnknown ||
          noise.outliers != OutlierHandling::kNone;

@@ -10,7 +10,8 @@ namespace {
 constexpr int kTerms = 40;  // (3.03²)^40/40! of the widest lognormal is 10⁻⁹
 constexpr int kNodes = 64;
 
-// h_1 … h_kTerms at the nodes: √(k+1) h_{k+1} = u h_k − √k h_{k−1}; weighted, kTerms × kNodes.
+// The polynomials h_1 … h_kTerms at the nodes, √(k+1) h_{k+1} = u h_k − √k h_{k−1}, times the
+// weights: kTerms × kNodes.
 struct HermiteRule {
   Vector nodes;
   Matrix weighted;
@@ -29,7 +30,7 @@ HermiteRule MakeHermiteRule() {
   return {rule.nodes, values.bottomRows(kTerms) * rule.weights.asDiagonal()};
 }
 
-// c_1 … c_kTerms of parameter i at score z with standard deviation s.
+// Returns c_1 … c_kTerms of parameter i at score z with standard deviation s.
 Vector Coefficients(const Prior& prior, int i, double z, double s) {
   const UncertainParameter& parameter = prior.parameters()[static_cast<size_t>(i)];
   Vector coefficients = Vector::Zero(kTerms);

@@ -6,7 +6,8 @@
 // With s_i² = C_ii, r_ij = C_ij/(s_i s_j) and the orthonormal Hermite polynomials h_k, expand each
 // parameter, t_i(ẑ_i + s_i u) = Σ_k c_ik h_k(u). Then by Mehler's formula
 //   cov(θ_i, θ_j) = Σ_{k≥1} r_ij^k c_ik c_jk,
-// positive semidefinite wherever the sum ends. Affine: c_i1 = scale s_i alone, the linear rule.
+// which is positive semidefinite wherever the sum ends. Affine: c_i1 = scale s_i alone, the linear
+// rule.
 // Lognormal: c_ik = e^{location + scale ẑ_i + v/2} v^{k/2}/√k!, v = (scale s_i)². A correlated
 // parameter of another family: Gauss's rule of 64 points; its standard deviation is then right to
 // 10⁻³ for s_i ≤ 1.

@@ -13,13 +13,13 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kCoverPerParticle = 4;  // points of the cover of the box for each particle
+constexpr int kCoverPerParticle = 4;  // points that cover the box, for each particle
 constexpr int kMinStartingPoints = 50;
 constexpr double kEffectiveFraction = 0.5;
 constexpr double kShrink = 0.7;  // of the guesses, mixed with 0.3 of the cover
 constexpr int kBisections = 50;
 
-// A cover of the box, count × n.
+// Returns points that cover the box, count × n.
 Matrix CoverOfBox(const Vector& lower, const Vector& upper, int count) {
   Matrix cover = UnitCubePoints(PointSet::kHalton, static_cast<int>(lower.size()), count);
   for (Eigen::Index j = 0; j < cover.cols(); ++j) {
@@ -75,12 +75,13 @@ class Sampler {
     return absl::OkStatus();
   }
 
-  // Weights e^{−step (J − min J)}, not normalized.
+  // Returns the weights e^{−step (J − min J)}, not normalized.
   Vector Weights(double step) const {
     return (-step * (particles_.costs.array() - particles_.costs.minCoeff())).exp();
   }
 
-  // The largest step ≤ most that keeps the effective size (Σ w)²/Σ w² above half of the particles.
+  // Returns the largest step ≤ most that keeps the effective size (Σ w)²/Σ w² above half of the
+  // particles.
   double TemperingStep(double most) const {
     const auto keeps_enough = [&](double step) {
       const Vector w = Weights(step);
@@ -97,7 +98,7 @@ class Sampler {
     return high;
   }
 
-  // Systematic resampling to options_.particles: one uniform draw, evenly spaced pointers.
+  // Resamples to options_.particles systematically: one uniform draw, evenly spaced pointers.
   void Resample(double step) {
     const Vector weights = Weights(step);
     const double spacing = weights.sum() / options_.particles;
@@ -115,8 +116,8 @@ class Sampler {
     Shuffle();
   }
 
-  // Systematic resampling leaves copies side by side; the halves that move each other must not
-  // depend on that order.
+  // Shuffles the particles: systematic resampling leaves copies side by side, and the halves that
+  // move each other must not depend on that order.
   void Shuffle() {
     for (Eigen::Index i = particles_.etas.rows() - 1; i > 0; --i) {
       const Eigen::Index j = moves_.Draw(i + 1);

@@ -20,13 +20,13 @@ namespace polyest::internal {
 
 struct SamplerOptions {
   int particles = 1000;
-  int sweeps = 10;        // of moves after each tempering step
-  int final_sweeps = 40;  // at β = 1, at least
-  // Least number of sweeps in all: more are added at β = 1 until it is reached, so that the work
-  // does not depend on the number of tempering steps unless sweeps × steps + final_sweeps exceeds
-  // it.
+  int sweeps = 10;        // moves of each particle after a tempering step
+  int final_sweeps = 40;  // moves at β = 1, at least
+  // The least number of sweeps in all. More are added at β = 1 until it is reached, so that the
+  // work does not depend on the number of tempering steps unless sweeps × steps + final_sweeps
+  // exceeds it.
   int total_sweeps = 0;
-  uint64_t seed = 1;  // the particles are a function of the arguments alone
+  uint64_t seed = 1;  // the particles depend on the arguments alone
 };
 
 // Returns particles of the posterior. `lower` and `upper` (n) bound the box in local coordinates

@@ -99,8 +99,8 @@ Vector Prior::ToGerm(const ConstVectorRef& theta) const {
   return OfScores(z);
 }
 
-// ∂θ/∂ξ = diag(t′) F,  t_i′ = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a correlated
-// one
+// Computes ∂θ/∂ξ = diag(t′) F with t_i′ = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a
+// correlated parameter.
 Matrix Prior::Jacobian(const ConstVectorRef& xi) const {
   const Vector z = ToScores(xi);
   Vector slope(dimension());
@@ -110,7 +110,7 @@ Matrix Prior::Jacobian(const ConstVectorRef& xi) const {
     slope[i] = marginal.Slope(x);
     const Germ& germ = marginal_germs_[static_cast<size_t>(i)];
     if (!IsCorrelated(i) || germ.family() == GermFamily::kNormal) continue;
-    // So near a bound that x has rounded to it, θ does not change any more.
+    // The slope is 0 so near a bound that x is rounded to it: θ does not change any more.
     const double density = germ.Density(x);
     slope[i] *= density > 0 ? NormalDensity(z[i]) / density : 0;
   }

@@ -22,7 +22,7 @@ namespace polyest::internal {
 
 class Prior {
  public:
-  // Independent parameters, at least one.
+  // Makes independent parameters, at least one.
   explicit Prior(std::vector<UncertainParameter> parameters);
   // Requires at least one parameter; returns INVALID_ARGUMENT as CorrelationMatrix does.
   static absl::StatusOr<Prior> Make(std::vector<UncertainParameter> parameters,
@@ -30,7 +30,7 @@ class Prior {
 
   int dimension() const { return static_cast<int>(parameters_.size()); }
   const std::vector<UncertainParameter>& parameters() const { return parameters_; }
-  std::vector<std::string> Names() const;  // of the parameters, in their order
+  std::vector<std::string> Names() const;  // of the parameters, in order
   // The germs of ξ_i and z_i: normal for a correlated parameter, whatever the germ of its marginal.
   const std::vector<Germ>& germs() const { return germs_; }
   const Matrix& factor() const { return factor_; }  // F

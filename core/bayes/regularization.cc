@@ -18,7 +18,7 @@ namespace {
 constexpr double kLowest = 1e-4, kHighest = 1e4;
 constexpr int kValues = 33;
 constexpr double kPrecision = 1e-4;  // of log α²
-// The evidence must fall by this much to either end of the range.
+// The least fall of the evidence towards either end of the range.
 constexpr double kMinFall = 0.5;
 
 RegularizationChoice Undetermined(std::string reason) { return {false, 1, std::move(reason)}; }
@@ -30,7 +30,7 @@ double Discrepancy(const RegularizedMinimum& minimum, double degrees) {
   return 2 * minimum.cost.mismatch - (degrees - minimum.effective_parameters);
 }
 
-// Returns the place of the only maximum of a function in [lower, upper], by golden section.
+// Returns the point of the only maximum of a function in [lower, upper], by golden section.
 double Maximize(const std::function<double(double)>& function, double lower, double upper) {
   const double section = 1 / std::numbers::phi;
   double left = upper - section * (upper - lower), right = lower + section * (upper - lower);

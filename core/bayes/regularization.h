@@ -1,8 +1,8 @@
 #pragma once
 
-// Choice of the regularization weight α² of (56), J = J_mismatch + α² J_apriori, from the minima of
-// J for several α². Three rules search the range 10⁻⁴ … 10⁴ with four values a decade. A rule may
-// have no answer and then says why; α² is then 1, as in Bayes' rule.
+// The rules that choose the regularization weight α² of (56), J = J_mismatch + α² J_apriori, from
+// the minima of J for several α². Three rules search the range 10⁻⁴ … 10⁴ with four values a
+// decade. A rule without an answer says why; α² is then 1, as in Bayes' rule.
 //
 // L-curve         l_curve.h.
 // Discrepancy     The largest α² whose minimum still fits the data as well as their noise allows,

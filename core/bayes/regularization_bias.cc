@@ -9,9 +9,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kOffBound = 1e-9;  // kept from a bound of Ω, of its width (or of 1)
-constexpr double kAtBound = 1e-6;   // counts as lying at it
-// Distance from the prior's mean and from ξ̂ within which a germ without bounds is searched, in
+constexpr double kOffBound = 1e-9;  // distance kept from a bound of Ω, in units of its width (or 1)
+constexpr double kAtBound = 1e-6;   // distance up to which a point counts as at the bound
+// The distance from the prior's mean and from ξ̂ within which a germ without bounds is searched, in
 // prior standard deviations.
 constexpr double kReach = 20;
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// The bias that a weight α² ≠ 1 of the prior term brings: how far the estimate lies from the one
-// that Bayes' rule asks for, θ̂(α²) − θ̂(1), in the parameters' units. More weight moves it towards
-// the prior's most likely value, less away from it.
+// The bias that a weight α² ≠ 1 of the prior term brings: the distance θ̂(α²) − θ̂(1) of the
+// estimate from that of Bayes' rule, in the parameters' units. More weight moves it towards the
+// prior's most likely value, less away from it.
 //
 // The bias is counted from α² = 1 and not from the minimum of the mismatch: in a direction that the
 // data do not inform the mismatch has no minimum, and the effect of the prior at its own weight is

@@ -13,10 +13,10 @@ namespace {
 
 const double kLogTwoPi = std::log(2 * std::numbers::pi);
 
-// Beyond it the probability is computed from Mills' ratio, because it may underflow.
+// The distance beyond which Mills' ratio gives the probability, which may underflow.
 constexpr double kTail = 30;
 
-// M(x) = ∫_x^∞ φ ÷ φ(x) = 1/(x + 1/(x + 2/(x + 3/(x + …)))), to rounding for x ≥ kTail.
+// Returns M(x) = ∫_x^∞ φ ÷ φ(x) = 1/(x + 1/(x + 2/(x + 3/(x + …)))), to rounding for x ≥ kTail.
 double MillsRatio(double x) {
   if (std::isinf(x)) return 0;
   double denominator = x;
@@ -24,7 +24,7 @@ double MillsRatio(double x) {
   return 1 / denominator;
 }
 
-// log ∫_a^b φ, also where the integral itself is too small a number.
+// Returns log ∫_a^b φ, even if the integral itself underflows.
 double LogNormalProbability(double a, double b) {
   if (b <= -kTail) return LogNormalProbability(-b, -a);
   if (a < kTail) return std::log(NormalProbability(a, b));
@@ -33,7 +33,7 @@ double LogNormalProbability(double a, double b) {
   return -0.5 * (a * a + kLogTwoPi) + std::log(MillsRatio(a) - beyond);
 }
 
-// −log of the constant factor of the beta density on [−1, 1]: log (2^{a+b−1} B(a, b)).
+// Returns −log of the constant factor of the beta density on [−1, 1]: log (2^{a+b−1} B(a, b)).
 double LogBetaIntegral(double a, double b) {
   return (a + b - 1) * std::numbers::ln2 + LogBeta(a, b);
 }
@@ -87,7 +87,7 @@ double WeightedVariance(const Germ& germ, double regularization) {
 double LogLaplaceNormalization(const Germ& germ, double regularization) {
   const double mode = germ.Mode();
   const double variance = WeightedVariance(germ, regularization);
-  // 0/0 where a density that ends in a corner has its mode in it.
+  // The second derivative is 0/0 if the density ends in a corner that is its mode.
   const double second = germ.LogDensitySecondDerivative(mode);
   const double curvature = std::isfinite(second) ? -regularization * second : 0;
   // ρ(mode)^{α²} √(2π ÷ curvature)

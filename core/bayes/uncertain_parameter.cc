@@ -17,13 +17,13 @@ using namespace internal;
 
 namespace {
 
-// Squares of anything in between are still finite numbers.
+// The limits between which squares are finite numbers.
 constexpr double kMinScale = 1e-100;
 constexpr double kGreatestMagnitude = 1e100;
-// Beyond it a beta or gamma density is normal to within a percent.
+// The shape beyond which a beta or gamma density is normal to within a percent.
 constexpr double kGreatestShape = 10'000;
-// Standard deviation ÷ mean of a lognormal: e^(37 scale) is still a number, and 100 is a factor of
-// 430 either way.
+// The greatest standard deviation ÷ mean of a lognormal: e^(37 scale) is still a number, and 100 is
+// a factor of 430 either way.
 constexpr double kGreatestRatio = 100;
 
 absl::Status CheckName(const std::string& name) {
@@ -139,7 +139,7 @@ absl::Status UncertainParameter::Validate() const {
   const auto is_shape = [](double shape) { return shape >= 1 && shape <= kGreatestShape; };
   bool valid = !name.empty() && std::abs(location) <= kGreatestMagnitude && scale >= kMinScale &&
                scale <= kGreatestMagnitude;
-  // A lognormal is the exponential of a normal, of a ratio of at most kGreatestRatio.
+  // A lognormal must be the exponential of a normal, of a ratio of at most kGreatestRatio.
   if (map == ParameterMap::kExponential) {
     valid = valid && germ.family == GermFamily::kNormal &&
             std::expm1(scale * scale) <= 1.0001 * kGreatestRatio * kGreatestRatio;
@@ -171,13 +171,13 @@ double UncertainParameter::Slope(double xi) const {
 }
 
 double UncertainParameter::Mean() const {
-  // E[e^(μ + σξ)] = e^(μ + σ²/2)
+  // The mean is E[e^(μ + σξ)] = e^(μ + σ²/2).
   if (map == ParameterMap::kExponential) return std::exp(location + 0.5 * scale * scale);
   return location + scale * Germ(germ).Mean();
 }
 
 double UncertainParameter::StandardDeviation() const {
-  // mean √(e^(σ²) − 1)
+  // The standard deviation is mean √(e^(σ²) − 1).
   if (map == ParameterMap::kExponential) return Mean() * std::sqrt(std::expm1(scale * scale));
   return scale * Germ(germ).StandardDeviation();
 }

@@ -17,7 +17,7 @@ UnitProblem::UnitProblem(const MinimizationProblem& problem, const Stop& stop)
     : problem_(problem), stop_(stop), width_(problem.upper - problem.lower) {
   POLYEST_CHECK(width_.allFinite() && width_.minCoeff() >= 0);
   POLYEST_CHECK(problem.constraint.rows() == problem.bound.size());
-  // a (lower + W u) ≤ bound, over the length of a W
+  // The rows are a (lower + W u) ≤ bound, divided by the length of a W.
   const Eigen::Index n = width_.size();
   rows_.resize(problem.constraint.rows(), n);
   bounds_.resize(problem.constraint.rows());

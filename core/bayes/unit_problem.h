@@ -1,7 +1,8 @@
 #pragma once
 
-// A minimization problem scaled for the solver: in u = (x − lower)/(upper − lower), where the box
-// is the unit cube, with constraint rows of unit length and the function divided by a scale.
+// A minimization problem scaled for the solver. The variable is u = (x − lower)/(upper − lower), so
+// that the box is the unit cube; constraint rows have unit length, and the function is divided by a
+// scale.
 
 #include "core/bayes/minimizer.h"
 #include "core/common/types.h"
@@ -11,13 +12,13 @@ namespace polyest::internal {
 
 class UnitProblem {
  public:
-  // Tolerance, in units of the cube, to which a constraint is active or satisfied.
+  // The tolerance, in units of the cube, within which a constraint is active or satisfied.
   static constexpr double kActive = 1e-10;
 
   // `problem` and `stop` must outlive the object. A variable whose bounds are equal stays at 0.
   UnitProblem(const MinimizationProblem& problem, const Stop& stop);
 
-  // The constraints: rows u ≤ bounds.
+  // The constraints are rows u ≤ bounds.
   const Matrix& rows() const { return rows_; }
   const Vector& bounds() const { return bounds_; }
   double function_scale() const { return function_scale_; }

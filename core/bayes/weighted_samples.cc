@@ -10,16 +10,16 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kLeftOut = 5e-4;  // of the probability, left out of a density at each side
+constexpr double kLeftOut = 5e-4;  // probability left out of a density at each side
 
-// Bins of equal width over the central part of the draws.
+// The bins of equal width over the central part of the draws.
 class Bins {
  public:
   Bins(const ConstVectorRef& draws, const ConstVectorRef& weights, int count) : count_(count) {
     const WeightedQuantiles quantile(draws, weights);
     lowest_ = quantile(kLeftOut);
     width_ = (quantile(1 - kLeftOut) - lowest_) / count;
-    // The draws do not vary, or so little that the density would overflow.
+    // One bin serves draws that do not vary, or so little that the density would overflow.
     if (width_ > std::numeric_limits<double>::min()) return;
     count_ = 1;
     width_ = 1;
@@ -31,7 +31,7 @@ class Bins {
   Vector Centres() const {
     return lowest_ + (Vector::LinSpaced(count_, 0, count_ - 1).array() + 0.5) * width_;
   }
-  // −1 outside.
+  // Returns the bin of a draw; −1 outside.
   int Of(double draw) const {
     const double position = (draw - lowest_) / width_;
     if (!(position >= 0 && position <= count_)) return -1;

@@ -12,8 +12,8 @@ namespace polyest::internal {
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights);
 double WeightedStandardDeviation(const ConstVectorRef& draws, const ConstVectorRef& weights);
 
-// Quantiles of one quantity; sorts once. The cumulative probability of the i-th smallest draw is
-// Σ_{j<i} w_j + w_i/2, linear between draws.
+// The quantiles of one quantity; sorts once. The cumulative probability of the i-th smallest draw
+// is Σ_{j<i} w_j + w_i/2, linear between draws.
 class WeightedQuantiles {
  public:
   WeightedQuantiles(const ConstVectorRef& draws, const ConstVectorRef& weights);
