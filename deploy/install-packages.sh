@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what polyest is built from: packages of Debian 12, those that are missing.
+# Installs the packages of Debian 12 that polyest is built from, those that are missing.
 #
 #   deploy/install-packages.sh            to build and run
 #   deploy/install-packages.sh --tests    to test, benchmark and check the formatting as well
@@ -18,12 +18,12 @@ test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl sqlite3 libfaketime
   python3-yaml python3-grpcio python3-protobuf
 )
-# SUNDIALS' CMake configuration wants OpenMP of whatever compiler there is.
+# SUNDIALS' CMake configuration needs OpenMP of every compiler.
 sanitizer_packages=(
   clang-14 libclang-rt-14-dev libomp-14-dev
 )
 
-# gRPC's CMake project asks for libprotoc, whether or not it is used.
+# gRPC's CMake project requires libprotoc, whether or not it is used.
 thread_packages=(
   libprotoc-dev
 )
@@ -63,7 +63,7 @@ install_missing() {
   say "installing ${missing[*]}"
   local apt_get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
     apt-get --quiet --quiet --option DPkg::Lock::Timeout=300)
-  # apt's own account goes to stderr: stdout belongs to whoever calls.
+  # apt's messages go to stderr: stdout belongs to the caller.
   "${apt_get[@]}" update </dev/null >&2 &&
     "${apt_get[@]}" install --yes --no-install-recommends "${missing[@]}" </dev/null >&2
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Writes man pages out of what the programs and each of their commands say to --help.
+# Writes man pages from the --help of the programs and of each of their commands.
 #
 #   deploy/man-pages.sh BIN FOLDER    BIN has polyest and polyestd; the pages go to FOLDER
 set -euo pipefail
@@ -14,7 +14,8 @@ scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 mkdir -p "$folder"
 
-# In GNU's form, which help2man reads: "-h, --help", and the description after the usage.
+# Prints the help in GNU's form, which help2man reads: "-h, --help", and the description after the
+# usage.
 say_help() { # PROGRAM [COMMAND]
   "$bin/$1" "${@:2}" --help | sed 's/^\( *-[a-zA-Z]\),--/\1, --/' | awk '
     NR == 1 { description = $0; next }
@@ -22,7 +23,7 @@ say_help() { # PROGRAM [COMMAND]
     { print }'
 }
 
-# The commands that a program lists: "  estimate     Estimate from a data file".
+# Prints the commands that a program lists: "  estimate     Estimate from a data file".
 commands() { # PROGRAM
   "$bin/$1" --help | awk '
     /^[A-Z]/ { arguments = tolower($0) ~ /^(positionals|arguments)/ }

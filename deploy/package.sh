@@ -42,7 +42,7 @@ while [[ $# -gt 0 ]]; do
   esac
 done
 
-# Debian's own flags, so that the packages are hardened, but for debug information.
+# Builds with Debian's own flags, so that the packages are hardened, but without debug information.
 build() { # LEVEL TARGET...
   local level="$1"
   shift
@@ -66,7 +66,7 @@ build() { # LEVEL TARGET...
   cmake --build "$work/$level" --parallel "$(nproc)" --target "$@" >&2
 }
 
-# Debian's folder beside nothing else: the sources were built elsewhere.
+# Makes Debian's folder in a tree of its own: the sources were built elsewhere.
 make_debian_folder() {
   local maintainer="${DEBFULLNAME:-polyest developers} <${DEBEMAIL:-polyest@users.noreply.github.com}>"
   local changed
@@ -111,5 +111,5 @@ packages=()
 make_packages
 say "checking them with lintian"
 lintian --fail-on error --allow-root --suppress-tags initial-upload-closes-no-bugs "${packages[@]}" >&2
-# The paths alone, on stdout, for whoever goes on with them.
+# Prints only the paths on stdout, for the caller.
 printf '%s\n' "${packages[@]}"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# From a fresh checkout to an estimate: installs the packages, builds, starts the daemon on a free
-# port of this machine, streams the demo record to it in batches, and stops the daemon again.
+# Goes from a fresh checkout to an estimate: installs the packages, builds, starts the daemon on a
+# free port of this machine, streams the demo record to it in batches, and stops the daemon again.
 # Its exit status is that of the stream.
 set -euo pipefail
 

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Runs the fuzzers, each from the corpus beside this file:
 #   tests/fuzz/run.sh [SECONDS] [FUZZER]... [-- OPTION-OF-LIBFUZZER...]
-# SECONDS: of all together, 60 unless given. FUZZER: equation, rpc; both unless given.
-# What makes one fail is written to build/asan-ubsan/fuzz as FUZZER-crash-…, -timeout-…, -oom-… or -leak-….
+# SECONDS: the time for all fuzzers together, by default 60. FUZZER: equation or rpc, by default
+# both.
+# Inputs that fail go to build/asan-ubsan/fuzz as FUZZER-crash-…, -timeout-…, -oom-… or -leak-….
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 seconds=${1:-60}
@@ -22,9 +23,9 @@ results=build/asan-ubsan/fuzz
 for fuzzer in "${fuzzers[@]}"; do
   case "$fuzzer" in
     equation) options=(-max_len=4096 -rss_limit_mb=512 -timeout=5 -dict=tests/fuzz/equation.dict) ;;
-    # A call is cut off after 0.1 s, and an input has at most 12. Without the entropic schedule, which
-    # takes longer than the calls; leaks are looked for at the end, for what a daemon at work holds
-    # is different after each input.
+    # A call is cut off after 0.1 s, and an input has at most 12 calls. The entropic schedule is
+    # off: it takes longer than the calls. Leaks are looked for at the end, because a working daemon
+    # holds other memory after each input.
     rpc) options=(-max_len=16384 -rss_limit_mb=2048 -timeout=20 -entropic=0 -detect_leaks=0) ;;
   esac
   corpus="$results/${fuzzer}_corpus"

@@ -39,7 +39,7 @@ package="$(ls -t "$packages"/polyest_*_amd64.deb 2>/dev/null | head -n 1)"
 scratch="$(mktemp --directory)"
 uml_pid=""
 clean() {
-  # With timeout, which leads their group, the kernel's processes.
+  # Kills timeout, which leads the group, and with it the kernel's processes.
   [[ -z "$uml_pid" ]] || kill -KILL -- "-$uml_pid" 2>/dev/null || true
   rm -rf "$scratch"
 }
@@ -49,7 +49,8 @@ cp "$here/under_systemd.sh" "$scratch/"
 cp "$here"/../../client/examples/oscillator.{json,csv} "$scratch/"
 : >"$scratch/output"
 
-# The first process: an overlay of / on memory, the folder of this try at /try, then systemd.
+# Writes the first process, which makes an overlay of / on memory, mounts this try's folder at
+# /try, and starts systemd.
 cat >"$scratch/init" <<END
 #!/bin/sh
 mount -t proc proc /proc
@@ -73,7 +74,7 @@ exec chroot . /lib/systemd/systemd --unit=polyest-try.target --show-status=0
 END
 chmod +x "$scratch/init"
 
-# No services but the system's own and ours: what else this machine runs stays out.
+# Starts only the system's own services and polyest's: the machine's other services stay out.
 cat >"$scratch/polyest-try.target" <<'END'
 [Unit]
 Requires=basic.target
@@ -91,7 +92,7 @@ StandardError=append:/try/output
 END
 
 echo "==> booting user-mode Linux" >&2
-# Its processes end with it. Consoles of its own would want a terminal.
+# The kernel's processes end with timeout. Consoles of their own would need a terminal.
 timeout --kill-after=10 "$timeout_s" linux.uml mem=1536M rootfstype=hostfs rootflags=/ rw \
   init="$scratch/init" uml_dir="$scratch/uml" \
   con=null con0=null,fd:1 </dev/null >"$scratch/console" 2>&1 &

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The steps of run.sh, done inside the clean system: in_clean_root.sh STEP [ARGUMENT...]
+# Does the steps of run.sh inside the clean system: in_clean_root.sh STEP [ARGUMENT...]
 set -euo pipefail
 
 daemon_pid=""
@@ -57,7 +57,7 @@ check_completion() {
 
 check_man_pages() {
   local page text
-  # A minimal system throws manual pages away, so out of the package itself.
+  # A minimal system discards manual pages, so they come from the package itself.
   rm -rf /tmp/unpacked
   dpkg-deb --extract "$1" /tmp/unpacked
   for page in polyest polyest-estimate polyest-stream polyestd; do
@@ -68,7 +68,7 @@ check_man_pages() {
 
 start_daemon() { # PROGRAM ARGUMENT...
   : >/tmp/daemon.out
-  # As the unit and the container say.
+  # The variable is the one that the unit and the container set.
   STATE_DIRECTORY=/var/lib/polyest "${as_polyest[@]}" "$@" >/tmp/daemon.out 2>/tmp/daemon.log &
   daemon_pid=$!
   for _ in {1..300}; do
@@ -82,7 +82,7 @@ stop_daemon() {
   kill -TERM "$daemon_pid"
   wait "$daemon_pid" || fail "the daemon ends with $?"
 }
-# Of an estimate in JSON, the parameters with their uncertainty.
+# Prints the parameters of an estimate in JSON, with their uncertainty.
 parameters() { tr -d ' \n' | sed 's/.*"parameters":\(\[[^]]*\]\).*/\1/'; }
 
 step_install() { # PACKAGE
@@ -91,13 +91,13 @@ step_install() { # PACKAGE
   check_files
   if [[ "$1" == older ]]; then
     version >/tmp/version-before
-    # What an administrator changes, which an upgrade keeps.
+    # An upgrade must keep this change, made by an administrator.
     sed -i 's/^max-sessions = .*/max-sessions = 77/' "$configuration"
   fi
 }
 
-# Streams rows up to the second number, of which the first number are there already; what comes back
-# is the estimate that the command makes of the same rows without a daemon.
+# Streams rows BEFORE to AFTER; the first BEFORE rows are in the session already. The daemon's
+# estimate must be that of the command for the same rows without a daemon.
 step_stream() { # BEFORE AFTER
   start_daemon /usr/bin/polyestd --config "$configuration"
   local answer
@@ -121,7 +121,8 @@ step_upgrade() {
   grep -q '^max-sessions = 77$' "$configuration" || fail "the upgrade changed the configuration"
 }
 
-# The loader takes the best build of the core that the processor has, and any lesser one if told so.
+# Checks that the loader takes the best build of the core for the processor, and any lesser one if
+# told so.
 step_levels() {
   local loader=/lib64/ld-linux-x86-64.so.2 level listed supported best="" k=""
   supported=$("$loader" --help | sed -n 's/^ *\(x86-64-v[0-9]\) (supported.*/\1/p')
@@ -140,7 +141,8 @@ step_levels() {
     best=$level
     echo "    $level: k = $k" >&2
   done
-  # The library's code is its own: none of the program's copies, made for x86-64-v2, stands in for it.
+  # The library must use its own code, and none of the program's copies, which are made for
+  # x86-64-v2.
   ! LD_DEBUG=bindings /usr/bin/polyest estimate "$problem" "$data" 2>&1 >/dev/null |
     grep 'libpolyest-core[^ ]* \[0\] to /usr/bin/polyest ' |
     grep --extended-regexp '`_ZN?K?(5Eigen|7polyest)' ||
@@ -150,7 +152,7 @@ step_levels() {
     expect "by itself the loader" "$("$loader" --list /usr/bin/polyest)" "glibc-hwcaps/$best/"
 }
 
-# The command of the container, as its user.
+# Runs the container's command, as its user.
 step_container() { # PROGRAM ARGUMENT...
   [[ ! -e /lib/systemd/systemd ]] || fail "the container has systemd in it"
   start_daemon "$@"

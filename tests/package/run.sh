@@ -47,7 +47,7 @@ package="$(newest "$packages" polyest)"
 dev_package="$(newest "$packages" libpolyest-dev)"
 [[ -n "$package" && -n "$dev_package" ]] || status=2 fail "no packages in $packages: deploy/package.sh"
 
-# In a mount namespace of its own, so that nothing stays mounted whatever happens.
+# Runs in its own mount namespace, so that nothing stays mounted whatever happens.
 if [[ -z "${POLYEST_OWN_MOUNTS:-}" ]]; then
   POLYEST_OWN_MOUNTS=1 exec unshare --mount --propagation private "${BASH_SOURCE[0]}" "${arguments[@]}"
 fi
@@ -68,7 +68,7 @@ if [[ ! -e "$clean/.complete" ]]; then
     fail "debootstrap failed: $clean.log"
   touch "$clean/.complete"
 fi
-# A clean system of its own in $tree.
+# Makes a clean system in $tree.
 begin() {
   cp --archive --reflink=auto "$clean/." "$tree"
   mount -t proc proc "$tree/proc"
@@ -82,7 +82,7 @@ end() {
 }
 
 begin
-# Nothing is started by packages here: the script does it.
+# Packages must not start services here: the script does it.
 printf '#!/bin/sh\nexit 101\n' >"$tree/usr/sbin/policy-rc.d"
 chmod +x "$tree/usr/sbin/policy-rc.d"
 mkdir "$tree/try"
@@ -104,7 +104,7 @@ inside() {
   chroot "$tree" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
     DEBIAN_FRONTEND=noninteractive bash /try/in_clean_root.sh "$@"
 }
-# The daemon and its clients have a network of their own, so that no port can be in use.
+# Gives the daemon and its clients their own network, so that no port can be in use.
 offline() {
   unshare --net --pid --fork --kill-child bash -c 'ip link set lo up && "$@"' offline \
     chroot "$tree" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
@@ -132,7 +132,8 @@ if ((with_dev)); then
   inside build
 fi
 
-# No container engine: the instructions of the file one after the other, in another clean system.
+# There is no container engine: carries out the file's instructions one after the other, in another
+# clean system.
 containerfile="$source_folder/deploy/container/Containerfile"
 instruction() { # NAME
   awk -v name="$1" '

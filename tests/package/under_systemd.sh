@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What boot.sh does inside: the package installed, ready, watched, upgraded, stopped and purged by
-# the service manager. Leaves the file /try/passed when everything held.
+# Does the work of boot.sh inside: the package is installed, ready, watched, upgraded, stopped and
+# purged by the service manager. Leaves the file /try/passed if everything held.
 set -euo pipefail
 
 say() { echo "==> $*"; }
@@ -31,7 +31,7 @@ stream() { # ROWS [SERVER]
     polyest stream /try/oscillator.json - --server "${2:-127.0.0.1:50051}" --session rig \
       --format jsonl 2>&1
 }
-# The triggers of other packages, such as the index of manual pages, take a minute here.
+# Skips the triggers of other packages, such as the index of manual pages, which take a minute here.
 install_package() { dpkg --no-triggers --install "$1" >/tmp/dpkg.log 2>&1; }
 is_active() { [[ "$(show ActiveState)" == active ]]; }
 configuration=/etc/polyest/polyestd.toml

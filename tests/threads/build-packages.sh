@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Builds Debian's own Abseil, Protocol Buffers and gRPC once more, with the thread sanitizer in them.
-# Without it, it does not see how gRPC's threads meet, and takes what one leaves to another for a
-# race; and messages compiled for it have members that those in Debian's library do not.
+# Builds Debian's own Abseil, Protocol Buffers and gRPC again, with the thread sanitizer in them.
+# Without that, the sanitizer does not see how gRPC's threads synchronize, and reports data handed
+# from one thread to another as a race; and messages compiled for the sanitizer have members that
+# those in Debian's library lack.
 #   tests/threads/build-packages.sh FOLDER
-# FOLDER/lib then has the libraries, by the names of those installed. Takes a quarter of an hour on two
-# cores the first time, then nothing.
+# FOLDER/lib then has the libraries, under the names of the installed ones. Takes a quarter of an
+# hour on two cores the first time, then nothing.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 if [[ $# -ne 1 || $1 == -* ]]; then
@@ -16,7 +17,7 @@ folder="$(realpath -m "$1")"
 
 say() { echo "build-packages: $*" >&2; }
 
-# The sources of the packages installed, fetched and verified by apt, with Debian's patches.
+# Fetches the sources of the installed packages with Debian's patches; apt verifies them.
 fetch() {
   rm -rf "$folder/sources"
   mkdir -p "$folder/sources/lists/partial" "$folder/lib"
@@ -34,7 +35,7 @@ fetch() {
 build() {
   local package=$1 target=$2 flags="-O1 -fsanitize=thread -fno-omit-frame-pointer"
   say "building $package"
-  # GCC warns that the sanitizer does not see fences.
+  # The sanitizer does not see fences, of which GCC warns: -Wno-tsan.
   cmake -G Ninja -S "$folder/sources/$package"-*/ -B "$folder/$package" -DCMAKE_BUILD_TYPE=None \
     -DBUILD_SHARED_LIBS=ON -DCMAKE_CXX_STANDARD=17 -DCMAKE_INSTALL_PREFIX="$folder" \
     -DCMAKE_INSTALL_LIBDIR=lib -DCMAKE_C_FLAGS="$flags" -DCMAKE_CXX_FLAGS="$flags -Wno-tsan" \

@@ -2,7 +2,7 @@
 # Looks for races: runs the tests in which threads meet (label threads) under the thread sanitizer,
 # with the libraries between them built for it as well.
 #   tests/threads/run.sh [CTEST-ARGUMENT...]
-# A race fails it, in whichever process it is found; the reports stay in build/tsan/reports.
+# Fails on a race in any process; the reports stay in build/tsan/reports.
 set -euo pipefail
 if [[ "${1:-}" == --help ]]; then
   sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
@@ -22,7 +22,7 @@ options="log_path=$reports/race second_deadlock_stack=1"
 options+=" suppressions=$PWD/tests/threads/suppressions.txt print_suppressions=0"
 options+=" handle_segv=0"  # an FMU of the tests crashes its worker on purpose
 status=0
-# Everything is tens of times slower: so the daemon is killed less often.
+# The daemon is killed less often, because everything is tens of times slower.
 TSAN_OPTIONS="$options" POLYEST_TEST_CRASHES="${POLYEST_TEST_CRASHES:-5}" \
   ctest --preset tsan --label-regex '^threads$' "$@" || status=$?
 found="$(find "$reports" -type f | wc -l)"

@@ -12,7 +12,7 @@ import re
 import sys
 
 ALLOWED = re.compile(r'#include (<[^>]+>|"polyest/[^"]+")$')
-# Declarations that say all by themselves.
+# Declarations that need no comment.
 PLAIN = re.compile(r"friend |(virtual )?~|.*= delete;$|.*operator=\(|namespace |using namespace|#")
 
 

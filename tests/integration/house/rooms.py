@@ -31,7 +31,7 @@ PUBLIC = {
     "core/estimator": ["estimator"],
 }
 
-# What no file of the core may include: it knows no calls, messages, storage or log.
+# Headers that no file of the core may include: it knows no calls, messages, storage or log.
 FOREIGN = re.compile(r"<(grpc|grpcpp|google/protobuf|spdlog|sqlite3|prometheus|CLI)[/.]|\"polyest/(v1|rpc)/")
 
 
@@ -52,7 +52,7 @@ def problems_of(root):
     wire = subfolders(root, "proto/wire") + ["proto/wire", "proto"]
     server = subfolders(root, "server") + ["server"]
     client = subfolders(root, "client") + ["client"]
-    # Neither of the last two knows the other.
+    # The server and the client do not know each other.
     orders = [CORE + wire + server, CORE + wire + client]
     public = {f"polyest/{name}.h": room for room, names in PUBLIC.items() for name in names}
     for header in (root / "client/cpp/include/polyest").glob("*.h"):

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Does what deploy/runbook.md says, command by command, with folders of its own in the place of the
-# system's: run.sh SOURCE POLYESTD POLYEST. Only "Install" needs root and is left out.
+# Carries out deploy/runbook.md, command by command, with its own folders in place of the system's:
+# run.sh SOURCE POLYESTD POLYEST. Leaves out only "Install", which needs root.
 set -euo pipefail
 
 source_folder=$1 polyestd=$2 polyest=$3
@@ -18,7 +18,7 @@ expect() { # TEXT PATTERN
   [[ "$1" == *"$2"* ]] || fail "\"$1\" has no \"$2\""
 }
 
-# What is the system's: users, and services, of which the daemon runs as its unit says.
+# Replaces the system's parts: users, and services. The daemon runs as its unit says.
 mkdir -p "$root"/{bin,work,etc/polyest,var/lib,backup}
 cat >"$root/bin/install" <<'END'
 #!/bin/bash
@@ -73,11 +73,11 @@ clean() {
 trap clean EXIT
 cd "$root/work"
 
-# The unit's configuration file, as it is installed, with what the runbook adds.
+# Makes the unit's configuration file: the installed one and the runbook's additions.
 cp "$source_folder/deploy/polyestd.toml" "$root/etc/polyest/polyestd.toml"
 sed -n '/^```toml$/,/^```$/{/^```/!p}' "$runbook" >>"$root/etc/polyest/polyestd.toml"
 
-# The commands of a section, all of them or the one block of that number.
+# Prints the commands of a section, all of them or those of the one block of that number.
 commands() { # SECTION [BLOCK]
   awk -v section="$1" -v wanted="${2:-0}" '
     /^##/ { inside = $0 ~ "^##+ " section "$" }
@@ -173,7 +173,7 @@ systemctl reload polyestd
 while models old.token >/dev/null; do :; done
 expect "$(models rig1.token)" mass_spring_damper
 
-# Every section with commands was here.
+# Checks that every section with commands has been carried out.
 while read -r section; do
   [[ $section == Install || " ${done_sections[*]/%/ |}" == *"$section"* ]] ||
     fail "nothing tests the commands of \"$section\""
