@@ -7,8 +7,8 @@
 //
 //   calibration [CAMPAIGNS] [--no-limits]
 //
-// A thousand unless told; they are dealt out evenly over rigs, lengths and noises. Prints a table
-// and exits with 1 when the whole is off: by more than 2 % in coverage and 0.05 in standard
+// CAMPAIGNS is 1000 by default; they are dealt out evenly over rigs, lengths and noises. Prints a
+// table and exits with 1 when the whole is off: by more than 2 % in coverage and 0.05 in standard
 // deviation for a thousand, by three standard errors where that is more, or ranks with p < 0.01.
 
 #include <algorithm>

@@ -243,7 +243,7 @@ TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
 
   process.Write(DemoRows(90).substr(DemoRows(30).size()));
   process.CloseInput();
-  // Each look asks the daemon.
+  // Asks the daemon meanwhile instead of sleeping.
   while (process.Errors().find("cannot accept batches now") == std::string::npos) {
     ASSERT_TRUE(client.GetStatus({}).ok());
   }
