@@ -4,7 +4,7 @@
 #
 #   tests/release.sh [STEP]...    all steps, in this order, unless some are named
 #
-#   crashes      kills the daemon 200 times while rigs stream to it (17 minutes on two cores)
+#   crashes      kills the daemon 200 times while rigs stream to it (a minute on two cores)
 #   sanitized    the long unit tests under the address and undefined-behaviour sanitizers
 #   fuzz         fuzzes equations and calls for half an hour
 #   threads      looks for races in the tests in which threads meet (90 minutes)
