@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "core/common/types.h"
+
 namespace polyest::internal {
 namespace {
 
