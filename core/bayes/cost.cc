@@ -19,13 +19,14 @@ double Total(double mismatch, double prior, double regularization) {
 }  // namespace
 
 Cost::Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, Mismatch mismatch,
-           Prior prior, double regularization)
+           Prior prior, double regularization, Element element)
     : basis_(std::move(basis)),
       region_(std::move(region)),
       reference_phi_(basis_->size()),
       mismatch_(std::move(mismatch)),
       prior_(std::move(prior)),
-      regularization_(regularization) {
+      regularization_(regularization),
+      element_(std::move(element)) {
   POLYEST_CHECK(regularization_ >= 0);
   POLYEST_CHECK(basis_->dimension() == region_.dimension());
   POLYEST_CHECK(basis_->dimension() == prior_.dimension());
@@ -45,7 +46,7 @@ CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
   value.total =
-      prior_.Contains(xi) ? Total(value.mismatch, value.prior, regularization_) : kInfinity;
+      Supports(xi) ? Total(power_ * value.mismatch, value.prior, regularization_) : kInfinity;
   return value;
 }
 
@@ -59,11 +60,11 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   value.mismatch = mismatch_.EvaluateWithGradient(d, by_d);
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
-  // ∇J = ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
-  gradient = phi_gradient.transpose() * by_d;
+  // ∇J = β ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
+  gradient = power_ * (phi_gradient.transpose() * by_d);
   value.total = kInfinity;
-  if (prior_.Contains(xi)) {
-    value.total = Total(value.mismatch, value.prior, regularization_);
+  if (Supports(xi)) {
+    value.total = Total(power_ * value.mismatch, value.prior, regularization_);
     if (regularization_ > 0) {
       gradient += regularization_ * (region_.axes().transpose() * prior_.Gradient(xi));
     }
@@ -81,7 +82,7 @@ Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
   // ∂φᵀ ∂²J/∂d² ∂φ + Σ_s (∂J/∂d)_s ∇²φ_s
   const Matrix hessian =
       mismatch_.Curvature(d, phi_gradient, spent) + basis_->WeightedHessian(eta, by_d);
-  return (hessian + hessian.transpose()) / 2;
+  return 0.5 * power_ * (hessian + hessian.transpose());
 }
 
 Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
@@ -116,7 +117,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
       double& total = totals[first + i];
       xi = xis.row(i).transpose();
       const double prior = prior_.NegativeLogDensity(xi);
-      total = prior_.Contains(xi) ? Total(total, prior, regularization_) : kInfinity;
+      total = Supports(xi) ? Total(power_ * total, prior, regularization_) : kInfinity;
     }
   }
 }

@@ -1,12 +1,14 @@
 #pragma once
 
 // The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
-//   J(η) = J_mismatch(η) + α² J_apriori(ξ(η)),   ξ = centre + axes η,
+//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)),   ξ = centre + axes η,
+// with the power β = 1 of the likelihood unless the posterior is tempered,
 // with exact derivatives: J_mismatch is a function of quadratic forms in φ(η) (mismatch.h), φ a
 // polynomial.
 
 #include <memory>
 
+#include "core/bayes/element.h"
 #include "core/bayes/mismatch.h"
 #include "core/bayes/prior.h"
 #include "core/bayes/region.h"
@@ -18,36 +20,47 @@ namespace polyest::internal {
 class Cost {
  public:
   // Requires that the sums of `mismatch` are taken about `reference` (η_0), and that
-  // `regularization` = α² ≥ 0.
+  // `regularization` = α² ≥ 0. The cost is +∞ outside Ω and outside `element`.
   Cost(std::shared_ptr<const Basis> basis, Region region, Vector reference, Mismatch mismatch,
-       Prior prior, double regularization);
+       Prior prior, double regularization, Element element = Element());
 
   int dimension() const { return region_.dimension(); }
   const Region& region() const { return region_; }
   const Prior& prior() const { return prior_; }
+  const Element& element() const { return element_; }
   double regularization() const { return regularization_; }
+  // The power β of the likelihood, 0 … 1. It enters the total and its derivatives but not
+  // CostValue::mismatch.
+  double power() const { return power_; }
+  void set_power(double power) { power_ = power; }
 
   CostValue Evaluate(const ConstVectorRef& eta) const;
   // `gradient` (n) is with respect to η.
   CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
-  // Returns the Hessian (n × n) of J_mismatch with respect to η. If a noise scale is unknown, the
+  // Returns the Hessian (n × n) of β J_mismatch with respect to η. If a noise scale is unknown, the
   // likelihood is a Student's t in the parameters, whose curvature at the mode is that of too
   // narrow a Gaussian; subtracting `spent` degrees of freedom (parameters fitted, plus 2) gives the
   // curvature of a Gaussian with the variance of the t.
   Matrix MismatchHessian(const ConstVectorRef& eta, double spent = 0) const;
   Matrix Hessian(const ConstVectorRef& eta, double spent = 0) const;  // of the total
-  // Writes the total at W points (W × n) into `totals` (resized) by matrix products; +∞ outside Ω.
+  // Writes the total at W points (W × n) into `totals` (resized) by matrix products.
   void EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const;
   // Returns d = φ(η) − φ(η_0), for the sums of single channels.
   Vector BasisDifference(const ConstVectorRef& eta) const;
 
  private:
+  bool Supports(const ConstVectorRef& xi) const {
+    return prior_.Contains(xi) && element_.Contains(xi);
+  }
+
   std::shared_ptr<const Basis> basis_;
   Region region_;
   Vector reference_phi_;
   Mismatch mismatch_;
   Prior prior_;
   double regularization_;
+  Element element_;
+  double power_ = 1;
 };
 
 }  // namespace polyest::internal

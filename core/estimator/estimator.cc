@@ -77,7 +77,10 @@ class Estimator::Implementation {
   absl::StatusOr<bool> TakeUpTo(int64_t rows, const Stop& stop);
   absl::Status Divide(size_t component, const Stop& stop);
   absl::Status Weigh(const Stop& stop);
-  absl::Status KeepHeaviest(Components& components, double weight, const Stop& stop);
+  absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
+                                                   size_t most, const Stop& stop);
+  absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
+  void Retire(const MixtureComponent& component);
   void MakeSnapshot(int64_t rows);
   absl::StatusOr<Components> ComponentsOf(EstimatorState& state, int64_t rows) const;
   static std::vector<AssessmentRequest> Requests(const Components& components);
@@ -175,7 +178,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
 absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation::ComponentsOf(
     EstimatorState& state, int64_t rows) const {
   const bool several = state.components.size() > 1;
-  if (state.components.empty() || state.components.size() > kMaxComponents ||
+  if (state.components.empty() || std::ssize(state.components) > MostComponents(problem_) ||
       (several && state.weighing_row <= rows)) {
     return absl::DataLossError("the snapshot's components cannot be of a mixture");
   }
@@ -194,7 +197,7 @@ absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation:
 absl::StatusOr<bool> Estimator::Implementation::TakeUpTo(int64_t rows, const Stop& stop) {
   for (size_t k = 0; k < components_.size(); ++k) {
     POLYEST_RETURN_IF_ERROR(components_[k]->TakeUpTo(rows, stop));
-    if (!components_[k]->is_multimodal()) continue;
+    if (!components_[k]->must_divide()) continue;
     POLYEST_RETURN_IF_ERROR(Divide(k, stop));
     return true;
   }
@@ -205,10 +208,14 @@ absl::Status Estimator::Implementation::Divide(size_t component, const Stop& sto
   MixtureComponent& whole = *components_[component];
   POLYEST_ASSIGN_OR_RETURN(Components parts, whole.Divide(stop));
   if (parts.empty()) return absl::OkStatus();
-  POLYEST_RETURN_IF_ERROR(KeepHeaviest(parts, whole.weight(), stop));
-  reexpansions_ += whole.reexpansions();
-  propagated_rows_ += whole.propagated_rows();
+  if (whole.bisects()) {
+    for (const auto& part : parts) part->set_weight(whole.weight() / 2);
+  } else {
+    const auto room = static_cast<size_t>(whole.room());
+    POLYEST_RETURN_IF_ERROR(KeepHeaviest(parts, whole.weight(), room, stop).status());
+  }
   if (components_.size() == 1) weighing_row_ = NextWindow(whole.rows_taken());
+  Retire(whole);
   const auto place =
       components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
   components_.insert(place, std::make_move_iterator(parts.begin()),
@@ -216,33 +223,65 @@ absl::Status Estimator::Implementation::Divide(size_t component, const Stop& sto
   return absl::OkStatus();
 }
 
+// Adds up what a component has done that is to be replaced.
+void Estimator::Implementation::Retire(const MixtureComponent& component) {
+  reexpansions_ += component.reexpansions();
+  propagated_rows_ += component.propagated_rows();
+}
+
 absl::Status Estimator::Implementation::Weigh(const Stop& stop) {
   for (const auto& component : components_) {
     POLYEST_RETURN_IF_ERROR(component->MakeComparable(stop));
   }
-  POLYEST_RETURN_IF_ERROR(KeepHeaviest(components_, 1, stop));
+  const int most = MostComponents(components_.front()->problem());
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles,
+                           KeepHeaviest(components_, 1, static_cast<size_t>(most), stop));
+  POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
+  for (const auto& component : components_) {
+    component->set_room(std::max(1, most / static_cast<int>(components_.size())));
+  }
   weighing_row_ = NextWindow(weighing_row_);
   return absl::OkStatus();
 }
 
-// Keeps the heaviest components. `weight` is the weight of all of them together.
-absl::Status Estimator::Implementation::KeepHeaviest(Components& components, double weight,
-                                                     const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const MixtureWeighing weighing,
-                           WeighMixture(Requests(components), stop));
+// Replaces the components by a single one if its expansion represents the posterior as well.
+// `particles` are those of each component.
+absl::Status Estimator::Implementation::Unite(const std::vector<Matrix>& particles,
+                                              const Stop& stop) {
+  if (components_.size() < 2) return absl::OkStatus();
+  std::vector<double> weights;
+  for (const auto& component : components_) weights.push_back(component->weight());
+  const std::optional<Piece> whole = UnitePieces(particles, weights);
+  if (!whole) return absl::OkStatus();
+  const auto heaviest = std::ranges::max_element(weights) - weights.begin();
+  POLYEST_ASSIGN_OR_RETURN(auto united,
+                           components_[static_cast<size_t>(heaviest)]->Unite(*whole, stop));
+  if (!united) return absl::OkStatus();
+  for (const auto& component : components_) Retire(*component);
+  components_.clear();
+  components_.push_back(std::move(united));
+  return absl::OkStatus();
+}
+
+// Keeps the `most` heaviest components and returns the particles of each. `weight` is the weight of
+// all of them together.
+absl::StatusOr<std::vector<Matrix>> Estimator::Implementation::KeepHeaviest(Components& components,
+                                                                            double weight,
+                                                                            size_t most,
+                                                                            const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(MixtureWeighing weighing,
+                           WeighMixture(Requests(components), most, stop));
   Components kept;
   for (size_t i = 0; i < weighing.kept.size(); ++i) {
     kept.push_back(std::move(components[weighing.kept[i]]));
     kept.back()->set_weight(weight * weighing.weights[i]);
   }
   for (const auto& component : components) {
-    if (!component) continue;
-    reexpansions_ += component->reexpansions();
-    propagated_rows_ += component->propagated_rows();
+    if (component) Retire(*component);
   }
   left_out_ = std::max(left_out_, weight * weighing.left_out);
   components = std::move(kept);
-  return absl::OkStatus();
+  return std::move(weighing.particles);
 }
 
 std::vector<AssessmentRequest> Estimator::Implementation::Requests(const Components& components) {

@@ -107,7 +107,7 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
   archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
           absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
           absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
-          absorbed.check_residual, absorbed.check_valid);
+          absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared);
 }
 
 template <class Archive>
@@ -115,7 +115,7 @@ void serialize(Archive& archive, DesignState& design) {
   archive(design.truncation.order, design.truncation.exponent);
   Flag(archive, design.whole_prior);
   archive(design.centre, design.axes, design.points, design.check_points, design.check_costs,
-          design.reference, design.lower, design.upper);
+          design.reference, design.lower, design.upper, design.element);
 }
 
 template <class Archive>
@@ -127,10 +127,12 @@ void serialize(Archive& archive, ExpansionState& expansion) {
 template <class Archive>
 void serialize(Archive& archive, ComponentState& component) {
   archive(component.runs, component.relative_tolerance, component.expansion, component.particles,
-          component.weight, component.taken, component.windows_from, component.window_end,
-          component.patient_until, component.whole_until, component.settled_row,
-          component.settlements_at_row, component.comparable_row, component.settlements,
-          component.reexpansions, component.abandoned_rows, component.summary);
+          component.weight, component.room);
+  Flag(archive, component.bisected);
+  archive(component.taken, component.windows_from, component.window_end, component.patient_until,
+          component.whole_until, component.settled_row, component.settlements_at_row,
+          component.comparable_row, component.settlements, component.reexpansions,
+          component.abandoned_rows, component.summary);
 }
 
 template <class Archive>

@@ -92,6 +92,21 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
   return design;
 }
 
+namespace {
+
+// Moves the points outside Ω (local coordinates) towards `inside`.
+void MoveInside(const Prior& prior, const Region& region, const Vector& inside, Matrix& points) {
+  for (Eigen::Index q = 0; q < points.rows(); ++q) {
+    const Vector xi = region.ToGerm(points.row(q).transpose());
+    const double fraction = FractionInside(prior, xi, inside);
+    if (fraction < 1) {
+      points.row(q) = region.ToLocal(inside + kJustInside * fraction * (xi - inside)).transpose();
+    }
+  }
+}
+
+}  // namespace
+
 ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
                                 Region region, const Vector& inside) {
   const ExpansionOptions& options = problem.problem().expansion;
@@ -101,14 +116,7 @@ ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation
                                          truncation);
   const PointSet set = options.points == PointSet::kHammersley ? options.points : PointSet::kHalton;
   design.points = 2 * UnitCubePoints(set, n, PointCount(problem, *design.basis)).array() - 1;
-  for (Eigen::Index q = 0; q < design.points.rows(); ++q) {
-    const Vector xi = region.ToGerm(design.points.row(q).transpose());
-    const double fraction = FractionInside(problem.prior(), xi, inside);
-    if (fraction < 1) {
-      design.points.row(q) =
-          region.ToLocal(inside + kJustInside * fraction * (xi - inside)).transpose();
-    }
-  }
+  MoveInside(problem.prior(), region, inside, design.points);
   design.region = std::move(region);
   design.check_points.resize(0, n);
   design.reference = Vector::Zero(n);
@@ -116,6 +124,27 @@ ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation
   design.upper = Vector::Constant(n, 1);
   design.whole_prior = false;
   return design;
+}
+
+void SpreadCheckPoints(const ResolvedProblem& problem, const Vector& inside,
+                       ExpansionDesign& design) {
+  const int n = problem.dimension(), checks = CheckCount(n);
+  const int used = static_cast<int>(design.points.rows());
+  // Later points of the sequence differ from the collocation points.
+  const Matrix sequence = UnitCubePoints(PointSet::kHalton, n, used + checks);
+  design.check_points = 2 * sequence.bottomRows(checks).array() - 1;
+  MoveInside(problem.prior(), design.region, inside, design.check_points);
+  design.check_costs = Vector::Zero(checks);
+}
+
+Vector NearestInside(const Prior& prior, const Vector& xi) {
+  Vector inside = xi;
+  for (Eigen::Index j = 0; j < xi.size(); ++j) {
+    const double width = prior.upper()[j] - prior.lower()[j];
+    const double off = (1 - kJustInside) * (std::isfinite(width) ? width : 1);
+    inside[j] = std::clamp(xi[j], prior.lower()[j] + off, prior.upper()[j] - off);
+  }
+  return inside;
 }
 
 Region RegionOfParticles(const Matrix& xis) {
@@ -161,7 +190,8 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
       ++at_edge;
       Vector beyond = units.row(i).transpose();
       beyond[j] *= kBeyond;
-      if (prior.Contains(trusted.ToGerm(beyond))) ++goes_on;
+      const Vector xi = trusted.ToGerm(beyond);
+      if (prior.Contains(xi) && design.element.Contains(xi)) ++goes_on;
     }
     if (at_edge > kLeaningFraction * static_cast<double>(units.rows()) &&
         goes_on > kGoesOnFraction * at_edge) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/bayes/element.h"
 #include "core/bayes/posterior.h"
 #include "core/bayes/region.h"
 #include "core/chaos/basis.h"
@@ -29,6 +30,7 @@ struct ExpansionDesign {
   Vector reference;     // η_0, the reference of the mismatch sums
   Vector lower, upper;  // the trusted box (n), local coordinates
   bool whole_prior = true;
+  Element element;  // the part of Ω whose posterior this expansion represents
 };
 
 // Fraction of the trusted box beyond which a particle counts as lying at its edge, and how far
@@ -53,6 +55,14 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation& truncation,
                                 Region region, const Vector& inside);
 
+// Adds check points that are spread evenly over the design's region, as draws of a uniform density.
+// Those outside Ω are moved as collocation points are.
+void SpreadCheckPoints(const ResolvedProblem& problem, const Vector& inside,
+                       ExpansionDesign& design);
+
+// Returns the point of Ω that is nearest to ξ, germ by germ, and a little off its bounds.
+Vector NearestInside(const Prior& prior, const Vector& xi);
+
 // Returns the box along the particles' principal axes that contains them, widened by a margin of
 // about a third. The particles are W × n, in germ coordinates.
 Region RegionOfParticles(const Matrix& xis);
@@ -64,7 +74,7 @@ Region TrustedRegion(const ExpansionDesign& design);
 void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper);
 
 // Returns the axes of the trusted region at whose edge more than 1 % of the particles (W × n, local
-// coordinates) lie although Ω extends beyond it.
+// coordinates) lie although Ω and the element extend beyond it.
 std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas);
 
 // Returns the trusted region, widened by half along `axes` and shifted along them to the particles'

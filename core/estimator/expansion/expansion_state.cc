@@ -35,6 +35,12 @@ bool IsTruncationOf(const ResolvedProblem& problem, const Truncation& truncation
          TermCount(problem.dimension(), truncation, kMaxTerms) <= kMaxTerms;
 }
 
+bool IsElementIn(int dimension, const std::vector<Element::Bound>& bounds) {
+  return std::ranges::all_of(bounds, [&](const Element::Bound& bound) {
+    return IsVector(bound.normal, dimension) && std::isfinite(bound.offset);
+  });
+}
+
 bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
   const int n = problem.dimension();
   const Eigen::Index checks = state.check_points.rows();
@@ -42,7 +48,7 @@ bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
       !IsMatrix(state.axes, n, n) || !IsMatrix(state.points, state.points.rows(), n) ||
       state.points.rows() > kMaxPoints || !IsMatrix(state.check_points, checks, n) ||
       checks > kMaxPoints || state.check_costs.size() != checks || !IsVector(state.reference, n) ||
-      !IsVector(state.lower, n) || !IsVector(state.upper, n)) {
+      !IsVector(state.lower, n) || !IsVector(state.upper, n) || !IsElementIn(n, state.element)) {
     return false;
   }
   const double volume = std::abs(LuFactors(state.axes).Determinant());
@@ -80,8 +86,10 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
          state.check_chi_squared.rows() == fresh.check_chi_squared.rows() &&
          state.check_chi_squared.cols() == channels &&
          state.check_residual.size() == fresh.check_residual.size() &&
-         state.check_valid.size() == fresh.check_valid.size() && state.rows >= 0 &&
-         state.samples >= 0 && state.propagated >= 0;
+         state.check_valid.size() == fresh.check_valid.size() &&
+         state.point_chi_squared.rows() == fresh.point_chi_squared.rows() &&
+         state.point_chi_squared.cols() == channels && state.rows >= 0 && state.samples >= 0 &&
+         state.propagated >= 0;
 }
 
 bool IsAscendingBelow(const std::vector<int>& numbers, int end) {
@@ -105,7 +113,8 @@ DesignState StateOf(const ExpansionDesign& design) {
           design.check_costs,
           design.reference,
           design.lower,
-          design.upper};
+          design.upper,
+          design.element.bounds()};
 }
 
 absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignState state) {
@@ -123,6 +132,7 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
   design.lower = std::move(state.lower);
   design.upper = std::move(state.upper);
   design.whole_prior = state.whole_prior;
+  design.element = Element(std::move(state.element));
   return design;
 }
 

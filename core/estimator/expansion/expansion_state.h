@@ -22,6 +22,7 @@ struct DesignState {
   Matrix points, check_points;
   Vector check_costs;
   Vector reference, lower, upper;
+  std::vector<Element::Bound> element;
 };
 
 DesignState StateOf(const ExpansionDesign& design);
@@ -31,7 +32,7 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
 struct ExpansionState {
   DesignState design;
   LearnedNoise noise;
-  AbsorbedRows absorbed{0, 0, 0};
+  AbsorbedRows absorbed{0, 0, 0, 0};
   std::vector<int> kept;
   std::vector<FailedTrajectory> failures;
   // These describe the middle of a run; they are empty if a new run begins.

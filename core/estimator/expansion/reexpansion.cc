@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/record/rows_ahead.h"
 
@@ -52,7 +53,7 @@ class Settler {
       }
       POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, OneOrderLess()));
       if (!moved) break;
-      may_move = false;
+      may_move = power_ < 1;
     }
     return std::move(result_);
   }
@@ -99,7 +100,9 @@ class Settler {
 
   // Returns false when the sampler finds no starting point.
   absl::StatusOr<bool> Sample(int attempt) {
-    const Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    power_ = LikelihoodPower(expansion(), cost);
+    cost.set_power(power_);
     Vector lower, upper;
     SamplingBox(expansion().design(), lower, upper);
     SamplerOptions options;
@@ -121,6 +124,7 @@ class Settler {
         DesignForRegion(*request_.problem, truncation, std::move(region), inside);
     const Eigen::Index checks =
         std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
+    design.element = present_.design().element;
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
     design.check_costs = particles_.costs.head(checks);
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
@@ -137,6 +141,7 @@ class Settler {
   const RegionalExpansion& present_;
   const SettleRequest& request_;
   const Stop& stop_;
+  double power_ = 1;  // of the likelihood from which the particles were drawn
   Particles particles_;
   Settlement result_;
 };
@@ -167,23 +172,18 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   return expansion;
 }
 
-namespace {
-
-// Returns J_mismatch of the model itself at check point i.
 double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
-                     const RegionalExpansion::Check& check, Eigen::Index i) {
+                     const ConstVectorRef& chi_squared) {
   double mismatch = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
     const ChannelSums& sums = expansion.sums()[c];
-    const double chi_squared = check.chi_squared(i, static_cast<Eigen::Index>(c));
-    const double differences = 2 * chi_squared * (1 - sums.Lag1Correlation(d));
-    mismatch += NegativeLogLikelihood(sums.Degrees(), chi_squared, differences, sums.scale_unknown,
+    const double own = chi_squared[static_cast<Eigen::Index>(c)];
+    const double differences = 2 * own * (1 - sums.Lag1Correlation(d));
+    mismatch += NegativeLogLikelihood(sums.Degrees(), own, differences, sums.scale_unknown,
                                       sums.correlation_unknown);
   }
   return mismatch;
 }
-
-}  // namespace
 
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
   const ExpansionDesign& design = expansion.design();
@@ -194,12 +194,20 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
     const CostValue value = cost.Evaluate(eta);
     if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
     log_weight.push_back(design.check_costs[i] - value.total);
-    difference.push_back(ModelMismatch(expansion, cost.BasisDifference(eta), check, i) -
-                         value.mismatch);
+    difference.push_back(
+        ModelMismatch(expansion, cost.BasisDifference(eta), check.chi_squared.row(i).transpose()) -
+        value.mismatch);
     residual.push_back(check.residual_to_noise[i]);
   }
   Agreement agreement;
-  if (log_weight.empty()) return agreement;
+  if (log_weight.empty()) {
+    double discount = 0;
+    for (size_t c = 0; c < expansion.sums().size(); ++c) {
+      discount += expansion.Discount(static_cast<int>(c));
+    }
+    agreement.shift = std::sqrt(discount);
+    return agreement;
+  }
   const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());
   double sum = 0, sum_of_squares = 0, mean = 0, worst = 0;
   for (size_t i = 0; i < log_weight.size(); ++i) {

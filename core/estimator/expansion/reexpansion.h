@@ -57,7 +57,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
 // error of a posterior mean, in units of its standard deviation, is bounded by each of
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
 //   (at the expansion's lag-1 correlation, where that enters),
-//   ‖(model − expansion)/σ‖ over the samples.
+//   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points.
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
 // is sharper but needs check points where the posterior is. The second holds wherever they are.
 struct Agreement {
@@ -69,6 +69,11 @@ struct Agreement {
   // weight.
   double residual_to_noise = 0;
 };
+
+// Returns J_mismatch of the model itself at a point with the basis difference d (cost.h) from its
+// χ² of each channel (m), at the expansion's lag-1 correlation.
+double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
+                     const ConstVectorRef& chi_squared);
 
 // Returns the agreement of the expansion with the model. `cost` is the cost on the expansion.
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost);

@@ -23,7 +23,7 @@ Matrix Stack(const Matrix& top, const Matrix& bottom) {
 
 }  // namespace
 
-AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index check_points)
+AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points)
     : sums(static_cast<size_t>(channels), ChannelSums(terms)),
       discount(Vector::Zero(channels)),
       outliers(static_cast<size_t>(channels), 0),
@@ -31,7 +31,8 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index check_points)
       previous_error(Vector::Zero(channels)),
       check_chi_squared(Matrix::Zero(check_points, channels)),
       check_residual(Vector::Zero(check_points)),
-      check_valid(static_cast<size_t>(check_points), true) {}
+      check_valid(static_cast<size_t>(check_points), true),
+      point_chi_squared(Matrix::Zero(points, channels)) {}
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
@@ -52,7 +53,8 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
       reference_phi_(design_.basis->size()),
       kept_(static_cast<size_t>(design_.points.rows())),
       whitening_(noise_.channels, design_.points.rows() + design_.check_points.rows()),
-      absorbed_(design_.basis->size(), channels_, design_.check_points.rows()),
+      absorbed_(design_.basis->size(), channels_, design_.points.rows(),
+                design_.check_points.rows()),
       difference_(design_.basis->size()) {
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   std::iota(kept_.begin(), kept_.end(), 0);
@@ -240,6 +242,17 @@ double RegionalExpansion::ResidualToNoise(int row) const {
   return worst;
 }
 
+Vector RegionalExpansion::TermWeights(int row) const {
+  Vector weights = Vector::Zero(design_.basis->size());
+  for (int c = 0; c < channels_; ++c) {
+    weights += absorbed_.sums[static_cast<size_t>(c)].samples.G().diagonal();
+    if (row < 0) continue;
+    const double noise = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    if (noise > 0) weights += (coefficients_.col(row * channels_ + c) / noise).cwiseAbs2();
+  }
+  return weights;
+}
+
 void RegionalExpansion::Absorb(int row) {
   const size_t width = block_.values.size() / block_.rows.size();
   const int run = block_.rows[static_cast<size_t>(row)].run;
@@ -269,6 +282,9 @@ void RegionalExpansion::Absorb(int row) {
               LackOfWeight(model.outliers, deviation));
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
+    // χ²_q += (z − y_q)²/R
+    absorbed_.point_chi_squared.col(c).array() +=
+        (outputs_.col(column).head(points()).array() - z).square() / variance;
     ++absorbed_.samples;
   }
   ++absorbed_.rows;
@@ -323,7 +339,7 @@ void RegionalExpansion::Compare(int column, double z, double variance) {
 
 Cost RegionalExpansion::MakeCost(double regularization) const {
   return Cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
-              problem_.prior(), regularization);
+              problem_.prior(), regularization, design_.element);
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {

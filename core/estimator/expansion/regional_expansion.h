@@ -36,8 +36,8 @@ struct FailedTrajectory {
 
 // The accumulated contributions of the rows that an expansion has absorbed.
 struct AbsorbedRows {
-  // Starts from zero, for S terms, m channels and C check points.
-  AbsorbedRows(int terms, int channels, Eigen::Index check_points);
+  // Starts from zero, for S terms, m channels, Q collocation points and C check points.
+  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points);
 
   int64_t rows = 0;
   int64_t samples = 0;            // over all channels
@@ -55,6 +55,9 @@ struct AbsorbedRows {
   Matrix check_chi_squared;       // C × m
   Vector check_residual;          // Σ ((model − expansion)/σ)²
   std::vector<bool> check_valid;  // whether the trajectory could be integrated
+  // χ² of the model itself at the collocation points, Q × m, with the variances R of the sums; not
+  // finite where the trajectory could not be integrated.
+  Matrix point_chi_squared;
 };
 
 struct ExpansionState;
@@ -86,6 +89,9 @@ class RegionalExpansion {
   // Returns, for row `row` of the block propagated last, the expansion's residual in units of the
   // noise: the largest over the channels with a sample.
   double ResidualToNoise(int row) const;
+  // Returns how much each term of the basis contributes (S): Σ c_s²/R over the absorbed samples
+  // and, if `row` ≥ 0, Σ c_s²/σ² over the samples of this row of the block propagated last.
+  Vector TermWeights(int row) const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
 
@@ -109,6 +115,9 @@ class RegionalExpansion {
   double LogNormalization(bool with_own_error) const {
     return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
   }
+  // Returns χ² of the model itself at the collocation points, Q × m: what the sums say of the
+  // expansion there. Not finite where a trajectory could not be integrated.
+  const Matrix& PointChiSquared() const { return absorbed_.point_chi_squared; }
   // Returns the cost on this expansion with α² = regularization.
   Cost MakeCost(double regularization) const;
 

@@ -11,7 +11,16 @@ namespace {
 // has no finite cost.
 constexpr double kOffBound = 1e-9;
 
-// Returns the box of the search, with Ω in local coordinates as rows a with aᵀη ≤ bound.
+// Adds the row aᵀη ≤ bound.
+void Constrain(const Vector& row, double bound, MinimizationProblem& search) {
+  search.constraint.conservativeResize(search.constraint.rows() + 1, row.size());
+  search.bound.conservativeResize(search.bound.size() + 1);
+  search.constraint.bottomRows(1) = row.transpose();
+  search.bound.tail(1)[0] = bound;
+}
+
+// Returns the box of the search, with Ω and the element in local coordinates as rows a with
+// aᵀη ≤ bound.
 MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& prior) {
   MinimizationProblem search;
   SamplingBox(design, search.lower, search.upper);
@@ -29,11 +38,13 @@ MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& pri
         if (sign < 0) search.lower[i] = std::max(search.lower[i], -(bound - off));
         continue;
       }
-      search.constraint.conservativeResize(search.constraint.rows() + 1, n);
-      search.bound.conservativeResize(search.bound.size() + 1);
-      search.constraint.bottomRows(1) = sign * design.region.axes().row(i);
-      search.bound.tail(1)[0] = bound - off - sign * design.region.centre()[i];
+      Constrain(sign * design.region.axes().row(i).transpose(),
+                bound - off - sign * design.region.centre()[i], search);
     }
+  }
+  for (const Element::Bound& bound : design.element.bounds()) {
+    Constrain(design.region.axes().transpose() * bound.normal,
+              bound.offset - bound.normal.dot(design.region.centre()), search);
   }
   return search;
 }

@@ -10,6 +10,7 @@
 #include "core/bayes/weighted_samples.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/noise_learning.h"
@@ -20,6 +21,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kDrawsForNoise = 200;
+constexpr int kDrawsForEdges = 2'000;
 constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
 // Other minima count when their density is at least this fraction of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
@@ -44,14 +46,14 @@ class Assessment {
       regularization_ = choice.regularization;
       findings_.regularization_not_determined = choice.reason;
     }
-    const Cost cost = request_.expansion->MakeCost(regularization_);
+    Cost cost = request_.expansion->MakeCost(regularization_);
+    findings_.power = LikelihoodPower(*request_.expansion, cost);
+    cost.set_power(findings_.power);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
     MixtureShare share;
-    if (request_.partition != nullptr) {
-      share =
-          TakeShare(*request_.partition, request_.component, *request_.expansion, cost, posterior_);
-    }
+    NoteLeaning();
+    if (request_.weigh) share = ShareOf(*request_.expansion, cost, posterior_);
     const std::vector<Minimum>& minima = posterior_.minima;
     const Vector eta = minima.front().point;
     findings_.problem = &problem_;
@@ -91,6 +93,12 @@ class Assessment {
       if (!minima[i].converged || !Isolated(cost, minima[i].point)) continue;
       findings_.other_minima.push_back(prior_.ToParameters(design_.region.ToGerm(minima[i].point)));
     }
+  }
+
+  void NoteLeaning() {
+    const Matrix xis =
+        posterior_.Germs(prior_)(EquallyWeighted(posterior_.weights, kDrawsForEdges), Eigen::all);
+    findings_.leans = !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis)).empty();
   }
 
   void Summarize(const Cost& cost, const Vector& eta) {

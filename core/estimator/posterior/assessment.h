@@ -27,10 +27,9 @@ struct AssessmentRequest {
   int64_t propagated_rows = 0;  // trajectories × rows
   PosteriorEffort effort;
   std::optional<double> regularization;  // α² if it has been chosen already
-  // For a component of a mixture: the partition, the component's index, and its weight at the last
+  // For a component of a mixture: whether its share is asked for, and its weight at the last
   // weighing.
-  const MixturePartition* partition = nullptr;
-  size_t component = 0;
+  bool weigh = false;
   double last_weight = 1;
 };
 

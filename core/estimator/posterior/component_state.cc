@@ -24,7 +24,7 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
   return state.taken > 0 && state.windows_from >= 0 && state.windows_from <= state.taken &&
          state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
-         state.weight >= 0 && state.weight <= 1 &&
+         state.weight >= 0 && state.weight <= 1 && state.room >= 1 &&
          IsSummaryFor(problem, state.summary, state.taken);
 }
 
@@ -50,13 +50,15 @@ absl::StatusOr<ResolvedProblem> ProblemOf(const ResolvedProblem& problem,
 }  // namespace
 
 ComponentState MixtureComponent::State() const {
-  POLYEST_CHECK(!broken_ && !is_multimodal());
+  POLYEST_CHECK(!broken_ && !must_divide());
   ComponentState state;
   state.runs = problem_.runs();
   state.relative_tolerance = problem_.problem().integration.relative_tolerance;
   state.expansion = expansion_->State();
   state.particles = particles_;
   state.weight = weight_;
+  state.room = room_;
+  state.bisected = bisected_;
   state.taken = taken_;
   state.windows_from = windows_from_;
   state.window_end = window_end_;
@@ -84,6 +86,8 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
                                component->problem_, std::move(state.expansion), *store, threads));
   component->particles_ = std::move(state.particles);
   component->weight_ = state.weight;
+  component->room_ = state.room;
+  component->bisected_ = state.bisected;
   component->taken_ = state.taken;
   component->windows_from_ = state.windows_from;
   component->window_end_ = state.window_end;

@@ -16,6 +16,8 @@ struct ComponentState {
   ExpansionState expansion;
   Matrix particles;
   double weight = 1;
+  int room = 1;
+  bool bisected = false;
   int64_t taken = 0;
   int64_t windows_from = 0;
   int64_t window_end = 0;

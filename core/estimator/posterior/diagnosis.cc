@@ -265,6 +265,42 @@ std::string_view RemedyForInaccuracy(const ExpansionOptions& expansion) {
   return "narrower priors or more informative data would let the expansion hold";
 }
 
+void AddInaccuracy(const Findings& findings, const Estimate& estimate,
+                   std::vector<Diagnostic>& diagnostics) {
+  const std::string_view remedy = RemedyForInaccuracy(findings.problem->problem().expansion);
+  if (findings.power < 1) {
+    diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat(
+             "the expansion of order %d differs from the model by %.3g times the noise; "
+             "the uncertainty reported is that of the likelihood to the power %.2g, as "
+             "far as the model's own trajectories confirm it; %s",
+             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.power,
+             remedy)});
+  } else if (findings.shift > kInaccurateShift) {
+    diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat(
+             "the expansion of order %d differs from the model by %.3g times the noise; "
+             "estimates may be off by %.3g standard deviations of the fit, by which the "
+             "uncertainty has been widened; %s",
+             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
+             remedy)});
+  }
+}
+
+void AddEdge(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.leans) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kExpansionInaccurate,
+       absl::StrFormat(
+           "the posterior goes on beyond the region in which the expansion is made, where "
+           "it is not looked at; %s",
+           findings.problem->problem().expansion.adaptive
+               ? "more samples let the region move there"
+               : "let expansion.adaptive be true, or widen the prior")});
+}
+
 void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (findings.regularization_not_determined.empty()) return;
   diagnostics.push_back(
@@ -278,16 +314,8 @@ void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagno
 std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
   std::vector<Diagnostic> diagnostics;
   AddIdentifiability(findings, estimate, diagnostics);
-  if (findings.shift > kInaccurateShift) {
-    diagnostics.push_back(
-        {DiagnosticCode::kExpansionInaccurate,
-         absl::StrFormat(
-             "the expansion of order %d differs from the model by %.3g times the noise; "
-             "estimates may be off by %.3g standard deviations of the fit, by which the "
-             "uncertainty has been widened; %s",
-             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
-             RemedyForInaccuracy(findings.problem->problem().expansion))});
-  }
+  AddInaccuracy(findings, estimate, diagnostics);
+  AddEdge(findings, diagnostics);
   AddMisfit(findings, estimate, diagnostics);
   AddCorrelation(findings, estimate, diagnostics);
   AddUnlearnedNoise(findings, estimate, diagnostics);

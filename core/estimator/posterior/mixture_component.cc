@@ -8,10 +8,12 @@
 
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/leaning.h"
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/bisection.h"
 #include "core/estimator/posterior/noise_learning.h"
-#include "core/estimator/posterior/posterior_pieces.h"
+#include "core/estimator/problem/truncation.h"
 #include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
@@ -43,6 +45,16 @@ constexpr int kMaxRevisions = 24;
 // Factor by which a scale that is not learned yet exceeds the largest sample.
 constexpr double kAboveSignal = 2;
 
+// Trajectories that the components may propagate together, and components that they always may be.
+constexpr double kMostTrajectories = 2048;
+constexpr int kPiecesAtLeast = 4;
+// An element is bisected in at most so many dimensions: the number of halves that a posterior
+// touches doubles with each of them.
+constexpr int kMaxDimensionToBisect = 3;
+// At the end of a window an element is bisected when the posterior's means may be wrong by so many
+// standard deviations and moving has not helped.
+constexpr double kMinShiftToBisect = 0.25;
+
 // Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
 PosteriorSummary SummaryOf(const Matrix& particles) {
   PosteriorSummary summary;
@@ -61,6 +73,14 @@ int64_t NextWindow(int64_t rows, int64_t from) {
   return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
 }
 
+int MostComponents(const ResolvedProblem& problem) {
+  const ExpansionOptions& options = problem.problem().expansion;
+  const int n = problem.dimension();
+  const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
+  const double points = options.points_per_term * static_cast<double>(terms);
+  return std::max(kPiecesAtLeast, static_cast<int>(kMostTrajectories / points));
+}
+
 MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleStore* store,
                                    int threads)
     : problem_(problem),
@@ -76,16 +96,17 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
   POLYEST_ASSIGN_OR_RETURN(component->expansion_,
                            RegionalExpansion::Make(component->problem_, std::move(design),
                                                    NoiseToBeginWith(problem.problem()), threads));
+  component->room_ = MostComponents(problem);
   return component;
 }
 
 absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
-  if (is_multimodal()) return absl::OkStatus();
+  if (must_divide()) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   // An earlier stop may have left the end of a window unprocessed.
   if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
   RowBlock block;
-  while (taken_ < rows && !is_multimodal()) {
+  while (taken_ < rows && !must_divide()) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(ReadBlock(rows, block, stop));
     broken_ = true;
@@ -153,7 +174,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
                         expansion_->ResidualToNoise(row) > kResidualToNoise;
     if (short_of_trajectories || (adaptive() && coarse)) {
-      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(short_of_trajectories, stop));
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(row, stop));
       if (moved) return false;
     }
     expansion_->Absorb(row);
@@ -168,7 +189,8 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
 }
 
 // Handles a next row at which the present expansion is too coarse or too few trajectories are left.
-absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
+  const bool short_of_trajectories = row == expansion_->fitted_rows();
   if (settled_row_ != taken_) settlements_at_row_ = 0;
   settled_row_ = taken_;
   if (adaptive() && taken_ > 0 && settlements_at_row_ < kMaxSettlementsAtRow) {
@@ -178,6 +200,7 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(bool short_of_trajectories, 
   }
   if (LookForPieces()) return true;
   if (short_of_trajectories) return expansion_->shortage();
+  if (BisectElement(row)) return true;
   patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
   return false;
 }
@@ -197,78 +220,127 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
-  const auto accurate = [&] {
+  const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    return AgreementWithModel(*expansion_, cost).shift <= kMaxShift;
+    return AgreementWithModel(*expansion_, cost).shift;
   };
+  const auto leans = [&] {
+    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+    return MayLean(cost, expansion_->design(), expansion_->design().reference);
+  };
+  const auto accurate = [&] { return shift() <= kMaxShift; };
   bool moved = false;
   // Each settlement may raise the order, so several may be needed.
   for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
-    if (accurate()) return moved;
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/true));
+    const bool follows = accurate();
+    if (follows && !leans()) return moved;
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
     if (!settled) break;
     moved = true;
   }
-  return (!accurate() && LookForPieces()) || moved;
+  if (accurate()) return moved;
+  return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement(-1)) || moved;
 }
 
 // Returns true when the posterior is in pieces on the present expansion, which no move makes
 // accurate. Does not look for pieces before the noise is learned, because the noise would decide
 // between them.
 bool MixtureComponent::LookForPieces() {
-  if (!adaptive() || taken_ < whole_until_) return false;
+  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
   for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
     const bool unknown = problem_.problem().measured[c].noise.unknown;
     if (unknown && !expansion_->noise().channels[c].learned) return false;
   }
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (AgreementWithModel(*expansion_, cost).shift > kMaxShiftInPieces) return false;
-  std::vector<Matrix> pieces = FindPieces(cost, expansion_->design(), particles_);
+  std::vector<Piece> pieces = FindPieces(cost, expansion_->design(), particles_);
   if (pieces.size() > 1) pieces_ = std::move(pieces);
-  return is_multimodal();
+  return must_divide();
+}
+
+// Returns true when the element is to be bisected. `row` is that of the block which the expansion
+// does not follow, or −1.
+bool MixtureComponent::BisectElement(int row) {
+  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
+  if (problem_.dimension() > kMaxDimensionToBisect) return false;
+  pieces_ = Bisect(*expansion_, row, particles_);
+  halves_ = true;
+  return true;
 }
 
 absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
     const Stop& stop) {
   std::vector<std::unique_ptr<MixtureComponent>> parts;
-  for (const Matrix& piece : pieces_) {
+  const int room = std::max(1, room_ / static_cast<int>(pieces_.size()));
+  for (const Piece& piece : pieces_) {
     std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
     const absl::Status begun = part->BeginOn(*this, piece, stop);
     if (absl::IsFailedPrecondition(begun)) {
       pieces_.clear();
+      halves_ = false;
       whole_until_ = NextWindow(taken_, windows_from_);
       parts.clear();
       return parts;
     }
     POLYEST_RETURN_IF_ERROR(begun);
+    part->room_ = room;
     parts.push_back(std::move(part));
   }
   return parts;
 }
 
+absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const Piece& whole,
+                                                                          const Stop& stop) const {
+  std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
+  const absl::Status begun = united->BeginOn(*this, whole, stop);
+  if (absl::IsFailedPrecondition(begun)) return nullptr;
+  POLYEST_RETURN_IF_ERROR(begun);
+  united->whole_until_ = 0;
+  united->bisected_ = false;
+  const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
+  if (!(AgreementWithModel(*united->expansion_, cost).shift <= kMaxShift)) return nullptr;
+  return united;
+}
+
+// Returns the design over the piece's region. Its check points are particles of the piece, or cover
+// the region if the particles' density is unknown.
+ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
+                                           const Piece& piece) const {
+  const ExpansionDesign& before = parent.expansion_->design();
+  const Vector middle = piece.particles.rows() > 0
+                            ? Vector(piece.particles.colwise().mean().transpose())
+                            : NearestInside(problem_.prior(), piece.region.centre());
+  ExpansionDesign design =
+      DesignForRegion(problem_, before.basis->truncation(), piece.region, middle);
+  design.element = piece.element;
+  if (piece.costs.size() == 0) {
+    SpreadCheckPoints(problem_, middle, design);
+    return design;
+  }
+  const Eigen::Index count = std::min(before.check_points.rows(), piece.particles.rows());
+  design.check_points = design.region.ManyToLocal(piece.particles.topRows(count));
+  design.check_costs = piece.costs.head(count);
+  return design;
+}
+
 // Starts at the parent's row, over a region around one of the parent's pieces.
-absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Matrix& piece,
+absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Piece& piece,
                                        const Stop& stop) {
   taken_ = window_end_ = parent.taken_;
   windows_from_ = parent.windows_from_;
   summary_ = parent.summary_;
   settlements_ = parent.settlements_;
-  whole_until_ = NextWindow(taken_, windows_from_);
-  particles_ = piece;
-  const ExpansionDesign& before = parent.expansion_->design();
-  ExpansionDesign design =
-      DesignForRegion(problem_, before.basis->truncation(), RegionOfParticles(piece),
-                      piece.colwise().mean().transpose());
-  const Matrix checks = piece.topRows(std::min(before.check_points.rows(), piece.rows()));
-  design.check_points = design.region.ManyToLocal(checks);
-  parent.expansion_->MakeCost(problem_.problem().regularization)
-      .EvaluateMany(before.region.ManyToLocal(checks), design.check_costs);
+  bisected_ = parent.bisected_ || parent.halves_;
+  if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
+  particles_ = piece.particles;
   LearnedNoise noise = parent.expansion_->noise();
-  if (noise.posterior.centre.size() > 0) noise.posterior = SummaryOf(piece);
-  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, std::move(design), std::move(noise),
+  if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
+    noise.posterior = SummaryOf(particles_);
+  }
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
                                               *store_, taken_, threads_, stop));
   ++reexpansions_;
-  bool moved = true;
+  bool moved = !parent.halves_;
   for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
     POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
   }
@@ -346,7 +418,7 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
 // Returns true when the expansion moved.
 absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order) {
   SettleRequest request;
-  request.may_raise_order = may_raise_order;
+  request.may_raise_order = may_raise_order && !bisected_;
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;

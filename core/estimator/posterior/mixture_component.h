@@ -12,6 +12,7 @@
 
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/posterior/assessment.h"
+#include "core/estimator/posterior/posterior_pieces.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
@@ -19,6 +20,11 @@ namespace polyest::internal {
 // Returns the row at which a window starting at `rows` ends. Windows grow in proportion to the
 // number of rows since `from` and have at least two rows.
 int64_t NextWindow(int64_t rows, int64_t from = 0);
+
+// Returns the maximum number of components of the problem's posterior. The budget is the number of
+// trajectories that they propagate together, so that it does not depend on their order or
+// dimension.
+int MostComponents(const ResolvedProblem& problem);
 
 struct ComponentState;
 
@@ -38,7 +44,7 @@ class MixtureComponent {
                                                                      const SampleStore* store,
                                                                      int threads);
   // Returns the state. May be called after TakeUpTo a checkpoint or the row before a new run,
-  // unless is_multimodal().
+  // unless must_divide().
   ComponentState State() const;
 
   // Takes rows of the store up to the first `rows`. On a stop request returns its status. The rows
@@ -46,17 +52,28 @@ class MixtureComponent {
   absl::Status TakeUpTo(int64_t rows, const Stop& stop);
   int64_t rows_taken() const { return taken_; }
 
-  // Whether the posterior consists of separated pieces that a single expansion cannot represent. No
-  // more rows are taken until Divide has been called.
-  bool is_multimodal() const { return !pieces_.empty(); }
+  // Whether a single expansion cannot represent the posterior, because this consists of separated
+  // pieces or the model changes too much over the element. No more rows are taken until Divide has
+  // been called.
+  bool must_divide() const { return !pieces_.empty(); }
   // Returns a component for each piece, at the same row. Returns none if one of them could not be
   // expanded; this component then continues undivided.
   absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> Divide(const Stop& stop);
+  // Returns a component for all of Ω at the same row that begins in the piece, with this one's
+  // noise and windows. Returns null if its expansion does not follow the model there.
+  absl::StatusOr<std::unique_ptr<MixtureComponent>> Unite(const Piece& whole,
+                                                          const Stop& stop) const;
+  // Whether the division is a bisection. Its halves need no weighing before they have taken more.
+  bool bisects() const { return halves_; }
+  // The number of components that this one may become by divisions.
+  int room() const { return room_; }
+  void set_room(int room) { room_ = room; }
 
   // Prepares for weighing: settles again, at most once at a row, if the posterior has become so
   // narrow that the check points no longer determine the height of its cost (mixture_share.h).
   absl::Status MakeComparable(const Stop& stop);
   // Returns the posterior probability of the component at the last weighing.
+  const ResolvedProblem& problem() const { return problem_; }
   double weight() const { return weight_; }
   void set_weight(double weight) { weight_ = weight; }
   const RegionalExpansion& expansion() const { return *expansion_; }
@@ -75,7 +92,7 @@ class MixtureComponent {
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
-  absl::StatusOr<bool> SettleBefore(bool short_of_trajectories, const Stop& stop);
+  absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
@@ -83,7 +100,9 @@ class MixtureComponent {
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
   bool LookForPieces();
-  absl::Status BeginOn(const MixtureComponent& parent, const Matrix& piece, const Stop& stop);
+  bool BisectElement(int row);
+  absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
+  ExpansionDesign DesignOn(const MixtureComponent& parent, const Piece& piece) const;
   absl::Status Reweigh(LearnedNoise noise, const Stop& stop);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
@@ -92,9 +111,12 @@ class MixtureComponent {
   int threads_;
   bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
-  bool broken_ = false;         // whether a stop left the expansion between two rows
-  Matrix particles_;            // of the last settlement, germ coordinates
-  std::vector<Matrix> pieces_;  // pieces of the particles if there are several
+  bool broken_ = false;        // whether a stop left the expansion between two rows
+  Matrix particles_;           // of the last settlement, germ coordinates
+  std::vector<Piece> pieces_;  // those to divide into
+  bool halves_ = false;        // whether the pieces are the halves of a bisection
+  bool bisected_ = false;      // whether it came from a bisection; its order stays low
+  int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;
   int64_t windows_from_ = 0;  // row from which the present windows are counted

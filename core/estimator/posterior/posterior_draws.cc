@@ -210,6 +210,15 @@ Vector PosteriorDraws::Parameter(const Prior& prior, int i) const {
   return scores.col(i).unaryExpr([&](double z) { return prior.OfScore(i, z); });
 }
 
+Matrix PosteriorDraws::Germs(const Prior& prior) const {
+  if (!prior.correlated()) return scores;
+  Matrix xis(scores.rows(), scores.cols());
+  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
+    xis.row(i) = prior.OfScores(scores.row(i).transpose()).transpose();
+  }
+  return xis;
+}
+
 absl::StatusOr<PosteriorDraws> DrawPosterior(const Cost& cost, const ExpansionDesign& design,
                                              const Matrix& guesses, const PosteriorEffort& effort,
                                              const Stop& stop) {

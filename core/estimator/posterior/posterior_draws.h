@@ -44,6 +44,7 @@ struct PosteriorDraws {
   std::vector<Minimum> minima;  // distinct, local coordinates, lowest first; at least one
 
   Vector Parameter(const Prior& prior, int i) const;  // returns the draws of θ_i
+  Matrix Germs(const Prior& prior) const;             // returns the draws of ξ, draws × n
 };
 
 // Draws from the posterior. `guesses` (any number × n, may be empty; germ coordinates) tells where

@@ -1,11 +1,15 @@
 #include "core/estimator/posterior/posterior_mixture.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <numeric>
 #include <utility>
 
 #include "core/bayes/identifiability.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
+#include "core/estimator/posterior/most_evidence.h"
 
 namespace polyest::internal {
 namespace {
@@ -14,91 +18,95 @@ namespace {
 constexpr PosteriorEffort kWeighingEffort = {
     .importance_points = 4'096, .chain_effective_size = 2'000, .max_sweeps = 64};
 
+constexpr int kParticlesKept = 1'000;
+// Up to this many components are all weighed by draws.
+constexpr size_t kFew = 4;
+
 // The expansion of a lighter component has no noticeable effect.
 constexpr double kMinWeightToWarn = 0.01;
 
-MixturePartition PartitionOf(const std::vector<AssessmentRequest>& requests,
-                             const std::vector<size_t>& kept) {
-  std::vector<const ExpansionDesign*> designs;
-  for (const size_t k : kept) designs.push_back(&requests[k].expansion->design());
-  return MixturePartition(designs);
-}
+// The posterior of one component, as far as its weight needs it.
+struct Weighed {
+  double log_evidence = -kInfinity;
+  Matrix particles;
+};
 
-// Draws from all components, and computes their shares among any subset of them.
 class Weighing {
  public:
-  explicit Weighing(const std::vector<AssessmentRequest>& requests) : requests_(requests) {}
+  Weighing(const std::vector<AssessmentRequest>& requests, size_t most)
+      : requests_(requests), most_(most), weighed_(requests.size()) {}
 
   absl::StatusOr<MixtureWeighing> Run(const Stop& stop) {
-    for (const AssessmentRequest& request : requests_) {
-      costs_.push_back(request.expansion->MakeCost(request.problem->problem().regularization));
-      POLYEST_ASSIGN_OR_RETURN(PosteriorDraws draws,
-                               DrawPosterior(costs_.back(), request.expansion->design(),
-                                             *request.guesses, kWeighingEffort, stop));
-      draws_.push_back(std::move(draws));
+    POLYEST_RETURN_IF_ERROR(WeighHeaviest(stop));
+    MixtureWeighing weighing;
+    std::vector<double> evidences;
+    for (const Weighed& one : weighed_) evidences.push_back(one.log_evidence);
+    const std::vector<double> weights = WeightsOf(evidences);
+    double light = 0;
+    const double least = LeastWeight(weights);
+    for (size_t k = 0; k < weights.size(); ++k) {
+      if (weights[k] < least) {
+        light = std::max(light, weights[k]);
+        continue;
+      }
+      weighing.kept.push_back(k);
+      weighing.weights.push_back(weights[k]);
+      weighing.particles.push_back(std::move(weighed_[k].particles));
     }
-    weighing_.kept.resize(requests_.size());
-    std::iota(weighing_.kept.begin(), weighing_.kept.end(), size_t{0});
-    Share();
-    while (DropMet()) Share();
-    weighing_.weights = WeightsOf(Evidences());
-    DropLight();
-    DropPastRoom();
-    const double all = std::accumulate(weighing_.weights.begin(), weighing_.weights.end(), 0.0);
-    for (double& weight : weighing_.weights) weight /= all;
-    return std::move(weighing_);
+    if (least > kMinWeight) weighing.left_out = light;
+    const double all = std::accumulate(weighing.weights.begin(), weighing.weights.end(), 0.0);
+    for (double& weight : weighing.weights) weight /= all;
+    return weighing;
   }
 
  private:
-  void Share() {
-    const MixturePartition partition = PartitionOf(requests_, weighing_.kept);
-    shares_.clear();
-    for (size_t i = 0; i < weighing_.kept.size(); ++i) {
-      const size_t k = weighing_.kept[i];
-      PosteriorDraws draws = draws_[k];
-      shares_.push_back(TakeShare(partition, i, *requests_[k].expansion, costs_[k], draws));
+  // The weight from which on a component is kept: kMinWeight, or what leaves no more than the most
+  // components allowed.
+  double LeastWeight(std::vector<double> weights) const {
+    if (weights.size() <= most_) return kMinWeight;
+    std::ranges::sort(weights, std::greater());
+    return std::max(kMinWeight, weights[most_ - 1]);
+  }
+
+  // Draws from the components in the order of the most that their evidence can be, until the rest
+  // can no longer matter.
+  absl::Status WeighHeaviest(const Stop& stop) {
+    std::vector<double> most;
+    for (const AssessmentRequest& request : requests_) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      const Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+      most.push_back(requests_.size() > kFew
+                         ? MostEvidence(*request.expansion, cost, *request.guesses)
+                         : kInfinity);
     }
-  }
-
-  // Drops the component that owns the smallest share of its draws, if that share is too small.
-  // Returns whether one was dropped.
-  bool DropMet() {
-    const auto least = std::ranges::min_element(shares_, {}, &MixtureShare::owned);
-    if (shares_.size() == 1 || least->owned >= kMinOwned) return false;
-    weighing_.kept.erase(weighing_.kept.begin() + (least - shares_.begin()));
-    return true;
-  }
-
-  std::vector<double> Evidences() const {
-    std::vector<double> evidences;
-    for (const MixtureShare& share : shares_) evidences.push_back(share.log_evidence);
-    return evidences;
-  }
-
-  void Drop(size_t i) {
-    weighing_.kept.erase(weighing_.kept.begin() + static_cast<std::ptrdiff_t>(i));
-    weighing_.weights.erase(weighing_.weights.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-
-  void DropLight() {
-    for (size_t i = weighing_.weights.size(); i-- > 0;) {
-      if (weighing_.weights[i] < kMinWeight) Drop(i);
+    std::vector<size_t> order(requests_.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return most[a] > most[b]; });
+    double heaviest = -kInfinity;
+    for (const size_t k : order) {
+      if (most[k] < heaviest + std::log(kMinWeight)) break;
+      POLYEST_RETURN_IF_ERROR(Weigh(k, stop));
+      heaviest = std::max(heaviest, weighed_[k].log_evidence);
     }
+    return absl::OkStatus();
   }
 
-  void DropPastRoom() {
-    while (weighing_.kept.size() > kMaxComponents) {
-      const auto lightest = std::ranges::min_element(weighing_.weights);
-      weighing_.left_out += *lightest;
-      Drop(static_cast<size_t>(lightest - weighing_.weights.begin()));
-    }
+  absl::Status Weigh(size_t k, const Stop& stop) {
+    const AssessmentRequest& request = requests_[k];
+    const Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+    absl::StatusOr<PosteriorDraws> draws =
+        DrawPosterior(cost, request.expansion->design(), *request.guesses, kWeighingEffort, stop);
+    if (absl::IsFailedPrecondition(draws.status())) return absl::OkStatus();  // a cost of +∞
+    if (!draws.ok()) return draws.status();
+    weighed_[k].log_evidence = ShareOf(*request.expansion, cost, *draws).log_evidence;
+    weighed_[k].particles =
+        draws->Germs(cost.prior())(EquallyWeighted(draws->weights, kParticlesKept), Eigen::all);
+    return absl::OkStatus();
   }
 
   const std::vector<AssessmentRequest>& requests_;
-  std::vector<Cost> costs_;
-  std::vector<PosteriorDraws> draws_;
-  std::vector<MixtureShare> shares_;  // of the components kept
-  MixtureWeighing weighing_;
+  const size_t most_;
+  std::vector<Weighed> weighed_;
 };
 
 // Returns the draws of all components in their order, heaviest first.
@@ -161,14 +169,11 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   return whole;
 }
 
-// Assesses all components with a partition among them.
 absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& requests,
-                                                const MixturePartition& partition,
                                                 const Stop& stop) {
   std::vector<Assessed> components;
   for (size_t k = 0; k < requests.size(); ++k) {
-    requests[k].partition = &partition;
-    requests[k].component = k;
+    requests[k].weigh = true;
     // All components use the α² of the first.
     if (k > 0) requests[k].regularization = components.front().estimate.regularization;
     POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(requests[k], stop));
@@ -210,8 +215,8 @@ std::vector<size_t> KeepSameProblem(std::vector<AssessmentRequest>& requests) {
 }  // namespace
 
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
-                                             const Stop& stop) {
-  return Weighing(requests).Run(stop);
+                                             size_t most, const Stop& stop) {
+  return Weighing(requests, most).Run(stop);
 }
 
 absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> requests,
@@ -225,8 +230,7 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
   }
   mixture.order.resize(requests.size());
   std::iota(mixture.order.begin(), mixture.order.end(), size_t{0});
-  const MixturePartition partition = PartitionOf(requests, mixture.order);
-  POLYEST_ASSIGN_OR_RETURN(std::vector<Assessed> assessed, AssessAll(requests, partition, stop));
+  POLYEST_ASSIGN_OR_RETURN(std::vector<Assessed> assessed, AssessAll(requests, stop));
   const std::vector<double> weights = WeightsNow(requests, assessed);
   std::ranges::stable_sort(mixture.order,
                            [&](size_t a, size_t b) { return weights[a] > weights[b]; });

@@ -20,6 +20,7 @@ constexpr double kMinShare = 0.02;  // fraction of the particles
 constexpr double kMinGap = 1;       // in standard deviations within the sets
 constexpr double kMinWall = 8;      // difference in cost: e^−8 ≈ 3·10⁻⁴
 constexpr int kRefinements = 4;     // number of refinements of a hyperplane
+constexpr double kMaxGrowth = 2;    // of the volume when pieces are united
 
 struct Gap {
   Vector normal;
@@ -35,40 +36,56 @@ Matrix Covariance(const Matrix& points) {
 class PieceFinder {
  public:
   PieceFinder(const Cost& cost, const ExpansionDesign& design, const Matrix& particles)
-      : particles_(design.region.ManyToLocal(particles)),
+      : region_(design.region),
+        element_(design.element),
+        particles_(design.region.ManyToLocal(particles)),
         search_(SearchOf(cost, design)),
         least_(static_cast<size_t>(std::ceil(kMinShare * static_cast<double>(particles.rows())))) {
-    Vector costs;
-    cost.EvaluateMany(particles_, costs);
-    const Matrix starts = SpreadStarts(particles_, costs, kStarts);
+    cost.EvaluateMany(particles_, costs_);
+    const Matrix starts = SpreadStarts(particles_, costs_, kStarts);
     for (Minimum& minimum : FindMinima(search_, starts, MinimizerOptions(), Stop())) {
       if (minimum.converged) minima_.push_back(std::move(minimum));
     }
   }
 
-  std::vector<Rows> Run() {
+  struct Part {
+    Element element;
+    Rows rows;
+  };
+
+  const Vector& costs() const { return costs_; }
+
+  std::vector<Part> Run() {
     Rows all(static_cast<size_t>(particles_.rows()));
     for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Eigen::Index>(i);
-    Divide(all, minima_);
-    return std::move(pieces_);
+    Divide({element_, std::move(all)}, minima_);
+    return std::move(parts_);
   }
 
  private:
-  void Divide(const Rows& rows, const std::vector<Minimum>& minima) {
+  void Divide(const Part& part, const std::vector<Minimum>& minima) {
     for (size_t a = 0; a < minima.size(); ++a) {
       for (size_t b = a + 1; b < minima.size(); ++b) {
-        const std::optional<Gap> gap = GapBetween(rows, minima[a].point, minima[b].point);
+        const std::optional<Gap> gap = GapBetween(part.rows, minima[a].point, minima[b].point);
         if (!gap || !HasWall(*gap, minima)) continue;
         std::vector<Minimum> below, above;
         for (const Minimum& minimum : minima) {
           (gap->normal.dot(minimum.point) < gap->offset ? below : above).push_back(minimum);
         }
-        Divide(gap->below, below);
-        Divide(gap->above, above);
+        const auto [lower, upper] = Elements(part.element, *gap);
+        Divide({lower, gap->below}, below);
+        Divide({upper, gap->above}, above);
         return;
       }
     }
-    pieces_.push_back(rows);
+    parts_.push_back(part);
+  }
+
+  // Divides the element by the gap's hyperplane, from local to germ coordinates: with
+  // η = axes⁻¹ (ξ − centre), normalᵀη = (axes⁻ᵀ normal)ᵀ (ξ − centre).
+  std::pair<Element, Element> Elements(const Element& element, const Gap& gap) const {
+    const Vector normal = Inverse(region_.axes()).transpose() * gap.normal;
+    return element.Divide(normal, gap.offset + normal.dot(region_.centre()));
   }
 
   // Returns the gap among the rows that Fisher's discriminant finds, starting from the sets nearer
@@ -83,16 +100,16 @@ class PieceFinder {
     gap.offset = gap.normal.dot(a + b) / 2;
     double width = 0;
     for (int i = 0; i < kRefinements; ++i) {
-      Part(rows, gap);
+      Assign(rows, gap);
       if (std::min(gap.below.size(), gap.above.size()) < least_) return std::nullopt;
       width = Discriminate(rows, gap);
     }
     if (!(width >= kMinGap)) return std::nullopt;
-    Part(rows, gap);
+    Assign(rows, gap);
     return gap;
   }
 
-  void Part(const Rows& rows, Gap& gap) const {
+  void Assign(const Rows& rows, Gap& gap) const {
     gap.below.clear();
     gap.above.clear();
     for (const Eigen::Index row : rows) {
@@ -148,21 +165,55 @@ class PieceFinder {
     return particles_.row(*nearest).transpose();
   }
 
+  const Region& region_;
+  const Element& element_;
   const Matrix particles_;  // local
   const MinimizationProblem search_;
   const size_t least_;
+  Vector costs_;  // of the particles
   std::vector<Minimum> minima_;
-  std::vector<Rows> pieces_;
+  std::vector<Part> parts_;
 };
 
 }  // namespace
 
-std::vector<Matrix> FindPieces(const Cost& cost, const ExpansionDesign& design,
-                               const Matrix& particles) {
-  if (particles.rows() < kMinParticlesForPieces) return {particles};
-  std::vector<Matrix> pieces;
-  for (const Rows& rows : PieceFinder(cost, design, particles).Run()) {
-    pieces.push_back(particles(rows, Eigen::all));
+std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
+                                 const std::vector<double>& weights) {
+  double volume = 0;
+  std::vector<Matrix> shares;
+  Eigen::Index count = 0;
+  for (size_t k = 0; k < particles.size(); ++k) {
+    volume += RegionOfParticles(particles[k]).Volume();
+    const auto own = static_cast<double>(particles[k].rows());
+    const auto share = static_cast<Eigen::Index>(std::ceil(weights[k] * own));
+    // Every so many-th, since the particles may be ordered.
+    const Eigen::Index stride = std::max<Eigen::Index>(1, particles[k].rows() / share);
+    shares.push_back(particles[k](Eigen::seqN(0, share, stride), Eigen::all));
+    count += share;
+  }
+  Matrix pooled(count, particles.front().cols());
+  Eigen::Index row = 0;
+  for (const Matrix& share : shares) {
+    pooled.middleRows(row, share.rows()) = share;
+    row += share.rows();
+  }
+  Region region = RegionOfParticles(pooled);
+  if (region.Volume() > kMaxGrowth * volume) return std::nullopt;
+  return Piece{Element(), std::move(region), std::move(pooled), Vector()};
+}
+
+std::vector<Piece> FindPieces(const Cost& cost, const ExpansionDesign& design,
+                              const Matrix& particles) {
+  if (particles.rows() < kMinParticlesForPieces) {
+    return {{design.element, TrustedRegion(design), particles, Vector()}};
+  }
+  PieceFinder finder(cost, design, particles);
+  std::vector<Piece> pieces;
+  for (PieceFinder::Part& part : finder.Run()) {
+    Matrix own = particles(part.rows, Eigen::all);
+    Region region = RegionOfParticles(own);
+    pieces.push_back(
+        {std::move(part.element), std::move(region), std::move(own), finder.costs()(part.rows)});
   }
   return pieces;
 }

@@ -9,12 +9,14 @@
 // - the cost on it is everywhere at least 8 above the higher of the two sides' least costs: every
 //   path from one piece to the other passes through a density below e^−8 of either peak.
 //
-// The hyperplane's normal is Fisher's discriminant of the sets. The sets are found from pairs of
-// minima of the cost, and are divided further in the same way.
+// The hyperplanes divide the design's element. A hyperplane's normal is Fisher's discriminant of
+// the sets. The sets are found from pairs of minima of the cost, and are divided further in the
+// same way.
 //
 // A posterior that is merely curved, skewed, heavy-tailed or a valley is one piece: it leaves no
 // gap and has no such wall. A posterior with too few particles also counts as one piece.
 
+#include <optional>
 #include <vector>
 
 #include "core/bayes/cost.h"
@@ -25,10 +27,25 @@ namespace polyest::internal {
 // Minimum number of particles for a division into pieces.
 inline constexpr Eigen::Index kMinParticlesForPieces = 200;
 
-// Returns the particles of each piece, or all particles as one piece if there are no others.
-// `particles` (W × n, germ coordinates) are of the posterior on the design's expansion. Takes
-// milliseconds.
-std::vector<Matrix> FindPieces(const Cost& cost, const ExpansionDesign& design,
-                               const Matrix& particles);
+// A part of an element, to be followed by a component of its own.
+struct Piece {
+  Element element;
+  Region region;     // where its expansion begins
+  Matrix particles;  // those of the posterior in it (W × n, germ coordinates); may be empty
+  // −log of the density from which the particles were drawn, up to a constant; empty if unknown.
+  Vector costs;
+};
+
+// Returns the pieces, or a single one if there are no others. `particles` (W × n, germ coordinates)
+// are of the posterior on the design's expansion. Takes milliseconds.
+std::vector<Piece> FindPieces(const Cost& cost, const ExpansionDesign& design,
+                              const Matrix& particles);
+
+// Returns a piece of all of Ω around the particles of all components (each W × n, germ
+// coordinates), drawn from in proportion to the components' weights (Σ = 1), if a region around all
+// of them has not much more volume than regions around each. Otherwise they are separate and
+// nothing is returned.
+std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
+                                 const std::vector<double>& weights);
 
 }  // namespace polyest::internal

@@ -1,0 +1,47 @@
+#pragma once
+
+// An element of the germ's space, as in multi-element polynomial chaos: a part of Ω that has an
+// expansion of its own. It is bounded by hyperplanes, each of which divided an element into two.
+// The elements that divisions leave cover Ω and have only hyperplanes in common, so that the
+// posterior's integral is the sum of theirs.
+//
+// Source: Wan & Karniadakis, Journal of Computational Physics 209 (2005), 617.
+
+#include <utility>
+#include <vector>
+
+#include "core/common/types.h"
+
+namespace polyest::internal {
+
+class Element {
+ public:
+  // The half-space normalᵀξ ≤ offset.
+  struct Bound {
+    Vector normal;
+    double offset = 0;
+
+    // Writes to or reads from a cereal archive. The size of what is read is not checked.
+    template <class Archive>
+    void serialize(Archive& archive) {
+      archive(normal, offset);
+    }
+  };
+
+  // All of Ω.
+  Element() = default;
+  explicit Element(std::vector<Bound> bounds) : bounds_(std::move(bounds)) {}
+
+  const std::vector<Bound>& bounds() const { return bounds_; }
+  // Whether the point of Ω belongs to the element.
+  bool Contains(const ConstVectorRef& xi) const;
+  // Returns the parts with normalᵀξ ≤ offset and with normalᵀξ ≥ offset.
+  std::pair<Element, Element> Divide(const Vector& normal, double offset) const;
+  // Returns the same part of a space with more dimensions, unbounded in the new ones.
+  Element WithDimension(Eigen::Index dimension) const;
+
+ private:
+  std::vector<Bound> bounds_;
+};
+
+}  // namespace polyest::internal

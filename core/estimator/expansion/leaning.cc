@@ -1,0 +1,42 @@
+#include "core/estimator/expansion/leaning.h"
+
+#include <cmath>
+
+#include "core/common/linear_algebra.h"
+#include "core/estimator/expansion/search_domain.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kReach = 2.33;   // the 99 % quantile, in standard deviations
+constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is looked for
+
+}  // namespace
+
+bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& start) {
+  const Minimum minimum =
+      FindMinima(SearchOf(cost, design), start.transpose(), MinimizerOptions(), Stop()).front();
+  const CholeskyFactor cholesky(cost.Hessian(minimum.point));
+  const Vector middle = 0.5 * (design.lower + design.upper);
+  const Vector half = 0.5 * (design.upper - design.lower);
+  const Vector place = (minimum.point - middle).cwiseQuotient(half);
+  const auto n = static_cast<Eigen::Index>(cost.dimension());
+  for (Eigen::Index j = 0; j < n; ++j) {
+    double deviation = kOvershoot;
+    if (cholesky.positive_definite()) {
+      // (H⁻¹)_jj = ‖L⁻¹ e_j‖²
+      deviation = cholesky.SolveLower(Vector(Vector::Unit(n, j))).norm() / half[j];
+    }
+    if (std::abs(place[j]) + kReach * deviation < kEdge) continue;
+    for (const double side : {-1.0, 1.0}) {
+      if (side * place[j] + kReach * deviation < kEdge) continue;
+      Vector beyond = minimum.point;
+      beyond[j] = middle[j] + side * kBeyond * half[j];
+      const Vector xi = design.region.ToGerm(beyond);
+      if (cost.prior().Contains(xi) && design.element.Contains(xi)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,24 @@
+#pragma once
+
+// How far an inaccurate expansion may be believed.
+//
+// The expansion's error is no noise: at one ξ it is systematic, so that many samples that the
+// expansion follows badly make the posterior narrow about a wrong place. The collocation points
+// show by how much: there the model's own mismatch J_m is known. The posterior is therefore taken
+// from the likelihood to the power β, the largest one at which
+//   β (J_m − J) has a standard deviation of at most 1 over the posterior ∝ e^{−β J − J_prior},
+//   this posterior has an effective number of collocation points of at least n + 2,
+// so that it is nowhere sharper than what the points can confirm. A region that moves to such a
+// posterior has a smaller error, and β grows from move to move until it is 1: the continuation from
+// large noise to the true one.
+
+#include "core/estimator/expansion/regional_expansion.h"
+
+namespace polyest::internal {
+
+// Returns β in (0, 1]. It is 1 when the expansion is accurate: when Σ ρ_k/R_k, by Cauchy–Schwarz
+// the square of the largest shift of a mean in standard deviations, is at most ¼, or when the check
+// points show it (reexpansion.h).
+double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost);
+
+}  // namespace polyest::internal

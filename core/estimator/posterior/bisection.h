@@ -1,0 +1,20 @@
+#pragma once
+
+// Bisection of an element whose expansion does not follow the model (multi-element polynomial
+// chaos). The element is cut across the axis of its region along which the expansion's terms of the
+// highest degree weigh most: there the polynomials have run out first, and half the width reduces
+// their error by 2^(p+1).
+
+#include <vector>
+
+#include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/posterior/posterior_pieces.h"
+
+namespace polyest::internal {
+
+// Returns the two halves of the expansion's element. `particles` (W × n, germ coordinates; may be
+// empty) are of its posterior. The weights of the terms are those of the absorbed samples and, if
+// `row` ≥ 0, of this row of the block propagated last.
+std::vector<Piece> Bisect(const RegionalExpansion& expansion, int row, const Matrix& particles);
+
+}  // namespace polyest::internal
