@@ -129,10 +129,10 @@ void serialize(Archive& archive, ComponentState& component) {
   archive(component.runs, component.relative_tolerance, component.expansion, component.particles,
           component.weight, component.room);
   Flag(archive, component.bisected);
-  archive(component.taken, component.windows_from, component.window_end, component.patient_until,
-          component.whole_until, component.settled_row, component.settlements_at_row,
-          component.comparable_row, component.settlements, component.reexpansions,
-          component.abandoned_rows, component.summary);
+  archive(component.taken, component.windows_from, component.window_end, component.edges_row,
+          component.patient_until, component.whole_until, component.settled_row,
+          component.settlements_at_row, component.comparable_row, component.settlements,
+          component.reexpansions, component.abandoned_rows, component.summary);
 }
 
 template <class Archive>

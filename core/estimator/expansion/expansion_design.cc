@@ -16,7 +16,6 @@ namespace {
 constexpr double kTrustedProbability = 1e-3;  // omitted in each tail of an unbounded germ
 constexpr double kMargin = 1.35;              // widening of a region beyond its particles
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
-constexpr double kLeaningFraction = 0.01;
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
 constexpr double kGoesOnFraction = 0.2;  // minimum fraction of the particles at an edge
 constexpr double kWiden = 1.5;
@@ -177,8 +176,8 @@ void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper) {
   upper = middle + half;
 }
 
-std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
-                             const Matrix& etas) {
+std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas,
+                             double fraction) {
   const Matrix units = InBoxUnits(design, etas);
   const Region trusted = TrustedRegion(design);
   std::vector<int> leaning;
@@ -193,7 +192,7 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
       const Vector xi = trusted.ToGerm(beyond);
       if (prior.Contains(xi) && design.element.Contains(xi)) ++goes_on;
     }
-    if (at_edge > kLeaningFraction * static_cast<double>(units.rows()) &&
+    if (at_edge > fraction * static_cast<double>(units.rows()) &&
         goes_on > kGoesOnFraction * at_edge) {
       leaning.push_back(static_cast<int>(j));
     }

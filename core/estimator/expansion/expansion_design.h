@@ -73,9 +73,11 @@ Region TrustedRegion(const ExpansionDesign& design);
 // Sets the box to which particles are confined: the trusted box with its overshoot.
 void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper);
 
-// Returns the axes of the trusted region at whose edge more than 1 % of the particles (W × n, local
-// coordinates) lie although Ω and the element extend beyond it.
-std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas);
+// Returns the axes of the trusted region at whose edge more than this fraction of the particles (W
+// × n, local coordinates) lie although Ω and the element extend beyond it.
+inline constexpr double kLeaningFraction = 0.01;
+std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas,
+                             double fraction = kLeaningFraction);
 
 // Returns the trusted region, widened by half along `axes` and shifted along them to the particles'
 // mean (particles in local coordinates).

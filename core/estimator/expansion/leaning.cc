@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kReach = 2.33;   // the 99 % quantile, in standard deviations
+constexpr double kReach = 2.2;    // 1.4 % lie beyond so many standard deviations
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is looked for
 
 }  // namespace

@@ -22,6 +22,8 @@ namespace {
 
 constexpr Eigen::Index kDrawsForNoise = 200;
 constexpr int kDrawsForEdges = 2'000;
+// Fraction of the posterior at an edge of the region from which on its being cut there matters.
+constexpr double kOverEdge = 0.03;
 constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
 // Other minima count when their density is at least this fraction of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
@@ -47,7 +49,9 @@ class Assessment {
       findings_.regularization_not_determined = choice.reason;
     }
     Cost cost = request_.expansion->MakeCost(regularization_);
-    findings_.power = LikelihoodPower(*request_.expansion, cost);
+    if (problem_.problem().expansion.adaptive) {
+      findings_.power = LikelihoodPower(*request_.expansion, cost);
+    }
     cost.set_power(findings_.power);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
@@ -98,7 +102,8 @@ class Assessment {
   void NoteLeaning() {
     const Matrix xis =
         posterior_.Germs(prior_)(EquallyWeighted(posterior_.weights, kDrawsForEdges), Eigen::all);
-    findings_.leans = !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis)).empty();
+    findings_.leans =
+        !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
   }
 
   void Summarize(const Cost& cost, const Vector& eta) {

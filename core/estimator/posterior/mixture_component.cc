@@ -38,6 +38,9 @@ constexpr double kTightestTolerance = 1e-12;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
 constexpr int64_t kPatience = 8;
+// The region's edges are looked at again after the record since the windows' beginning, divided by
+// this number.
+constexpr int64_t kLooksPerRecord = 20;
 constexpr int kMaxSettlementsAtRow = 4;
 // Maximum number of revisions of the noise at the end of a window. A scale that falls from the
 // signal's size to 10⁻⁶ of it takes 20 halvings.
@@ -180,10 +183,13 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     expansion_->Absorb(row);
     summary_.Add(block, row, problem_.channels());
     ++taken_;
+    bool moved = false;
     if (WindowEnds()) {
-      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleAfterWindow(stop));
-      if (moved) return false;
+      POLYEST_ASSIGN_OR_RETURN(moved, SettleAfterWindow(stop));
+    } else if (LooksAtEdges()) {
+      POLYEST_ASSIGN_OR_RETURN(moved, SettleIfLeaning(stop));
     }
+    if (moved) return false;
   }
   return true;
 }
@@ -216,7 +222,24 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     moved = moved || tightened || settled;
   }
   window_end_ = NextWindow(taken_, windows_from_);
+  edges_row_ = NextLook();
   return moved;
+}
+
+int64_t MixtureComponent::NextLook() const {
+  return taken_ + 1 + (taken_ - windows_from_) / kLooksPerRecord;
+}
+
+bool MixtureComponent::Leans() const {
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  return MayLean(cost, expansion_->design(), expansion_->design().reference);
+}
+
+// Within a window the posterior may wander to an edge of the region, where it would be cut.
+absl::StatusOr<bool> MixtureComponent::SettleIfLeaning(const Stop& stop) {
+  edges_row_ = NextLook();
+  if (!Leans()) return false;
+  return Settle(stop, /*may_raise_order=*/false);
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
@@ -224,16 +247,12 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
     return AgreementWithModel(*expansion_, cost).shift;
   };
-  const auto leans = [&] {
-    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    return MayLean(cost, expansion_->design(), expansion_->design().reference);
-  };
   const auto accurate = [&] { return shift() <= kMaxShift; };
   bool moved = false;
   // Each settlement may raise the order, so several may be needed.
   for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
     const bool follows = accurate();
-    if (follows && !leans()) return moved;
+    if (follows && !Leans()) return moved;
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
     if (!settled) break;
     moved = true;

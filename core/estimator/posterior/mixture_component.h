@@ -87,6 +87,7 @@ class MixtureComponent {
 
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
   bool automatic_order() const { return !problem_.problem().expansion.order; }
+  bool LooksAtEdges() const { return adaptive() && taken_ >= edges_row_; }
   bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
   absl::Status Recover(const Stop& stop);
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
@@ -99,6 +100,9 @@ class MixtureComponent {
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
+  int64_t NextLook() const;
+  bool Leans() const;
+  absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
   bool LookForPieces();
   bool BisectElement(int row);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
@@ -121,6 +125,7 @@ class MixtureComponent {
   int64_t taken_ = 0;
   int64_t windows_from_ = 0;  // row from which the present windows are counted
   int64_t window_end_ = 2;
+  int64_t edges_row_ = 2;      // row at which to look at the region's edges next
   int64_t patient_until_ = 0;  // rows before this one are taken regardless of residual
   int64_t whole_until_ = 0;    // no search for pieces before this row
   int64_t settled_row_ = -1;

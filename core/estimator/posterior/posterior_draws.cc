@@ -13,6 +13,7 @@
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/cover_draws.h"
 
 namespace polyest::internal {
 namespace {
@@ -33,6 +34,11 @@ constexpr double kMaxDecrement = 1e-3;
 constexpr double kOnBound = 1e-6;  // fraction of the box's width
 constexpr double kMinEffective = 0.5;
 constexpr double kHeaviest = 0.01;
+// A cover of the box has so many points for each of importance sampling's. Their effective number
+// must be this fraction of it: a cover of low discrepancy knows means far better than as many
+// random draws.
+constexpr int kCoverPerPoint = 2;
+constexpr double kMinEffectiveCover = 0.15;
 
 class Drawing {
  public:
@@ -53,7 +59,7 @@ class Drawing {
   absl::StatusOr<PosteriorDraws> Run() {
     Look();
     POLYEST_RETURN_IF_ERROR(stop_.Check());
-    if (!DrawByImportance()) POLYEST_RETURN_IF_ERROR(DrawByChains());
+    if (!DrawByImportance() && !DrawByCover()) POLYEST_RETURN_IF_ERROR(DrawByChains());
     return std::move(draws_);
   }
 
@@ -104,11 +110,25 @@ class Drawing {
         drawn.weights.maxCoeff() > kHeaviest) {
       return false;
     }
+    TakeWeighted(std::move(drawn));
+    return true;
+  }
+
+  bool DrawByCover() {
+    if (draws_.minima.empty()) return false;
+    const int points = kCoverPerPoint * effort_.importance_points;
+    std::optional<WeightedDraws> drawn =
+        DrawFromCover(cost_, design_, points, kMinEffectiveCover * effort_.importance_points);
+    if (!drawn) return false;
+    TakeWeighted(*std::move(drawn));
+    return true;
+  }
+
+  void TakeWeighted(WeightedDraws drawn) {
     draws_.method = PosteriorMethod::kImportanceSampling;
     draws_.scores = ToScores(drawn.etas);
     draws_.weights = std::move(drawn.weights);
     draws_.effective_size = Vector::Constant(cost_.dimension(), drawn.effective_size);
-    return true;
   }
 
   // Returns L of H = L Lᵀ if the curvature's Gaussian may approximate the posterior, else nothing.

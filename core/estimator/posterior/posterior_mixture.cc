@@ -9,6 +9,7 @@
 #include "core/bayes/identifiability.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
+#include "core/estimator/posterior/connected_elements.h"
 #include "core/estimator/posterior/most_evidence.h"
 
 namespace polyest::internal {
@@ -109,25 +110,33 @@ class Weighing {
   std::vector<Weighed> weighed_;
 };
 
-// Returns the draws of all components in their order, heaviest first.
-PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<double>& weights) {
+using Places = std::vector<size_t>;
+
+// Returns the draws of the components at these places, in proportion to their weights.
+PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<double>& weights,
+                   const Places& places) {
   PosteriorDraws mixture;
   Eigen::Index count = 0;
-  for (const Assessed& one : components) count += one.posterior.weights.size();
+  double all = 0;
+  for (const size_t k : places) {
+    count += components[k].posterior.weights.size();
+    all += weights[k];
+  }
   const Eigen::Index n = components.front().posterior.scores.cols();
   mixture.scores.resize(count, n);
   mixture.weights.resize(count);
   mixture.method = PosteriorMethod::kImportanceSampling;
-  mixture.minima = components.front().posterior.minima;
+  mixture.minima = components[places.front()].posterior.minima;
   Vector inverse = Vector::Zero(n);
   Eigen::Index row = 0;
-  for (size_t k = 0; k < components.size(); ++k) {
+  for (const size_t k : places) {
     const PosteriorDraws& draws = components[k].posterior;
+    const double weight = weights[k] / all;
     mixture.scores.middleRows(row, draws.weights.size()) = draws.scores;
-    mixture.weights.segment(row, draws.weights.size()) = weights[k] * draws.weights;
+    mixture.weights.segment(row, draws.weights.size()) = weight * draws.weights;
     row += draws.weights.size();
     // Var(Σ w_k m_k) = Σ w_k² s²/N_k
-    inverse += weights[k] * weights[k] * draws.effective_size.cwiseInverse();
+    inverse += weight * weight * draws.effective_size.cwiseInverse();
     if (draws.method == PosteriorMethod::kMarkovChains) mixture.method = draws.method;
     if (draws.r_hat.size() == 0) continue;
     mixture.r_hat =
@@ -149,22 +158,76 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, Estimate
   }
 }
 
-Assessed Combine(const std::vector<Assessed>& components, const std::vector<double>& weights,
-                 const Prior& prior) {
-  const Assessed& heaviest = components.front();
-  Assessed whole;
-  whole.estimate = heaviest.estimate;
-  whole.findings = heaviest.findings;
-  ExpansionSummary& expansion = whole.estimate.expansion;
+// Returns the places of each piece's components, heaviest piece first.
+std::vector<Places> PiecesOf(const std::vector<AssessmentRequest>& requests,
+                             const std::vector<Assessed>& components,
+                             const std::vector<double>& weights) {
+  std::vector<Cost> costs;
   for (size_t k = 0; k < components.size(); ++k) {
-    const Estimate& one = components[k].estimate;
-    if (components.size() > 1) whole.estimate.components.push_back({weights[k], one.parameters});
-    if (weights[k] < kMinWeightToWarn) continue;
-    expansion.residual_to_noise =
-        std::max(expansion.residual_to_noise, one.expansion.residual_to_noise);
-    whole.findings.shift = std::max(whole.findings.shift, components[k].findings.shift);
+    costs.push_back(requests[k].expansion->MakeCost(components[k].estimate.regularization));
   }
-  whole.posterior = Mix(components, weights);
+  std::vector<ElementCost> elements;
+  for (size_t k = 0; k < components.size(); ++k) {
+    elements.push_back({&requests[k].expansion->design(), &costs[k], components[k].share.height,
+                        components[k].posterior.minima.front()});
+  }
+  const std::vector<size_t> numbers = ConnectedPieces(elements);
+  std::vector<Places> pieces(std::ranges::max(numbers) + 1);
+  for (size_t k = 0; k < numbers.size(); ++k) pieces[numbers[k]].push_back(k);
+  const auto weight = [&](const Places& places) {
+    return std::accumulate(places.begin(), places.end(), 0.0,
+                           [&](double sum, size_t k) { return sum + weights[k]; });
+  };
+  std::ranges::stable_sort(pieces,
+                           [&](const Places& a, const Places& b) { return weight(a) > weight(b); });
+  return pieces;
+}
+
+// Returns the place of the piece's component with the least cost.
+size_t BestOf(const std::vector<Assessed>& components, const Places& places) {
+  return *std::ranges::min_element(places, {}, [&](size_t k) {
+    return components[k].estimate.cost.total + components[k].share.height;
+  });
+}
+
+ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
+                                const std::vector<double>& weights, const Places& places,
+                                const Prior& prior) {
+  ComponentEstimate piece;
+  for (const size_t k : places) piece.weight += weights[k];
+  piece.parameters = components[BestOf(components, places)].estimate.parameters;
+  if (places.size() == 1) return piece;
+  const PosteriorDraws draws = Mix(components, weights, places);
+  for (int i = 0; i < prior.dimension(); ++i) {
+    DescribeMarginal(draws, prior, i, piece.parameters[static_cast<size_t>(i)]);
+  }
+  return piece;
+}
+
+Assessed Combine(const std::vector<Assessed>& components, const std::vector<double>& weights,
+                 const std::vector<Places>& pieces, const Prior& prior) {
+  const Assessed& best = components[BestOf(components, pieces.front())];
+  Assessed whole;
+  whole.estimate = best.estimate;
+  whole.findings = best.findings;
+  ExpansionSummary& expansion = whole.estimate.expansion;
+  Places all;
+  for (size_t k = 0; k < components.size(); ++k) {
+    all.push_back(k);
+    if (weights[k] < kMinWeightToWarn) continue;
+    const Findings& findings = components[k].findings;
+    expansion.residual_to_noise =
+        std::max(expansion.residual_to_noise, components[k].estimate.expansion.residual_to_noise);
+    whole.findings.shift = std::max(whole.findings.shift, findings.shift);
+    whole.findings.power = std::min(whole.findings.power, findings.power);
+    whole.findings.leans = whole.findings.leans || findings.leans;
+  }
+  if (pieces.size() > 1) {
+    for (const Places& places : pieces) {
+      whole.estimate.components.push_back(DescribePiece(components, weights, places, prior));
+    }
+  }
+  whole.posterior = Mix(components, weights, all);
   DescribeWhole(prior, whole.posterior, whole.estimate);
   return whole;
 }
@@ -242,12 +305,16 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
   }
   std::erase_if(mixture.order, [&](size_t k) { return weights[k] < kMinWeight; });
   std::vector<double> in_order;
+  std::vector<AssessmentRequest> requests_in_order;
   for (size_t& k : mixture.order) {
     in_order.push_back(weights[k]);
+    requests_in_order.push_back(requests[k]);
     mixture.components.push_back(std::move(assessed[k]));
     k = places[k];
   }
-  mixture.whole = Combine(mixture.components, in_order, requests.front().problem->prior());
+  mixture.whole = Combine(mixture.components, in_order,
+                          PiecesOf(requests_in_order, mixture.components, in_order),
+                          requests.front().problem->prior());
   mixture.whole.estimate.expansion.reexpansions = reexpansions;
   mixture.whole.estimate.expansion.trajectories = trajectories;
   mixture.whole.findings.left_out = left_out;

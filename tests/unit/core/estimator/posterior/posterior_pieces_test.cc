@@ -29,7 +29,7 @@ ExpansionDesign WideDesign(int dimension) {
   return design;
 }
 
-std::vector<Matrix> PiecesOf(const Cost& cost, int particles = 1000) {
+std::vector<Piece> PiecesOf(const Cost& cost, int particles = 1000) {
   const ExpansionDesign design = WideDesign(cost.dimension());
   SamplerOptions options;
   options.particles = particles;
@@ -47,26 +47,30 @@ std::vector<Measurement> SquareOfTheFirst() {
 
 TEST(PosteriorPieces, AreTwoWhereASignIsNotObserved) {
   for (const int n : {1, 2, 6}) {
-    const std::vector<Matrix> pieces = PiecesOf(CostOf(Normals(n), SquareOfTheFirst()));
+    const std::vector<Piece> pieces = PiecesOf(CostOf(Normals(n), SquareOfTheFirst()));
     ASSERT_EQ(pieces.size(), 2U) << n;
-    EXPECT_EQ(pieces[0].rows() + pieces[1].rows(), 1000);
-    const double first = pieces[0].col(0).maxCoeff(), second = pieces[1].col(0).minCoeff();
+    EXPECT_EQ(pieces[0].particles.rows() + pieces[1].particles.rows(), 1000);
+    const double first = pieces[0].particles.col(0).maxCoeff(),
+                 second = pieces[1].particles.col(0).minCoeff();
     EXPECT_LT(std::min(first, second), 0) << n;
-    EXPECT_NEAR(std::abs(pieces[0].col(0).mean()), 1, 0.05);
-    EXPECT_LT(pieces[0].col(0).mean() * pieces[1].col(0).mean(), 0);
+    EXPECT_NEAR(std::abs(pieces[0].particles.col(0).mean()), 1, 0.05);
+    EXPECT_LT(pieces[0].particles.col(0).mean() * pieces[1].particles.col(0).mean(), 0);
   }
 }
 
 TEST(PosteriorPieces, AreFourWhereTwoSignsAreNotObserved) {
   std::vector<Measurement> measurements = SquareOfTheFirst();
   measurements.push_back({[](const Vector& xi) { return xi[1] * xi[1]; }, 1.5, 0.1});
-  const std::vector<Matrix> pieces = PiecesOf(CostOf(Normals(2), measurements));
+  const std::vector<Piece> pieces = PiecesOf(CostOf(Normals(2), measurements));
   ASSERT_EQ(pieces.size(), 4U);
-  for (const Matrix& piece : pieces) {
-    // The particles of a piece all have the signs of its mean.
+  for (const Piece& piece : pieces) {
+    // The particles of a piece all have the signs of its mean, and lie in its element alone.
+    for (const Piece& other : pieces) {
+      EXPECT_EQ(other.element.Contains(piece.particles.row(0).transpose()), &other == &piece);
+    }
     for (int j = 0; j < 2; ++j) {
-      const double sign = piece.col(j).mean() > 0 ? 1 : -1;
-      EXPECT_GT((sign * piece.col(j)).minCoeff(), 0);
+      const double sign = piece.particles.col(j).mean() > 0 ? 1 : -1;
+      EXPECT_GT((sign * piece.particles.col(j)).minCoeff(), 0);
     }
   }
 }
@@ -88,9 +92,9 @@ TEST(PosteriorPieces, AreOneOfABanana) {
 // The data a b = 1 have two branches under the prior; each is one piece, though a curved valley.
 TEST(PosteriorPieces, AreTheBranchesOfAHyperbola) {
   const Cost cost = CostOf(Normals(2), {{[](const Vector& xi) { return xi[0] * xi[1]; }, 1, 0.02}});
-  const std::vector<Matrix> pieces = PiecesOf(cost);
+  const std::vector<Piece> pieces = PiecesOf(cost);
   ASSERT_EQ(pieces.size(), 2U);
-  EXPECT_LT(pieces[0].col(0).mean() * pieces[1].col(0).mean(), 0);
+  EXPECT_LT(pieces[0].particles.col(0).mean() * pieces[1].particles.col(0).mean(), 0);
 }
 
 // The data a = b to 10⁻⁴ make a valley a thousandth as wide as long.

@@ -1,0 +1,67 @@
+#include "core/estimator/posterior/connected_elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/cost_slice.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kMinWall = 8;  // difference in cost: e^−8 ≈ 3·10⁻⁴
+// Distance from the bound at which the cost is taken, as a fraction of the element's extent: on the
+// bound itself rounding decides whether a point belongs to the element.
+constexpr double kOffBound = 1e-9;
+
+bool AreOpposite(const Element::Bound& a, const Element::Bound& b) {
+  return a.offset == -b.offset && a.normal == -b.normal;
+}
+
+// Returns the least cost of the element at its bound, +∞ if the expansion's box does not reach it.
+double LeastAt(const Element::Bound& bound, const ElementCost& element) {
+  const Region& region = element.design->region;
+  const Vector normal = region.axes().transpose() * bound.normal;
+  const MinimizationProblem search = SearchOf(*element.cost, *element.design);
+  const double reach = normal.cwiseAbs().dot(search.upper - search.lower);
+  const double offset = bound.offset - bound.normal.dot(region.centre()) - kOffBound * reach;
+  const std::optional<Minimum> least =
+      CostSlice(search, normal).Minimize(offset, {element.minimum.point}, Stop());
+  return least && std::isfinite(least->value) ? least->value + element.height : kInfinity;
+}
+
+bool AreConnected(const ElementCost& a, const ElementCost& b) {
+  const double peak = std::max(a.minimum.value + a.height, b.minimum.value + b.height);
+  for (const Element::Bound& bound : a.design->element.bounds()) {
+    for (const Element::Bound& other : b.design->element.bounds()) {
+      if (!AreOpposite(bound, other)) continue;
+      // Both sides must reach the bound, each at its own place if the expansions differ a little.
+      return LeastAt(bound, a) < peak + kMinWall && LeastAt(other, b) < peak + kMinWall;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<size_t> ConnectedPieces(const std::vector<ElementCost>& elements) {
+  std::vector<size_t> pieces(elements.size());
+  for (size_t i = 0; i < elements.size(); ++i) {
+    pieces[i] = i;
+    for (size_t k = 0; k < i; ++k) {
+      if (pieces[k] == pieces[i] || !AreConnected(elements[k], elements[i])) continue;
+      const auto [kept, joined] = std::minmax(pieces[k], pieces[i]);
+      std::ranges::replace(pieces, joined, size_t{kept});
+    }
+  }
+  std::vector<size_t> numbers = pieces;
+  std::ranges::sort(numbers);
+  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
+  for (size_t& piece : pieces) {
+    piece = static_cast<size_t>(std::ranges::lower_bound(numbers, piece) - numbers.begin());
+  }
+  return pieces;
+}
+
+}  // namespace polyest::internal

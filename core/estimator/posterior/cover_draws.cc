@@ -1,0 +1,88 @@
+#include "core/estimator/posterior/cover_draws.h"
+
+#include <cmath>
+
+#include "core/bayes/differential_evolution.h"
+#include "core/chaos/collocation_points.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kMaxDimension = 3;
+constexpr int kFirstPoints = 4096;
+constexpr int kMaxRefinements = 4;
+// A point whose density is less than e^−18 of the highest has no noticeable weight.
+constexpr double kNegligibleCost = 18;
+
+struct Box {
+  Vector lower, upper;
+};
+
+Matrix CoverOf(const Box& box, int points) {
+  const int n = static_cast<int>(box.lower.size());
+  Matrix cover = UnitCubePoints(PointSet::kHalton, n, points);
+  cover *= (box.upper - box.lower).asDiagonal();
+  cover.rowwise() += box.lower.transpose();
+  return cover;
+}
+
+// Returns the box around the points that have noticeable weight, widened by the spacing of so many
+// points and cut to the box covered.
+Box BoxOfWeight(const Matrix& cover, const Vector& costs, const Box& covered) {
+  const double most = costs.minCoeff() + kNegligibleCost;
+  Box box{covered.upper, covered.lower};
+  for (Eigen::Index i = 0; i < cover.rows(); ++i) {
+    if (!(costs[i] < most)) continue;
+    box.lower = box.lower.cwiseMin(cover.row(i).transpose());
+    box.upper = box.upper.cwiseMax(cover.row(i).transpose());
+  }
+  const double spacing =
+      2 / std::pow(static_cast<double>(cover.rows()), 1.0 / static_cast<double>(cover.cols()));
+  const Vector margin = spacing * (covered.upper - covered.lower);
+  return {(box.lower - margin).cwiseMax(covered.lower),
+          (box.upper + margin).cwiseMin(covered.upper)};
+}
+
+WeightedDraws WeightedBy(const Vector& costs, const Matrix& cover) {
+  WeightedDraws draws;
+  const Vector weights = (costs.minCoeff() - costs.array()).exp();
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < costs.size(); ++i) {
+    if (std::isfinite(costs[i]) && weights[i] > 0) kept.push_back(i);
+  }
+  draws.etas = cover(kept, Eigen::all);
+  draws.costs = costs(kept);
+  draws.weights = weights(kept) / weights(kept).sum();
+  draws.effective_size = 1 / draws.weights.squaredNorm();
+  return draws;
+}
+
+}  // namespace
+
+std::optional<WeightedDraws> DrawFromCover(const Cost& cost, const ExpansionDesign& design,
+                                           int points, double effective_size) {
+  if (cost.dimension() > kMaxDimension) return std::nullopt;
+  Box box;
+  SamplingBox(design, box.lower, box.upper);
+  const DifferentialEvolution confined(cost, box.lower, box.upper, 0);
+  Matrix cover;
+  Vector costs;
+  for (int i = 0; i < kMaxRefinements; ++i) {
+    cover = CoverOf(box, kFirstPoints);
+    confined.Evaluate(cover, costs);
+    if (!std::isfinite(costs.minCoeff())) return std::nullopt;
+    const Box smaller = BoxOfWeight(cover, costs, box);
+    const double ratio =
+        (smaller.upper - smaller.lower).cwiseQuotient(box.upper - box.lower).prod();
+    box = smaller;
+    if (ratio > 0.5) break;
+  }
+  cover = CoverOf(box, points);
+  confined.Evaluate(cover, costs);
+  if (!std::isfinite(costs.minCoeff())) return std::nullopt;
+  WeightedDraws draws = WeightedBy(costs, cover);
+  if (draws.effective_size < effective_size) return std::nullopt;
+  return draws;
+}
+
+}  // namespace polyest::internal
