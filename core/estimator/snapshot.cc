@@ -88,7 +88,7 @@ void serialize(Archive& archive, ChannelNoise& noise) {
 
 template <class Archive>
 void serialize(Archive& archive, LearnedNoise& noise) {
-  archive(noise.channels, noise.posterior.centre, noise.posterior.factor);
+  archive(noise.channels, noise.posterior.centre, noise.posterior.factor, noise.misfit);
 }
 
 template <class Archive>

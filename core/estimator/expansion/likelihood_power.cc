@@ -58,21 +58,21 @@ bool IsAccurate(const RegionalExpansion& expansion, const Cost& cost) {
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
     discount += expansion.Discount(static_cast<int>(c));
   }
-  return discount <= kMaxShift * kMaxShift ||
+  return cost.power() * discount <= kMaxShift * kMaxShift ||
          AgreementWithModel(expansion, cost).shift <= kMaxShift;
 }
 
 }  // namespace
 
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
-  if (IsAccurate(expansion, cost)) return 1;
+  if (IsAccurate(expansion, cost)) return cost.power();
   const Points points = PointsOf(expansion, cost);
   const auto count = static_cast<double>(points.least.size());
   // The fit has used up S of the Q points' differences.
   const double left = count - expansion.design().basis->size();
   const double inflation = left > 0 ? std::sqrt(count / left) : 2;
   const double effective = std::min(cost.dimension() + 2.0, 0.5 * count);
-  double beta = 1;
+  double beta = cost.power();
   while (beta > kLeastPower && !Confirmed(points, beta, inflation, effective)) beta *= kStep;
   return beta;
 }

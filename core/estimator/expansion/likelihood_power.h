@@ -16,7 +16,7 @@
 
 namespace polyest::internal {
 
-// Returns β in (0, 1]. It is 1 when the expansion is accurate: when Σ ρ_k/R_k, by Cauchy–Schwarz
+// Returns β, at most the power that the cost already has, and that when the expansion is accurate: when Σ ρ_k/R_k, by Cauchy–Schwarz
 // the square of the largest shift of a mean in standard deviations, is at most ¼, or when the check
 // points show it (reexpansion.h).
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost);

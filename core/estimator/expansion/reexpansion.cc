@@ -194,10 +194,11 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
     const CostValue value = cost.Evaluate(eta);
     if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
     log_weight.push_back(design.check_costs[i] - value.total);
-    difference.push_back(
-        ModelMismatch(expansion, cost.BasisDifference(eta), check.chi_squared.row(i).transpose()) -
-        value.mismatch);
-    residual.push_back(check.residual_to_noise[i]);
+    difference.push_back(cost.power() *
+                         (ModelMismatch(expansion, cost.BasisDifference(eta),
+                                        check.chi_squared.row(i).transpose()) -
+                          value.mismatch));
+    residual.push_back(std::sqrt(cost.power()) * check.residual_to_noise[i]);
   }
   Agreement agreement;
   if (log_weight.empty()) {
@@ -205,7 +206,7 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
     for (size_t c = 0; c < expansion.sums().size(); ++c) {
       discount += expansion.Discount(static_cast<int>(c));
     }
-    agreement.shift = std::sqrt(discount);
+    agreement.shift = std::sqrt(cost.power() * discount);
     return agreement;
   }
   const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());

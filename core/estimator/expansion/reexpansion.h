@@ -56,7 +56,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
 // How accurate the posterior on the expansion is, judged at the check points. To first order the
 // error of a posterior mean, in units of its standard deviation, is bounded by each of
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
-//   (at the expansion's lag-1 correlation, where that enters),
+//   (at the expansion's lag-1 correlation, where that enters; times the power of the likelihood),
 //   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points.
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
 // is sharper but needs check points where the posterior is. The second holds wherever they are.

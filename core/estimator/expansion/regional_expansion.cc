@@ -338,8 +338,10 @@ void RegionalExpansion::Compare(int column, double z, double variance) {
 }
 
 Cost RegionalExpansion::MakeCost(double regularization) const {
-  return Cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
-              problem_.prior(), regularization, design_.element);
+  Cost cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
+            problem_.prior(), regularization, design_.element);
+  cost.set_power(1 / noise_.misfit);
+  return cost;
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {

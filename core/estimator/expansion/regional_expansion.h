@@ -97,6 +97,7 @@ class RegionalExpansion {
 
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }
+  void set_misfit(double misfit) { noise_.misfit = misfit; }
   int points() const { return static_cast<int>(design_.points.rows()); }
   int64_t absorbed_rows() const { return absorbed_.rows; }
   // Returns the number of trajectories × rows.
@@ -118,7 +119,8 @@ class RegionalExpansion {
   // Returns χ² of the model itself at the collocation points, Q × m: what the sums say of the
   // expansion there. Not finite where a trajectory could not be integrated.
   const Matrix& PointChiSquared() const { return absorbed_.point_chi_squared; }
-  // Returns the cost on this expansion with α² = regularization.
+  // Returns the cost on this expansion with α² = regularization and the likelihood to the power
+  // 1/misfit.
   Cost MakeCost(double regularization) const;
 
   // Agreement with the model itself at the check points: each one's χ² per channel from its own

@@ -49,10 +49,12 @@ class Assessment {
       findings_.regularization_not_determined = choice.reason;
     }
     Cost cost = request_.expansion->MakeCost(regularization_);
+    if (request_.power) cost.set_power(*request_.power);
     if (problem_.problem().expansion.adaptive) {
-      findings_.power = LikelihoodPower(*request_.expansion, cost);
+      const double power = LikelihoodPower(*request_.expansion, cost);
+      findings_.power = power / cost.power();
+      cost.set_power(power);
     }
-    cost.set_power(findings_.power);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
     MixtureShare share;

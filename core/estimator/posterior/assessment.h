@@ -30,6 +30,7 @@ struct AssessmentRequest {
   // For a component of a mixture: whether its share is asked for, and its weight at the last
   // weighing.
   bool weigh = false;
+  std::optional<double> power;  // of the likelihood, if it is common to several
   double last_weight = 1;
 };
 

@@ -25,7 +25,8 @@ struct Findings {
   std::vector<Vector> other_minima;  // θ of other minima with comparable cost
   double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations
-  double power = 1;                  // of the likelihood that the posterior was taken from
+  // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
+  double power = 1;
   bool leans = false;  // whether the posterior goes on beyond the region of the expansion
   // Why the requested rule did not choose α²; empty if it did or if no rule was requested.
   std::string regularization_not_determined;

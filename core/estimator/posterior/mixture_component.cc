@@ -12,6 +12,7 @@
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
+#include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/record/rows_ahead.h"
@@ -175,7 +176,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     if (raised) return false;
     const bool short_of_trajectories = row == expansion_->fitted_rows();
     const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
-                        expansion_->ResidualToNoise(row) > kResidualToNoise;
+                        expansion_->ResidualToNoise(row) > CoarseResidual();
     if (short_of_trajectories || (adaptive() && coarse)) {
       POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(row, stop));
       if (moved) return false;
@@ -211,12 +212,19 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
   return false;
 }
 
+// The residual of the expansion from which on it is too coarse, in units of the stated noise.
+double MixtureComponent::CoarseResidual() const {
+  return kResidualToNoise * std::sqrt(expansion_->noise().misfit);
+}
+
 absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   bool moved = false;
   if (learns_noise_) {
     POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
   }
   if (adaptive()) {
+    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+    expansion_->set_misfit(Misfit(*expansion_, cost, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
     moved = moved || tightened || settled;

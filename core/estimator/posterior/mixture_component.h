@@ -100,6 +100,7 @@ class MixtureComponent {
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
+  double CoarseResidual() const;
   int64_t NextLook() const;
   bool Leans() const;
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);

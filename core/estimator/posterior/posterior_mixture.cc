@@ -32,10 +32,19 @@ struct Weighed {
   Matrix particles;
 };
 
+// Returns the power of the likelihood of the component that the residuals contradict least.
+double CommonPower(const std::vector<AssessmentRequest>& requests) {
+  double misfit = kInfinity;
+  for (const AssessmentRequest& request : requests) {
+    misfit = std::min(misfit, request.expansion->noise().misfit);
+  }
+  return 1 / misfit;
+}
+
 class Weighing {
  public:
   Weighing(const std::vector<AssessmentRequest>& requests, size_t most)
-      : requests_(requests), most_(most), weighed_(requests.size()) {}
+      : requests_(requests), most_(most), power_(CommonPower(requests)), weighed_(requests.size()) {}
 
   absl::StatusOr<MixtureWeighing> Run(const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(WeighHeaviest(stop));
@@ -75,7 +84,7 @@ class Weighing {
     std::vector<double> most;
     for (const AssessmentRequest& request : requests_) {
       POLYEST_RETURN_IF_ERROR(stop.Check());
-      const Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+      const Cost cost = CostOf(request);
       most.push_back(requests_.size() > kFew
                          ? MostEvidence(*request.expansion, cost, *request.guesses)
                          : kInfinity);
@@ -92,9 +101,17 @@ class Weighing {
     return absl::OkStatus();
   }
 
+  // The cost with the power of the component that the residuals contradict least: the others'
+  // residuals speak against them.
+  Cost CostOf(const AssessmentRequest& request) const {
+    Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+    cost.set_power(power_);
+    return cost;
+  }
+
   absl::Status Weigh(size_t k, const Stop& stop) {
     const AssessmentRequest& request = requests_[k];
-    const Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+    const Cost cost = CostOf(request);
     absl::StatusOr<PosteriorDraws> draws =
         DrawPosterior(cost, request.expansion->design(), *request.guesses, kWeighingEffort, stop);
     if (absl::IsFailedPrecondition(draws.status())) return absl::OkStatus();  // a cost of +∞
@@ -107,6 +124,7 @@ class Weighing {
 
   const std::vector<AssessmentRequest>& requests_;
   const size_t most_;
+  const double power_;
   std::vector<Weighed> weighed_;
 };
 
@@ -165,6 +183,7 @@ std::vector<Places> PiecesOf(const std::vector<AssessmentRequest>& requests,
   std::vector<Cost> costs;
   for (size_t k = 0; k < components.size(); ++k) {
     costs.push_back(requests[k].expansion->MakeCost(components[k].estimate.regularization));
+    costs.back().set_power(CommonPower(requests));
   }
   std::vector<ElementCost> elements;
   for (size_t k = 0; k < components.size(); ++k) {
@@ -235,8 +254,10 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
 absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& requests,
                                                 const Stop& stop) {
   std::vector<Assessed> components;
+  const double power = CommonPower(requests);
   for (size_t k = 0; k < requests.size(); ++k) {
     requests[k].weigh = true;
+    requests[k].power = power;
     // All components use the α² of the first.
     if (k > 0) requests[k].regularization = components.front().estimate.regularization;
     POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(requests[k], stop));

@@ -27,6 +27,9 @@ struct PosteriorSummary {
 struct LearnedNoise {
   std::vector<ChannelNoise> channels;
   PosteriorSummary posterior;
+  // Mean square of the residuals ÷ that of the stated noise where the residuals contradict it
+  // (misfit.h), else 1. The cost is divided by it.
+  double misfit = 1;
 };
 
 }  // namespace polyest::internal

@@ -1,0 +1,36 @@
+#include "core/estimator/posterior/misfit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/estimator/expansion/search_domain.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kDeviations = 6;
+
+}  // namespace
+
+double Misfit(const RegionalExpansion& expansion, const Cost& cost, const Stop& stop) {
+  double degrees = 0;
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    const ChannelSums& sums = expansion.sums()[c];
+    // Where the expansion's own error has been added to the noise, χ² is smaller by the discount.
+    if (!sums.scale_unknown) degrees += sums.Degrees() - expansion.Discount(static_cast<int>(c));
+  }
+  if (!(degrees > 0)) return 1;
+  const ExpansionDesign& design = expansion.design();
+  const Minimum minimum =
+      FindMinima(SearchOf(cost, design), design.reference.transpose(), MinimizerOptions(), stop)
+          .front();
+  const Vector d = cost.BasisDifference(minimum.point);
+  double chi_squared = 0;
+  for (const ChannelSums& sums : expansion.sums()) {
+    if (!sums.scale_unknown) chi_squared += sums.samples.ChiSquared(d);
+  }
+  const double excess = chi_squared - degrees;
+  return excess > kDeviations * std::sqrt(2 * degrees) ? chi_squared / degrees : 1;
+}
+
+}  // namespace polyest::internal

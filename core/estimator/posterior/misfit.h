@@ -1,0 +1,22 @@
+#pragma once
+
+// How far residuals contradict the noise that the problem states.
+//
+// Residuals far larger than the stated noise make every sample count too much: the posterior
+// becomes narrower than anything the model can explain, wanders from sample to sample by many of
+// its standard deviations, and asks for an expansion that follows the model more closely than the
+// model follows the rig. Either the estimate is not at the cost's minimum, which an expansion that
+// has moved to a wrong place shows first in this way, or model or noise are wrong. In both cases
+// the cost is divided by the ratio of the residuals' mean square to the noise's. This leaves the
+// minimum of the mismatch where it is and widens the posterior to what the residuals allow. The
+// classical name of the ratio is the reduced χ².
+
+#include "core/estimator/expansion/regional_expansion.h"
+
+namespace polyest::internal {
+
+// Returns χ²/N of the channels with known noise at the minimum of the cost on the expansion if it
+// is larger than 1 by at least six standard deviations, else 1.
+double Misfit(const RegionalExpansion& expansion, const Cost& cost, const Stop& stop);
+
+}  // namespace polyest::internal
