@@ -27,6 +27,9 @@ struct ExpansionDesign {
   // reweighting them as the posterior narrows.
   Matrix check_points;
   Vector check_costs;
+  // Whether the check points are draws of a posterior. Those that cover the prior or the region are
+  // too few to speak for a posterior that is much narrower.
+  bool checks_are_draws = false;
   Vector reference;     // η_0, the reference of the mismatch sums
   Vector lower, upper;  // the trusted box (n), local coordinates
   bool whole_prior = true;

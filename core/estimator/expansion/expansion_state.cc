@@ -112,6 +112,7 @@ DesignState StateOf(const ExpansionDesign& design) {
           design.points,
           design.check_points,
           design.check_costs,
+          design.checks_are_draws,
           design.reference,
           design.lower,
           design.upper,
@@ -129,6 +130,7 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
   design.points = std::move(state.points);
   design.check_points = std::move(state.check_points);
   design.check_costs = std::move(state.check_costs);
+  design.checks_are_draws = state.checks_are_draws;
   design.reference = std::move(state.reference);
   design.lower = std::move(state.lower);
   design.upper = std::move(state.upper);

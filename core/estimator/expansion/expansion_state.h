@@ -21,6 +21,7 @@ struct DesignState {
   Matrix axes;
   Matrix points, check_points;
   Vector check_costs;
+  bool checks_are_draws = false;
   Vector reference, lower, upper;
   std::vector<Element::Bound> element;
 };

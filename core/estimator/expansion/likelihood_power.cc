@@ -53,19 +53,22 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
   return beta * inflation * std::sqrt(variance) <= kMaxSpread;
 }
 
-bool IsAccurate(const RegionalExpansion& expansion, const Cost& cost) {
+}  // namespace
+
+double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
   double discount = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
     discount += expansion.Discount(static_cast<int>(c));
   }
-  return cost.power() * discount <= kMaxShift * kMaxShift ||
-         AgreementWithModel(expansion, cost).shift <= kMaxShift;
+  return std::sqrt(cost.power() * discount);
 }
 
-}  // namespace
-
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
-  if (IsAccurate(expansion, cost)) return cost.power();
+  if (LargestShift(expansion, cost) <= kMaxShift) return cost.power();
+  if (expansion.design().checks_are_draws &&
+      AgreementWithModel(expansion, cost).shift <= kMaxShift) {
+    return cost.power();
+  }
   const Points points = PointsOf(expansion, cost);
   const auto count = static_cast<double>(points.least.size());
   // The fit has used up S of the Q points' differences.

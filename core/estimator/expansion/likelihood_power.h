@@ -16,9 +16,13 @@
 
 namespace polyest::internal {
 
-// Returns β, at most the power that the cost already has, and that when the expansion is accurate: when Σ ρ_k/R_k, by Cauchy–Schwarz
-// the square of the largest shift of a mean in standard deviations, is at most ¼, or when the check
-// points show it (reexpansion.h).
+// Returns √(Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
+// deviations, that the residuals of the expansion at its collocation points allow.
+double LargestShift(const RegionalExpansion& expansion, const Cost& cost);
+
+// Returns β, at most the power that the cost already has, and that when the expansion is accurate:
+// when LargestShift is at most ½, or when check points drawn from a posterior show it
+// (reexpansion.h).
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost);
 
 }  // namespace polyest::internal

@@ -67,6 +67,7 @@ absl::StatusOr<ExpansionDesign> DesignForNewRuns(const ResolvedProblem& grown,
       DesignForRegion(grown, FirstTruncation(grown.problem().expansion, grown.dimension()),
                       std::move(region), inside);
   AddCheckPoints(grown, present, design);
+  design.checks_are_draws = present.checks_are_draws;
   design.element = present.element.WithDimension(grown.dimension());
   return design;
 }

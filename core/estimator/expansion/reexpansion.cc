@@ -127,6 +127,7 @@ class Settler {
     design.element = present_.design().element;
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
     design.check_costs = particles_.costs.head(checks);
+    design.checks_are_draws = true;
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
         Replay(*request_.problem, std::move(design), present_.noise(), *request_.store,
                request_.rows, request_.threads, stop_);
@@ -194,10 +195,9 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
     const CostValue value = cost.Evaluate(eta);
     if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
     log_weight.push_back(design.check_costs[i] - value.total);
-    difference.push_back(cost.power() *
-                         (ModelMismatch(expansion, cost.BasisDifference(eta),
-                                        check.chi_squared.row(i).transpose()) -
-                          value.mismatch));
+    difference.push_back(cost.power() * (ModelMismatch(expansion, cost.BasisDifference(eta),
+                                                       check.chi_squared.row(i).transpose()) -
+                                         value.mismatch));
     residual.push_back(std::sqrt(cost.power()) * check.residual_to_noise[i]);
   }
   Agreement agreement;

@@ -7,17 +7,19 @@
 namespace polyest::internal {
 namespace {
 
-// Returns the axis on which the terms of the highest degree depend most: each counts by its weight
-// and the share of its degree that belongs to the axis.
+// Returns the axis on which the terms of the two highest degrees depend most: each counts by its
+// weight and the share of its degree that belongs to the axis. Two degrees, because those of one
+// parity vanish if the model is even or odd.
 Eigen::Index AxisToCut(const Basis& basis, const Vector& weights) {
   const Eigen::ArrayXXi& indices = basis.indices();
   Vector share = Vector::Zero(indices.cols());
   for (Eigen::Index s = 0; s < indices.rows(); ++s) {
-    if (indices.row(s).sum() < basis.order()) continue;
+    if (indices.row(s).sum() < basis.order() - 1) continue;
     share += weights[s] * indices.row(s).cast<double>().matrix().transpose();
   }
   Eigen::Index axis = 0;
   share.maxCoeff(&axis);
+
   return axis;
 }
 

@@ -2,7 +2,7 @@
 
 // Bisection of an element whose expansion does not follow the model (multi-element polynomial
 // chaos). The element is cut across the axis of its region along which the expansion's terms of the
-// highest degree weigh most: there the polynomials have run out first, and half the width reduces
+// highest degrees weigh most: there the polynomials have run out first, and half the width reduces
 // their error by 2^(p+1).
 
 #include <vector>

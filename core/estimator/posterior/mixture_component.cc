@@ -9,6 +9,7 @@
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/leaning.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
@@ -319,13 +320,13 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const Piece& whole,
                                                                           const Stop& stop) const {
   std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
-  const absl::Status begun = united->BeginOn(*this, whole, stop);
+  const absl::Status begun = united->ExpandOn(*this, whole, stop);
   if (absl::IsFailedPrecondition(begun)) return nullptr;
   POLYEST_RETURN_IF_ERROR(begun);
   united->whole_until_ = 0;
   united->bisected_ = false;
   const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
-  if (!(AgreementWithModel(*united->expansion_, cost).shift <= kMaxShift)) return nullptr;
+  if (!(LargestShift(*united->expansion_, cost) <= kMinShiftToBisect)) return nullptr;
   return united;
 }
 
@@ -347,12 +348,13 @@ ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
   const Eigen::Index count = std::min(before.check_points.rows(), piece.particles.rows());
   design.check_points = design.region.ManyToLocal(piece.particles.topRows(count));
   design.check_costs = piece.costs.head(count);
+  design.checks_are_draws = true;
   return design;
 }
 
-// Starts at the parent's row, over a region around one of the parent's pieces.
-absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Piece& piece,
-                                       const Stop& stop) {
+// Starts at the parent's row, over the region of one of the parent's pieces.
+absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Piece& piece,
+                                        const Stop& stop) {
   taken_ = window_end_ = parent.taken_;
   windows_from_ = parent.windows_from_;
   summary_ = parent.summary_;
@@ -367,6 +369,13 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Pie
   POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
                                               *store_, taken_, threads_, stop));
   ++reexpansions_;
+  return absl::OkStatus();
+}
+
+// As ExpandOn, and moves the expansion to the piece's posterior.
+absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Piece& piece,
+                                       const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
   bool moved = !parent.halves_;
   for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
     POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));

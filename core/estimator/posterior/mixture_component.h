@@ -106,6 +106,7 @@ class MixtureComponent {
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
   bool LookForPieces();
   bool BisectElement(int row);
+  absl::Status ExpandOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   ExpansionDesign DesignOn(const MixtureComponent& parent, const Piece& piece) const;
   absl::Status Reweigh(LearnedNoise noise, const Stop& stop);

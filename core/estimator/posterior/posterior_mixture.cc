@@ -44,7 +44,10 @@ double CommonPower(const std::vector<AssessmentRequest>& requests) {
 class Weighing {
  public:
   Weighing(const std::vector<AssessmentRequest>& requests, size_t most)
-      : requests_(requests), most_(most), power_(CommonPower(requests)), weighed_(requests.size()) {}
+      : requests_(requests),
+        most_(most),
+        power_(CommonPower(requests)),
+        weighed_(requests.size()) {}
 
   absl::StatusOr<MixtureWeighing> Run(const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(WeighHeaviest(stop));
