@@ -12,6 +12,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/regularization_choice.h"
@@ -61,7 +62,7 @@ class Assessment {
     NoteLeaning();
     if (request_.weigh) share = ShareOf(*request_.expansion, cost, posterior_);
     const std::vector<Minimum>& minima = posterior_.minima;
-    const Vector eta = minima.front().point;
+    const Vector eta = MinimumAsStated(cost, stop);
     findings_.problem = &problem_;
     findings_.expansion = request_.expansion;
     findings_.record = request_.record;
@@ -85,6 +86,19 @@ class Assessment {
   Matrix ToGermHessian(const Matrix& hessian) const {
     const Matrix inverse = Inverse(design_.region.axes());
     return inverse.transpose() * hessian * inverse;
+  }
+
+  // Returns the minimum of the cost with the noise as stated, also where the posterior is taken
+  // from a power of the likelihood.
+  Vector MinimumAsStated(Cost cost, const Stop& stop) const {
+    const std::vector<Minimum>& minima = posterior_.minima;
+    if (cost.power() == 1) return minima.front().point;
+    cost.set_power(1);
+    Matrix starts(static_cast<Eigen::Index>(minima.size()), cost.dimension());
+    for (size_t i = 0; i < minima.size(); ++i) {
+      starts.row(static_cast<Eigen::Index>(i)) = minima[i].point.transpose();
+    }
+    return FindMinima(SearchOf(cost, design_), starts, MinimizerOptions(), stop).front().point;
   }
 
   bool Isolated(const Cost& cost, const Vector& eta) const {
@@ -122,7 +136,9 @@ class Assessment {
     estimate_.time_s = record.time_s();
     estimate_.samples = record.samples();
     estimate_.regularization = regularization_;
-    estimate_.cost = cost.Evaluate(eta);
+    Cost stated = cost;
+    stated.set_power(1);
+    estimate_.cost = stated.Evaluate(eta);
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
@@ -146,9 +162,25 @@ class Assessment {
       parameter.contraction = deviation_[i] / prior_deviation[i];
       parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
       DescribeMarginal(posterior_, prior_, i, parameter);
+      if (findings_.power < 1 && parameter.posterior_std_dev > parameter.prior_std_dev) {
+        DescribeByPrior(i, parameter);
+      }
       estimate_.parameters.push_back(std::move(parameter));
     }
     DescribeTradeOffs();
+  }
+
+  // Sets what is known of parameter i to what its prior says: an expansion that is not accurate
+  // must not make it less.
+  void DescribeByPrior(int i, ParameterEstimate& parameter) const {
+    const UncertainParameter& prior = prior_.parameters()[static_cast<size_t>(i)];
+    const Germ germ(prior.germ);
+    parameter.mean = parameter.prior_mean;
+    parameter.posterior_std_dev = parameter.std_dev = parameter.prior_std_dev;
+    parameter.lower95 = prior.ToParameter(germ.Quantile(0.025));
+    parameter.upper95 = prior.ToParameter(germ.Quantile(0.975));
+    parameter.contraction = 1;
+    parameter.verdict = Verdict::kNotIdentified;
   }
 
   void DescribeBias(const Cost& cost, const Vector& eta, const Stop& stop) {

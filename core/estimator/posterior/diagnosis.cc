@@ -163,11 +163,12 @@ int BoundReached(const Findings& findings, int i) {
   return germ.Upper() - x < near ? 1 : 0;
 }
 
-// Whether the prior alone puts the estimate at a bound: it is densest there and the data do not
-// inform the parameter.
+// Whether the prior alone puts the estimate at a bound: it is densest there, the data do not inform
+// the parameter, and nothing contradicts their noise.
 bool PriorAsksForBound(const Findings& findings, const Estimate& estimate, int i) {
   const Germ& germ = findings.problem->prior().germs()[static_cast<size_t>(i)];
   return (germ.Mode() == germ.Lower() || germ.Mode() == germ.Upper()) &&
+         findings.expansion->noise().misfit == 1 &&
          estimate.parameters[static_cast<size_t>(i)].verdict == Verdict::kNotIdentified;
 }
 

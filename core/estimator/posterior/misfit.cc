@@ -10,14 +10,22 @@ namespace {
 
 constexpr double kDeviations = 6;
 
+// Whether the residuals of the channel test its noise: not where the noise is learned from them or
+// where large ones count as outliers.
+bool IsTested(const ResolvedProblem& problem, size_t channel) {
+  const NoiseModel& noise = problem.problem().measured[channel].noise;
+  return !noise.unknown && noise.outliers == OutlierHandling::kNone;
+}
+
 }  // namespace
 
-double Misfit(const RegionalExpansion& expansion, const Cost& cost, const Stop& stop) {
+double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, const Cost& cost,
+              const Stop& stop) {
   double degrees = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
-    const ChannelSums& sums = expansion.sums()[c];
+    if (!IsTested(problem, c)) continue;
     // Where the expansion's own error has been added to the noise, χ² is smaller by the discount.
-    if (!sums.scale_unknown) degrees += sums.Degrees() - expansion.Discount(static_cast<int>(c));
+    degrees += expansion.sums()[c].Degrees() - expansion.Discount(static_cast<int>(c));
   }
   if (!(degrees > 0)) return 1;
   const ExpansionDesign& design = expansion.design();
@@ -26,8 +34,8 @@ double Misfit(const RegionalExpansion& expansion, const Cost& cost, const Stop& 
           .front();
   const Vector d = cost.BasisDifference(minimum.point);
   double chi_squared = 0;
-  for (const ChannelSums& sums : expansion.sums()) {
-    if (!sums.scale_unknown) chi_squared += sums.samples.ChiSquared(d);
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    if (IsTested(problem, c)) chi_squared += expansion.sums()[c].samples.ChiSquared(d);
   }
   const double excess = chi_squared - degrees;
   return excess > kDeviations * std::sqrt(2 * degrees) ? chi_squared / degrees : 1;

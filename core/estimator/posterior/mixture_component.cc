@@ -225,7 +225,7 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   }
   if (adaptive()) {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    expansion_->set_misfit(Misfit(*expansion_, cost, stop));
+    expansion_->set_misfit(Misfit(problem_, *expansion_, cost, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
     moved = moved || tightened || settled;

@@ -24,7 +24,9 @@ inline constexpr size_t kMaxProbabilities = 1'000;    // PosteriorOptions::proba
 
 // How draws of the posterior were made.
 enum class PosteriorMethod {
-  kImportanceSampling,  // weighted draws of a Gaussian; for a posterior that is nearly Gaussian
+  // Weighted draws of a Gaussian, for a posterior that is nearly Gaussian, or of an even cover, in
+  // at most three dimensions.
+  kImportanceSampling,
   kMarkovChains,        // differential evolution, started from draws of tempered posteriors
 };
 

@@ -1,6 +1,7 @@
 // Checks that snapshots which are cut off, changed, or of something else are refused by name. None
 // crashes an estimator or leaves anything in it.
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -102,7 +103,7 @@ TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
     EXPECT_TRUE(absl::IsDataLoss(status) || absl::IsFailedPrecondition(status)) << status;
     EXPECT_EQ(estimator->rows_processed(), 0);
   }
-  EXPECT_GT(refused, kTrials / 4);
+  EXPECT_GT(refused, kTrials / 5);
 }
 
 TEST_F(BadSnapshot, LeavesTheEstimatorToProcessTheRowsItself) {
@@ -141,7 +142,8 @@ TEST_F(BadSnapshot, IsOneOfAnotherVersion) {
   body[version] = static_cast<char>(kSnapshotVersion + 1);
   const absl::Status status = Restored(Sealed(body));
   EXPECT_TRUE(absl::IsFailedPrecondition(status));
-  EXPECT_THAT(std::string(status.message()), HasSubstr("version 2"));
+  EXPECT_THAT(std::string(status.message()),
+              HasSubstr(absl::StrCat("version ", kSnapshotVersion + 1)));
 }
 
 TEST_F(BadSnapshot, IsOneOfOtherRows) {

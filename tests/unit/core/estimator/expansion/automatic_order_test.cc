@@ -1,5 +1,6 @@
 // Tests expansions of automatic order: no more than is needed, enough where it is needed.
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,10 +15,17 @@ namespace {
 constexpr double kNoise = 0.4;
 
 // Makes a problem with so few and poor samples of exp(sin(3 a)) that the posterior stays as wide as
-// the prior. No cubic follows the output over that width.
-Problem WideProblem(std::optional<int> order) {
-  Problem problem =
-      TextProblem("exp(sin(3*a))", {UncertainParameter::Uniform("a", -0.5, 1).value()}, kNoise);
+// the prior. No cubic follows the output over that width. Other parameters, which change nothing,
+// make so many dimensions that elements are not bisected.
+Problem WideProblem(std::optional<int> order, int others = 3) {
+  std::vector<UncertainParameter> parameters = {UncertainParameter::Uniform("a", -0.5, 1).value()};
+  std::string output = "exp(sin(3*a))";
+  for (int i = 0; i < others; ++i) {
+    const std::string name = absl::StrCat("b", i);
+    parameters.push_back(UncertainParameter::Uniform(name, 0, 1).value());
+    absl::StrAppend(&output, " + 0*", name);
+  }
+  Problem problem = TextProblem(output, parameters, kNoise);
   problem.expansion.order = order;
   return problem;
 }
@@ -60,6 +68,17 @@ TEST(AutomaticOrder, RisesWhereTheFirstOrderDoesNotFollowTheModel) {
   EXPECT_NEAR(automatic.parameters[0].posterior_std_dev, exact.std_dev, 0.03 * exact.std_dev);
 }
 
+// In few dimensions elements are bisected instead, whether the order may rise or not.
+TEST(AutomaticOrder, NeedNotRiseWhereElementsAreBisected) {
+  const Moments exact = Exact();
+  const Estimate estimate = Processed(WideProblem(3, 0), FewSamples())->CurrentEstimate().value();
+  EXPECT_EQ(estimate.expansion.order, 3);
+  EXPECT_TRUE(estimate.components.empty());
+  EXPECT_FALSE(Has(estimate, DiagnosticCode::kExpansionInaccurate));
+  EXPECT_NEAR(estimate.parameters[0].mean, exact.mean, 0.03 * exact.std_dev);
+  EXPECT_NEAR(estimate.parameters[0].posterior_std_dev, exact.std_dev, 0.03 * exact.std_dev);
+}
+
 TEST(AutomaticOrder, StaysWhereTheFirstOrderIsEnough) {
   Problem problem =
       InitialVelocityProblem(UncertainParameter::Uniform("v0", 0.5, 1.5).value(), 0.1);
@@ -71,10 +90,13 @@ TEST(AutomaticOrder, StaysWhereTheFirstOrderIsEnough) {
 }
 
 // The output has thirteen periods over the prior, more than a polynomial of order 9 follows. The
-// data allow values in all of them.
+// data allow values in all of them. There are too many dimensions to bisect elements.
 TEST(AutomaticOrder, SaysWhenNothingAffordableSuffices) {
-  Problem problem =
-      TextProblem("sin(40*a)", {UncertainParameter::Uniform("a", -1, 1).value()}, 0.2);
+  std::vector<UncertainParameter> parameters;
+  for (const char* name : {"a", "b", "c", "d"}) {
+    parameters.push_back(UncertainParameter::Uniform(name, -1, 1).value());
+  }
+  const Problem problem = TextProblem("sin(40*a) + 0*(b + c + d)", parameters, 0.2);
   const Estimate estimate = Processed(problem, {0.5, 0.45, 0.55})->CurrentEstimate().value();
   EXPECT_THAT(Message(estimate, DiagnosticCode::kExpansionInaccurate),
               ::testing::HasSubstr("narrower priors or more informative data"));

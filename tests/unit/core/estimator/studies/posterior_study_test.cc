@@ -1,5 +1,6 @@
 #include "core/estimator/studies/posterior_study.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -113,9 +114,13 @@ TEST(Posterior, AgreesWithTheEstimate) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kNonGaussian));
 }
 
-// Uses problems in which the Gaussian of one minimum must not stand for the posterior.
+// Uses problems in which the Gaussian of one minimum must not stand for the posterior. Four
+// dimensions are too many for a cover.
 TEST(Posterior, IsOfMarkovChainsWhereItIsNotNearlyGaussian) {
-  const auto uniform = UncertainParameter::Uniform("a", -1, 1).value();
+  std::vector<UncertainParameter> parameters;
+  for (const char* name : {"a", "b", "c", "d"}) {
+    parameters.push_back(UncertainParameter::Uniform(name, -1, 1).value());
+  }
   struct {
     const char* what;
     const char* output;
@@ -127,7 +132,8 @@ TEST(Posterior, IsOfMarkovChainsWhereItIsNotNearlyGaussian) {
                      {"no information", "0*a", 0, 1}};
   for (const auto& one : cases) {
     SCOPED_TRACE(one.what);
-    const auto estimator = Processed(TextProblem(one.output, {uniform}, one.noise), {one.z});
+    const std::string output = absl::StrCat(one.output, " + 0*(b + c + d)");
+    const auto estimator = Processed(TextProblem(output, parameters, one.noise), {one.z});
     const Posterior posterior = estimator->CurrentPosterior({}).value();
     EXPECT_EQ(posterior.method, PosteriorMethod::kMarkovChains);
     EXPECT_GT(posterior.r_hat, 0.99);
