@@ -242,14 +242,9 @@ double RegionalExpansion::ResidualToNoise(int row) const {
   return worst;
 }
 
-Vector RegionalExpansion::TermWeights(int row) const {
+Vector RegionalExpansion::TermWeights() const {
   Vector weights = Vector::Zero(design_.basis->size());
-  for (int c = 0; c < channels_; ++c) {
-    weights += absorbed_.sums[static_cast<size_t>(c)].samples.G().diagonal();
-    if (row < 0) continue;
-    const double noise = block_.noise[static_cast<size_t>(row * channels_ + c)];
-    if (noise > 0) weights += (coefficients_.col(row * channels_ + c) / noise).cwiseAbs2();
-  }
+  for (const ChannelSums& sums : absorbed_.sums) weights += sums.samples.G().diagonal();
   return weights;
 }
 

@@ -89,9 +89,8 @@ class RegionalExpansion {
   // Returns, for row `row` of the block propagated last, the expansion's residual in units of the
   // noise: the largest over the channels with a sample.
   double ResidualToNoise(int row) const;
-  // Returns how much each term of the basis contributes (S): Σ c_s²/R over the absorbed samples
-  // and, if `row` ≥ 0, Σ c_s²/σ² over the samples of this row of the block propagated last.
-  Vector TermWeights(int row) const;
+  // Returns how much each term of the basis contributes (S), Σ c_s²/R over the absorbed samples.
+  Vector TermWeights() const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
 

@@ -19,7 +19,6 @@ Eigen::Index AxisToCut(const Basis& basis, const Vector& weights) {
   }
   Eigen::Index axis = 0;
   share.maxCoeff(&axis);
-
   return axis;
 }
 
@@ -41,10 +40,10 @@ Matrix ParticlesIn(const Element& element, const Matrix& particles) {
 
 }  // namespace
 
-std::vector<Piece> Bisect(const RegionalExpansion& expansion, int row, const Matrix& particles) {
+std::vector<Piece> Bisect(const RegionalExpansion& expansion, const Matrix& particles) {
   const ExpansionDesign& design = expansion.design();
   const Region whole = TrustedRegion(design);
-  const Eigen::Index axis = AxisToCut(*design.basis, expansion.TermWeights(row));
+  const Eigen::Index axis = AxisToCut(*design.basis, expansion.TermWeights());
   // e = axes⁻¹ (ξ − centre): the cut is e_axis = 0.
   const Vector normal = Inverse(whole.axes()).row(axis).transpose();
   auto [below, above] = design.element.Divide(normal, normal.dot(whole.centre()));

@@ -13,8 +13,7 @@
 namespace polyest::internal {
 
 // Returns the two halves of the expansion's element. `particles` (W × n, germ coordinates; may be
-// empty) are of its posterior. The weights of the terms are those of the absorbed samples and, if
-// `row` ≥ 0, of this row of the block propagated last.
-std::vector<Piece> Bisect(const RegionalExpansion& expansion, int row, const Matrix& particles);
+// empty) are of its posterior.
+std::vector<Piece> Bisect(const RegionalExpansion& expansion, const Matrix& particles);
 
 }  // namespace polyest::internal

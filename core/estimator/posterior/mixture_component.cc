@@ -176,17 +176,21 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     POLYEST_ASSIGN_OR_RETURN(const bool raised, RaiseUnlearnedScales(block, row, stop));
     if (raised) return false;
     const bool short_of_trajectories = row == expansion_->fitted_rows();
+    bool too_coarse = false;
     const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
                         expansion_->ResidualToNoise(row) > CoarseResidual();
     if (short_of_trajectories || (adaptive() && coarse)) {
       POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(row, stop));
       if (moved) return false;
+      too_coarse = !short_of_trajectories && MayBisect();
     }
     expansion_->Absorb(row);
     summary_.Add(block, row, problem_.channels());
     ++taken_;
     bool moved = false;
-    if (WindowEnds()) {
+    if (too_coarse) {
+      POLYEST_ASSIGN_OR_RETURN(moved, ContractOrBisect(stop));
+    } else if (WindowEnds()) {
       POLYEST_ASSIGN_OR_RETURN(moved, SettleAfterWindow(stop));
     } else if (LooksAtEdges()) {
       POLYEST_ASSIGN_OR_RETURN(moved, SettleIfLeaning(stop));
@@ -208,7 +212,7 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
   }
   if (LookForPieces()) return true;
   if (short_of_trajectories) return expansion_->shortage();
-  if (BisectElement(row)) return true;
+  if (MayBisect()) return false;
   patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
   return false;
 }
@@ -254,7 +258,9 @@ absl::StatusOr<bool> MixtureComponent::SettleIfLeaning(const Stop& stop) {
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    return AgreementWithModel(*expansion_, cost).shift;
+    return bisected_ && !expansion_->design().checks_are_draws
+               ? LargestShift(*expansion_, cost)
+               : AgreementWithModel(*expansion_, cost).shift;
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };
   bool moved = false;
@@ -267,7 +273,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     moved = true;
   }
   if (accurate()) return moved;
-  return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement(-1)) || moved;
+  return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
 // Returns true when the posterior is in pieces on the present expansion, which no move makes
@@ -286,14 +292,25 @@ bool MixtureComponent::LookForPieces() {
   return must_divide();
 }
 
-// Returns true when the element is to be bisected. `row` is that of the block which the expansion
-// does not follow, or −1.
-bool MixtureComponent::BisectElement(int row) {
-  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
-  if (problem_.dimension() > kMaxDimensionToBisect) return false;
-  pieces_ = Bisect(*expansion_, row, particles_);
+bool MixtureComponent::MayBisect() const {
+  return adaptive() && taken_ >= whole_until_ && room_ > 1 &&
+         problem_.dimension() <= kMaxDimensionToBisect;
+}
+
+// Returns true when the element is to be bisected.
+bool MixtureComponent::BisectElement() {
+  if (!MayBisect()) return false;
+  pieces_ = Bisect(*expansion_, particles_);
   halves_ = true;
   return true;
+}
+
+// After a row that the expansion does not follow, which has been taken with its discount: if the
+// posterior contracts as far as the collocation points confirm it, the expansion moves there. That
+// costs far less than elements, but leaves separate modes where they are.
+absl::StatusOr<bool> MixtureComponent::ContractOrBisect(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, /*may_raise_order=*/false));
+  return moved || BisectElement();
 }
 
 absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(

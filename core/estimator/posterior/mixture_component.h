@@ -105,7 +105,9 @@ class MixtureComponent {
   bool Leans() const;
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
   bool LookForPieces();
-  bool BisectElement(int row);
+  bool MayBisect() const;
+  bool BisectElement();
+  absl::StatusOr<bool> ContractOrBisect(const Stop& stop);
   absl::Status ExpandOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   ExpansionDesign DesignOn(const MixtureComponent& parent, const Piece& piece) const;

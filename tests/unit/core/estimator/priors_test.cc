@@ -258,7 +258,7 @@ TEST(TruncatedNormalPriors, LeaveTheBoundToTheDataToBeBlamedFor) {
 }
 
 TEST(CorrelatedPriors, ShowWhenTheDataAskForValuesBeyondTheMarginal) {
-  Problem problem = PairProblem(0.5, 1e-4);
+  Problem problem = PairProblem(0.5, 1e-3);
   problem.uncertain[1] = UncertainParameter::Uniform("v0", 0, 1).value();
   std::vector<double> x;
   const std::vector<double> times = {0, 0.1, 0.2, 0.3, 0.4};
