@@ -34,6 +34,7 @@ class BdfIntegrator final : public SundialsIntegrator {
     return CVodeGetDky(memory_, time_s, 0, states);
   }
   double InternalTime() const override;
+  double LastStep() const override;
   int Reset(double time_s, N_Vector states) override;
   const char* InWords(int flag) const override;
   int SolveNewton(N_Vector x, N_Vector b);
@@ -88,6 +89,12 @@ double BdfIntegrator::InternalTime() const {
   double time_s = 0;
   CVodeGetCurrentTime(memory_, &time_s);
   return time_s;
+}
+
+double BdfIntegrator::LastStep() const {
+  double step_s = 0;
+  CVodeGetLastStep(memory_, &step_s);
+  return step_s;
 }
 
 int BdfIntegrator::Reset(double time_s, N_Vector states) {

@@ -26,6 +26,7 @@ class ErkIntegrator final : public SundialsIntegrator {
     return ERKStepGetDky(memory_, time_s, 0, states);
   }
   double InternalTime() const override;
+  double LastStep() const override;
   int Reset(double time_s, N_Vector states) override {
     return ERKStepReset(memory_, time_s, states);
   }
@@ -64,6 +65,12 @@ double ErkIntegrator::InternalTime() const {
   double time_s = 0;
   ERKStepGetCurrentTime(memory_, &time_s);
   return time_s;
+}
+
+double ErkIntegrator::LastStep() const {
+  double step_s = 0;
+  ERKStepGetLastStep(memory_, &step_s);
+  return step_s;
 }
 
 const char* ErkIntegrator::InWords(int flag) const {
@@ -131,12 +138,10 @@ bool ErkIntegrator::LooksStiff() {
   ERKStepGetNumSteps(memory_, &steps);
   if (steps - steps_looked_at_ < kStepsBetweenLooks) return false;
   steps_looked_at_ = steps;
-  double step_s = 0;
-  ERKStepGetLastStep(memory_, &step_s);
   // On the negative real axis the method is stable for h |λ| ≤ 3.3. Steps limited by accuracy are
   // many times shorter at the tolerances in use.
   constexpr double kNearTheLimit = 2;
-  return step_s * LargestRate() > kNearTheLimit;
+  return LastStep() * LargestRate() > kNearTheLimit;
 }
 
 }  // namespace

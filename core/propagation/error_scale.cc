@@ -2,16 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace polyest::internal {
 
 ErrorScale::ErrorScale(Eigen::Index points, Eigen::Index states, double relative_tolerance)
     : relative_tolerance_(relative_tolerance),
       largest_(Eigen::ArrayXXd::Zero(points, states)),
-      scale_(Eigen::ArrayXXd::Constant(points, states, kAbsoluteTolerance)),
-      weights_(Eigen::ArrayXXd::Constant(points, states, 1 / kAbsoluteTolerance)),
+      scale_(points, states),
+      weights_(points, states),
       block_scale_(Vector::Zero(states)),
-      point_norm_(Eigen::ArrayXd::Zero(points)) {}
+      floor_(Vector::Zero(states)),
+      expected_(Vector::Zero(states)),
+      point_norm_(Eigen::ArrayXd::Zero(points)) {
+  for (Eigen::Index s = 0; s < states; ++s) SetScale(s);
+}
+
+void ErrorScale::SetScale(Eigen::Index state) {
+  // rtol · S_ps + floor_s, S_ps = max(own, share of the block's). The smallest number stands in for
+  // 0, so that the weights stay finite.
+  scale_.col(state) =
+      (relative_tolerance_ * largest_.col(state).max(kBlockShare * block_scale_(state)) +
+       floor_(state))
+          .max(std::numeric_limits<double>::min());
+  weights_.col(state) = scale_.col(state).inverse();
+}
 
 void ErrorScale::Grow(const Eigen::ArrayXXd& states) {
   // Nothing changes unless a state exceeds its largest magnitude so far.
@@ -19,11 +34,36 @@ void ErrorScale::Grow(const Eigen::ArrayXXd& states) {
   largest_ = largest_.max(states.abs());
   for (Eigen::Index s = 0; s < states.cols(); ++s) {
     block_scale_(s) = largest_.col(s).maxCoeff();
-    // rtol · S_ps + atol, S_ps = max(own, share of the block's)
-    scale_.col(s) = relative_tolerance_ * largest_.col(s).max(kBlockShare * block_scale_(s)) +
-                    kAbsoluteTolerance;
+    SetScale(s);
   }
-  weights_ = scale_.inverse();
+}
+
+bool ErrorScale::NeedsFloors() const {
+  return block_scale_at_floors_.size() == 0 ||
+         (block_scale_.array() > 2 * block_scale_at_floors_.array()).any() ||
+         (block_scale_at_floors_.array() == 0).any();
+}
+
+void ErrorScale::SetFloors(const Vector& largest_changes, const Vector& expected_sizes) {
+  constexpr double kExpectedShare = 1e-6;
+  constexpr double kCancelled = 1e-10;
+  constexpr double kRoundings = 100 * std::numeric_limits<double>::epsilon();
+  block_scale_at_floors_ = block_scale_;
+  expected_ = expected_sizes;
+  for (Eigen::Index s = 0; s < floor_.size(); ++s) {
+    const double change = largest_changes(s);
+    const bool cancelled = block_scale_(s) < kCancelled * change;
+    floor_(s) = cancelled ? kRoundings * change : 0;
+    if (block_scale_(s) == 0) {
+      floor_(s) = std::max(floor_(s), relative_tolerance_ * kExpectedShare * expected_(s));
+    }
+    SetScale(s);
+  }
+}
+
+double ErrorScale::SizeOf(Eigen::Index state) const {
+  if (block_scale_(state) > 0) return block_scale_(state);
+  return expected_(state) > 0 ? expected_(state) : 1;
 }
 
 double ErrorScale::WeightedNorm(const Eigen::ArrayXXd& error, const Eigen::ArrayXXd& weights) {
@@ -48,7 +88,7 @@ double ErrorScale::GrowingNorm(const Eigen::ArrayXXd& error) {
   for (Eigen::Index s = 0; s < error.cols(); ++s) {
     for (Eigen::Index p = 0; p < points; ++p) {
       const double magnitude = relative_tolerance_ * std::abs((*watched_)(p, s));
-      // |e_ps| / max(rtol · S_ps + atol, rtol · |x_ps|)
+      // |e_ps| / max(rtol · S_ps + floor_s, rtol · |x_ps|)
       const double ratio = std::abs(error(p, s)) / std::max(scale_(p, s), magnitude);
       point_norm_(p) = std::max(point_norm_(p), ratio < kHuge ? ratio : kHuge);
     }

@@ -28,9 +28,7 @@ void NewtonMatrix::TakeDifferences(double time_s, const Eigen::ArrayXXd& states,
   system_->Derivatives(time_s, states, rates_);
   moved_ = states;
   for (Eigen::Index s = 0; s < count; ++s) {
-    // If state s has been 0 for the whole block, its size is unknown and one SI unit is used.
-    const double size = scale.block_scale(s) > 0 ? scale.block_scale(s) : 1;
-    moved_.col(s) += root_epsilon * states.col(s).abs().max(size);
+    moved_.col(s) += root_epsilon * states.col(s).abs().max(scale.SizeOf(s));
     system_->Derivatives(time_s, moved_, moved_rates_);
     // ∂f/∂x_s ≈ (f(x + δ e_s) − f(x))/δ, where δ is the difference that remains after rounding of
     // the sum.

@@ -45,6 +45,7 @@ class SundialsIntegrator : public BlockIntegrator {
                      double* reached_s) = 0;
   virtual int Interpolate(double time_s, N_Vector states) = 0;
   virtual double InternalTime() const = 0;  // the end of the last step
+  virtual double LastStep() const = 0;      // its length in s, 0 before the first
   virtual int Reset(double time_s, N_Vector states) = 0;
   virtual const char* InWords(int flag) const = 0;
 
@@ -60,6 +61,11 @@ class SundialsIntegrator : public BlockIntegrator {
   // that an input that is 0 now is not stepped over. It is a guess: the error test shortens it, and
   // it may grow fast.
   double FirstStep(double span_s);
+  // Gives the error scale its floors, for steps of about `step_s` until a sample in `span_s`.
+  void SetFloors(double step_s, double span_s);
+  // Returns the size that each state which is 0 will have reached after `span_s`, nearly: the rates
+  // on the way, with the other states as large as they are now or will be.
+  Vector ExpectedSizes(double span_s);
   IntegratorOutcome Outcome(int flag, double advance_s, double span_s) const;
 
   BlockSystem* const system_;
@@ -68,8 +74,9 @@ class SundialsIntegrator : public BlockIntegrator {
   OwnedVector vector_;  // the states at time_s_
   double time_s_;
   double covered_s_;  // dense output reaches to here
-  Eigen::ArrayXXd first_rates_;
+  Eigen::ArrayXXd first_rates_, moved_states_, moved_rates_;
   bool first_step_set_ = false;
+  double floors_step_s_ = 0;  // for which the floors were set
 };
 
 }  // namespace polyest::internal

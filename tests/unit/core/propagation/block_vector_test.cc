@@ -97,7 +97,7 @@ TEST(ErrorScale, CountsTheMagnitudeAtTheEndOfTheStepUnderTest) {
   ErrorScale scale(8, 1, 1e-2);
   const Eigen::ArrayXXd end = Eigen::ArrayXXd::Constant(8, 1, 0.5);
   const Eigen::ArrayXXd error = Eigen::ArrayXXd::Constant(8, 1, 0.01);
-  EXPECT_GT(scale.Norm(error, scale.weights()), 1e6);  // Only the absolute tolerance is known.
+  EXPECT_GT(scale.Norm(error, scale.weights()), 1e6);  // Nothing is known of the size.
   scale.Watch(&end);
   EXPECT_NEAR(scale.Norm(error, scale.weights()), 0.01 / (1e-2 * 0.5), 1e-9);
 }
