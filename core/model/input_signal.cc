@@ -236,14 +236,18 @@ double InputSignal::NextBreak(double time_s) const {
   return std::visit(
       [&]<class Input>(const Input& input) {
         if constexpr (kHasKnots<Input>) {
-          if (KnotsAhead(input.interpolation) > 0) return EndAfter(time_s);
-          const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
-          return next == knot_time_s_.end() ? kInfinity : *next;
+          return KnotsAhead(input.interpolation) > 0 ? EndAfter(time_s) : NextKnot(time_s);
         } else {
           return ClosedFormBreak(input, time_s);
         }
       },
       specification_);
+}
+
+double InputSignal::NextKnot(double time_s) const {
+  if (!interpolation()) return NextBreak(time_s);
+  const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
+  return next == knot_time_s_.end() ? kInfinity : *next;
 }
 
 // Returns the next end of a smooth curve, where its derivative jumps.

@@ -28,6 +28,8 @@ class InputSignal {
   const InputSpecification& specification() const { return specification_; }
   std::span<const double> knot_times_s() const { return knot_time_s_; }
   std::span<const double> knot_values() const { return knot_value_; }
+  // Returns the slopes at the knots of a smooth curve, as far as it is settled.
+  std::span<const double> knot_slopes() const { return knot_slope_; }
   // Adds the next knot of a streamed signal, in amortized O(1). Time and value must be finite, and
   // times must strictly increase within a run.
   void Append(double time_s, double value);
@@ -49,6 +51,9 @@ class InputSignal {
   // Returns the first time strictly after time_s at which shape or its derivative jumps, or +∞ if
   // there is none. A smooth curve through knots has breaks only at its two ends.
   double NextBreak(double time_s) const;
+  // Returns the first knot strictly after time_s, those of a smooth curve included; for a signal
+  // without knots its next break; +∞ if there is none.
+  double NextKnot(double time_s) const;
   // Whether shape itself jumps at its breaks (step, chirp, hold). An integrator must then also
   // discard the derivative that it has stored.
   bool Jumps() const;

@@ -16,11 +16,20 @@
 //   template <class Real> static void
 //     Outputs(double time_s, …the same…, std::array<Real, kOutputs>& outputs);
 //
+// and may provide
+//
+//   static constexpr bool kUsesTime = false;     // Derivatives ignores time_s
+//   static constexpr std::array<int, …> kNonlinear;  // Derivatives is linear in states and inputs
+//                                                // (StateSpaceModel::IsLinear) if these parameters
+//                                                // are 0; an empty array: always
+//
 // Real is Lane here; with double the equations give the value at a single point. An algebraic model
 // (kStates = 0) omits Initial and Derivatives. Declare locals `const Real`, never `auto`, which
 // would keep an unevaluated Eigen expression. Each column of a block is contiguous in memory.
 
+#include <algorithm>
 #include <array>
+#include <vector>
 
 #include "core/common/check.h"
 #include "core/common/types.h"
@@ -83,6 +92,20 @@ class LaneModel final : public StateSpaceModel {
                          Load<Equations::kInputs>(inputs, row), y);
       Store(y, row, outputs);
     }
+  }
+
+  bool uses_time() const override {
+    if constexpr (requires { Equations::kUsesTime; }) return Equations::kUsesTime;
+    return true;
+  }
+
+  bool IsLinear(const std::vector<bool>& zero_parameters, const std::vector<bool>&) const override {
+    if constexpr (requires { Equations::kNonlinear; }) {
+      return std::ranges::all_of(Equations::kNonlinear, [&](int parameter) {
+        return zero_parameters[static_cast<size_t>(parameter)];
+      });
+    }
+    return false;
   }
 
  private:

@@ -72,6 +72,19 @@ class StateSpaceModel : public Model {
   virtual void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                        const ConstBlock& inputs, Block outputs) const = 0;
 
+  // Whether f may depend on time_s itself and not only through u. An integrator then takes no step
+  // longer than the interval between two samples, so that it cannot step over what f does in time.
+  // By default it may.
+  virtual bool uses_time() const { return true; }
+  // Returns whether f(t, x, θ, u) = A x + B v + c for every x and v, where v are the inputs that
+  // vary, and A, B and c depend on nothing but θ and the other inputs. It must hold for all θ whose
+  // parameters marked in `zero_parameters` are 0; inputs marked in `constant_inputs` do not vary.
+  // Such a model is stepped without error of integration. By default nothing is known, so false.
+  virtual bool IsLinear(const std::vector<bool>& /*zero_parameters*/,
+                        const std::vector<bool>& /*constant_inputs*/) const {
+    return false;
+  }
+
   // Whether StateJacobian is implemented. By default it is not, and differences of Derivatives
   // stand in for it where a stiff model needs it.
   virtual bool has_state_jacobian() const { return false; }

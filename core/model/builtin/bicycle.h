@@ -45,6 +45,7 @@ struct Bicycle {
   static constexpr int kParameters = 9;
   static constexpr int kInputs = 2;
   static constexpr int kOutputs = 4;
+  static constexpr bool kUsesTime = false;
 
   static ModelDescription Describe() {
     return {

@@ -13,6 +13,8 @@ struct Duffing {
   static constexpr int kParameters = 8;
   static constexpr int kInputs = 1;
   static constexpr int kOutputs = 2;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 2> kNonlinear = {3, 4};  // k2, k3
 
   static ModelDescription Describe() {
     return {

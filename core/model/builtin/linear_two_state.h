@@ -13,6 +13,8 @@ struct LinearTwoState {
   static constexpr int kParameters = 3;
   static constexpr int kInputs = 2;
   static constexpr int kOutputs = 3;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 0> kNonlinear = {};
 
   static ModelDescription Describe() {
     return {

@@ -14,6 +14,8 @@ struct MassSpringDamper {
   static constexpr int kParameters = 5;
   static constexpr int kInputs = 1;
   static constexpr int kOutputs = 3;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 0> kNonlinear = {};
 
   static ModelDescription Describe() {
     const double omega = 2 * std::numbers::pi;  // gives k the default for 1 Hz

@@ -13,6 +13,7 @@ struct Pendulum {
   static constexpr int kParameters = 5;
   static constexpr int kInputs = 0;
   static constexpr int kOutputs = 2;
+  static constexpr bool kUsesTime = false;
 
   static ModelDescription Describe() {
     return {

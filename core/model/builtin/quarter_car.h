@@ -26,6 +26,8 @@ struct QuarterCar {
   static constexpr int kParameters = 10;
   static constexpr int kInputs = 1;
   static constexpr int kOutputs = 5;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 1> kNonlinear = {5};  // ks3
 
   static ModelDescription Describe() {
     return {

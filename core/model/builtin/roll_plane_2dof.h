@@ -34,6 +34,8 @@ struct RollPlane2Dof {
   static constexpr int kParameters = 9;
   static constexpr int kInputs = 2;
   static constexpr int kOutputs = 4;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 0> kNonlinear = {};
 
   static ModelDescription Describe() {
     return {

@@ -39,6 +39,8 @@ struct RollPlane4Dof {
   static constexpr int kParameters = 18;
   static constexpr int kInputs = 2;
   static constexpr int kOutputs = 10;
+  static constexpr bool kUsesTime = false;
+  static constexpr std::array<int, 2> kNonlinear = {5, 6};  // k3, c_f
 
   static ModelDescription Describe() {
     return {

@@ -14,16 +14,20 @@
 #include "core/model/equations/equation_units.h"
 #include "core/model/equations/limits.h"
 #include "core/model/equations/program.h"
+#include "core/model/equations/structure.h"
 
 namespace polyest::internal {
 namespace equations {
 namespace {
 
 enum BlockNumber { kStatesBlock, kParametersBlock, kInputsBlock };
+constexpr int kTimeVariable = 0;  // index of the variable t
 
 struct Programs {
   Program initial, derivatives, outputs;
   std::optional<Program> jacobian;
+  Structure structure;  // of the derivatives
+  std::vector<VariablePlace> places;
 };
 
 class EquationModel final : public StateSpaceModel {
@@ -51,6 +55,28 @@ class EquationModel final : public StateSpaceModel {
     CheckShapes(states, parameters, inputs);
     POLYEST_CHECK(outputs.rows() == parameters.rows());
     Run(programs_.outputs, time_s, states, parameters, inputs, outputs);
+  }
+
+  bool uses_time() const override { return programs_.structure.Uses(kTimeVariable); }
+
+  bool IsLinear(const std::vector<bool>& zero_parameters,
+                const std::vector<bool>& constant_inputs) const override {
+    const auto form_of = [&](const VariablePlace& place) {
+      const auto column = static_cast<size_t>(place.column);
+      switch (place.block) {
+        case kStatesBlock:
+          return Form::kLinear;
+        case kParametersBlock:
+          return zero_parameters[column] ? Form::kZero : Form::kFixed;
+        case kInputsBlock:
+          return constant_inputs[column] ? Form::kFixed : Form::kLinear;
+        default:  // the time
+          return Form::kOther;
+      }
+    };
+    std::vector<Form> forms;
+    for (const VariablePlace& place : programs_.places) forms.push_back(form_of(place));
+    return programs_.structure.Highest(forms) <= Form::kLinear;
   }
 
   bool has_state_jacobian() const override { return programs_.jacobian.has_value(); }
@@ -149,7 +175,10 @@ absl::Status Assembly::Assemble() {
 Programs Assembly::Compile(const std::vector<Lookup>& tables) {
   Programs programs{Program(graph_, initial_, places_, tables),
                     Program(graph_, derivatives_, places_, tables),
-                    Program(graph_, outputs_, places_, tables), std::nullopt};
+                    Program(graph_, outputs_, places_, tables),
+                    std::nullopt,
+                    Structure(graph_, derivatives_),
+                    places_};
   if (states_.empty()) return programs;
   graph_.set_most_nodes(kMaxJacobianNodes);
   const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
