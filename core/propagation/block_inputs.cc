@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
+
+#include "core/model/input_generator.h"
 
 namespace polyest::internal {
 namespace {
@@ -9,6 +12,21 @@ namespace {
 Eigen::ArrayXXd RowsOf(const Matrix& matrix, const std::vector<int>& points) {
   if (matrix.size() == 0) return {};
   return matrix(points, Eigen::all).array();
+}
+
+// Returns the last knot up to `time_s`, −∞ if there is none.
+double KnotUpTo(const InputSignal& signal, double time_s) {
+  const std::span<const double> knots = signal.knot_times_s();
+  const auto next = std::upper_bound(knots.begin(), knots.end(), time_s);
+  if (next != knots.begin()) return *(next - 1);
+  double last_s = -kInfinity;
+  if (!knots.empty()) return last_s;
+  // Signals without a table have at most two.
+  for (double knot_s = signal.NextKnot(last_s); knot_s <= time_s && knot_s < kInfinity;
+       knot_s = signal.NextKnot(knot_s)) {
+    last_s = knot_s;
+  }
+  return last_s;
 }
 
 }  // namespace
@@ -35,6 +53,11 @@ bool BlockInputs::Stops(size_t input) const {
   return cursors_[input].size() == 1 || (*signals_)[input].Jumps();
 }
 
+double BlockInputs::BreakAfter(size_t input, double time_s) const {
+  const InputSignal& signal = (*signals_)[input];
+  return every_knot_ ? signal.NextKnot(time_s) : signal.NextBreak(time_s);
+}
+
 BlockInputs::Break BlockInputs::NextBreak() {
   Break next;
   for (size_t i = 0; i < cursors_.size(); ++i) {
@@ -42,7 +65,7 @@ BlockInputs::Break BlockInputs::NextBreak() {
     const InputSignal& signal = (*signals_)[i];
     for (Cursor& cursor : cursors_[i]) {
       // The break is computed again each time, because knots may have been appended.
-      cursor.next_s = signal.NextBreak(cursor.last_s);
+      cursor.next_s = BreakAfter(i, cursor.last_s);
       const double break_s = cursor.next_s + cursor.delay_s;
       if (break_s > next.time_s || break_s == kInfinity) continue;
       next = {break_s, signal.Jumps() || (break_s == next.time_s && next.jumps)};
@@ -57,19 +80,60 @@ void BlockInputs::Pass(double time_s) {
     for (Cursor& cursor : cursors_[i]) {
       while (cursor.next_s + cursor.delay_s <= time_s) {
         cursor.last_s = cursor.next_s;
-        cursor.next_s = (*signals_)[i].NextBreak(cursor.last_s);
+        cursor.next_s = BreakAfter(i, cursor.last_s);
       }
     }
   }
   time_s_ = std::numeric_limits<double>::quiet_NaN();
 }
 
-double BlockInputs::Shape(size_t input, const Cursor& cursor, double time_s) const {
-  const InputSignal& signal = (*signals_)[input];
+double BlockInputs::BoundedTime(size_t input, const Cursor& cursor, double time_s) const {
   const double at_s = time_s - cursor.delay_s;
-  if (!Stops(input)) return signal.Shape(at_s);
+  if (!Stops(input)) return at_s;
   const double before_next_s = std::nextafter(cursor.next_s, -kInfinity);
-  return signal.Shape(std::max(cursor.last_s, std::min(at_s, before_next_s)));
+  return std::max(cursor.last_s, std::min(at_s, before_next_s));
+}
+
+double BlockInputs::Shape(size_t input, const Cursor& cursor, double time_s) const {
+  return (*signals_)[input].Shape(BoundedTime(input, cursor, time_s));
+}
+
+double BlockInputs::StepEnd(double time_s) const {
+  double end_s = kInfinity;
+  for (size_t i = 0; i < cursors_.size(); ++i) {
+    const InputSignal& signal = (*signals_)[i];
+    if (signal.streamed() || every_knot_) continue;
+    for (const Cursor& cursor : cursors_[i]) {
+      const double at_s = time_s - cursor.delay_s;
+      double first_s = signal.NextKnot(at_s);
+      // The rounding of t − delay may leave a knot that has been reached.
+      while (first_s + cursor.delay_s <= time_s) first_s = signal.NextKnot(first_s);
+      if (first_s == kInfinity || (Stops(i) && first_s == signal.NextBreak(at_s))) continue;
+      // A step is at most half as long as the interval that it starts in. It ends no later than the
+      // knot before the next interval, or after half the length of that one: some evaluation falls
+      // inside each interval, even if there is one a step.
+      const double next_s = 0.5 * (signal.NextKnot(first_s) - first_s);
+      const double present_s = 0.5 * (first_s - KnotUpTo(signal, at_s));
+      const double latest_s = std::min(std::max(first_s, at_s + next_s), at_s + present_s);
+      if (latest_s + cursor.delay_s > time_s) end_s = std::min(end_s, latest_s + cursor.delay_s);
+    }
+  }
+  return end_s;
+}
+
+std::vector<size_t> BlockInputs::Varying() const {
+  std::vector<size_t> varying;
+  for (size_t i = 0; i < signals_->size(); ++i) {
+    if (!std::holds_alternative<ConstantInput>((*signals_)[i].specification())) {
+      varying.push_back(i);
+    }
+  }
+  return varying;
+}
+
+void BlockInputs::GeneratorStateOf(size_t input, double time_s, std::span<double> state) const {
+  const Cursor& cursor = cursors_[input].front();
+  GeneratorState((*signals_)[input], BoundedTime(input, cursor, time_s), state);
 }
 
 const Eigen::ArrayXXd& BlockInputs::At(double time_s) {

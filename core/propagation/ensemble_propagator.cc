@@ -10,6 +10,7 @@
 #include "core/common/field_error.h"
 #include "core/common/parallel.h"
 #include "core/common/status.h"
+#include "core/propagation/linear_system.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest {
@@ -64,9 +65,11 @@ class IntegratedEnsemble final : public TrajectoryEnsemble {
 IntegratedEnsemble::IntegratedEnsemble(EnsembleSpecification specification,
                                        const InputSignals* inputs)
     : specification_(std::move(specification)) {
+  const bool exact = StepsExactly(specification_, *inputs);
   for (int first = 0; first < points(); first += TrajectoryBlock::kPoints) {
     const int count = std::min(TrajectoryBlock::kPoints, points() - first);
-    blocks_.push_back(std::make_unique<TrajectoryBlock>(&specification_, inputs, first, count));
+    blocks_.push_back(
+        std::make_unique<TrajectoryBlock>(&specification_, inputs, first, count, exact));
   }
   statuses_.resize(blocks_.size());
   CollectFailures();

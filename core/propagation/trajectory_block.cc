@@ -1,5 +1,7 @@
 #include "core/propagation/trajectory_block.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +11,8 @@
 #include "core/common/status.h"
 #include "core/propagation/bdf_integrator.h"
 #include "core/propagation/erk_integrator.h"
+#include "core/propagation/linear_integrator.h"
+#include "core/propagation/linear_system.h"
 
 namespace polyest::internal {
 namespace {
@@ -37,10 +41,13 @@ std::vector<int> Shifted(std::vector<int> rows, int first) {
 }  // namespace
 
 TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
-                                 const InputSignals* inputs, int first_point, int points)
+                                 const InputSignals* inputs, int first_point, int points,
+                                 bool exact)
     : specification_(specification),
       model_(dynamic_cast<const StateSpaceModel*>(specification->model.get())),
       first_point_(first_point),
+      signals_(inputs),
+      exact_(exact),
       source_(PaddedRows(points)),
       parameters_(specification->parameters(Shifted(source_, first_point), Eigen::all).array()),
       inputs_(*specification, inputs, Shifted(source_, first_point)),
@@ -51,18 +58,25 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
   const ModelDescription& description = model_->description();
   const Eigen::Index rows = parameters_.rows();
   for (const InputSignal& input : *inputs) streamed_ = streamed_ || input.streamed();
+  stops_at_samples_ = streamed_ || model_->uses_time();
+  if (exact_) inputs_.StopAtEveryKnot();
   states_.setZero(rows, static_cast<Eigen::Index>(description.states.size()));
   model_outputs_.setZero(rows, static_cast<Eigen::Index>(description.outputs.size()));
   selected_outputs_.setZero(rows, static_cast<Eigen::Index>(specification->outputs.size()));
   if (states_.cols() == 0) return;
   model_->InitialStates(parameters_, states_);
-  FailRowsNotFinite(states_, 0, "an initial state is not finite");
+  FailRowsBeyond(states_, 0, "an initial state");
   StartIntegrator(0);
 }
 
 void TrajectoryBlock::StartIntegrator(double time_s) {
   integrator_.reset();
   if (!alive()) return;
+  if (exact_) {
+    integrator_ = MakeLinearIntegrator(LinearSystemOf(*model_, parameters_, *signals_, inputs_),
+                                       &inputs_, time_s, states_);
+    return;
+  }
   const double tolerance = specification_->integration.relative_tolerance;
   integrator_ = stiff_ ? MakeBdfIntegrator(this, tolerance, time_s, states_)
                        : MakeErkIntegrator(this, tolerance, time_s, states_);
@@ -85,9 +99,12 @@ bool TrajectoryBlock::StateJacobian(double time_s, const ConstBlock& states, Blo
 TrajectoryBlock::StopTime TrajectoryBlock::NextStop() {
   const BlockInputs::Break next = inputs_.NextBreak();
   const StopTime stop = {next.time_s, next.jumps, true};
-  if (!stiff_ || streamed_ || next.time_s == kInfinity) return stop;
+  if (exact_) return stop;
+  const double step_end_s = inputs_.StepEnd(time_s_);
+  const StopTime early = step_end_s < stop.time_s ? StopTime{step_end_s, false, false} : stop;
+  if (!stiff_ || streamed_ || next.time_s == kInfinity) return early;
   const double look_s = last_break_s_ + kLook * (next.time_s - last_break_s_);
-  return look_s > time_s_ ? StopTime{look_s, false, false} : stop;
+  return look_s > time_s_ && look_s < early.time_s ? StopTime{look_s, false, false} : early;
 }
 
 absl::Status TrajectoryBlock::Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -107,7 +124,7 @@ absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
   for (;;) {
     const StopTime next = NextStop();
     if (next.time_s > time_s) {
-      return Reach(time_s, streamed_ ? time_s : next.time_s, stop);
+      return Reach(time_s, stops_at_samples_ ? time_s : next.time_s, stop);
     }
     POLYEST_RETURN_IF_ERROR(Reach(next.time_s, next.time_s, stop));
     time_s_ = next.time_s;
@@ -157,7 +174,7 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
       selected_outputs_.col(j) = model_outputs_.col(selected[j]);
     }
     const int alive_before = alive_points_;
-    FailRowsNotFinite(selected_outputs_, time_s_, "an output is not finite");
+    FailRowsBeyond(selected_outputs_, time_s_, "an output");
     if (alive_points_ < alive_before && states_.cols() > 0) StartIntegrator(time_s);
   }
   for (Eigen::Index point = 0; point < std::ssize(point_alive_); ++point) {
@@ -170,12 +187,14 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
   }
 }
 
-void TrajectoryBlock::FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s,
-                                        const char* reason) {
-  // x − x is 0 for a finite number and NaN otherwise.
-  if ((values - values).sum() == 0) return;
+void TrajectoryBlock::FailRowsBeyond(const Eigen::ArrayXXd& values, double time_s,
+                                     const char* what) {
+  constexpr double kLargest = 1e100;
+  if ((values.abs() <= kLargest).all()) return;
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
-    if (point_alive_[row] && !values.row(row).isFinite().all()) Fail(row, time_s, 0, reason);
+    if (!point_alive_[row] || (values.row(row).abs() <= kLargest).all()) continue;
+    const bool finite = values.row(row).isFinite().all();
+    Fail(row, time_s, 0, absl::StrCat(what, finite ? " has passed 1e100" : " is not finite"));
   }
 }
 

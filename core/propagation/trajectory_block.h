@@ -27,9 +27,9 @@ class TrajectoryBlock final : public BlockSystem {
   static constexpr int kPoints = 64;
 
   // Takes points first_point … first_point + points − 1 of the specification. The specification and
-  // the inputs must outlive the block.
+  // the inputs must outlive the block. `exact`: the ensemble StepsExactly (linear_system.h).
   TrajectoryBlock(const EnsembleSpecification* specification, const InputSignals* inputs,
-                  int first_point, int points);
+                  int first_point, int points, bool exact);
 
   Eigen::Index points() const override { return states_.rows(); }
   Eigen::Index states() const override { return states_.cols(); }
@@ -64,7 +64,9 @@ class TrajectoryBlock final : public BlockSystem {
   absl::Status AdvanceStates(double time_s, const Stop& stop);
   absl::Status Reach(double time_s, double stop_time_s, const Stop& stop);
   void ReadOutputs(double time_s, int sample, MatrixRef outputs);
-  void FailRowsNotFinite(const Eigen::ArrayXXd& values, double time_s, const char* reason);
+  // Fails the rows with a value that is not finite or beyond 1e100, whose square an estimate's sums
+  // could not hold.
+  void FailRowsBeyond(const Eigen::ArrayXXd& values, double time_s, const char* what);
   // Leaves out the point in that row from now on.
   void Fail(Eigen::Index row, double time_s, int flag, std::string reason);
   void CarryPoint(Eigen::Index row, Eigen::Index point);
@@ -73,7 +75,10 @@ class TrajectoryBlock final : public BlockSystem {
   const EnsembleSpecification* specification_;
   const StateSpaceModel* model_;
   const int first_point_;
-  bool streamed_ = false;  // a knot yet to come must not change a step already taken
+  const InputSignals* const signals_;
+  const bool exact_;
+  bool streamed_ = false;          // a knot yet to come must not change a step already taken
+  bool stops_at_samples_ = false;  // because of that, or because the equations may use the time
 
   std::vector<int> source_;  // the block's own point that each row carries
   Eigen::ArrayXXd parameters_;
