@@ -11,6 +11,7 @@
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/propagation/linear_system.h"
 
 namespace polyest::internal {
 namespace {
@@ -102,6 +103,12 @@ void RegionalExpansion::StartRun(int run) {
   inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), inputs_.get());
+}
+
+bool RegionalExpansion::StepsExactly() const {
+  const InputSignals inputs = problem_.MakeInputs();
+  return internal::StepsExactly(
+      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, std::max(run_, 0)), inputs);
 }
 
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {

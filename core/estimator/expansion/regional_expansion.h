@@ -97,6 +97,8 @@ class RegionalExpansion {
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }
   void set_misfit(double misfit) { noise_.misfit = misfit; }
+  // Whether its trajectories are stepped without error of integration (linear_system.h).
+  bool StepsExactly() const;
   int points() const { return static_cast<int>(design_.points.rows()); }
   int64_t absorbed_rows() const { return absorbed_.rows; }
   // Returns the number of trajectories × rows.

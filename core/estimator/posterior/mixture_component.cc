@@ -32,10 +32,13 @@ constexpr double kMaxShift = 0.1;
 constexpr double kMaxShiftInPieces = 1;
 constexpr double kWindowGrowth = 1.3;
 // The integration error must stay so far below the noise that over a long record it does not
-// accumulate to a noticeable share of the posterior's standard deviation: relative tolerance ≤ this
-// × noise ÷ signal. The tolerance is checked where windows end, and never goes below what double
-// precision supports.
-constexpr double kTolerancePerNoise = 1e-5;
+// accumulate to a noticeable share of the posterior's standard deviation. The error is the same at
+// every sample's parameters while the noise averages out, so N samples together see errors smaller
+// than one sample does by √N: relative tolerance ≤ kTolerancePerNoise × noise ÷ signal ÷ √N,
+// counting no fewer than kFewestSamples. The tolerance is checked where windows end, and never goes
+// below what double precision supports.
+constexpr double kTolerancePerNoise = 1e-4;
+constexpr double kFewestSamples = 100;
 constexpr double kTightestTolerance = 1e-12;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
@@ -450,12 +453,14 @@ absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
 // it.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
-  const double needed = std::max(kTightestTolerance,
-                                 kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()));
+  const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
+  const double needed = std::max(
+      kTightestTolerance,
+      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples));
   const double present = problem_.problem().integration.relative_tolerance;
-  if (needed >= present) return false;
+  if (needed >= present || expansion_->StepsExactly()) return false;
   // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
-  // replays.
+  // replays: four times as many samples come before the next.
   problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
   auto replayed =
       Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
