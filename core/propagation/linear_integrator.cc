@@ -154,7 +154,7 @@ void LinearIntegrator::Compose(double length_s) {
 IntegratorOutcome LinearIntegrator::Failure() const {
   IntegratorOutcome outcome;
   outcome.ok = false;
-  outcome.reason = "a state has passed 1e100";
+  outcome.reason = "a state exceeds 1e100 in magnitude";
   double largest = 0;
   for (Eigen::Index row = 0; row < next_.rows(); ++row) {
     if (!next_.row(row).isFinite().all()) {

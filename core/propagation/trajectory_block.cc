@@ -13,6 +13,7 @@
 #include "core/propagation/erk_integrator.h"
 #include "core/propagation/linear_integrator.h"
 #include "core/propagation/linear_system.h"
+#include "core/propagation/output_limit.h"
 
 namespace polyest::internal {
 namespace {
@@ -189,12 +190,11 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
 
 void TrajectoryBlock::FailRowsBeyond(const Eigen::ArrayXXd& values, double time_s,
                                      const char* what) {
-  constexpr double kLargest = 1e100;
-  if ((values.abs() <= kLargest).all()) return;
+  if ((values.abs() <= kMaxOutput).all()) return;
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
-    if (!point_alive_[row] || (values.row(row).abs() <= kLargest).all()) continue;
+    if (!point_alive_[row] || (values.row(row).abs() <= kMaxOutput).all()) continue;
     const bool finite = values.row(row).isFinite().all();
-    Fail(row, time_s, 0, absl::StrCat(what, finite ? " has passed 1e100" : " is not finite"));
+    Fail(row, time_s, 0, absl::StrCat(what, finite ? " exceeds 1e100 in magnitude" : " is not finite"));
   }
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/propagation/output_limit.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -90,11 +92,14 @@ bool CoSimulationPoint::ReadOutputs(double* outputs) {
     failure_ = instance_->failure();
     return false;
   }
-  const bool finite = std::all_of(outputs, outputs + output_count_,
-                                  [](double value) { return std::isfinite(value); });
-  if (!finite) failure_ = "an output is not finite";
-  if (finite) good_s_ = time_s_;
-  return finite;
+  const char* const reason =
+      FailureOfOutputs(Eigen::Map<const Eigen::ArrayXd>(outputs, output_count_));
+  if (reason != nullptr) {
+    failure_ = reason;
+    return false;
+  }
+  good_s_ = time_s_;
+  return true;
 }
 
 PointFailure CoSimulationPoint::failure() const {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/propagation/output_limit.h"
 
 namespace polyest::internal {
 namespace {
@@ -221,9 +222,9 @@ bool EventTrajectory::ReadOutputs(double* outputs) {
   if (!SetPoint(time_s_, states_) || !instance_->GetOutputs(outputs)) {
     return FailSinceRead(instance_->failure());
   }
-  const bool finite = std::all_of(outputs, outputs + factory_.outputs.size(),
-                                  [](double value) { return std::isfinite(value); });
-  if (!finite) return FailSinceRead("an output is not finite");
+  const char* const reason =
+      FailureOfOutputs(Eigen::Map<const Eigen::ArrayXd>(outputs, std::ssize(factory_.outputs)));
+  if (reason != nullptr) return FailSinceRead(reason);
   read_s_ = time_s_;
   return true;
 }

@@ -123,6 +123,20 @@ TEST(PointFailures, IncludeOutputsThatAreNotFinite) {
   EXPECT_GT(omega(1, 1), 0);
 }
 
+// ω = √(k/m) is 10¹⁰⁵ at one point and 10⁹⁸ at another, whose squares are still far from overflow.
+TEST(PointFailures, IncludeOutputsWhoseSquaresCouldOverflow) {
+  Ensemble ensemble("mass_spring_frequency", 4, {"omega"});
+  ensemble.Set("m", 1.0);
+  ensemble.Set("k", 1, 1e210);
+  ensemble.Set("k", 2, 1e196);
+  const Matrix omega = ensemble.Propagate({0, 1});
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  EXPECT_EQ(ensemble.failures[0].point, 1);
+  EXPECT_EQ(ensemble.failures[0].reason, "an output exceeds 1e100 in magnitude");
+  EXPECT_TRUE(omega.row(1).array().isNaN().all());
+  EXPECT_DOUBLE_EQ(omega(2, 1), 1e98);
+}
+
 // Follows x″ = −x, but the derivative of a point is NaN once t passes its time of death.
 class Mortal final : public StateSpaceModel {
  public:
