@@ -14,10 +14,10 @@ Region Region::WholePrior(int dimension) {
 Region::Region(Vector centre, Matrix axes)
     : centre_(std::move(centre)), axes_(std::move(axes)), factors_(axes_) {
   POLYEST_CHECK(axes_.rows() == centre_.size() && axes_.cols() == centre_.size());
-  POLYEST_CHECK(std::abs(factors_.Determinant()) > 0);
+  POLYEST_CHECK(std::isfinite(LogVolume()));
 }
 
-double Region::Volume() const { return std::abs(factors_.Determinant()); }
+double Region::LogVolume() const { return factors_.LogAbsDeterminant(); }
 
 Vector Region::ToGerm(const ConstVectorRef& eta) const { return centre_ + axes_ * eta; }
 

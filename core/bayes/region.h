@@ -13,13 +13,14 @@ namespace polyest::internal {
 class Region {
  public:
   static Region WholePrior(int dimension);
-  // `axes` (n × n) must be invertible.
+  // `axes` (n × n) must be invertible. Their determinant may be far below the smallest double: 64
+  // axes of 10⁻⁶ have 10⁻³⁸⁴.
   Region(Vector centre, Matrix axes);
 
   int dimension() const { return static_cast<int>(centre_.size()); }
   const Vector& centre() const { return centre_; }
   const Matrix& axes() const { return axes_; }
-  double Volume() const;  // |det axes|, in units of the volume of the cube of η
+  double LogVolume() const;  // log |det axes|: the volume in units of that of the cube of η
   Vector ToGerm(const ConstVectorRef& eta) const;
   Vector ToLocal(const ConstVectorRef& xi) const;
   // Map W points at once, W × n.

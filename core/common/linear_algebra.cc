@@ -27,7 +27,9 @@ Vector CholeskyFactor::SolveLower(const Vector& right) const {
 
 LuFactors::LuFactors(const Matrix& matrix) : factors_(matrix) {}
 
-double LuFactors::Determinant() const { return factors_.determinant(); }
+double LuFactors::LogAbsDeterminant() const {
+  return factors_.matrixLU().diagonal().array().abs().log().sum();
+}
 
 Vector LuFactors::Solve(const Vector& right) const { return factors_.solve(right); }
 

@@ -44,12 +44,13 @@ class CholeskyFactor {
 };
 
 // The factors P A = L U of a square matrix, with partial pivoting. A is invertible only if
-// Determinant() ≠ 0.
+// LogAbsDeterminant() is finite.
 class LuFactors {
  public:
   explicit LuFactors(const Matrix& matrix);
 
-  double Determinant() const;
+  double LogAbsDeterminant()
+      const;  // log |det A| = Σ log |U_ii|, which neither over- nor underflows
   Vector Solve(const Vector& right) const;
   // Solves for each row of `right` (k × n, k ≥ 1); the solutions are rows, too.
   Matrix SolveRows(const Matrix& right) const;

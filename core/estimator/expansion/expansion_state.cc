@@ -51,8 +51,8 @@ bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
       !IsVector(state.lower, n) || !IsVector(state.upper, n) || !IsElementIn(n, state.element)) {
     return false;
   }
-  const double volume = std::abs(LuFactors(state.axes).Determinant());
-  return volume > 0 && std::isfinite(volume) && (state.upper - state.lower).minCoeff() > 0;
+  return std::isfinite(LuFactors(state.axes).LogAbsDeterminant()) &&
+         (state.upper - state.lower).minCoeff() > 0;
 }
 
 bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {

@@ -47,7 +47,7 @@ class Settler {
       }
       if (!may_move) break;
       const Region region = RegionOfParticles(result_.particles);
-      if (region.Volume() >= kPays * TrustedRegion(design).Volume()) {
+      if (region.LogVolume() >= std::log(kPays) + TrustedRegion(design).LogVolume()) {
         if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
         break;
       }

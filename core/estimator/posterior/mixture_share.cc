@@ -31,7 +31,7 @@ MixtureShare ShareOf(const RegionalExpansion& expansion, const Cost& cost,
   // ∫ e^{−J} dξ = |det axes| ∫ e^{−J} dη
   share.log_evidence =
       LogEvidence(density, design.region.ManyToLocal(draws.Germs(cost.prior())), draws.weights) +
-      std::log(design.region.Volume()) - share.height;
+      design.region.LogVolume() - share.height;
   return share;
 }
 

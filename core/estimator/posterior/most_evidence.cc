@@ -43,7 +43,7 @@ double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const 
     least = std::min(least, minimum.value);
   }
   // ∫ e^{−J} dξ ≤ |box| e^{−min J}
-  return std::log(design.region.Volume()) + (upper - lower).array().log().sum() - least -
+  return design.region.LogVolume() + (upper - lower).array().log().sum() - least -
          HeightOf(expansion, cost);
 }
 

@@ -179,11 +179,11 @@ class PieceFinder {
 
 std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
                                  const std::vector<double>& weights) {
-  double volume = 0;
+  Vector log_volumes(std::ssize(particles));
   std::vector<Matrix> shares;
   Eigen::Index count = 0;
   for (size_t k = 0; k < particles.size(); ++k) {
-    volume += RegionOfParticles(particles[k]).Volume();
+    log_volumes[static_cast<Eigen::Index>(k)] = RegionOfParticles(particles[k]).LogVolume();
     const auto own = static_cast<double>(particles[k].rows());
     const auto share = static_cast<Eigen::Index>(std::ceil(weights[k] * own));
     // Every so many-th, since the particles may be ordered.
@@ -198,7 +198,9 @@ std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
     row += share.rows();
   }
   Region region = RegionOfParticles(pooled);
-  if (region.Volume() > kMaxGrowth * volume) return std::nullopt;
+  const double largest = log_volumes.maxCoeff();
+  const double together = largest + std::log((log_volumes.array() - largest).exp().sum());
+  if (region.LogVolume() > std::log(kMaxGrowth) + together) return std::nullopt;
   return Piece{Element(), std::move(region), std::move(pooled), Vector()};
 }
 

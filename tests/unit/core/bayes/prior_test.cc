@@ -101,14 +101,24 @@ TEST(Region, WholePriorIsTheIdentity) {
   const Eigen::Vector3d eta(0.1, -2, 7);
   EXPECT_EQ(region.ToGerm(eta), eta);
   EXPECT_EQ(region.ToLocal(eta), eta);
-  EXPECT_EQ(region.Volume(), 1);
+  EXPECT_EQ(region.LogVolume(), 0);
+}
+
+// The determinant of 64 axes of 10⁻⁶ is 10⁻³⁸⁴, which underflows; that of 64 axes of 10⁶ overflows.
+TEST(Region, HasAVolumeInManyDimensions) {
+  for (const double axis : {1e-6, 1e6}) {
+    const Region region(Vector::Zero(64), axis * Matrix::Identity(64, 64));
+    EXPECT_NEAR(region.LogVolume(), 64 * std::log(axis), 1e-11);
+    const Vector xi = Vector::Constant(64, 0.5 * axis);
+    EXPECT_TRUE(region.ToLocal(xi).isApprox(Vector::Constant(64, 0.5)));
+  }
 }
 
 TEST(Region, MapsThereAndBackOneOrMany) {
   Matrix axes(2, 2);
   axes << 0.1, 2, -0.3, 1;  // determinant 0.7
   const Region region(Eigen::Vector2d(3, -4), axes);
-  EXPECT_NEAR(region.Volume(), 0.7, 1e-15);
+  EXPECT_NEAR(region.LogVolume(), std::log(0.7), 1e-15);
   EXPECT_TRUE(region.ToGerm(Eigen::Vector2d(1, 1)).isApprox(Eigen::Vector2d(5.1, -3.3)));
   Matrix etas(3, 2);
   etas << 0, 0, 1, 1, -0.5, 0.25;
