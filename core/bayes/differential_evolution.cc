@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace polyest::internal {
 namespace {
@@ -18,13 +19,34 @@ DifferentialEvolution::DifferentialEvolution(const Cost& cost, const Vector& low
     : cost_(cost), lower_(lower), upper_(upper), generator_(seed) {}
 
 void DifferentialEvolution::Evaluate(const Matrix& etas, Vector& costs) const {
-  cost_.EvaluateMany(etas, costs);
+  // Points outside, many where a posterior leans on bounds, are not evaluated at all.
+  thread_local Matrix inside, xis;
+  thread_local Vector inside_costs;
+  thread_local std::vector<Eigen::Index> rows;
+  xis.resize(etas.rows(), etas.cols());
+  xis.noalias() = etas * cost_.region().axes().transpose();
+  xis.rowwise() += cost_.region().centre().transpose();
+  rows.clear();
   for (Eigen::Index i = 0; i < etas.rows(); ++i) {
-    const auto row = etas.row(i).transpose().array();
-    if ((row < lower_.array()).any() || (row > upper_.array()).any()) {
-      costs[i] = std::numeric_limits<double>::infinity();
-    }
+    if (IsInBox(etas, i) && cost_.prior().Contains(xis.row(i).transpose())) rows.push_back(i);
   }
+  if (std::ssize(rows) == etas.rows()) {
+    cost_.EvaluateMany(etas, costs);
+    return;
+  }
+  const auto count = std::ssize(rows);
+  inside.resize(count, etas.cols());
+  for (Eigen::Index k = 0; k < count; ++k) inside.row(k) = etas.row(rows[static_cast<size_t>(k)]);
+  cost_.EvaluateMany(inside, inside_costs);
+  costs.setConstant(etas.rows(), std::numeric_limits<double>::infinity());
+  for (Eigen::Index k = 0; k < count; ++k) costs[rows[static_cast<size_t>(k)]] = inside_costs[k];
+}
+
+bool DifferentialEvolution::IsInBox(const Matrix& etas, Eigen::Index row) const {
+  for (Eigen::Index j = 0; j < etas.cols(); ++j) {
+    if (!(etas(row, j) >= lower_[j] && etas(row, j) <= upper_[j])) return false;
+  }
+  return true;
 }
 
 void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index count,

@@ -25,7 +25,7 @@ class DifferentialEvolution {
   // the object. The moves depend on the arguments alone.
   DifferentialEvolution(const Cost& cost, const Vector& lower, const Vector& upper, uint64_t seed);
 
-  // Writes J at each row of `etas` into `costs`; +∞ outside the box.
+  // Writes J at each row of `etas` into `costs`; +∞ outside the box and outside Ω.
   void Evaluate(const Matrix& etas, Vector& costs) const;
   // Moves each of the rows [first, first + count) once; they are a population of their own of at
   // least two particles.
@@ -35,6 +35,7 @@ class DifferentialEvolution {
   Eigen::Index Draw(Eigen::Index count);             // in [0, count)
 
  private:
+  bool IsInBox(const Matrix& etas, Eigen::Index row) const;
   void MoveHalf(double beta, Eigen::Index first, Eigen::Index count, Eigen::Index other,
                 Eigen::Index other_count, Particles& particles);
 

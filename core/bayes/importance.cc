@@ -1,5 +1,6 @@
 #include "core/bayes/importance.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -15,14 +16,21 @@ struct Component {
   double share;
   double scale;
 };
-constexpr std::array<Component, 2> kComponents = {{{0.85, 1.1}, {0.15, 2.0}}};
+using Mixture = std::array<Component, 2>;
+
+// Returns the components, the narrower first. For a Gaussian its own Σ w² grows as (s²/√(2s² − 1))ⁿ
+// ≈ e^{n (s² − 1)²/2}, so s is chosen to keep that bounded.
+Mixture MixtureOf(int dimension) {
+  const double narrow = std::sqrt(1 + 0.6 / std::sqrt(static_cast<double>(dimension)));
+  return {{{0.85, std::min(1.1, narrow)}, {0.15, 2.0}}};
+}
 
 // Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²}.
-double LogProposal(double squared_radius, int dimension) {
+double LogProposal(const Mixture& mixture, double squared_radius, int dimension) {
   double density = 0;
   // The sum is relative to the widest component, whose exponential underflows last.
-  const double widest = 0.5 * squared_radius / std::pow(kComponents.back().scale, 2);
-  for (const Component& c : kComponents) {
+  const double widest = 0.5 * squared_radius / std::pow(mixture.back().scale, 2);
+  for (const Component& c : mixture) {
     density += c.share * std::pow(c.scale, -dimension) *
                std::exp(widest - 0.5 * squared_radius / (c.scale * c.scale));
   }
@@ -31,12 +39,12 @@ double LogProposal(double squared_radius, int dimension) {
 
 // Returns standard normal points, the first share of them scaled for the first component and so on.
 // Stretches of a Halton sequence are themselves low-discrepancy points.
-Matrix MixturePoints(int dimension, int points) {
+Matrix MixturePoints(const Mixture& mixture, int dimension, int points) {
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
   Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, points).value();
-  const auto first = static_cast<Eigen::Index>(kComponents.front().share * points);
-  normal.topRows(first) *= kComponents.front().scale;
-  normal.bottomRows(points - first) *= kComponents.back().scale;
+  const auto first = static_cast<Eigen::Index>(mixture.front().share * points);
+  normal.topRows(first) *= mixture.front().scale;
+  normal.bottomRows(points - first) *= mixture.back().scale;
   return normal;
 }
 
@@ -47,7 +55,8 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
                                int points) {
   POLYEST_CHECK(points >= 100);
   const int n = cost.dimension();
-  const Matrix normal = MixturePoints(n, points);
+  const Mixture mixture = MixtureOf(n);
+  const Matrix normal = MixturePoints(mixture, n, points);
   // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
   Matrix etas = SolveLowerTransposedRows(hessian_factor, normal);
   etas.rowwise() += minimum.transpose();
@@ -60,7 +69,7 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   Vector log_weights(points);
   for (Eigen::Index i = 0; i < points; ++i) {
     // log w = −J − log q
-    log_weights[i] = least - costs[i] - LogProposal(normal.row(i).squaredNorm(), n);
+    log_weights[i] = least - costs[i] - LogProposal(mixture, normal.row(i).squaredNorm(), n);
   }
   Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
   Eigen::Index kept = 0;

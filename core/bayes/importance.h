@@ -7,7 +7,8 @@
 // have r² = ‖Lᵀ(η − η̂)‖² and the density q ∝ s⁻ⁿ e^{−r²/2s²}. The points are drawn from a mixture
 // of two such densities, one a little wider than the Gaussian and one twice as wide, which bounds
 // the weights where the posterior has heavier tails,
-//   q ∝ Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²},   w ∝ e^{−J}/q,   s = 1.1 and 2, p = 0.85 and 0.15.
+//   q ∝ Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²},   w ∝ e^{−J}/q,   s = s₁ and 2, p = 0.85 and 0.15,
+// where s₁ = min(1.1, √(1 + 0.6/√n)) keeps the effective size from falling with the dimension n.
 // The u are quasi-random: Halton's points mapped by the normal quantile. A mean over a nearly
 // Gaussian posterior is therefore known far better than from as many random draws; the effective
 // size 1/Σ w² (Σ w = 1) counts them as random and so is a lower bound.

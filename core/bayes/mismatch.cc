@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <utility>
 
+#include "core/bayes/factored_sums.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -88,10 +90,19 @@ double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
-Mismatch::Mismatch(MismatchSums sums) : known_(std::move(sums)), count_(known_.count()) {}
+struct Mismatch::Factors {
+  std::once_flag once;
+  std::vector<FactoredSums> known;        // one
+  std::vector<FactoredSums> samples;      // of the other channels
+  std::vector<FactoredSums> differences;  // of those with unknown correlation; else not used
+};
+
+Mismatch::Mismatch(MismatchSums sums)
+    : known_(std::move(sums)), count_(known_.count()), factors_(std::make_shared<Factors>()) {}
 
 Mismatch::Mismatch(std::vector<ChannelSums> channels)
-    : known_(channels.empty() ? 0 : channels.front().samples.terms()) {
+    : known_(channels.empty() ? 0 : channels.front().samples.terms()),
+      factors_(std::make_shared<Factors>()) {
   POLYEST_CHECK(!channels.empty());
   for (ChannelSums& channel : channels) {
     count_ += channel.samples.count();
@@ -155,22 +166,37 @@ Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gr
   return curvature;
 }
 
+const Mismatch::Factors& Mismatch::FactorsOnce() const {
+  std::call_once(factors_->once, [this] {
+    factors_->known.emplace_back(known_, /*relative=*/false);
+    for (const ChannelSums& channel : other_) {
+      factors_->samples.emplace_back(channel.samples, /*relative=*/true);
+      const bool needed = channel.correlation_unknown;
+      factors_->differences.emplace_back(needed ? channel.differences : MismatchSums(0),
+                                         /*relative=*/true);
+    }
+  });
+  return *factors_;
+}
+
 void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
                             VectorRef values) const {
+  const Factors& factors = FactorsOnce();
   values.setZero();
   if (known_.count() > 0) {
-    known_.ChiSquaredMany(differences, product, values);
+    factors.known.front().ChiSquaredMany(differences, product, values);
     values /= 2;
   }
   thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
   a.resize(values.size());
   d.resize(values.size());
-  for (const ChannelSums& channel : other_) {
-    channel.samples.ChiSquaredMany(differences, product, a);
-    if (channel.correlation_unknown) channel.differences.ChiSquaredMany(differences, product, d);
+  for (size_t c = 0; c < other_.size(); ++c) {
+    const bool correlation_unknown = other_[c].correlation_unknown;
+    factors.samples[c].ChiSquaredMany(differences, product, a);
+    if (correlation_unknown) factors.differences[c].ChiSquaredMany(differences, product, d);
     for (Eigen::Index i = 0; i < values.size(); ++i) {
       values[i] +=
-          polyest::internal::Evaluate(channel, a[i], channel.correlation_unknown ? d[i] : 0).value;
+          polyest::internal::Evaluate(other_[c], a[i], correlation_unknown ? d[i] : 0).value;
     }
   }
 }

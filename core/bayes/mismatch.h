@@ -18,6 +18,7 @@
 //
 // Source: Zellner, An Introduction to Bayesian Inference in Econometrics (1971), ch. 3 and 4.
 
+#include <memory>
 #include <vector>
 
 #include "core/bayes/mismatch_sums.h"
@@ -63,13 +64,17 @@ class Mismatch {
   Matrix Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
                    double spent = 0) const;
   // Writes J_mismatch at W points into `values` (W); `differences` is W × S. `product` is scratch
-  // memory, resized to W × S.
+  // memory. The first call factors the sums (factored_sums.h), which costs O(S³) at most.
   void EvaluateMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
  private:
-  MismatchSums known_;              // of all channels with known noise
-  std::vector<ChannelSums> other_;  // the rest
-  int64_t count_ = 0;               // of samples, over all channels
+  struct Factors;
+  const Factors& FactorsOnce() const;
+
+  MismatchSums known_;                // of all channels with known noise
+  std::vector<ChannelSums> other_;    // the rest
+  int64_t count_ = 0;                 // of samples, over all channels
+  std::shared_ptr<Factors> factors_;  // of all sums, for many points; shared by copies
 };
 
 }  // namespace polyest::internal

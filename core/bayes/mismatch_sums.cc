@@ -40,13 +40,4 @@ double MismatchSums::ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef g
   return value;
 }
 
-void MismatchSums::ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product,
-                                  VectorRef values) const {
-  product.resize(differences.rows(), differences.cols());
-  product.noalias() = differences * g_;
-  // rowwise (D G)∘D − 2 D b + w
-  product.rowwise() -= 2 * b_.transpose();
-  values = (product.cwiseProduct(differences).rowwise().sum().array() + w_).max(0.0);
-}
-
 }  // namespace polyest::internal

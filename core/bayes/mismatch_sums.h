@@ -33,9 +33,6 @@ class MismatchSums {
   double ChiSquared(const ConstVectorRef& d) const;
   // Returns χ² at d; `gradient` (S) is with respect to d.
   double ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
-  // Writes χ² at W points into `values` (W); `differences` is W × S. `product` is scratch memory,
-  // resized to W × S.
-  void ChiSquaredMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
   // Writes to or reads from a cereal archive. The shapes of what is read are not checked.
   template <class Archive>

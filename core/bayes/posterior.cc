@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/chaos/collocation_points.h"
+#include "core/bayes/domain_cover.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
@@ -19,19 +19,14 @@ constexpr double kEffectiveFraction = 0.5;
 constexpr double kShrink = 0.7;  // of the guesses, mixed with 0.3 of the cover
 constexpr int kBisections = 50;
 
-// Returns points that cover the box, count × n.
-Matrix CoverOfBox(const Vector& lower, const Vector& upper, int count) {
-  Matrix cover = UnitCubePoints(PointSet::kHalton, static_cast<int>(lower.size()), count);
-  for (Eigen::Index j = 0; j < cover.cols(); ++j) {
-    cover.col(j) = (lower[j] + (upper[j] - lower[j]) * cover.col(j).array()).matrix();
-  }
-  return cover;
-}
-
 class Sampler {
  public:
   Sampler(const Cost& cost, const Vector& lower, const Vector& upper, const SamplerOptions& options)
-      : lower_(lower), upper_(upper), options_(options), moves_(cost, lower, upper, options.seed) {}
+      : cost_(cost),
+        lower_(lower),
+        upper_(upper),
+        options_(options),
+        moves_(cost, lower, upper, options.seed) {}
 
   absl::StatusOr<Particles> Run(const Matrix& guesses, const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(Start(guesses));
@@ -54,7 +49,8 @@ class Sampler {
 
  private:
   absl::Status Start(const Matrix& guesses) {
-    const Matrix cover = CoverOfBox(lower_, upper_, kCoverPerParticle * options_.particles);
+    const Matrix cover = CoverOfDomain(cost_.region(), cost_.prior(), lower_, upper_, guesses,
+                                       kCoverPerParticle * options_.particles);
     const Eigen::Index g = std::min(guesses.rows(), cover.rows());
     Matrix start(2 * g + cover.rows(), cover.cols());
     const auto used = guesses.topRows(g);
@@ -72,6 +68,8 @@ class Sampler {
           "only %d of %d starting points of the sampler have a finite cost", kept, start.rows()));
     }
     particles_ = {start.topRows(kept), costs.head(kept)};
+    // Resampling takes evenly spaced ones, and every fourth of Halton's points lies in one quarter.
+    Shuffle();
     return absl::OkStatus();
   }
 
@@ -116,7 +114,7 @@ class Sampler {
     Shuffle();
   }
 
-  // Shuffles the particles: systematic resampling leaves copies side by side, and the halves that
+  // Shuffles the particles. Systematic resampling leaves copies side by side, and the halves that
   // move each other must not depend on that order.
   void Shuffle() {
     for (Eigen::Index i = particles_.etas.rows() - 1; i > 0; --i) {
@@ -126,6 +124,7 @@ class Sampler {
     }
   }
 
+  const Cost& cost_;
   const Vector& lower_;
   const Vector& upper_;
   const SamplerOptions& options_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/bayes/weighted_samples.h"
+#include "tests/unit/core/bayes/many_parameters.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
 namespace polyest::internal {
@@ -55,6 +56,21 @@ TEST(ImportanceSample, KeepsMostOfItsPointsOnAGaussian) {
     const Cost cost = CostOf(Normals(n), {});
     const double spent = std::pow(1.21 / std::sqrt(2 * 1.21 - 1), n) / 0.85;
     EXPECT_GT(Sample(cost, Vector::Zero(n), 20).effective_size, 0.97 * 16'384 / spent) << n;
+  }
+}
+
+// The data z_i of noise 1 and the prior N(0, 1) leave N(z_i/2, 1/2). With the scale 1.1 in all
+// dimensions 0.85/2.66 of the points would be left.
+TEST(ImportanceSample, KeepsMostOfItsPointsInManyDimensions) {
+  const int n = 64;
+  const Vector z = Vector::LinSpaced(n, -2, 2);
+  const WeightedDraws draws = Sample(CostOfEach(ManyNormals(n), z, 1), z / 2, 20);
+  EXPECT_GT(draws.effective_size, 0.6 * 16'384);
+  for (int i = 0; i < n; ++i) {
+    const double sd = std::sqrt(0.5);
+    // Four standard errors of as many random draws as the effective size.
+    EXPECT_NEAR(WeightedMean(draws.etas.col(i), draws.weights), z[i] / 2, 0.04 * sd);
+    EXPECT_NEAR(WeightedStandardDeviation(draws.etas.col(i), draws.weights) / sd, 1, 0.03);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <stop_token>
 
+#include "tests/unit/core/bayes/many_parameters.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
 namespace polyest::internal {
@@ -196,6 +197,18 @@ TEST(SamplePosterior, IsCancelledByAStopRequest) {
   const auto particles = SamplePosterior(cost, Filled(1, -5), Filled(1, 5), Matrix(0, 1), {},
                                          Stop(source.get_token()));
   EXPECT_EQ(particles.status().code(), absl::StatusCode::kCancelled);
+}
+
+// The box reaches beyond Ω as an expansion's does. Of 4,000 points of it not one would lie in Ω:
+// the fraction is 1.15⁻⁶⁴ ≈ 10⁻⁴. The posterior is the prior, of standard deviation 1/√3.
+TEST(SamplePosterior, StartsInManyDimensions) {
+  const int n = 64;
+  const Particles particles = Sample(CostOfEach(ManyUniforms(n), Vector(0), 1), 1.15);
+  ASSERT_EQ(particles.etas.rows(), 1000);
+  for (int j = 0; j < n; ++j) {
+    EXPECT_NEAR(particles.etas.col(j).mean(), 0, MeanError(1 / std::sqrt(3.0), 1000));
+    EXPECT_LE(particles.etas.col(j).cwiseAbs().maxCoeff(), 1);
+  }
 }
 
 TEST(SamplePosterior, NeedsSomewhereToStart) {
