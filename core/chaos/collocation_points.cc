@@ -3,6 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <random>
 #include <utility>
 
 #include "core/chaos/gauss_rule.h"
@@ -11,6 +14,8 @@
 
 namespace polyest::internal {
 namespace {
+
+constexpr int kLastFaureBase = 89;  // of 24 dimensions
 
 std::vector<int> FirstPrimes(int count) {
   std::vector<int> primes;
@@ -45,8 +50,22 @@ std::vector<int> DigitPermutation(int base) {
   return permutation;
 }
 
+// Returns a permutation of the digits 0 … base − 1 that fixes 0 and is otherwise random, the same
+// at each call.
+std::vector<int> RandomPermutation(int base) {
+  std::vector<int> permutation(static_cast<size_t>(base));
+  std::iota(permutation.begin(), permutation.end(), 0);
+  std::mt19937_64 generator(static_cast<uint64_t>(base));
+  for (uint64_t i = permutation.size() - 1; i > 1; --i) {
+    std::swap(permutation[i], permutation[1 + generator() % i]);
+  }
+  return permutation;
+}
+
 std::vector<int> Digits(int base, bool scrambled) {
-  if (scrambled) return DigitPermutation(base);
+  if (scrambled) {
+    return base > kLastFaureBase ? RandomPermutation(base) : DigitPermutation(base);
+  }
   std::vector<int> digits;
   for (int digit = 0; digit < base; ++digit) digits.push_back(digit);
   return digits;

@@ -21,8 +21,10 @@ namespace polyest::internal {
 // for extreme discrepancy", J. Number Theory 42 (1992), it has 5.3, less than independent random
 // points (6 to 7). The permutations follow from σ_2 = (0, 1) by σ_{2m} = (2σ_m, 2σ_m + 1) and, for
 // odd b, by raising the digits of σ_{b−1} from (b−1)/2 on by one and inserting (b−1)/2 in the
-// middle; zero stays zero. The primes 2, 3 and 5 are not permuted, so few dimensions give Halton's
-// own points.
+// middle; zero stays zero. In bases beyond the number of points these, too, make coordinates that
+// hardly differ: with 82 points in 40 dimensions the condition number of order 1 is 700, with 130
+// in 64 it is 1,000. The primes beyond 89 therefore have fixed random permutations, which make
+// it 5. The primes 2, 3 and 5 are not permuted, so few dimensions give Halton's own points.
 Matrix UnitCubePoints(PointSet set, int dimension, int count);
 
 // Returns collocation points in germ coordinates, Q × n: unit-cube points mapped by each germ's

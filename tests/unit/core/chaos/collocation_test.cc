@@ -100,6 +100,18 @@ TEST(CollocationMatrix, OfHaltonPointsIsWellConditioned) {
   }
 }
 
+// As many independent random points have about 5.5. With Faure's permutations alone it is 700 and
+// more: the bases of the last dimensions exceed the number of points.
+TEST(CollocationMatrix, OfManyParametersIsWellConditioned) {
+  for (const int n : {26, 40, 64}) {
+    const std::vector<Germ> germs(static_cast<size_t>(n), Germ::Uniform());
+    const Matrix points = CollocationPoints(PointSet::kHalton, germs, 1, 2 * (n + 1)).value();
+    const auto matrix = CollocationMatrix::Factor(Basis(germs, 1), points);
+    ASSERT_TRUE(matrix.ok()) << matrix.status();
+    EXPECT_LT(matrix->condition(), 7) << n;
+  }
+}
+
 TEST(CollocationMatrix, ConditionIsTheRatioOfSingularValues) {
   // The points are ±1 and the basis is 1, √3 ξ, so that the columns are orthogonal with lengths √2
   // and √6.
