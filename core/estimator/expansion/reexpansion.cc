@@ -7,6 +7,7 @@
 
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
+#include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/record/rows_ahead.h"
 
@@ -103,13 +104,9 @@ class Settler {
     Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
     power_ = LikelihoodPower(expansion(), cost);
     cost.set_power(power_);
-    Vector lower, upper;
-    SamplingBox(expansion().design(), lower, upper);
-    SamplerOptions options;
-    options.seed = request_.seed + static_cast<uint64_t>(attempt);
-    const Matrix guesses = expansion().design().region.ManyToLocal(result_.particles);
     absl::StatusOr<Particles> particles =
-        SamplePosterior(cost, lower, upper, guesses, options, stop_);
+        SampleForSettlement(cost, expansion().design(), result_.particles,
+                            request_.seed + static_cast<uint64_t>(attempt), stop_);
     if (absl::IsFailedPrecondition(particles.status())) return false;
     if (!particles.ok()) return particles.status();
     particles_ = *std::move(particles);

@@ -2,17 +2,8 @@
 
 // Draws of the posterior on an expansion, with as few evaluations as a reliable result needs.
 // Importance sampling from the curvature's Gaussian is used where the posterior is nearly Gaussian
-// (bayes/importance.h). Elsewhere Markov chains are started from tempered particles
+// (expansion/guarded_importance.h). Elsewhere Markov chains are started from tempered particles
 // (bayes/posterior.h, bayes/markov_chains.h).
-//
-// Importance sampling is used only if all of these hold:
-// - There is one minimum, searched from starts spread over the best points of a cover of the box
-//   and of the guesses. Other minima have a negligible e^{−J}.
-// - It lies inside Ω and the box, the Hessian there is positive definite and the gradient
-//   vanishes: Newton's decrement gᵀH⁻¹g/2 is below 10⁻³.
-// - No probable point of the cover or of the guesses lies outside the reach of the Gaussian.
-// - The effective size is at least half the number of points, and no weight exceeds 1 % of the
-//   total.
 
 #include <absl/status/statusor.h>
 

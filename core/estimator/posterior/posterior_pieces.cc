@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/newton_starts.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cost_slice.h"
@@ -42,8 +43,10 @@ class PieceFinder {
         search_(SearchOf(cost, design)),
         least_(static_cast<size_t>(std::ceil(kMinShare * static_cast<double>(particles.rows())))) {
     cost.EvaluateMany(particles_, costs_);
-    const Matrix starts = SpreadStarts(particles_, costs_, kStarts);
-    for (Minimum& minimum : FindMinima(search_, starts, MinimizerOptions(), Stop())) {
+    const MinimizerOptions options;
+    const Matrix starts =
+        ImprovedStarts(cost, search_, SpreadStarts(particles_, costs_, kStarts), options);
+    for (Minimum& minimum : FindMinima(search_, starts, options, Stop())) {
       if (minimum.converged) minima_.push_back(std::move(minimum));
     }
   }
