@@ -10,7 +10,10 @@ namespace polyest {
 
 // The integrator.
 enum class IntegrationMethod {
-  kAuto,      // explicit; trajectories that need too many steps change to the stiff method for good
+  // Steps by matrix exponentials for models that are linear in states and inputs
+  // (StateSpaceModel::IsLinear), without error of integration; else explicit, and trajectories that
+  // need too many steps change to the stiff method for good.
+  kAuto,
   kExplicit,  // Dormand–Prince 5(4)
   kStiff,     // backward differentiation formulas of order 1 to 5
 };
@@ -19,9 +22,9 @@ enum class IntegrationMethod {
 struct IntegrationOptions {
   IntegrationMethod method = IntegrationMethod::kAuto;  // which integrator
   // From 1e-13 to 0.01. The estimated local error of each state of each trajectory is at most
-  // relative_tolerance × the largest magnitude of this state so far, + 1e-14 in SI units. That
-  // magnitude is the trajectory's own, but at least a thousandth of the largest in its block of
-  // trajectories.
+  // relative_tolerance × the largest magnitude of this state so far. That magnitude is the
+  // trajectory's own, but at least a thousandth of the largest in its block of trajectories.
+  // Nothing is absolute: states of 1e-14 are as accurate as states of 1. Exact steps do not use it.
   double relative_tolerance = 1e-7;
   // Most steps from one sample to the next, ≥ 1; a trajectory that needs more has failed.
   int max_steps = 100'000;
