@@ -41,6 +41,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "noise not learned";
     case v1::Diagnostic::REGULARIZATION_NOT_DETERMINED:
       return "regularization not determined";
+    case v1::Diagnostic::SUSPICIOUS_DATA:
+      return "suspicious data";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }

@@ -255,6 +255,24 @@ Vector RegionalExpansion::TermWeights() const {
   return weights;
 }
 
+// With orthonormal polynomials, an output cᵀφ has the mean c_0 and the variance Σ c_s² over s ≥ 1
+// (12).
+std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int channel) const {
+  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
+  if (!design_.whole_prior || sigma <= 0) return std::nullopt;
+  const size_t width = block_.values.size() / block_.rows.size();
+  const int column = row * channels_ + channel;
+  const auto coefficients = coefficients_.col(column);
+  PriorPrediction prediction;
+  prediction.value = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(channel)];
+  prediction.mean = coefficients[0];
+  prediction.variance =
+      coefficients.tail(coefficients.size() - 1).squaredNorm() + residual_variance_[column];
+  prediction.noise = sigma;
+  if (!std::isfinite(prediction.variance) || !std::isfinite(prediction.mean)) return std::nullopt;
+  return prediction;
+}
+
 void RegionalExpansion::Absorb(int row) {
   const size_t width = block_.values.size() / block_.rows.size();
   const int run = block_.rows[static_cast<size_t>(row)].run;

@@ -13,12 +13,14 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/bayes/mismatch.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/estimator/expansion/expansion_design.h"
+#include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "core/estimator/record/whitening.h"
 #include "polyest/samples.h"
@@ -91,6 +93,9 @@ class RegionalExpansion {
   double ResidualToNoise(int row) const;
   // Returns how much each term of the basis contributes (S), Σ c_s²/R over the absorbed samples.
   Vector TermWeights() const;
+  // Returns what the prior predicts for the channel's sample in that row, if the expansion is over
+  // the whole prior and the prediction is finite. Samples with correlated noise are whitened.
+  std::optional<PriorPrediction> PredictionOf(int row, int channel) const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
 

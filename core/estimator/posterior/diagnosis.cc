@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/estimator/posterior/undersampling.h"
+#include "core/estimator/record/suspicious_data.h"
 
 namespace polyest::internal {
 namespace {
@@ -326,6 +327,9 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddMinima(findings, diagnostics);
   AddRegularization(findings, diagnostics);
   AddFailures(findings, diagnostics);
+  for (std::string& warning : WarnOfSuspiciousData(*findings.problem, findings.record->facts())) {
+    diagnostics.push_back({DiagnosticCode::kSuspiciousData, std::move(warning)});
+  }
   return diagnostics;
 }
 

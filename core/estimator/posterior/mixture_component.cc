@@ -11,6 +11,7 @@
 #include "core/estimator/expansion/leaning.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/new_runs.h"
+#include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
 #include "core/estimator/posterior/misfit.h"
@@ -189,6 +190,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     }
     expansion_->Absorb(row);
     summary_.Add(block, row, problem_.channels());
+    AddPredictionsOf(*expansion_, row, summary_);
     ++taken_;
     bool moved = false;
     if (too_coarse) {

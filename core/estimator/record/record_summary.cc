@@ -31,6 +31,7 @@ void RecordSummary::Add(const RowBlock& block, int row, int channels) {
   const auto m = static_cast<size_t>(channels);
   const size_t width = block.values.size() / block.rows.size();
   channels_.resize(m);
+  facts_.Add(block, row, channels);
   for (size_t c = 0; c < m; ++c) {
     const double sigma = block.noise[k * m + c];
     if (sigma <= 0) continue;  // no sample

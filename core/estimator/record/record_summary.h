@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "polyest/samples.h"
 
@@ -32,6 +33,10 @@ class RecordSummary {
 
   // Adds row `row` of the block, whose samples are those of `channels` channels.
   void Add(const RowBlock& block, int row, int channels);
+  // Adds what the prior predicts for the channel's next sample; rows must have been added.
+  void AddPrediction(int channel, const PriorPrediction& prediction) {
+    facts_.AddPrediction(channel, prediction);
+  }
 
   int64_t rows() const { return rows_; }
   int64_t samples() const;                   // over all channels
@@ -43,13 +48,15 @@ class RecordSummary {
   // Returns the first rows of the first run, at most kBeginning, which suffice to see how the
   // record is sampled.
   const RowBlock& beginning() const { return beginning_; }
+  // Returns what suspicious data are recognized by.
+  const DataFacts& facts() const { return facts_; }
 
   static constexpr int kBeginning = 64;
 
   // cereal calls this for writing and for reading.
   template <class Archive>
   void serialize(Archive& archive) {
-    archive(rows_, time_s_, channels_, beginning_);
+    archive(rows_, time_s_, channels_, beginning_, facts_);
   }
 
  private:
@@ -57,6 +64,7 @@ class RecordSummary {
   double time_s_ = 0;
   std::vector<Channel> channels_;
   RowBlock beginning_;
+  DataFacts facts_;
 };
 
 }  // namespace polyest::internal

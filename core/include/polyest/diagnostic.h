@@ -20,6 +20,7 @@ enum class DiagnosticCode {
   kCorrelatedResiduals,  // residuals are correlated in time; the noise is taken to be white
   kNoiseNotLearned,      // too few samples to learn a noise of unknown size from
   kRegularizationNotDetermined,  // the rule asked for does not choose an α²; it stays 1
+  kSuspiciousData,               // the data are allowed but probably not what was meant
 };
 
 // One warning.

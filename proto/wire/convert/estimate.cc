@@ -43,6 +43,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::NOISE_NOT_LEARNED;
     case DiagnosticCode::kRegularizationNotDetermined:
       return v1::Diagnostic::REGULARIZATION_NOT_DETERMINED;
+    case DiagnosticCode::kSuspiciousData:
+      return v1::Diagnostic::SUSPICIOUS_DATA;
   }
   POLYEST_CHECK(false);
 }

@@ -119,8 +119,8 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kNonGaussian, v1::Diagnostic::NON_GAUSSIAN},
       {DiagnosticCode::kCorrelatedResiduals, v1::Diagnostic::CORRELATED_RESIDUALS},
       {DiagnosticCode::kNoiseNotLearned, v1::Diagnostic::NOISE_NOT_LEARNED},
-      {DiagnosticCode::kRegularizationNotDetermined,
-       v1::Diagnostic::REGULARIZATION_NOT_DETERMINED}};
+      {DiagnosticCode::kRegularizationNotDetermined, v1::Diagnostic::REGULARIZATION_NOT_DETERMINED},
+      {DiagnosticCode::kSuspiciousData, v1::Diagnostic::SUSPICIOUS_DATA}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};

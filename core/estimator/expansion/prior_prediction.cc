@@ -1,0 +1,58 @@
+#include "core/estimator/expansion/prior_prediction.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/estimator/record/row_block.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int64_t kRows = 16;
+constexpr std::chrono::seconds kPatience{1};
+
+// Returns the first rows, with those ahead that settle the streamed inputs.
+RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning) {
+  RowBlock block;
+  const int64_t ahead = problem.knots_ahead();
+  const int64_t rows = std::min<int64_t>(kRows + ahead, beginning.count());
+  AppendRows(beginning, 0, rows, block);
+  block.ahead = static_cast<int>(std::min(ahead, rows));
+  return block;
+}
+
+LearnedNoise NoiseOf(const ResolvedProblem& problem) {
+  LearnedNoise noise;
+  for (const MeasuredOutput& measured : problem.problem().measured) {
+    const bool correlated = measured.noise.correlation == NoiseCorrelation::kKnown;
+    noise.channels.push_back({.time_constant_s = correlated ? measured.noise.time_constant_s : 0});
+  }
+  return noise;
+}
+
+}  // namespace
+
+void AddPredictionsOf(const RegionalExpansion& expansion, int row, RecordSummary& record) {
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    const auto prediction = expansion.PredictionOf(row, static_cast<int>(c));
+    if (prediction) record.AddPrediction(static_cast<int>(c), *prediction);
+  }
+}
+
+void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record) {
+  if (record.facts().intervals().StartsLate()) return;
+  const RowBlock block = FirstRows(problem, record.beginning());
+  if (block.count() == 0) return;
+  auto design = DesignForPrior(problem);
+  if (!design.ok()) return;
+  auto expansion = RegionalExpansion::Make(problem, *std::move(design), NoiseOf(problem), 1);
+  if (!expansion.ok()) return;
+  const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
+  if (!(*expansion)->Propagate(block, stop).ok()) return;
+  for (int row = 0; row < (*expansion)->fitted_rows(); ++row) {
+    AddPredictionsOf(**expansion, row, record);
+  }
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,149 @@
+#include "core/estimator/record/data_facts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace polyest::internal {
+namespace {
+
+constexpr size_t kMinDistinct = 4;          // for a resolution: fewer are multiples by chance
+constexpr double kRounding = 1e-9;          // of a mean interval
+constexpr double kMultiple = 1e-3;          // how far from a multiple of the step a value may be
+constexpr double kIntegrationError = 1e-5;  // relative error of a prediction that means nothing
+
+}  // namespace
+
+int IntervalFacts::OctaveOf(double interval_s) {
+  return std::clamp(std::ilogb(interval_s) + kOctaves / 2, 0, kOctaves - 1);
+}
+
+void IntervalFacts::Add(const SampleRow& row) {
+  if (rows_ == 0 || row.run != run_) {
+    latest_first_s_ = std::max(latest_first_s_, row.time_s);
+  } else {
+    const double interval_s = row.time_s - time_s_;
+    if (interval_s > longest_s_) {
+      longest_s_ = interval_s;
+      longest_after_s_ = time_s_;
+    }
+    count_[OctaveOf(interval_s)] += 1;
+    sum_s_[OctaveOf(interval_s)] += interval_s;
+  }
+  ++rows_;
+  run_ = row.run;
+  time_s_ = row.time_s;
+}
+
+double IntervalFacts::usual_s() const {
+  const double half = 0.5 * count_.sum();
+  double before = 0;
+  for (Eigen::Index k = 0; k < count_.size(); ++k) {
+    before += count_[k];
+    if (count_[k] > 0 && before >= half) return sum_s_[k] / count_[k];
+  }
+  return 0;
+}
+
+int64_t IntervalFacts::gaps() const {
+  const double gap_s = kGapSteps * usual_s();
+  if (!(longest_s_ > gap_s)) return 0;
+  double gaps = 0;
+  for (Eigen::Index k = 0; k < count_.size(); ++k) {
+    if (count_[k] > 0 && sum_s_[k] > gap_s * count_[k]) gaps += count_[k];
+  }
+  return std::max<int64_t>(1, std::llround(gaps));
+}
+
+bool IntervalFacts::IsConsistent() const {
+  if (count_.size() != kOctaves || sum_s_.size() != kOctaves) return false;
+  for (int k = 0; k < kOctaves; ++k) {
+    if (!(count_[k] >= 0) || count_[k] != std::floor(count_[k])) return false;
+    // An empty octave has no sum, and another one's mean lies in it up to rounding.
+    const double mean_s = sum_s_[k] / count_[k];
+    if (count_[k] == 0
+            ? sum_s_[k] != 0
+            : OctaveOf(mean_s * (1 + kRounding)) != k && OctaveOf(mean_s * (1 - kRounding)) != k) {
+      return false;
+    }
+  }
+  return count_.sum() <= static_cast<double>(rows_) && longest_s_ >= 0 && latest_first_s_ >= 0;
+}
+
+double DistanceOf(const PriorPrediction& prediction) {
+  const double tolerance = kIntegrationError * prediction.mean;
+  const double variance = prediction.variance + prediction.noise * prediction.noise;
+  return std::abs(prediction.value - prediction.mean) / std::sqrt(variance + tolerance * tolerance);
+}
+
+void ColumnFacts::Add(double value, double noise) {
+  if (samples == 0) {
+    smallest = largest = value;
+    min_noise = max_noise = noise;
+  }
+  ++samples;
+  smallest = std::min(smallest, value);
+  largest = std::max(largest, value);
+  min_noise = std::min(min_noise, noise);
+  max_noise = std::max(max_noise, noise);
+  // Welford's update of the mean and the sum of squares about it.
+  const double before = value - mean;
+  mean += before / static_cast<double>(samples);
+  square_sum += before * (value - mean);
+  if (distinct.size() >= kMaxDistinct) return;
+  const auto place = std::ranges::lower_bound(distinct, value);
+  if (place == distinct.end() || *place != value) distinct.insert(place, value);
+}
+
+void ColumnFacts::AddPrediction(const PriorPrediction& prediction) {
+  if (predicted == 0) first = prediction;
+  ++predicted;
+  const double error = prediction.value - prediction.mean;
+  error_sum += error * error;
+  deviation_sum += prediction.variance + prediction.noise * prediction.noise;
+  if (DistanceOf(prediction) > DataFacts::kFar) ++far;
+}
+
+bool ColumnFacts::IsConsistent() const {
+  const bool in_range =
+      distinct.empty() || (distinct.front() >= smallest && distinct.back() <= largest);
+  return samples >= 0 && distinct.size() <= kMaxDistinct && std::ranges::is_sorted(distinct) &&
+         in_range && distinct.empty() == (samples == 0) && smallest <= largest && min_noise >= 0 &&
+         min_noise <= max_noise && square_sum >= 0 && std::isfinite(mean) && far >= 0 &&
+         far <= predicted && predicted <= samples && error_sum >= 0 && deviation_sum >= 0;
+}
+
+double ColumnFacts::Spread() const {
+  return samples == 0 ? 0 : std::sqrt(square_sum / static_cast<double>(samples));
+}
+
+double ColumnFacts::Resolution() const {
+  if (distinct.size() < kMinDistinct) return 0;
+  double step = std::numeric_limits<double>::infinity();
+  for (size_t i = 1; i < distinct.size(); ++i) step = std::min(step, distinct[i] - distinct[i - 1]);
+  for (const double value : distinct) {
+    const double multiple = (value - distinct.front()) / step;
+    if (std::abs(multiple - std::round(multiple)) > kMultiple) return 0;
+  }
+  return step;
+}
+
+bool DataFacts::IsFor(size_t columns) const {
+  return columns_.size() == columns && intervals_.IsConsistent() &&
+         std::ranges::all_of(columns_, &ColumnFacts::IsConsistent);
+}
+
+void DataFacts::Add(const RowBlock& block, int row, int channels) {
+  const auto k = static_cast<size_t>(row);
+  const auto m = static_cast<size_t>(channels);
+  const size_t width = block.values.size() / block.rows.size();
+  columns_.resize(width);
+  intervals_.Add(block.rows[k]);
+  for (size_t i = 0; i < width; ++i) {
+    const double value = block.values[k * width + i];
+    if (std::isnan(value)) continue;
+    columns_[i].Add(value, i < m ? block.noise[k * m + i] : 0);
+  }
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,174 @@
+#include "core/estimator/record/suspicious_data.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <cmath>
+
+namespace polyest::internal {
+namespace {
+
+// If the smallest noise is below this part of the largest, a few samples outweigh all others.
+constexpr double kNoiseRange = 1e-3;
+// Probability below which the samples' spread is too small for their noise.
+constexpr double kUnlikely = 5e-3;
+constexpr int64_t kMinConstant = 3;  // samples of one value before it is said never to change
+
+// Returns an upper bound of the probability that χ² with `degrees` degrees of freedom is at most
+// `chi_squared` (Chernoff): (r e^{1−r})^{degrees/2} with r = χ²/degrees < 1; else 1.
+double ProbabilityOfLess(double chi_squared, double degrees) {
+  if (degrees <= 0) return 1;
+  const double r = chi_squared / degrees;
+  return r < 1 ? std::exp(0.5 * degrees * (std::log(r) + 1 - r)) : 1;
+}
+
+// Returns the names of the parameters that are initial states, "x_0" or "x0" for a state x.
+std::vector<std::string> InitialStates(const ModelDescription& model) {
+  std::vector<std::string> names;
+  for (const Quantity& state : model.states) {
+    for (const std::string& name : {state.name + "_0", state.name + "0"}) {
+      if (model.FindParameter(name)) names.push_back(name);
+    }
+  }
+  return names;
+}
+
+class Warnings {
+ public:
+  Warnings(const ResolvedProblem& problem, const DataFacts& facts)
+      : problem_(problem),
+        model_(problem.problem().model->description()),
+        intervals_(facts.intervals()),
+        columns_(facts.columns()) {}
+
+  std::vector<std::string> Run() {
+    if (columns_.empty()) return {};
+    AddGaps();
+    AddLateStart();
+    const auto channels = static_cast<size_t>(problem_.channels());
+    int64_t samples = 0;
+    for (size_t i = 0; i < columns_.size(); ++i) {
+      AddConstant(NameOf(i), columns_[i], i < channels);
+      if (i >= channels) continue;
+      samples += columns_[i].samples;
+      AddNoise(problem_.problem().measured[i], columns_[i]);
+      AddPrediction(problem_.problem().measured[i], columns_[i]);
+    }
+    if (samples < problem_.dimension()) {
+      Add("there are only %d samples for %d unknowns: the prior determines what they leave open",
+          samples, problem_.dimension());
+    }
+    return std::move(warnings_);
+  }
+
+ private:
+  template <class... Arguments>
+  void Add(const absl::FormatSpec<Arguments...>& format, const Arguments&... arguments) {
+    warnings_.push_back(absl::StrFormat(format, arguments...));
+  }
+
+  const std::string& NameOf(size_t column) const {
+    const auto channels = static_cast<size_t>(problem_.channels());
+    if (column < channels) return problem_.problem().measured[column].output;
+    const int input = problem_.streamed_inputs()[column - channels];
+    return model_.inputs[static_cast<size_t>(input)].name;
+  }
+
+  // Returns "its initial state (x0, v0)".
+  std::string InitialState() const {
+    const std::vector<std::string> names = InitialStates(model_);
+    return names.empty() ? "its initial state"
+                         : absl::StrCat("its initial state (", absl::StrJoin(names, ", "), ")");
+  }
+
+  bool StartsLate() const { return !model_.states.empty() && intervals_.StartsLate(); }
+
+  // Between samples the model goes on exactly, unless an input is known at the samples only.
+  void AddGaps() {
+    const int64_t gaps = intervals_.gaps();
+    if (gaps == 0 || problem_.streamed_inputs().empty()) return;
+    Add("%d gap%s of more than %g usual steps; the longest is %g s, after t = %g s: the streamed "
+        "input is interpolated across it, and what it did there is not known; split the record "
+        "there with a column run, and make %s uncertain with perRun",
+        gaps, gaps == 1 ? "" : "s", IntervalFacts::kGapSteps, intervals_.longest_s(),
+        intervals_.longest_after_s(), InitialState());
+  }
+
+  void AddLateStart() {
+    if (!StartsLate()) return;
+    Add("t does not begin near 0: a run's first row is at t = %g s, but the model starts from its "
+        "initial state at t = 0; if the record was cut out of a longer one, let its times begin at "
+        "0 and make %s uncertain",
+        intervals_.latest_first_s(), InitialState());
+  }
+
+  void AddConstant(const std::string& name, const ColumnFacts& column, bool measured) {
+    if (column.samples == 0 && measured) {
+      Add("%s is measured, but the data have no sample of it", name);
+    }
+    if (column.samples >= kMinConstant && column.smallest == column.largest) {
+      Add("%s never changes: it is %g in every row; is the sensor connected?", name,
+          column.smallest);
+    }
+  }
+
+  void AddNoise(const MeasuredOutput& measured, const ColumnFacts& column) {
+    if (measured.noise.unknown || column.samples < 3 || column.smallest == column.largest) return;
+    const std::string& name = measured.output;
+    const double chi_squared = column.square_sum / (column.min_noise * column.min_noise);
+    if (ProbabilityOfLess(chi_squared, static_cast<double>(column.samples - 1)) < kUnlikely) {
+      Add("%s: its noise of %g is larger than the spread of its samples, %g; check its size and "
+          "its "
+          "unit",
+          name, column.min_noise, column.Spread());
+    }
+    const double rounding = column.Resolution() / std::sqrt(12.0);
+    if (column.max_noise < rounding) {
+      Add("%s: its noise of at most %g is less than the rounding of its samples, %.2g, which is "
+          "noise as well",
+          name, column.max_noise, rounding);
+    }
+    // Noise with a part relative to the largest value so far is that small only during rest.
+    if (measured.noise.relative_to_max == 0 && column.min_noise < kNoiseRange * column.max_noise) {
+      Add("%s: its noise goes down to %g, so that the samples near 0 outweigh all others; give it "
+          "an absolute part",
+          name, column.min_noise);
+    }
+  }
+
+  // Noise that is not known, or has gross errors, is no measure of a sample's distance.
+  void AddPrediction(const MeasuredOutput& measured, const ColumnFacts& column) {
+    if (measured.noise.unknown || measured.noise.outliers != OutlierHandling::kNone) return;
+    if (column.predicted == 0 || StartsLate()) return;
+    const PriorPrediction& first = column.first;
+    const double distance = DistanceOf(first);
+    const bool is_fixed = first.variance <= first.noise * first.noise;
+    if (!model_.states.empty() && is_fixed && distance > DataFacts::kFar) {
+      Add("%s: its first sample, %g, is %.3g times its noise away from %g, where the model's "
+          "initial state puts it whatever the unknowns are; check the unit of %s, or make %s "
+          "uncertain",
+          measured.output, first.value, distance, first.mean, measured.output, InitialState());
+      return;
+    }
+    if (column.far < 2 || 2 * column.far <= column.predicted) return;
+    Add("%s: the data are %.3g times as far from what the prior predicts as its spread and the "
+        "noise together; check the unit of %s, the priors and the values that are fixed",
+        measured.output, std::sqrt(column.error_sum / column.deviation_sum), measured.output);
+  }
+
+  const ResolvedProblem& problem_;
+  const ModelDescription& model_;
+  const IntervalFacts& intervals_;
+  const std::vector<ColumnFacts>& columns_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+std::vector<std::string> WarnOfSuspiciousData(const ResolvedProblem& problem,
+                                              const DataFacts& facts) {
+  return Warnings(problem, facts).Run();
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,158 @@
+// Tests the warnings of suspicious data in estimates.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/core/estimator/snapshot_session.h"
+#include "tests/unit/core/estimator/text_problem.h"
+
+namespace polyest::internal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::vector<std::string> Warnings(const Estimate& estimate) {
+  std::vector<std::string> messages;
+  for (const Diagnostic& diagnostic : estimate.diagnostics) {
+    if (diagnostic.code == DiagnosticCode::kSuspiciousData) messages.push_back(diagnostic.message);
+  }
+  return messages;
+}
+
+std::vector<std::string> WarningsOf(const Problem& problem, const Samples& samples) {
+  return Warnings(EstimateOf(problem, samples));
+}
+
+// Returns `count` times from `first` on, 0.05 s apart.
+std::vector<double> TimesFrom(double first, int count) {
+  std::vector<double> times;
+  for (int k = 0; k < count; ++k) times.push_back(first + 0.05 * k);
+  return times;
+}
+
+// Makes the oscillator's problem with v0 in (0.5, 1.5) m/s.
+Problem VelocityProblem(double noise = 0.01) {
+  return InitialVelocityProblem(UncertainParameter::Uniform("v0", 0.5, 1.5).value(), noise);
+}
+
+// Makes the oscillator's problem with a streamed force.
+Problem ForcedProblem() {
+  Problem problem = VelocityProblem();
+  problem.inputs = {{"force", StreamedInput{.interpolation = Interpolation::kLinear}}};
+  return problem;
+}
+
+Samples ForcedRecord(const std::vector<double>& times) {
+  Samples samples = InitialVelocityRecord(times, 1.1, 0.01);
+  samples.columns.push_back({"force", {}, {}});
+  // A force far too small to move the mass, but not constant.
+  for (const double t : times) samples.columns[1].value.push_back(1e-6 * std::cos(t));
+  samples.end_of_run = true;
+  return samples;
+}
+
+TEST(SuspiciousData, AreNoneInAGoodRecord) {
+  EXPECT_THAT(WarningsOf(VelocityProblem(), InitialVelocityRecord(TimesFrom(0.05, 60), 1.1, 0.01)),
+              IsEmpty());
+  EXPECT_THAT(WarningsOf(ForcedProblem(), ForcedRecord(TimesFrom(0, 60))), IsEmpty());
+}
+
+TEST(SuspiciousData, AreTimesThatDoNotBeginNearZero) {
+  const Samples samples = InitialVelocityRecord(TimesFrom(12.345, 60), 1.1, 0.01);
+  EXPECT_THAT(WarningsOf(VelocityProblem(), samples),
+              ElementsAre(AllOf(HasSubstr("t does not begin near 0"), HasSubstr("t = 12.345 s"),
+                                HasSubstr("(x0, v0)"))));
+}
+
+TEST(SuspiciousData, AreFirstSamplesAwayFromAFixedInitialState) {
+  Samples samples = InitialVelocityRecord(TimesFrom(0, 60), 1.1, 0.01);
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    samples.columns[0].value[k] += 0.2 * std::cos(2 * std::numbers::pi * samples.time_s[k]);
+  }
+  EXPECT_THAT(WarningsOf(VelocityProblem(), samples),
+              ElementsAre(AllOf(HasSubstr("its first sample"), HasSubstr("(x0, v0) uncertain"))));
+  Problem uncertain = VelocityProblem();
+  uncertain.uncertain.push_back(UncertainParameter::Normal("x0", 0, 0.5).value());
+  EXPECT_THAT(WarningsOf(uncertain, samples), IsEmpty());
+}
+
+TEST(SuspiciousData, AreGapsOfAStreamedInputOnly) {
+  std::vector<double> times = TimesFrom(0, 30);
+  for (const double t : TimesFrom(2.1, 30)) times.push_back(t);  // 0.65 s after the last
+  EXPECT_THAT(WarningsOf(ForcedProblem(), ForcedRecord(times)),
+              ElementsAre(AllOf(HasSubstr("1 gap of more than 10 usual steps"),
+                                HasSubstr("is 0.65 s, after t = 1.45 s"), HasSubstr("perRun"))));
+  EXPECT_THAT(WarningsOf(VelocityProblem(), InitialVelocityRecord(times, 1.1, 0.01)), IsEmpty());
+}
+
+TEST(SuspiciousData, AreSamplesInAnotherUnit) {
+  const Problem problem = TextProblem("a + b*t/10",
+                                      {UncertainParameter::Normal("a", 1, 0.3).value(),
+                                       UncertainParameter::Normal("b", 0, 0.3).value()},
+                                      0.05);
+  const std::vector<double> metres = {1.13, 1.18, 1.24, 1.31, 1.33, 1.44, 1.43, 1.52};
+  std::vector<double> millimetres = metres;
+  for (double& value : millimetres) value *= 1'000;
+  EXPECT_THAT(Warnings(Processed(problem, metres)->CurrentEstimate().value()), IsEmpty());
+  EXPECT_THAT(Warnings(Processed(problem, millimetres)->CurrentEstimate().value()),
+              Contains(AllOf(HasSubstr("what the prior predicts"), HasSubstr("unit of y"))));
+}
+
+// Data that contradict the prior by five of its standard deviations are not in another unit.
+TEST(SuspiciousData, AreNotThoseThatContradictThePriorALittle) {
+  const Problem problem =
+      TextProblem("a + 0*t", {UncertainParameter::Normal("a", 0, 1).value()}, 1);
+  const auto estimator = Processed(problem, {5.3, 4.1, 6.0, 4.7, 5.2, 3.9, 5.5, 6.4, 4.6, 5.1});
+  EXPECT_THAT(Warnings(estimator->CurrentEstimate().value()), IsEmpty());
+}
+
+TEST(SuspiciousData, AreSensorsThatNeverChange) {
+  const Problem problem =
+      TextProblem("a + 0*t", {UncertainParameter::Normal("a", 0, 1).value()}, 1);
+  EXPECT_THAT(Warnings(Processed(problem, {2, 2, 2, 2})->CurrentEstimate().value()),
+              ElementsAre(HasSubstr("y never changes: it is 2 in every row")));
+}
+
+TEST(SuspiciousData, AreTheSameHoweverTheRowsArrive) {
+  const Samples all = InitialVelocityRecord(TimesFrom(12.345, 80), 1.1, 0.01);
+  const std::vector<std::string> expected = WarningsOf(VelocityProblem(), all);
+  for (const size_t batch : {1, 7}) {
+    const auto estimator = MakeEstimator(VelocityProblem());
+    for (size_t first = 0; first < all.rows(); first += batch) {
+      Samples part;
+      part.columns = {{"x", {}, {}}};
+      for (size_t k = first; k < std::min(first + batch, all.rows()); ++k) {
+        part.time_s.push_back(all.time_s[k]);
+        part.columns[0].value.push_back(all.columns[0].value[k]);
+      }
+      ASSERT_TRUE(estimator->Append(part).ok());
+      ASSERT_TRUE(estimator->Process().ok());
+    }
+    EXPECT_EQ(Warnings(estimator->CurrentEstimate().value()), expected);
+  }
+}
+
+TEST(SuspiciousData, AreRememberedBySnapshots) {
+  Problem problem = VelocityProblem();
+  problem.integration.samples_between_checkpoints = kInterval;
+  Samples samples = InitialVelocityRecord(TimesFrom(0, 2 * kInterval), 1.1, 0.01);
+  samples.columns[0].value[0] = 0.4;  // far from the initial state, in the first row only
+  Session session(problem);
+  session.Take(samples);
+  const std::vector<std::string> expected = Warnings(session.Current());
+  ASSERT_THAT(expected, ElementsAre(HasSubstr("its first sample, 0.4")));
+  const auto restored = MakeEstimator(problem);
+  ASSERT_TRUE(restored->Append(samples).ok());
+  const absl::Status status = restored->Restore(session.last);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(Warnings(restored->CurrentEstimate().value()), expected);
+}
+
+}  // namespace
+}  // namespace polyest::internal
