@@ -16,7 +16,7 @@ packages=(
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl sqlite3 libfaketime
-  python3-yaml python3-grpcio python3-protobuf
+  python3-yaml python3-grpcio python3-protobuf python3-numpy python3-scipy
 )
 # SUNDIALS' CMake configuration needs OpenMP of every compiler.
 sanitizer_packages=(

@@ -9,6 +9,8 @@
 #   fuzz         fuzzes equations and calls for half an hour
 #   threads      looks for races in the tests in which threads meet (90 minutes)
 #   calibration  asks of 1,008 campaigns whether the uncertainty is true (10 minutes)
+#   properties   compares estimates of 2,000 random small problems with exact posteriors
+#   adversary    asks for estimates of all problems made to mislead it, if their maker is there
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
 #
@@ -17,7 +19,7 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-all_steps=(crashes sanitized fuzz threads calibration package)
+all_steps=(crashes sanitized fuzz threads calibration properties adversary package)
 
 crashes() {
   deploy/install-packages.sh --tests
@@ -36,6 +38,21 @@ calibration() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target calibration
   build/release/bin/calibration 1008
+}
+
+properties() {
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target properties
+  build/release/bin/properties 2000 1 60 0  # see tests/README.md for the limit
+}
+
+adversary() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyest
+  # 77: the cases' maker is not there, as the step has said.
+  python3 -B tests/adversary/run.py build/release/bin/polyest build/release/adversary ||
+    [[ $? -eq 77 ]]
 }
 
 package() {
