@@ -15,22 +15,32 @@
 #include "core/model/equations/limits.h"
 #include "core/model/equations/program.h"
 #include "core/model/equations/structure.h"
+#include "core/model/equations/switches.h"
+#include "core/model/switching_model.h"
 
 namespace polyest::internal {
 namespace equations {
 namespace {
 
-enum BlockNumber { kStatesBlock, kParametersBlock, kInputsBlock };
+enum BlockNumber { kStatesBlock, kParametersBlock, kInputsBlock, kModesBlock };
 constexpr int kTimeVariable = 0;  // index of the variable t
+
+// The programs of equations that switch, with frozen modes.
+struct SwitchingPrograms {
+  std::vector<SwitchKind> kinds;
+  bool changes_at_rest = false;
+  Program derivatives, outputs, arguments, slopes;
+};
 
 struct Programs {
   Program initial, derivatives, outputs;
   std::optional<Program> jacobian;
   Structure structure;  // of the derivatives
   std::vector<VariablePlace> places;
+  SwitchingPrograms switching;
 };
 
-class EquationModel final : public StateSpaceModel {
+class EquationModel final : public StateSpaceModel, public SwitchingModel {
  public:
   EquationModel(ModelDescription description, std::vector<Lookup> tables)
       : description_(std::move(description)), tables_(std::move(tables)) {}
@@ -88,6 +98,21 @@ class EquationModel final : public StateSpaceModel {
     Run(*programs_.jacobian, time_s, states, parameters, inputs, jacobian);
   }
 
+  std::span<const SwitchKind> switches() const override { return programs_.switching.kinds; }
+  bool changes_at_rest() const override { return programs_.switching.changes_at_rest; }
+  void FrozenDerivatives(const SwitchingPoint& at, Block derivatives) const override {
+    RunFrozen(programs_.switching.derivatives, at, derivatives);
+  }
+  void FrozenOutputs(const SwitchingPoint& at, Block outputs) const override {
+    RunFrozen(programs_.switching.outputs, at, outputs);
+  }
+  void Arguments(const SwitchingPoint& at, Block arguments) const override {
+    RunFrozen(programs_.switching.arguments, at, arguments);
+  }
+  void ArgumentSlopes(const SwitchingPoint& at, Block slopes) const override {
+    RunFrozen(programs_.switching.slopes, at, slopes);
+  }
+
  private:
   // A block without columns may have any number of rows, since none of it is read.
   void CheckShapes(const ConstBlock& states, const ConstBlock& parameters,
@@ -109,6 +134,15 @@ class EquationModel final : public StateSpaceModel {
     program.Run(time_s, blocks, results);
   }
 
+  void RunFrozen(const Program& program, const SwitchingPoint& at, Block& results) const {
+    CheckShapes(at.states, at.parameters, at.inputs);
+    POLYEST_CHECK(at.modes.cols() == 1 + std::ssize(programs_.switching.kinds));
+    POLYEST_CHECK(at.modes.rows() == results.rows() && results.cols() == program.results());
+    const std::array<const ConstBlock*, 4> blocks = {&at.states, &at.parameters, &at.inputs,
+                                                     &at.modes};
+    program.Run(0, blocks, results);  // the time is in the first column of the modes
+  }
+
   const ModelDescription description_;
   const std::vector<Lookup> tables_;
   Programs programs_;
@@ -125,6 +159,7 @@ class Assembly {
  private:
   NodeId Variable(const std::string& name, VariablePlace place);
   absl::StatusOr<std::vector<NodeId>> LowerAll(const std::vector<Definition>& definitions);
+  SwitchingPrograms CompileSwitching(const std::vector<Lookup>& tables) const;
 
   const ReadEquations& read_;
   Graph graph_{kMaxNodes};
@@ -178,13 +213,53 @@ Programs Assembly::Compile(const std::vector<Lookup>& tables) {
                     Program(graph_, outputs_, places_, tables),
                     std::nullopt,
                     Structure(graph_, derivatives_),
-                    places_};
+                    places_,
+                    CompileSwitching(tables)};
   if (states_.empty()) return programs;
   graph_.set_most_nodes(kMaxJacobianNodes);
   const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
   if (graph_.exhausted()) return programs;
   programs.jacobian = Program(graph_, jacobian, places_, tables);
   if (programs.jacobian->registers() > kMaxRegisters) programs.jacobian.reset();
+  return programs;
+}
+
+// Compiles the programs with frozen modes. Equations too large for that are integrated as if they
+// were smooth, as are those that do not switch.
+SwitchingPrograms Assembly::CompileSwitching(const std::vector<Lookup>& tables) const {
+  if (states_.empty() || !MaySwitch(graph_, derivatives_)) return {};
+  Graph graph = graph_;
+  graph.set_most_nodes(kMaxJacobianNodes);
+  std::vector<VariablePlace> places = places_;
+  const auto add_mode = [&graph, &places] {
+    Eigen::Index column = 0;
+    for (const VariablePlace& place : places) column += place.block == kModesBlock ? 1 : 0;
+    places.push_back({kModesBlock, column});
+    return graph.Variable(static_cast<int>(places.size()) - 1);
+  };
+  std::vector<NodeId> variables = {add_mode()};  // of the arguments: time, states, inputs
+  std::vector<NodeId> parameters;
+  for (const Quantity& parameter : read_.parameters)
+    parameters.push_back(names_.at(parameter.name));
+  SwitchFreezer freezer(graph, names_.at("t"), variables.front(), parameters, add_mode);
+  const std::vector<NodeId> derivatives = freezer.Freeze(derivatives_, true);
+  const std::vector<NodeId> outputs = freezer.Freeze(outputs_, false);
+  variables.insert(variables.end(), states_.begin(), states_.end());
+  for (const std::string& input : read_.inputs) variables.push_back(names_.at(input));
+  const std::vector<NodeId> slopes = Differentiate(graph, freezer.arguments(), variables);
+  if (graph.exhausted() || freezer.kinds().size() > kMaxSwitches) return {};
+  SwitchingPrograms programs{freezer.kinds(),
+                             false,
+                             Program(graph, derivatives, places, tables),
+                             Program(graph, outputs, places, tables),
+                             Program(graph, freezer.arguments(), places, tables),
+                             Program(graph, slopes, places, tables)};
+  // The arguments are part of the right-hand sides, but not of those whose modes are frozen.
+  const NodeId time = names_.at("t");
+  programs.changes_at_rest = !read_.inputs.empty() || DependOn(graph_, derivatives_, time);
+  for (const Program* program : {&programs.derivatives, &programs.outputs, &programs.slopes}) {
+    if (program->registers() > kMaxRegisters) return {};
+  }
   return programs;
 }
 

@@ -19,7 +19,9 @@ inline constexpr size_t kMaxTableValues = 100'000;  // per table
 inline constexpr size_t kMaxTableValuesInAll = 400'000;
 inline constexpr int kMaxNodes = 20'000;  // distinct operations of a model
 inline constexpr int kMaxJacobianNodes =
-    60'000;                                 // including the Jacobian; a larger Jacobian is left out
+    60'000;  // including the Jacobian; a larger Jacobian is left out
+// Conditions of a model that are located; a model with more is integrated as if it were smooth.
+inline constexpr size_t kMaxSwitches = 200;
 inline constexpr int kMaxRegisters = 4096;  // values held at once; each takes 512 bytes per thread
 inline constexpr int kMaxArguments = 100;   // arguments of min and max
 
