@@ -70,7 +70,7 @@ void serialize(Archive& archive, FailedTrajectory& failure) {
 
 template <class Archive>
 void serialize(Archive& archive, EnsembleState::OfBlock& block) {
-  archive(block.source, block.alive, block.states);
+  archive(block.source, block.alive, block.states, block.modes);
   Flag(archive, block.stiff);
   archive(block.last_break_s, block.failures);
 }

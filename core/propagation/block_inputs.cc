@@ -154,6 +154,14 @@ const Eigen::ArrayXXd& BlockInputs::At(double time_s) {
   return values_;
 }
 
+double BlockInputs::At(Eigen::Index row, Eigen::Index input, double time_s) const {
+  const auto i = static_cast<size_t>(input);
+  const Cursor& cursor =
+      cursors_[i].size() == 1 ? cursors_[i].front() : cursors_[i][static_cast<size_t>(row)];
+  const double u = amplitudes_(row, input) * Shape(i, cursor, time_s);
+  return offsets_.size() > 0 ? u + offsets_(row, input) : u;
+}
+
 void BlockInputs::CopyRow(Eigen::Index from, Eigen::Index to) {
   amplitudes_.row(to) = amplitudes_.row(from);
   if (offsets_.size() > 0) offsets_.row(to) = offsets_.row(from);

@@ -59,6 +59,9 @@ class BlockInputs {
   const Eigen::ArrayXXd& amplitudes() const { return amplitudes_; }
   // Rows × inputs, or empty where there are no offsets.
   const Eigen::ArrayXXd& offsets() const { return offsets_; }
+  Eigen::Index channels() const { return amplitudes_.cols(); }
+  // Returns one row's input at a time of its own, with the same limits.
+  double At(Eigen::Index row, Eigen::Index input, double time_s) const;
   // Drives row `to` as row `from` from now on.
   void CopyRow(Eigen::Index from, Eigen::Index to);
 

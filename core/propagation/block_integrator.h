@@ -51,6 +51,12 @@ class BlockIntegrator {
   // Returns whether stability and not accuracy has limited the recent steps, so that a method for
   // stiff systems would do better.
   virtual bool LooksStiff() { return false; }
+
+  // Writes the model's outputs at the time and the states of the last call, if they do not follow
+  // from these alone; otherwise returns false and writes nothing.
+  virtual bool Outputs(double /*time_s*/, const ConstBlock& /*states*/, Block /*outputs*/) {
+    return false;
+  }
 };
 
 }  // namespace polyest::internal

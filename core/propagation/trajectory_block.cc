@@ -14,6 +14,7 @@
 #include "core/propagation/linear_integrator.h"
 #include "core/propagation/linear_system.h"
 #include "core/propagation/output_limit.h"
+#include "core/propagation/switching_integrator.h"
 
 namespace polyest::internal {
 namespace {
@@ -39,6 +40,12 @@ std::vector<int> Shifted(std::vector<int> rows, int first) {
   return rows;
 }
 
+// Returns the model if its equations switch, else null.
+const SwitchingModel* SwitchingOrNull(const Model* model) {
+  const auto* switching = dynamic_cast<const SwitchingModel*>(model);
+  return switching != nullptr && !switching->switches().empty() ? switching : nullptr;
+}
+
 }  // namespace
 
 TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
@@ -46,6 +53,7 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
                                  bool exact)
     : specification_(specification),
       model_(dynamic_cast<const StateSpaceModel*>(specification->model.get())),
+      switching_(SwitchingOrNull(specification->model.get())),
       first_point_(first_point),
       signals_(inputs),
       exact_(exact),
@@ -64,6 +72,9 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
   states_.setZero(rows, static_cast<Eigen::Index>(description.states.size()));
   model_outputs_.setZero(rows, static_cast<Eigen::Index>(description.outputs.size()));
   selected_outputs_.setZero(rows, static_cast<Eigen::Index>(specification->outputs.size()));
+  const size_t switches = switching_ == nullptr ? 0 : switching_->switches().size();
+  modes_.setConstant(rows, static_cast<Eigen::Index>(switches),
+                     std::numeric_limits<double>::quiet_NaN());
   if (states_.cols() == 0) return;
   model_->InitialStates(parameters_, states_);
   FailRowsBeyond(states_, 0, "an initial state");
@@ -79,6 +90,11 @@ void TrajectoryBlock::StartIntegrator(double time_s) {
     return;
   }
   const double tolerance = specification_->integration.relative_tolerance;
+  if (switching_ != nullptr && !stiff_) {
+    integrator_ = MakeSwitchingIntegrator(switching_, &parameters_, &inputs_, tolerance, time_s,
+                                          states_, &modes_);
+    return;
+  }
   integrator_ = stiff_ ? MakeBdfIntegrator(this, tolerance, time_s, states_)
                        : MakeErkIntegrator(this, tolerance, time_s, states_);
 }
@@ -170,7 +186,9 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
   const std::vector<int>& selected = specification_->outputs;
   const Eigen::Index columns = selected_outputs_.cols();
   if (alive()) {
-    model_->Outputs(time_s, states_, parameters_, inputs_.At(time_s), model_outputs_);
+    if (!integrator_ || !integrator_->Outputs(time_s, states_, model_outputs_)) {
+      model_->Outputs(time_s, states_, parameters_, inputs_.At(time_s), model_outputs_);
+    }
     for (Eigen::Index j = 0; j < columns; ++j) {
       selected_outputs_.col(j) = model_outputs_.col(selected[j]);
     }
@@ -214,6 +232,7 @@ void TrajectoryBlock::Fail(Eigen::Index row, double time_s, int flag, std::strin
     if (source_[copy] != point) continue;
     CarryPoint(copy, healthy);
     states_.row(copy) = states_.row(healthy);
+    modes_.row(copy) = modes_.row(healthy);
   }
 }
 
@@ -233,14 +252,15 @@ void TrajectoryBlock::Restart() {
 }
 
 EnsembleState::OfBlock TrajectoryBlock::State() const {
-  return {source_, point_alive_, states_, stiff_, last_break_s_, failures_};
+  return {source_, point_alive_, states_, modes_, stiff_, last_break_s_, failures_};
 }
 
 bool TrajectoryBlock::Fits(const EnsembleState::OfBlock& state) const {
   const auto points = std::ssize(point_alive_);
   if (state.source.size() != source_.size() || std::ssize(state.alive) != points ||
       state.states.rows() != states_.rows() || state.states.cols() != states_.cols() ||
-      !std::isfinite(state.last_break_s)) {
+      state.modes.rows() != modes_.rows() || state.modes.cols() != modes_.cols() ||
+      state.modes.isInf().any() || !std::isfinite(state.last_break_s)) {
     return false;
   }
   for (const PointFailure& failure : state.failures) {
@@ -263,6 +283,7 @@ void TrajectoryBlock::Restore(double time_s, const EnsembleState::OfBlock& state
   }
   source_ = state.source;
   states_ = state.states;
+  modes_ = state.modes;
   stiff_ = state.stiff;
   time_s_ = time_s;
   last_break_s_ = state.last_break_s;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/common/types.h"
+#include "core/model/switching_model.h"
 #include "core/propagation/block_inputs.h"
 #include "core/propagation/block_integrator.h"
 #include "core/propagation/trajectory_ensemble.h"
@@ -74,6 +75,7 @@ class TrajectoryBlock final : public BlockSystem {
 
   const EnsembleSpecification* specification_;
   const StateSpaceModel* model_;
+  const SwitchingModel* switching_;  // the same model if its equations switch, else null
   const int first_point_;
   const InputSignals* const signals_;
   const bool exact_;
@@ -84,6 +86,7 @@ class TrajectoryBlock final : public BlockSystem {
   Eigen::ArrayXXd parameters_;
   BlockInputs inputs_;
   Eigen::ArrayXXd states_;
+  Eigen::ArrayXXd modes_;  // as EnsembleState::OfBlock::modes
   Eigen::ArrayXXd model_outputs_;
   Eigen::ArrayXXd selected_outputs_;
 

@@ -30,6 +30,9 @@ struct EnsembleState {
     std::vector<int> source;  // by row: the block's point that it carries
     std::vector<bool> alive;  // by point
     Eigen::ArrayXXd states;   // rows × states
+    // rows × switches of the model: the mode of each switch, halfway between its two modes if the
+    // row slides along the surface where it switches, NaN if it follows from the states.
+    Eigen::ArrayXXd modes;
     bool stiff = false;       // integrated by the stiff method
     double last_break_s = 0;  // of the inputs
     std::vector<PointFailure> failures;

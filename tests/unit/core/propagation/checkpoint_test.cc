@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "polyest/equation_model.h"
 #include "tests/unit/core/propagation/ensemble.h"
 #include "tests/unit/core/propagation/oscillator.h"
 
@@ -132,6 +133,20 @@ TEST(Checkpoint, KeepsWhereTheInputsAre) {
   ExpectSameBitsAfter(ensemble, 20, 60);
 }
 
+TEST(Checkpoint, KeepsWhichWayTheEquationsHaveSwitched) {
+  const auto model = *MakeEquationModel({.states = {{"x", "v"}, {"v", "u - k*x - 3*sign(v)"}},
+                                         .outputs = {{"x", "x"}, {"a", "u - k*x - 3*sign(v)"}},
+                                         .parameters = {{"x_0", 1.0}, {"k", 20.0}},
+                                         .inputs = {"u"}});
+  Ensemble ensemble(model, 20, {"x", "a"});
+  for (int point = 0; point < 20; ++point) ensemble.Set("k", point, 2 + point);
+  EXPECT_EQ(ExpectSameBitsAfter(ensemble, 20, 60).blocks[0].modes.rows(), 24);
+  // All stick at the checkpoint, where the velocity says nothing, and break loose later.
+  ensemble.Drive("u", StepInput{1, 5}, 30);
+  const EnsembleState state = ExpectSameBitsAfter(ensemble, 40, 60);
+  EXPECT_TRUE((state.blocks[0].modes == 0).all()) << state.blocks[0].modes;
+}
+
 TEST(Checkpoint, IsThereOfModelsWithoutStatesToo) {
   Ensemble ensemble("mass_spring_frequency", 5, {"omega"});
   ExpectSameBitsAfter(ensemble, 20, 60);
@@ -191,6 +206,7 @@ TEST(Checkpoint, RefusesWhatCannotBeOfTheEnsemble) {
   EXPECT_TRUE(refused([](EnsembleState& state) { state.blocks[0].alive.pop_back(); }));
   EXPECT_TRUE(refused([](EnsembleState& state) { state.blocks[0].states.resize(8, 2); }));
   EXPECT_TRUE(refused([](EnsembleState& state) { state.blocks[0].states(0, 0) = NAN; }));
+  EXPECT_TRUE(refused([](EnsembleState& state) { state.blocks[0].modes.setZero(16, 1); }));
   EXPECT_TRUE(refused([](EnsembleState& state) {
     state.blocks[0].failures.push_back({9, 0, 0, ""});
   }));

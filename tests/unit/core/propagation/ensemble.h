@@ -23,8 +23,10 @@ inline std::vector<double> TimesUntil(double end_s, double step_s) {
 }
 
 struct Ensemble {
-  Ensemble(const char* model, int points, std::vector<const char*> outputs) {
-    specification.model = *FindBuiltinModel(model);
+  Ensemble(const char* model, int points, std::vector<const char*> outputs)
+      : Ensemble(*FindBuiltinModel(model), points, std::move(outputs)) {}
+  Ensemble(std::shared_ptr<const Model> model, int points, std::vector<const char*> outputs) {
+    specification.model = std::move(model);
     const ModelDescription& description = specification.model->description();
     specification.parameters.resize(points, std::ssize(description.parameters));
     for (Eigen::Index j = 0; j < specification.parameters.cols(); ++j) {
