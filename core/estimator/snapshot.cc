@@ -107,7 +107,8 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
   archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
           absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
           absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
-          absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared);
+          absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared,
+          absorbed.windows);
 }
 
 template <class Archive>

@@ -80,8 +80,8 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
   for (const ChannelSums& sums : state.sums) {
     if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
   }
-  return state.sums.size() == fresh.sums.size() && IsVector(state.discount, channels) &&
-         std::ssize(state.outliers) == channels &&
+  return state.sums.size() == fresh.sums.size() && state.windows.Suits(fresh.sums, state.rows) &&
+         IsVector(state.discount, channels) && std::ssize(state.outliers) == channels &&
          IsMatrix(state.previous_coefficients, terms, channels) &&
          IsVector(state.previous_error, channels) &&
          state.check_chi_squared.rows() == fresh.check_chi_squared.rows() &&

@@ -307,6 +307,7 @@ void RegionalExpansion::Absorb(int row) {
         (outputs_.col(column).head(points()).array() - z).square() / variance;
     ++absorbed_.samples;
   }
+  absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
   ++absorbed_.rows;
   absorbed_.propagated += thetas_.rows();
 }

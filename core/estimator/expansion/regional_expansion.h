@@ -23,6 +23,7 @@
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "core/estimator/record/whitening.h"
+#include "core/estimator/record/window_sums.h"
 #include "polyest/samples.h"
 
 namespace polyest::internal {
@@ -45,6 +46,7 @@ struct AbsorbedRows {
   int64_t samples = 0;            // over all channels
   int64_t propagated = 0;         // trajectories × rows
   std::vector<ChannelSums> sums;  // per channel, over all runs
+  WindowSums windows;             // the sums by windows of the record
   Vector discount;                // per channel: Σ ρ_k/R_k
   double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
   double log_variance = 0;  // as log_noise, with R in place of σ²
@@ -112,6 +114,7 @@ class RegionalExpansion {
 
   // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
+  const WindowSums& windows() const { return absorbed_.windows; }
   // Returns Σ ρ_k/R_k of a channel: the number of its samples lost to the expansion's own error ρ.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Returns the number of samples of a channel that have less than half their weight.
