@@ -43,6 +43,10 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "regularization not determined";
     case v1::Diagnostic::SUSPICIOUS_DATA:
       return "suspicious data";
+    case v1::Diagnostic::INCONSISTENT_OVER_TIME:
+      return "inconsistent over time";
+    case v1::Diagnostic::WINDOWS_DISAGREE:
+      return "windows disagree";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }
@@ -72,6 +76,33 @@ void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   }
   out << "\nmoved by α² = " << FormatNumber(estimate.regularization(), 3)
       << " from the estimate with α² = 1\n";
+  table.Print(out);
+}
+
+// Prints what windows of the record say on their own, one row for each window.
+void PrintWindows(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.windows().empty()) return;
+  const bool runs = estimate.windows().rbegin()->last_run() > 0;
+  std::vector<std::string> header = {"window"};
+  for (const v1::ParameterEstimate& p : estimate.parameters()) header.push_back(p.name());
+  TextTable table(header);
+  for (const v1::WindowEstimate& window : estimate.windows()) {
+    const std::string first = runs ? absl::StrFormat("run %d, ", window.first_run()) : "";
+    const std::string last = window.last_run() != window.first_run()
+                                 ? absl::StrFormat("run %d, ", window.last_run())
+                                 : "";
+    std::vector<std::string> row = {
+        absl::StrFormat("%s%.6g … %s%.6g s", first, window.start_time(), last, window.end_time())};
+    for (const v1::ParameterEstimate& p : estimate.parameters()) {
+      row.emplace_back("-");
+      for (const v1::WindowEstimate::Value& v : window.values()) {
+        if (v.parameter() == p.name()) row.back() = FormatUncertain(v.value(), v.std_dev());
+      }
+    }
+    table.AddRow(row);
+  }
+  out << absl::StrFormat("\nwhat windows of the record say on their own (disagreement %.2g)\n",
+                         estimate.disagreement());
   table.Print(out);
 }
 
@@ -198,6 +229,7 @@ void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
   PrintParameters(estimate, out);
   PrintBias(estimate, out);
   PrintComponents(estimate, out);
+  PrintWindows(estimate, out);
   PrintChannels(estimate, out);
   PrintDirections(estimate, out);
   PrintSummary(estimate, out);

@@ -51,6 +51,10 @@ const char* NameOf(DiagnosticCode code) {
       return "NOISE_NOT_LEARNED";
     case DiagnosticCode::kRegularizationNotDetermined:
       return "REGULARIZATION_NOT_DETERMINED";
+    case DiagnosticCode::kInconsistentOverTime:
+      return "INCONSISTENT_OVER_TIME";
+    case DiagnosticCode::kWindowsDisagree:
+      return "WINDOWS_DISAGREE";
   }
   return "";
 }

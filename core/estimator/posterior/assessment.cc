@@ -73,10 +73,12 @@ class Assessment {
     Summarize(cost, eta);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
+    WidenForShift();
+    DescribeChannels(cost, eta);
+    DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    DescribeChannels(cost, eta);
     estimate_.diagnostics = Diagnose(findings_, estimate_);
     return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share};
   }
@@ -143,24 +145,27 @@ class Assessment {
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
     const Vector informed = ContractionByData(cost, eta);
-    const double widening =
-        findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
+    const Vector widening = shift_widening_ * findings_.windows.widening;
     DescribeSpread(cost, eta, informed, widening);
     estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
-    WidenPosterior(widening);
     for (int i = 0; i < prior_.dimension(); ++i) {
       ParameterEstimate parameter;
       parameter.name = prior_.parameters()[static_cast<size_t>(i)].name;
       parameter.unit = problem_.units()[static_cast<size_t>(i)];
       parameter.map = map[i];
       parameter.std_dev = deviation_[i];
+      parameter.robust_std_dev = robust_deviation_[i];
       parameter.prior_mean = prior_mean[i];
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation_[i] / prior_deviation[i];
-      parameter.verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
+      parameter.verdict = VerdictOfContraction(std::min(1.0, widening[i] * informed[i]));
+      if (parameter.verdict == Verdict::kIdentified &&
+          findings_.windows.doubtful[static_cast<size_t>(i)]) {
+        parameter.verdict = Verdict::kWeak;
+      }
       DescribeMarginal(posterior_, prior_, i, parameter);
       if (findings_.power < 1 && parameter.posterior_std_dev > parameter.prior_std_dev) {
         DescribeByPrior(i, parameter);
@@ -181,6 +186,24 @@ class Assessment {
     parameter.upper95 = prior.ToParameter(germ.Quantile(0.975));
     parameter.contraction = 1;
     parameter.verdict = Verdict::kNotIdentified;
+  }
+
+  void WidenForShift() {
+    shift_widening_ =
+        findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
+    WidenPosterior(Vector::Constant(prior_.dimension(), shift_widening_));
+  }
+
+  // The windows' ratios are relative to the standard deviations at the stated noise. Those of a
+  // likelihood to a power have been widened already.
+  void DescribeWindows(const Cost& cost, const Vector& eta) {
+    findings_.windows = AssessWindows(*request_.expansion, problem_, *request_.record,
+                                      estimate_.channels, eta, regularization_);
+    const double narrower = std::sqrt(cost.power());
+    findings_.windows.widening = (narrower * findings_.windows.widening).cwiseMax(1);
+    findings_.windows.robust.ratio *= narrower;
+    estimate_.disagreement = findings_.windows.robust.disagreement;
+    estimate_.windows = findings_.windows.estimates;
   }
 
   void DescribeBias(const Cost& cost, const Vector& eta, const Stop& stop) {
@@ -210,19 +233,42 @@ class Assessment {
   // curved map that the data do not identify is given the prior's own standard deviation instead,
   // wherever the estimate lies.
   void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
-                      double widening) {
+                      const Vector& widening) {
     const Curvature curvature =
         CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
     const Vector prior_deviation = prior_.StandardDeviation();
-    deviation_ = (widening * curvature.standard_deviation).cwiseMin(prior_deviation);
+    deviation_ = widening.cwiseProduct(curvature.standard_deviation).cwiseMin(prior_deviation);
     for (int i = 0; i < prior_.dimension(); ++i) {
-      const Verdict verdict = VerdictOfContraction(std::min(1.0, widening * informed[i]));
+      const Verdict verdict = VerdictOfContraction(std::min(1.0, widening[i] * informed[i]));
       if (prior_.IsCurved(i) && verdict == Verdict::kNotIdentified) {
         deviation_[i] = prior_deviation[i];
       }
     }
     const Vector factor = deviation_.cwiseQuotient(curvature.standard_deviation);
     estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
+    const Vector& robust = findings_.windows.robust.ratio;
+    robust_deviation_ = Vector::Zero(prior_.dimension());
+    if (robust.size() > 0) {
+      robust_deviation_ = (shift_widening_ * robust.cwiseProduct(curvature.standard_deviation))
+                              .cwiseMin(prior_deviation);
+    }
+    if (findings_.windows.contradicted) WidenContradicted(curvature.contraction);
+  }
+
+  // Widens the draws where residuals or windows contradict the estimate. The interval is then also
+  // at least as wide as the curvature's Gaussian, with standard deviations `contraction` relative
+  // to the prior's: of two contradicting spreads the wider one counts.
+  void WidenContradicted(const Vector& contraction) {
+    Vector factors = findings_.windows.widening;
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const double present =
+          WeightedStandardDeviation(posterior_.scores.col(i), posterior_.weights);
+      if (!(present > 0)) continue;
+      const double most = prior_.GermStandardDeviation()[i] / present;
+      const double curved = shift_widening_ * contraction[i] * most;
+      factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));
+    }
+    WidenPosterior(factors);
   }
 
   // Returns the ratio of posterior to prior standard deviation of the scores that is due to the
@@ -242,10 +288,11 @@ class Assessment {
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
   }
 
-  // Widens the draws' scores about their mean, but not beyond Ω.
-  void WidenPosterior(double widening) {
-    if (!(widening > 1)) return;
+  // Widens the draws' scores about their mean by a factor for each parameter, but not beyond Ω.
+  void WidenPosterior(const Vector& factors) {
     for (int i = 0; i < prior_.dimension(); ++i) {
+      const double widening = factors[i];
+      if (!(widening > 1)) continue;
       auto scores = posterior_.scores.col(i).array();
       const double centre = WeightedMean(posterior_.scores.col(i), posterior_.weights);
       scores =
@@ -309,7 +356,9 @@ class Assessment {
   double fitted_ = 0;  // number of parameters fitted by the data
   double spent_ = 0;   // degrees of freedom used up, see Cost::MismatchHessian
   PosteriorDraws posterior_;
-  Vector deviation_;  // standard deviations of the parameters
+  double shift_widening_ = 1;  // factor of the uncertainty for the expansion's own error
+  Vector deviation_;           // standard deviations of the parameters
+  Vector robust_deviation_;    // as deviation_, from the scores of windows; 0 if unknown
   Findings findings_;
   Estimate estimate_;
 };

@@ -5,21 +5,18 @@
 
 #include <cmath>
 
+#include "core/estimator/posterior/residual_tests.h"
 #include "core/estimator/posterior/undersampling.h"
 #include "core/estimator/record/suspicious_data.h"
 
 namespace polyest::internal {
 namespace {
 
-// For a correct model, χ² has mean N and standard deviation √(2N). A misfit is reported when χ²
-// exceeds N both by many standard deviations and by half.
+// For a correct model, χ² has mean N and standard deviation √(2N). Residuals that are too small,
+// which is the less dangerous error, are reported when χ² is below N both by many standard
+// deviations and by a third.
 constexpr double kMisfitDeviations = 6;
-constexpr double kMisfitRatio = 1.5;
-// The lag-1 correlation of independent residuals has a standard deviation of 1/√N. A correlation
-// below kCorrelated changes the uncertainty by less than a sixth.
-constexpr double kCorrelationDeviations = 4;
-constexpr double kCorrelated = 0.15;
-constexpr int64_t kMinForCorrelation = 20;
+constexpr double kTooSmallRatio = 1.5;
 constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
 // As kAtBound, for a correlated parameter: its score has no bound, and only approaches the
 // parameter's.
@@ -27,6 +24,10 @@ constexpr double kNearBound = 1e-4;
 // Maximum ratio of the posterior's and the curvature's standard deviations, in either direction.
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
+constexpr std::string_view kByPosterior =
+    "the posterior's own mean, standard deviation and interval";
+constexpr std::string_view kByCurvature = "the curvature's, which is the wider";
+constexpr double kNoticeable = 1.05;  // factor of a standard deviation that is worth a word
 
 const std::string& Name(const Findings& findings, int i) {
   return findings.problem->prior().parameters()[static_cast<size_t>(i)].name;
@@ -66,6 +67,17 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
   }
 }
 
+// Returns what has become of the uncertainty because residuals or windows contradict the estimate.
+std::string WideningText(const Findings& findings) {
+  const Vector& widening = findings.windows.widening;
+  Eigen::Index widest = 0;
+  const double factor = widening.size() > 0 ? widening.maxCoeff(&widest) : 1;
+  if (factor < kNoticeable) return "windows of the record ask for no wider uncertainty";
+  return absl::StrFormat(
+      "standard deviations and intervals have been widened, that of %s %.2g times",
+      Name(findings, static_cast<int>(widest)), factor);
+}
+
 // A learned scale is skipped: it was learned from χ², which is therefore no test of it.
 void AddMisfit(const Findings& findings, const Estimate& estimate,
                std::vector<Diagnostic>& diagnostics) {
@@ -73,17 +85,17 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
     const ChannelEstimate& channel = estimate.channels[c];
     if (findings.problem->problem().measured[c].noise.unknown) continue;
     const auto samples = static_cast<double>(channel.samples);
-    if (channel.chi_squared > kMisfitRatio * samples &&
-        channel.chi_squared > samples + kMisfitDeviations * std::sqrt(2 * samples)) {
+    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
-                           "prior is wrong, and the uncertainty reported is too small",
-                           channel.output, std::sqrt(channel.chi_squared / samples))});
+                           "prior is wrong; %s",
+                           channel.output, std::sqrt(channel.chi_squared / samples),
+                           WideningText(findings))});
     }
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
-    if (channel.chi_squared < expected / kMisfitRatio &&
+    if (channel.chi_squared < expected / kTooSmallRatio &&
         channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
@@ -100,14 +112,11 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
 // correlated.
 void AddCorrelation(const Findings& findings, const Estimate& estimate,
                     std::vector<Diagnostic>& diagnostics) {
+  if (findings.record->channels().empty()) return;  // no row yet
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     const ChannelEstimate& channel = estimate.channels[c];
     const double correlation = channel.lag1_correlation;
-    if (std::abs(correlation) < kCorrelated || channel.samples < kMinForCorrelation ||
-        std::abs(correlation) * std::sqrt(static_cast<double>(channel.samples)) <
-            kCorrelationDeviations) {
-      continue;
-    }
+    if (!AreCorrelated(channel, findings.record->channels()[c].Runs())) continue;
     const NoiseModel& noise = findings.problem->problem().measured[c].noise;
     if (noise.correlation != NoiseCorrelation::kWhite) {
       diagnostics.push_back(
@@ -119,11 +128,10 @@ void AddCorrelation(const Findings& findings, const Estimate& estimate,
       diagnostics.push_back(
           {DiagnosticCode::kCorrelatedResiduals,
            absl::StrFormat("output %s: successive residuals are correlated (%.2f), so that %d "
-                           "samples tell no more than %.0f independent ones and the uncertainty "
-                           "reported is too small; let the noise have a correlation "
-                           "({\"auto\": true}), or improve the model",
-                           channel.output, correlation, channel.samples,
-                           channel.effective_samples)});
+                           "samples tell no more than %.0f independent ones; %s; let the noise "
+                           "have a correlation ({\"auto\": true}), or improve the model",
+                           channel.output, correlation, channel.samples, channel.effective_samples,
+                           WideningText(findings))});
     } else {
       diagnostics.push_back(
           {DiagnosticCode::kCorrelatedResiduals,
@@ -185,22 +193,62 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
   }
 }
 
+// Returns "0.93 ± 0.01 (t = 0 to 10 s)", the value of parameter i in a window.
+std::string DescribeChange(const Findings& findings, int i, const WindowChange& window,
+                           bool name_runs) {
+  const WindowParameter changed = ChangedParameter(findings.problem->prior(), findings.map_xi, i,
+                                                   window.change, window.std_dev);
+  const WindowSpan& span = window.span;
+  const std::string first = name_runs ? absl::StrFormat("run %d, ", span.first_run) : "";
+  const std::string last =
+      span.last_run != span.first_run ? absl::StrFormat("run %d, ", span.last_run) : "";
+  return absl::StrFormat("%.6g ± %.2g (%st = %.6g to %s%.6g s)", changed.value, changed.std_dev,
+                         first, span.start_s, last, span.end_s);
+}
+
+// Reports a parameter that differs between windows of the record.
+void AddInconsistency(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.windows.inconsistency) return;
+  const Inconsistency& found = *findings.windows.inconsistency;
+  const bool name_runs = found.second.span.last_run > 0;
+  diagnostics.push_back(
+      {DiagnosticCode::kInconsistentOverTime,
+       absl::StrFormat(
+           "%s is not constant over the record: %s and %s, %.3g standard deviations apart; the "
+           "model or an input lacks what changes",
+           Name(findings, found.parameter),
+           DescribeChange(findings, found.parameter, found.first, name_runs),
+           DescribeChange(findings, found.parameter, found.second, name_runs), found.separation)});
+}
+
+// Reports scores of windows that scatter more than the noise explains.
+void AddDisagreement(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.windows.Disagree()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kWindowsDisagree,
+       absl::StrFormat("windows of the record disagree %.2g times as much as the noise explains "
+                       "(1.1 to 1.7 is usual); model or noise is wrong; %s",
+                       findings.windows.robust.disagreement, WideningText(findings))});
+}
+
 // Reports a posterior that differs from the curvature's Gaussian. Parameters that the data do not
-// inform are skipped, because the reported values are then the prior's by definition.
+// inform are skipped, because the reported values are then the prior's by definition. The advice is
+// always to go by the wider of the two.
 void AddNonGaussian(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
   std::vector<std::string> ratios;
   for (const ParameterEstimate& parameter : estimate.parameters) {
     if (parameter.verdict == Verdict::kNotIdentified) continue;
     const double ratio = parameter.posterior_std_dev / parameter.std_dev;
     if (ratio <= kGaussianRatio && ratio >= 1 / kGaussianRatio) continue;
-    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large", parameter.name, ratio));
+    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large; go by %s", parameter.name,
+                                     ratio, ratio > 1 ? kByPosterior : kByCurvature));
   }
   if (ratios.empty()) return;
   diagnostics.push_back(
       {DiagnosticCode::kNonGaussian,
        absl::StrFormat("the posterior's standard deviation is not what the curvature of the cost "
-                       "says: %s; go by the posterior's own mean, standard deviation and interval",
-                       absl::StrJoin(ratios, ", "))});
+                       "says: %s",
+                       absl::StrJoin(ratios, "; "))});
 }
 
 void AddFailures(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
@@ -320,6 +368,8 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddEdge(findings, diagnostics);
   AddMisfit(findings, estimate, diagnostics);
   AddCorrelation(findings, estimate, diagnostics);
+  AddInconsistency(findings, diagnostics);
+  AddDisagreement(findings, diagnostics);
   AddUnlearnedNoise(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
   AddNonGaussian(estimate, diagnostics);

@@ -6,6 +6,7 @@
 
 #include "core/bayes/minimizer.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/window_assessment.h"
 #include "core/estimator/record/record_summary.h"
 #include "polyest/estimate.h"
 
@@ -27,7 +28,8 @@ struct Findings {
   double shift = 0;                  // bound on the error of a mean, in standard deviations
   // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
   double power = 1;
-  bool leans = false;  // whether the posterior goes on beyond the region of the expansion
+  bool leans = false;        // whether the posterior goes on beyond the region of the expansion
+  WindowAssessment windows;  // what the windows of the record say
   // Why the requested rule did not choose α²; empty if it did or if no rule was requested.
   std::string regularization_not_determined;
 };

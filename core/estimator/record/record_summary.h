@@ -22,6 +22,8 @@ class RecordSummary {
     double last_time_s = 0;
     int last_run = -1;
 
+    // Returns the number of runs that have samples.
+    int64_t Runs() const { return samples - intervals; }
     double RootMeanSquareNoise() const;  // of the noise that the problem gives
     double MeanInterval() const;         // in s; 0 without intervals
     // Returns exp(−Δt/τ), the correlation of successive samples with this noise, at the mean

@@ -21,6 +21,8 @@ enum class DiagnosticCode {
   kNoiseNotLearned,      // too few samples to learn a noise of unknown size from
   kRegularizationNotDetermined,  // the rule asked for does not choose an α²; it stays 1
   kSuspiciousData,               // the data are allowed but probably not what was meant
+  kInconsistentOverTime,         // a parameter differs between parts of the record
+  kWindowsDisagree,              // windows of the record scatter by more than the noise explains
 };
 
 // One warning.

@@ -56,12 +56,16 @@ struct TradeOff {
   double first_alone = 0, second_alone = 0;
 };
 
-// What is known of one uncertain parameter; numbers are in its unit unless said otherwise.
+// What is known of one uncertain parameter; numbers are in its unit unless said otherwise. Where
+// residuals or windows of the record contradict model or noise, std_dev is widened to
+// robust_std_dev, if that is larger, and the posterior's spread with it, but never beyond the
+// prior's.
 struct ParameterEstimate {
   std::string name;              // "x_0[2]" for run 2's own value
   std::string unit;              // "1" for a plain number; empty: the equations give none
   double map = 0;                // at the minimum of the cost: the most probable value
   double std_dev = 0;            // from the cost's curvature there; at most the prior's
+  double robust_std_dev = 0;     // by the scatter of windows' scores; 0 if there are too few
   double mean = 0;               // of the posterior
   double lower95 = 0;            // 2.5 % quantile of the posterior
   double upper95 = 0;            // 97.5 % quantile of the posterior
@@ -71,6 +75,22 @@ struct ParameterEstimate {
   double contraction = 0;        // std_dev ÷ prior_std_dev, 0 … 1
   double bias = 0;               // how far α² ≠ 1 moves map; 0 for α² = 1
   Verdict verdict = Verdict::kNotIdentified;  // by the contraction of the normal score
+};
+
+// One parameter in one window of the record, in its unit.
+struct WindowParameter {
+  int parameter = 0;  // index of the uncertain parameter
+  double value = 0;
+  double std_dev = 0;  // from the noise assumed
+};
+
+// What the samples of one window of the record and the prior alone say: one Gauss–Newton step from
+// the estimate.
+struct WindowEstimate {
+  int first_run = 0, last_run = 0;          // of the window's first and last row
+  double start_s = 0;                       // time of the first row, in first_run
+  double end_s = 0;                         // time of the last row, in last_run
+  std::vector<WindowParameter> parameters;  // those that the window identifies
 };
 
 // One of the separated pieces of a posterior.
@@ -111,6 +131,9 @@ struct ExpansionSummary {
 // An estimate. If the posterior has several pieces, then map, std_dev, covariance, cost, channels
 // and directions are those of the heaviest piece, and mean, posterior_std_dev and limits those of
 // all pieces. A parameter is kWeak if each piece identifies it but the pieces disagree.
+//
+// `disagreement` is r: how much more the scores of the record's windows scatter than the noise
+// explains, in the parameters' worst direction. It is 1.1 … 1.7 when all is well.
 struct Estimate {
   std::vector<ParameterEstimate> parameters;  // in the problem's order
   std::vector<ComponentEstimate> components;  // heaviest first; none when there is one piece
@@ -121,6 +144,8 @@ struct Estimate {
   std::vector<Direction> directions;          // the best known first
   std::vector<TradeOff> trade_offs;           // pairs of which only a combination is known
   ExpansionSummary expansion;                 // what it was computed on
+  double disagreement = 0;                    // of windows; 0 if there are too few
+  std::vector<WindowEstimate> windows;        // at most 16, in order; none unless they disagree
   std::vector<Diagnostic> diagnostics;        // warnings; empty is good
   double time_s = 0;                          // of the last sample
   int64_t samples = 0;                        // values used, over all outputs and runs

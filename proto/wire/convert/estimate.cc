@@ -45,6 +45,10 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::REGULARIZATION_NOT_DETERMINED;
     case DiagnosticCode::kSuspiciousData:
       return v1::Diagnostic::SUSPICIOUS_DATA;
+    case DiagnosticCode::kInconsistentOverTime:
+      return v1::Diagnostic::INCONSISTENT_OVER_TIME;
+    case DiagnosticCode::kWindowsDisagree:
+      return v1::Diagnostic::WINDOWS_DISAGREE;
   }
   POLYEST_CHECK(false);
 }
@@ -63,6 +67,7 @@ void ToProto(const ParameterEstimate& parameter, v1::ParameterEstimate& proto) {
   proto.set_verdict(ToProto(parameter.verdict));
   proto.set_posterior_std_dev(parameter.posterior_std_dev);
   proto.set_bias(parameter.bias);
+  proto.set_robust_std_dev(parameter.robust_std_dev);
 }
 
 void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {
@@ -90,6 +95,22 @@ void AddComponents(const Estimate& estimate, v1::Estimate& proto) {
     v1::MixtureComponent& added = *proto.add_components();
     added.set_weight(component.weight);
     for (const auto& parameter : component.parameters) ToProto(parameter, *added.add_parameters());
+  }
+}
+
+void AddWindows(const Estimate& estimate, v1::Estimate& proto) {
+  for (const WindowEstimate& window : estimate.windows) {
+    v1::WindowEstimate& added = *proto.add_windows();
+    added.set_first_run(window.first_run);
+    added.set_last_run(window.last_run);
+    added.set_start_time(window.start_s);
+    added.set_end_time(window.end_s);
+    for (const WindowParameter& parameter : window.parameters) {
+      v1::WindowEstimate::Value& value = *added.add_values();
+      value.set_parameter(estimate.parameters[static_cast<size_t>(parameter.parameter)].name);
+      value.set_value(parameter.value);
+      value.set_std_dev(parameter.std_dev);
+    }
   }
 }
 
@@ -142,6 +163,8 @@ v1::Estimate ToProto(const Estimate& estimate) {
   AddDirections(estimate, proto);
   AddTradeOffs(estimate, proto);
   AddComponents(estimate, proto);
+  proto.set_disagreement(estimate.disagreement);
+  AddWindows(estimate, proto);
   ToProto(estimate.expansion, *proto.mutable_expansion());
   for (const auto& diagnostic : estimate.diagnostics) {
     *proto.add_diagnostics() = ToProto(diagnostic);

@@ -73,14 +73,15 @@ inline bool Has(const Estimate& estimate, DiagnosticCode code) {
 inline std::vector<double> NumbersOf(const Estimate& estimate) {
   std::vector<double> all;
   for (const ParameterEstimate& p : estimate.parameters) {
-    all.insert(all.end(), {p.map, p.std_dev, p.mean, p.lower95, p.upper95, p.prior_mean,
-                           p.prior_std_dev, p.contraction, static_cast<double>(p.verdict)});
+    all.insert(all.end(),
+               {p.map, p.std_dev, p.robust_std_dev, p.mean, p.lower95, p.upper95, p.prior_mean,
+                p.prior_std_dev, p.contraction, static_cast<double>(p.verdict)});
   }
   all.insert(all.end(), estimate.covariance.data(),
              estimate.covariance.data() + estimate.covariance.size());
-  all.insert(all.end(),
-             {estimate.cost.mismatch, estimate.cost.prior, estimate.cost.total,
-              estimate.regularization, estimate.time_s, static_cast<double>(estimate.samples)});
+  all.insert(all.end(), {estimate.cost.mismatch, estimate.cost.prior, estimate.cost.total,
+                         estimate.regularization, estimate.disagreement, estimate.time_s,
+                         static_cast<double>(estimate.samples)});
   for (const ChannelEstimate& c : estimate.channels) {
     all.insert(all.end(), {static_cast<double>(c.samples), c.chi_squared, c.noise_std_dev});
   }

@@ -11,6 +11,7 @@ Estimate TwoParameters() {
                           .unit = "N/m",
                           .map = 1,
                           .std_dev = 2,
+                          .robust_std_dev = 2.5,
                           .mean = 3,
                           .lower95 = 4,
                           .upper95 = 5,
@@ -34,6 +35,12 @@ Estimate TwoParameters() {
                         .residual_to_noise = 0.02,
                         .reexpansions = 1,
                         .trajectories = 40};
+  estimate.disagreement = 1.25;
+  estimate.windows = {{.first_run = 1,
+                       .last_run = 2,
+                       .start_s = 3,
+                       .end_s = 4,
+                       .parameters = {{.parameter = 1, .value = 5, .std_dev = 6}}}};
   estimate.time_s = 12;
   estimate.samples = 13;
   return estimate;
@@ -62,6 +69,7 @@ TEST(EstimateToProto, CarriesParametersAndCovarianceRowMajor) {
   EXPECT_EQ(k.unit(), "N/m");
   EXPECT_EQ(k.map(), 1);
   EXPECT_EQ(k.std_dev(), 2);
+  EXPECT_EQ(k.robust_std_dev(), 2.5);
   EXPECT_EQ(k.mean(), 3);
   EXPECT_EQ(k.lower95(), 4);
   EXPECT_EQ(k.upper95(), 5);
@@ -106,6 +114,21 @@ TEST(EstimateToProto, CarriesEverythingElse) {
   EXPECT_EQ(proto.sequence(), 0);
 }
 
+TEST(EstimateToProto, CarriesTheWindowsOfARecord) {
+  const v1::Estimate proto = ToProto(TwoParameters());
+  EXPECT_EQ(proto.disagreement(), 1.25);
+  ASSERT_EQ(proto.windows_size(), 1);
+  const v1::WindowEstimate& window = proto.windows(0);
+  EXPECT_EQ(window.first_run(), 1);
+  EXPECT_EQ(window.last_run(), 2);
+  EXPECT_EQ(window.start_time(), 3);
+  EXPECT_EQ(window.end_time(), 4);
+  ASSERT_EQ(window.values_size(), 1);
+  EXPECT_EQ(window.values(0).parameter(), "c");
+  EXPECT_EQ(window.values(0).value(), 5);
+  EXPECT_EQ(window.values(0).std_dev(), 6);
+}
+
 TEST(EstimateToProto, KnowsEveryDiagnostic) {
   const std::pair<DiagnosticCode, v1::Diagnostic::Code> codes[] = {
       {DiagnosticCode::kNotIdentified, v1::Diagnostic::NOT_IDENTIFIED},
@@ -120,7 +143,9 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kCorrelatedResiduals, v1::Diagnostic::CORRELATED_RESIDUALS},
       {DiagnosticCode::kNoiseNotLearned, v1::Diagnostic::NOISE_NOT_LEARNED},
       {DiagnosticCode::kRegularizationNotDetermined, v1::Diagnostic::REGULARIZATION_NOT_DETERMINED},
-      {DiagnosticCode::kSuspiciousData, v1::Diagnostic::SUSPICIOUS_DATA}};
+      {DiagnosticCode::kSuspiciousData, v1::Diagnostic::SUSPICIOUS_DATA},
+      {DiagnosticCode::kInconsistentOverTime, v1::Diagnostic::INCONSISTENT_OVER_TIME},
+      {DiagnosticCode::kWindowsDisagree, v1::Diagnostic::WINDOWS_DISAGREE}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};

@@ -1,0 +1,41 @@
+#include "core/estimator/posterior/residual_tests.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kExcessDeviations = 6;
+constexpr double kExcessRatio = 1.2;
+constexpr double kExcessRatioWithOutliers = 1.5;
+constexpr double kCorrelationDeviations = 4;
+constexpr double kCorrelated = 0.05;
+constexpr int64_t kMinForCorrelation = 20;
+constexpr double kMaxLag1Correlation = 0.99;
+
+}  // namespace
+
+bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers) {
+  const auto samples = static_cast<double>(channel.samples);
+  const double ratio = outliers == OutlierHandling::kNone ? kExcessRatio : kExcessRatioWithOutliers;
+  return channel.chi_squared > ratio * samples &&
+         channel.chi_squared > samples + kExcessDeviations * std::sqrt(2 * samples);
+}
+
+bool AreCorrelated(const ChannelEstimate& channel, int64_t runs) {
+  if (channel.samples < kMinForCorrelation) return false;
+  const auto samples = static_cast<double>(channel.samples);
+  const double by_chance = std::max(kCorrelated, kCorrelationDeviations / std::sqrt(samples)) +
+                           static_cast<double>(runs) / (2 * samples);
+  return std::abs(channel.lag1_correlation) > by_chance;
+}
+
+double Dispersion(const ChannelEstimate& channel, bool noise_known) {
+  if (channel.samples == 0) return 1;
+  const double r = std::clamp(channel.lag1_correlation, 0.0, kMaxLag1Correlation);
+  const double ratio = noise_known ? channel.chi_squared / static_cast<double>(channel.samples) : 1;
+  return std::max(1.0, std::max(1.0, ratio) * (1 + r) / (1 - r));
+}
+
+}  // namespace polyest::internal

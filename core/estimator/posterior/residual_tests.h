@@ -1,0 +1,27 @@
+#pragma once
+
+// Tests of a channel's residuals. They grow sharp with the number of samples N, but a deviation
+// that would hardly change the uncertainty is not reported, however significant it is.
+
+#include "polyest/estimate.h"
+#include "polyest/noise.h"
+
+namespace polyest::internal {
+
+// Returns whether χ² is too large for the noise assumed: for a right model it has mean N and
+// standard deviation √(2N). It must exceed N by six of them and by a fifth, which is noise that is
+// larger by a tenth; by a half if outliers are handled, because some of them are expected and their
+// weight is small but not 0.
+bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers);
+
+// Returns whether successive residuals are correlated: of independent ones the lag-1 correlation
+// has the standard deviation 1/√N. It must be four of them and 0.05, which changes the uncertainty
+// by a twentieth. `runs` is the number of runs with samples; each contributes 1/2N by chance.
+bool AreCorrelated(const ChannelEstimate& channel, int64_t runs);
+
+// Returns the variance of a mean of residuals relative to that of as many independent samples of
+// the noise assumed, at least 1: χ²/N (if the noise was known) times (1 + r)/(1 − r), with r the
+// lag-1 correlation if it is positive.
+double Dispersion(const ChannelEstimate& channel, bool noise_known);
+
+}  // namespace polyest::internal

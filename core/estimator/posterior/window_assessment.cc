@@ -1,0 +1,134 @@
+#include "core/estimator/posterior/window_assessment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/identifiability.h"
+#include "core/common/linear_algebra.h"
+#include "core/estimator/posterior/residual_tests.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr size_t kMaxEstimates = 16;  // windows for which estimates are given
+
+const NoiseModel& NoiseOf(const ResolvedProblem& problem, size_t channel) {
+  return problem.problem().measured[channel].noise;
+}
+
+// Returns whether the residuals of any channel are larger than the noise, or correlated.
+bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& record,
+                         const std::vector<ChannelEstimate>& channels) {
+  for (size_t c = 0; c < channels.size(); ++c) {
+    const NoiseModel& noise = NoiseOf(problem, c);
+    if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers)) return true;
+    if (c < record.channels().size() && AreCorrelated(channels[c], record.channels()[c].Runs())) {
+      return true;
+    }
+  }
+  return false;
+}
+
+double LargestDispersion(const ResolvedProblem& problem,
+                         const std::vector<ChannelEstimate>& channels) {
+  double largest = 1;
+  for (size_t c = 0; c < channels.size(); ++c) {
+    largest = std::max(largest, Dispersion(channels[c], !NoiseOf(problem, c).unknown));
+  }
+  return largest;
+}
+
+// Returns the gradient of α² J_apriori in the coordinates of the scores; 0 where it is infinite, at
+// some bounds.
+Vector PriorGradient(const Prior& prior, const Vector& xi, double regularization) {
+  Vector gradient = regularization * prior.Gradient(xi);
+  if (!gradient.allFinite()) return Vector::Zero(xi.size());
+  if (prior.correlated()) gradient = SolveTransposed(prior.factor(), gradient);
+  return gradient.cwiseProduct(prior.GermStandardDeviation());
+}
+
+// Returns what the window's samples and the prior alone say: a Gauss–Newton step from the estimate.
+WindowEstimate EstimateOfWindow(const WindowScore& window, const Prior& prior, const Vector& xi,
+                                const Matrix& precision, const Vector& prior_gradient) {
+  WindowEstimate estimate;
+  estimate.first_run = window.span.first_run;
+  estimate.last_run = window.span.last_run;
+  estimate.start_s = window.span.start_s;
+  estimate.end_s = window.span.end_s;
+  const Matrix total = window.information + precision;
+  if (!CholeskyFactor(total).positive_definite()) return estimate;
+  const Matrix covariance = Inverse(total);
+  const Vector step = -(covariance * (window.score + prior_gradient));
+  for (int i = 0; i < prior.dimension(); ++i) {
+    const double deviation = std::sqrt(covariance(i, i));
+    if (VerdictOfContraction(deviation) != Verdict::kIdentified) continue;
+    estimate.parameters.push_back(ChangedParameter(prior, xi, i, step[i], deviation));
+  }
+  return estimate;
+}
+
+std::vector<WindowEstimate> EstimatesByWindow(std::vector<WindowScore> windows, const Prior& prior,
+                                              const Vector& xi, const Matrix& precision,
+                                              double regularization) {
+  while (windows.size() > kMaxEstimates) windows = MergePairs(windows);
+  const Vector gradient = PriorGradient(prior, xi, regularization);
+  std::vector<WindowEstimate> estimates;
+  for (const WindowScore& window : windows) {
+    estimates.push_back(EstimateOfWindow(window, prior, xi, precision, gradient));
+  }
+  return estimates;
+}
+
+void Widen(double dispersion, WindowAssessment& assessment) {
+  const Vector& ratio = assessment.robust.ratio;
+  for (Eigen::Index i = 0; i < assessment.widening.size(); ++i) {
+    assessment.widening[i] = std::max(1.0, ratio.size() > 0 ? ratio[i] : std::sqrt(dispersion));
+    if (assessment.Disagree() && ratio[i] > kDisagreement) {
+      assessment.doubtful[static_cast<size_t>(i)] = true;
+    }
+  }
+  if (assessment.inconsistency) {
+    assessment.doubtful[static_cast<size_t>(assessment.inconsistency->parameter)] = true;
+  }
+}
+
+}  // namespace
+
+WindowParameter ChangedParameter(const Prior& prior, const Vector& xi, int i, double change,
+                                 double std_dev) {
+  const double unit = prior.GermStandardDeviation()[i];
+  const double lower = prior.lower()[i], upper = prior.upper()[i];
+  const double z = std::clamp(prior.ToScores(xi)[i] + change * unit, lower, upper);
+  // The standard deviation by the slope within the bounds.
+  const double above = std::min(upper, z + std_dev * unit);
+  const double below = std::max(lower, z - std_dev * unit);
+  if (!(above > below)) return {i, prior.OfScore(i, z), 0};
+  const double slope = (prior.OfScore(i, above) - prior.OfScore(i, below)) / (above - below);
+  return {i, prior.OfScore(i, z), slope * std_dev * unit};
+}
+
+WindowAssessment AssessWindows(const RegionalExpansion& expansion, const ResolvedProblem& problem,
+                               const RecordSummary& record,
+                               const std::vector<ChannelEstimate>& channels, const Vector& eta,
+                               double regularization) {
+  const Prior& prior = problem.prior();
+  WindowAssessment assessment;
+  assessment.widening = Vector::Ones(prior.dimension());
+  assessment.doubtful.assign(static_cast<size_t>(prior.dimension()), false);
+  if (expansion.windows().count() == 0) return assessment;
+  const std::vector<WindowScore> windows = ScoresByWindow(expansion, prior, eta);
+  const Matrix precision = PriorPrecision(prior);
+  const double dispersion = LargestDispersion(problem, channels);
+  assessment.robust = RobustCovarianceOf(windows, precision);
+  assessment.inconsistency = FindInconsistency(windows, precision, dispersion);
+  const bool windows_contradict = assessment.Disagree() || assessment.inconsistency.has_value();
+  assessment.contradicted = windows_contradict || ResidualsContradict(problem, record, channels);
+  if (assessment.contradicted) Widen(dispersion, assessment);
+  if (windows_contradict) {
+    assessment.estimates = EstimatesByWindow(windows, prior, expansion.design().region.ToGerm(eta),
+                                             precision, regularization);
+  }
+  return assessment;
+}
+
+}  // namespace polyest::internal
