@@ -91,8 +91,8 @@ void PrintWindows(const v1::Estimate& estimate, std::ostream& out) {
     const std::string last = window.last_run() != window.first_run()
                                  ? absl::StrFormat("run %d, ", window.last_run())
                                  : "";
-    std::vector<std::string> row = {
-        absl::StrFormat("%s%.6g … %s%.6g s", first, window.start_time(), last, window.end_time())};
+    std::vector<std::string> row = {absl::StrFormat(
+        "%s%.6g … %s%.6g s", first, window.start_time_s(), last, window.end_time_s())};
     for (const v1::ParameterEstimate& p : estimate.parameters()) {
       row.emplace_back("-");
       for (const v1::WindowEstimate::Value& v : window.values()) {

@@ -103,8 +103,8 @@ void AddWindows(const Estimate& estimate, v1::Estimate& proto) {
     v1::WindowEstimate& added = *proto.add_windows();
     added.set_first_run(window.first_run);
     added.set_last_run(window.last_run);
-    added.set_start_time(window.start_s);
-    added.set_end_time(window.end_s);
+    added.set_start_time_s(window.start_s);
+    added.set_end_time_s(window.end_s);
     for (const WindowParameter& parameter : window.parameters) {
       v1::WindowEstimate::Value& value = *added.add_values();
       value.set_parameter(estimate.parameters[static_cast<size_t>(parameter.parameter)].name);

@@ -121,8 +121,8 @@ TEST(EstimateToProto, CarriesTheWindowsOfARecord) {
   const v1::WindowEstimate& window = proto.windows(0);
   EXPECT_EQ(window.first_run(), 1);
   EXPECT_EQ(window.last_run(), 2);
-  EXPECT_EQ(window.start_time(), 3);
-  EXPECT_EQ(window.end_time(), 4);
+  EXPECT_EQ(window.start_time_s(), 3);
+  EXPECT_EQ(window.end_time_s(), 4);
   ASSERT_EQ(window.values_size(), 1);
   EXPECT_EQ(window.values(0).parameter(), "c");
   EXPECT_EQ(window.values(0).value(), 5);
