@@ -163,7 +163,7 @@ absl::StatusOr<Experiment> Section36() {
 }
 
 NoiseModel PaperNoise(double percent) {
-  return {.absolute = 0, .relative = percent / 100, .relative_to_max = 0.001};
+  return {.relative = percent / 100, .relative_to_max = 0.001, .least = 1e-6};
 }
 
 Problem PaperProblem(std::shared_ptr<const Model> model, int order) {

@@ -35,8 +35,10 @@ double NegativeLogLikelihood(double degrees, double chi_squared, double differen
 struct ChannelSums {
   explicit ChannelSums(int terms = 0) : samples(terms), differences(terms) {}
 
-  MismatchSums samples;      // of u_k
-  MismatchSums differences;  // of u_k − u_{k−1}; of u_k where a run begins
+  MismatchSums samples;  // of u_k
+  // Of u_k − u_{k−1}, and of u_k where a run begins and where it has ended. With the run that has
+  // not, Σ (…)² = 2 Σ u_k² − 2 Σ u_k u_{k−1} − u² of the last sample.
+  MismatchSums differences;
   bool scale_unknown = false;
   bool correlation_unknown = false;
   double degrees_factor = 1;  // NoiseModel::DegreesFactor

@@ -77,4 +77,10 @@ inline bool IsLearned(const NoiseModel& noise) {
          noise.outliers != OutlierHandling::kNone;
 }
 
+// Returns whether the noise depends on the value that is measured, so that it should be that of the
+// prediction. Correlated samples are combined with their noise before there are predictions.
+inline bool IsOfPrediction(const NoiseModel& noise) {
+  return noise.relative > 0 && noise.correlation == NoiseCorrelation::kWhite;
+}
+
 }  // namespace polyest::internal

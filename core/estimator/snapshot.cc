@@ -60,7 +60,8 @@ namespace polyest::internal {
 template <class Archive>
 void serialize(Archive& archive, RecordSummary::Channel& channel) {
   archive(channel.samples, channel.noise_variance_sum, channel.largest, channel.intervals,
-          channel.interval_sum_s, channel.last_time_s, channel.last_run);
+          channel.interval_sum_s, channel.least_interval_s, channel.longest_run_s,
+          channel.run_began_s, channel.last_time_s, channel.last_run);
 }
 
 template <class Archive>
@@ -84,11 +85,14 @@ template <class Archive>
 void serialize(Archive& archive, ChannelNoise& noise) {
   archive(noise.scale, noise.time_constant_s);
   Flag(archive, noise.learned);
+  Flag(archive, noise.of_prediction);
+  archive(noise.grid.shortest_s, noise.grid.longest_s);
 }
 
 template <class Archive>
 void serialize(Archive& archive, LearnedNoise& noise) {
-  archive(noise.channels, noise.posterior.centre, noise.posterior.factor, noise.misfit);
+  archive(noise.channels, noise.posterior.centre, noise.posterior.factor, noise.misfit,
+          noise.centre);
 }
 
 template <class Archive>
@@ -108,7 +112,7 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
           absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
           absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared,
-          absorbed.windows);
+          absorbed.windows, absorbed.profiles, absorbed.largest);
 }
 
 template <class Archive>

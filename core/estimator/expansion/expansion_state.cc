@@ -61,8 +61,12 @@ bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {
   for (const ChannelNoise& channel : noise.channels) {
     if (!(channel.scale > 0 && std::isfinite(channel.scale))) return false;
     if (!(channel.time_constant_s >= 0 && std::isfinite(channel.time_constant_s))) return false;
+    const TimeConstantGrid& grid = channel.grid;
+    if (grid.empty()) continue;
+    if (!(grid.shortest_s > 0 && std::isfinite(grid.longest_s))) return false;
   }
   const int n = problem.dimension();
+  if (noise.centre.size() > 0 && !IsVector(noise.centre, n)) return false;
   const PosteriorSummary& posterior = noise.posterior;
   return posterior.centre.size() == 0 ||
          (IsVector(posterior.centre, n) && IsMatrix(posterior.factor, n, n));
@@ -80,10 +84,14 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
   for (const ChannelSums& sums : state.sums) {
     if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
   }
+  const auto same = [](const CorrelationProfile& a, const CorrelationProfile& b) {
+    return a.HasSizesOf(b);
+  };
   return state.sums.size() == fresh.sums.size() && state.windows.Suits(fresh.sums, state.rows) &&
+         std::ranges::equal(state.profiles, fresh.profiles, same) &&
          IsVector(state.discount, channels) && std::ssize(state.outliers) == channels &&
          IsMatrix(state.previous_coefficients, terms, channels) &&
-         IsVector(state.previous_error, channels) &&
+         IsVector(state.previous_error, channels) && IsVector(state.largest, channels) &&
          state.check_chi_squared.rows() == fresh.check_chi_squared.rows() &&
          state.check_chi_squared.cols() == channels &&
          state.check_residual.size() == fresh.check_residual.size() &&

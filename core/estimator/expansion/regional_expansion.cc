@@ -30,6 +30,8 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::
       outliers(static_cast<size_t>(channels), 0),
       previous_coefficients(Matrix::Zero(terms, channels)),
       previous_error(Vector::Zero(channels)),
+      profiles(static_cast<size_t>(channels)),
+      largest(Vector::Zero(channels)),
       check_chi_squared(Matrix::Zero(check_points, channels)),
       check_residual(Vector::Zero(check_points)),
       check_valid(static_cast<size_t>(check_points), true),
@@ -71,10 +73,14 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
     const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
     sums.scale_unknown = model.unknown && learned;
-    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned;
+    // A time constant that has been found is taken as known: the one lag that is integrated out is
+    // not that of irregular samples.
+    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned &&
+                               noise_.channels[static_cast<size_t>(c)].time_constant_s == 0;
     sums.degrees_factor = DegreesFactor(model.outliers);
   }
   LookFromPosterior();
+  Linearize();
 }
 
 void RegionalExpansion::LookFromPosterior() {
@@ -141,6 +147,7 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
       propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
+  PredictNoise(first);
   return absl::OkStatus();
 }
 
@@ -273,18 +280,21 @@ std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int chan
   return prediction;
 }
 
+double RegionalExpansion::Magnitude(int row, int channel) const {
+  return row < fitted_rows_ ? coefficients_.col(row * channels_ + channel).norm() : 0;
+}
+
 void RegionalExpansion::Absorb(int row) {
   const size_t width = block_.values.size() / block_.rows.size();
   const int run = block_.rows[static_cast<size_t>(row)].run;
   if (run != absorbed_.summed_run) {
+    EndRunOfSums();
     absorbed_.summed_run = run;
-    absorbed_.previous_coefficients.setZero();
-    absorbed_.previous_error.setZero();
   }
   for (int c = 0; c < channels_; ++c) {
     const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
     if (sigma <= 0) continue;  // no sample
-    const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
+    double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
     const int column = row * channels_ + c;
     const auto coefficients = coefficients_.col(column);
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
@@ -292,14 +302,21 @@ void RegionalExpansion::Absorb(int row) {
         DeviationFromCentre(c, coefficients, z, sigma * sigma + residual_variance_[column]);
     const double weight = OutlierWeight(model.outliers, deviation);
     // e = z − cᵀφ_0,  R = σ²/w + the residual's variance ρ
-    const double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
+    double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
+    double lack = LackOfWeight(model.outliers, deviation);
+    if (IsScored(c)) {
+      const ScoredSample scored = Scored(c, coefficients, z, noise, residual_variance_[column]);
+      z = scored.value;
+      noise = scored.noise_variance;
+      lack += scored.lack;
+    }
     const double variance = noise + residual_variance_[column];
     const double error = z - coefficients.dot(reference_phi_);
     absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
     AddDifference(c, coefficients, error, variance);
+    AddToProfile(row, c, coefficients, z, variance);
     absorbed_.discount[c] += residual_variance_[column] / variance;
-    Normalize(VarianceFactor(model.outliers) * sigma * sigma, residual_variance_[column],
-              LackOfWeight(model.outliers, deviation));
+    Normalize(VarianceFactor(model.outliers) * sigma * sigma, residual_variance_[column], lack);
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
     // χ²_q += (z − y_q)²/R
@@ -328,6 +345,18 @@ double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef&
 void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
   absorbed_.log_noise += 0.5 * std::log(noise) + lack;
   absorbed_.log_variance += 0.5 * std::log(noise + own_error) + lack;
+}
+
+// Ends the run summed so far. The differences get its last u, as they got its first: every u² of an
+// ended run is then in them twice, but for the products of successive ones.
+void RegionalExpansion::EndRunOfSums() {
+  for (int c = 0; c < channels_ && absorbed_.summed_run >= 0; ++c) {
+    absorbed_.sums[static_cast<size_t>(c)].differences.Add(absorbed_.previous_coefficients.col(c),
+                                                           absorbed_.previous_error[c], 1);
+  }
+  absorbed_.previous_coefficients.setZero();
+  absorbed_.previous_error.setZero();
+  for (CorrelationProfile& profile : absorbed_.profiles) profile.BeginRun();
 }
 
 // Adds u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/bayes/mismatch.h"
+#include "core/bayes/relative_noise.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
@@ -55,6 +56,8 @@ struct AbsorbedRows {
   int summed_run = -1;
   Matrix previous_coefficients;  // S × m
   Vector previous_error;
+  std::vector<CorrelationProfile> profiles;  // per channel; empty unless its correlation is learned
+  Vector largest;  // per channel: largest |z| of the rows propagated, for relative noise
   // Sums at the check points.
   Matrix check_chi_squared;       // C × m
   Vector check_residual;          // Σ ((model − expansion)/σ)²
@@ -98,6 +101,9 @@ class RegionalExpansion {
   // Returns what the prior predicts for the channel's sample in that row, if the expansion is over
   // the whole prior and the prediction is finite. Samples with correlated noise are whitened.
   std::optional<PriorPrediction> PredictionOf(int row, int channel) const;
+  // Returns the root mean square over the germ of a channel's output at row `row` of the block
+  // propagated last; 0 where too few trajectories are left.
+  double Magnitude(int row, int channel) const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
 
@@ -117,6 +123,11 @@ class RegionalExpansion {
   const WindowSums& windows() const { return absorbed_.windows; }
   // Returns Σ ρ_k/R_k of a channel: the number of its samples lost to the expansion's own error ρ.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
+  // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
+  const CorrelationProfile& Profile(int channel) const {
+    return absorbed_.profiles[static_cast<size_t>(channel)];
+  }
+  const Vector& LinearizedAt() const { return linearized_at_; }  // η, n
   // Returns the number of samples of a channel that have less than half their weight.
   int64_t Outliers(int channel) const { return absorbed_.outliers[static_cast<size_t>(channel)]; }
   // Returns the term that makes the costs of different expansions of the same record comparable,
@@ -156,10 +167,18 @@ class RegionalExpansion {
   absl::Status DropFailed(int row);
   void NoteFailures(int row);
   void LookFromPosterior();
+  void Linearize();
+  void PredictNoise(int first);
+  bool IsScored(int channel) const;
+  ScoredSample Scored(int channel, const ConstVectorRef& coefficients, double z, double variance,
+                      double own_error) const;
+  void EndRunOfSums();
   double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
                              double variance) const;
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                      double variance);
+  void AddToProfile(int row, int channel, const ConstVectorRef& coefficients, double z,
+                    double variance);
   void Normalize(double noise, double own_error, double lack);
   void Compare(int column, double z, double variance);
 
@@ -195,8 +214,14 @@ class RegionalExpansion {
   Vector centre_phi_;
   Matrix spread_;  // S × n
 
+  // Where noise is predicted and about which residuals are linearized: η, φ and ∂φ/∂η.
+  Vector linearized_at_;
+  Vector linearized_phi_;
+  Matrix linearized_gradient_;  // S × n
+
   AbsorbedRows absorbed_;
   Vector difference_;  // S
+  Vector slope_;       // n
 };
 
 // Returns one line with the parameters, the time, the run and the solver's flag.

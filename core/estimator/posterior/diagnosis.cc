@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/residual_tests.h"
 #include "core/estimator/posterior/undersampling.h"
 #include "core/estimator/record/suspicious_data.h"
@@ -17,6 +18,11 @@ namespace {
 // deviations and by a third.
 constexpr double kMisfitDeviations = 6;
 constexpr double kTooSmallRatio = 1.5;
+// Relative noise whose bias, if it is taken of the samples, is mentioned.
+constexpr double kLargeRelativeNoise = 0.05;
+// A record of fewer time constants than five hardly knows them: that of a random walk, which has
+// none, is mostly found to be a fifth of the record or more.
+constexpr double kMaxTimeConstant = 0.2;
 constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
 // As kAtBound, for a correlated parameter: its score has no bound, and only approaches the
 // parameter's.
@@ -143,18 +149,47 @@ void AddCorrelation(const Findings& findings, const Estimate& estimate,
   }
 }
 
+// Returns why a channel's noise has not been learned; empty if it has or need not be.
+std::string ReasonNotLearned(const Findings& findings, size_t c) {
+  const NoiseModel& model = findings.problem->problem().measured[c].noise;
+  const bool correlation = model.correlation == NoiseCorrelation::kUnknown;
+  const RecordSummary::Channel& channel = findings.record->channels()[c];
+  if (channel.samples == 0) return "";
+  const ChannelNoise& noise = findings.expansion->noise().channels[c];
+  const double relative = noise.scale * model.relative;
+  if (relative > kLargeRelativeNoise && !noise.of_prediction) {
+    return absl::StrFormat(
+        "its relative noise of %.3g %% is taken of the samples and not of the predictions, which "
+        "makes predictions too small by about %.2g %%",
+        100 * relative, 200 * relative * relative);
+  }
+  if (!model.unknown && !correlation) return "";
+  if (!noise.learned) {
+    const std::string why =
+        model.unknown && channel.largest <= 0
+            ? "all samples are 0, from which its noise cannot be learned"
+            : absl::StrFormat("too few samples (%d), fewer than %d, to learn its noise from",
+                              channel.samples, MinSamplesForNoise(findings.problem->dimension()));
+    return absl::StrCat(why, "; it is taken to be ",
+                        model.unknown ? "as large as the signal"
+                                      : "white, and if it is not, the uncertainty is too small");
+  }
+  if (!correlation || noise.grid.empty()) return "";
+  if (noise.time_constant_s < kMaxTimeConstant * channel.longest_run_s) return "";
+  return absl::StrFormat(
+      "its noise is correlated over %.3g s or longer, a large part of the record of "
+      "%.3g s, so that its time constant and its size are hardly known",
+      noise.time_constant_s, channel.longest_run_s);
+}
+
 void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
                        std::vector<Diagnostic>& diagnostics) {
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
-    if (!findings.problem->problem().measured[c].noise.unknown ||
-        findings.expansion->noise().channels[c].learned || estimate.channels[c].samples == 0) {
-      continue;
-    }
-    diagnostics.push_back(
-        {DiagnosticCode::kNoiseNotLearned,
-         absl::StrFormat("output %s: too few samples (%d) to learn its noise from; it is taken to "
-                         "be as large as the signal",
-                         estimate.channels[c].output, estimate.channels[c].samples)});
+    if (findings.record->channels().empty()) return;
+    const std::string reason = ReasonNotLearned(findings, c);
+    if (reason.empty()) continue;
+    diagnostics.push_back({DiagnosticCode::kNoiseNotLearned,
+                           absl::StrFormat("output %s: %s", estimate.channels[c].output, reason)});
   }
 }
 

@@ -51,8 +51,6 @@ constexpr int kMaxSettlementsAtRow = 4;
 // Maximum number of revisions of the noise at the end of a window. A scale that falls from the
 // signal's size to 10⁻⁶ of it takes 20 halvings.
 constexpr int kMaxRevisions = 24;
-// Factor by which a scale that is not learned yet exceeds the largest sample.
-constexpr double kAboveSignal = 2;
 
 // Trajectories that the components may propagate together, and components that they always may be.
 constexpr double kMostTrajectories = 2048;
@@ -149,6 +147,7 @@ absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
   LearnedNoise noise = expansion_->noise();
   noise.posterior = SummaryForNewRuns(grown, noise.posterior);
+  noise.centre.resize(0);
   Matrix particles = ParticlesForNewRuns(grown, particles_);
   std::swap(problem_, grown);  // the object stays in place, since expansions refer to it
   auto replayed =
@@ -416,10 +415,13 @@ absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& bloc
   for (size_t c = 0; c < present.size(); ++c) {
     const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
     if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;
-    const double size = std::abs(block.values[static_cast<size_t>(row) * width + c]) / shape;
-    if (size <= present[c].scale) continue;
+    const double value = std::abs(block.values[static_cast<size_t>(row) * width + c]);
+    const double predicted = expansion_->Magnitude(row, static_cast<int>(c));
+    const std::optional<double> scale =
+        UnlearnedScale(summary_, c, value / shape, predicted / shape, present[c].scale);
+    if (!scale) continue;
     if (!raised) raised = expansion_->noise();
-    raised->channels[c].scale = kAboveSignal * size;
+    raised->channels[c].scale = *scale;
   }
   if (!raised) return false;
   POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(raised), stop));

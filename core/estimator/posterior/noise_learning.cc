@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "core/bayes/noise.h"
 #include "core/common/linear_algebra.h"
@@ -15,30 +17,66 @@ constexpr double kWorthIt = 1.25;
 // Limits of a scale's change in one revision: the expansion must be able to follow.
 constexpr double kMaxFall = 0.5;
 constexpr double kMaxRise = 4;
+// Least noise in units of the largest sample. The squares of a record with less would drown in
+// rounding errors.
+constexpr double kLeastNoiseToSignal = 1e-9;
 // If the expansion's own error makes up more than this share of χ², the scale cannot be determined.
 constexpr double kMaxDiscount = 0.8;
-constexpr double kSignificance = 2;  // in standard deviations, for giving up white noise
-constexpr double kMinCorrelation = 0.02;
-constexpr double kMaxCorrelation = 0.9999;
-// Fraction of the requested change. The whole change would be right for noise of the assumed kind,
-// but oscillates for other noise.
-constexpr double kCorrelationStep = 0.6;
+// Factor by which a scale that is not learned yet exceeds the largest sample.
+constexpr double kAboveSignal = 2;
+// Gains of log likelihood for which correlation is preferred to white noise, and for which a time
+// constant is revised: a standard deviation of log τ is worth ½.
+constexpr double kWorthCorrelation = 1;
+constexpr double kWorthRevision = 0.25;
+// Error of the linearized χ², in units of the noise's variance, from which it is linearized anew.
+constexpr double kMaxNonlinearity = 0.5;
+// Relative noise is taken of the predictions while the expansion's own error and the misfit (χ²/N)
+// are at most these; the predictions are renewed when the minimum moves by this many posterior
+// standard deviations.
+constexpr double kMaxDiscountOfPrediction = 0.2;
+constexpr double kMaxMisfit = 2;
+constexpr double kMovedPrediction = 1;
+// The shortest time constant of the grid, in least intervals: successive samples are then
+// correlated by e⁻⁴ = 0.02.
+constexpr double kShortestInIntervals = 0.25;
+// Factor by which the record must exceed the grid before that is extended.
+constexpr double kGridGrowth = 1.3;
 // Changes from which the posterior counts as different: of its centre, in standard deviations, and
 // of its spread, as a factor.
 constexpr double kMoved = 0.2;
 constexpr double kSpread = 1.3;
 
-// Returns the correlation x of noise whose residuals have the lag-1 correlation r after whitening
-// with a:
-//   r = (x − a)(1 − a x)/(1 − 2 a x + a²).
-// This is a quadratic equation in x, with the root a for r = 0. If it has no real root, the noise
-// is not of this kind, and the first-order solution a + r is returned.
-double CorrelationBehind(double r, double a) {
-  if (a <= 0) return std::clamp(r, -kMaxCorrelation, kMaxCorrelation);
-  const double b = 1 + a * a + 2 * r * a;
-  const double discriminant = b * b - 4 * a * (a + r * (1 + a * a));
-  const double x = discriminant < 0 ? a + r : (b - std::sqrt(discriminant)) / (2 * a);
-  return std::clamp(x, -kMaxCorrelation, kMaxCorrelation);
+// A time constant with the scale of the noise that goes with it.
+struct NoiseChoice {
+  double time_constant_s = 0;
+  double scale = 1;  // in units of the working noise
+  double negative_log_likelihood = std::numeric_limits<double>::infinity();
+  int step = -1;  // of the grid, the nearest; −1 for white noise
+};
+
+// Returns the best time constant of the profile; where it lies between two steps of the grid, by
+// the parabola through the best step and its neighbours.
+NoiseChoice BestOfGrid(const std::vector<ProfileValue>& values, const TimeConstantGrid& grid) {
+  const auto at = [&](int step) -> const ProfileValue& {
+    return values[CorrelationProfile::kFirstOfGrid + static_cast<size_t>(step)];
+  };
+  NoiseChoice best;
+  for (int step = 0; step < TimeConstantGrid::kSteps; ++step) {
+    if (!(at(step).negative_log_likelihood < best.negative_log_likelihood)) continue;
+    best = {grid.At(step), at(step).scale, at(step).negative_log_likelihood, step};
+  }
+  if (best.step <= 0 || best.step == TimeConstantGrid::kSteps - 1) return best;
+  const double below = at(best.step - 1).negative_log_likelihood - best.negative_log_likelihood;
+  const double above = at(best.step + 1).negative_log_likelihood - best.negative_log_likelihood;
+  if (!std::isfinite(below + above) || below + above <= 0) return best;
+  // With f(−1) = below, f(0) = 0 and f(1) = above, the minimum is at x, |x| ≤ ½, of height −x²
+  // (…)/2.
+  const double x = 0.5 * (below - above) / (below + above);
+  const double ratio = grid.At(1) / grid.At(0);
+  best.time_constant_s *= std::pow(ratio, x);
+  best.scale *= std::pow(at(best.step + (x < 0 ? -1 : 1)).scale / best.scale, std::abs(x));
+  best.negative_log_likelihood -= 0.5 * x * x * (below + above);
+  return best;
 }
 
 class Revision {
@@ -56,15 +94,21 @@ class Revision {
     Minimize(stop);
     for (int c = 0; c < problem_.channels(); ++c) {
       const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+      RevisePredicted(c, model);
       if (!model.unknown && model.correlation != NoiseCorrelation::kUnknown) continue;
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
-      if (sums.samples.count() < kMinSamplesForNoise + 4 * problem_.dimension()) continue;
+      if (sums.samples.count() < MinSamplesForNoise(problem_.dimension())) continue;
+      // Samples that are all 0 do not tell how large their noise is.
+      const bool silent = record_.channels()[static_cast<size_t>(c)].largest <= 0;
+      if (model.unknown && silent) continue;
       // The channel's share of the fitted parameters.
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());
       ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
-      if (model.unknown) ReviseScale(c, sums, share, noise);
-      if (model.correlation == NoiseCorrelation::kUnknown) ReviseCorrelation(c, sums, share, noise);
+      if (model.correlation != NoiseCorrelation::kUnknown ||
+          !ReviseTimeConstant(c, sums, model.unknown, noise)) {
+        if (model.unknown) ReviseScale(c, sums, share, noise);
+      }
       if (!noise.learned) changed_ = noise.learned = true;
     }
     if (HandlesOutliers()) RevisePosterior();
@@ -94,34 +138,98 @@ class Revision {
     const double chi_squared = std::max(0.0, sums.samples.ChiSquared(d_) - discount);
     const double factor = std::clamp(std::sqrt(chi_squared / degrees), kMaxFall, kMaxRise);
     // The learned scale is not included.
-    const double typical = record_.channels()[static_cast<size_t>(c)].RootMeanSquareNoise();
-    const double revised =
-        std::max(noise.scale * factor, NoiseModel::kMinStandardDeviation / typical);
+    const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
+    const double least = kLeastNoiseToSignal * channel.largest / channel.RootMeanSquareNoise();
+    const double revised = std::max(noise.scale * factor, least);
     const double ratio = revised / noise.scale;
     if (ratio < kWorthIt && ratio > 1 / kWorthIt) return;
     noise.scale = revised;
     changed_ = true;
   }
 
-  void ReviseCorrelation(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
-    const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
-    const auto samples = static_cast<double>(sums.samples.count());
-    if (channel.intervals == 0) return;
-    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share, samples);
-    const double present = channel.Correlation(noise);
-    const double asked = CorrelationBehind(left, present);
-    // The standard error of a correlation a is √((1 − a²)/N).
-    const double significance = present > 0 ? 1 : kSignificance;
-    if (std::abs(asked - present) * std::sqrt(samples / (1 - asked * asked)) < significance) return;
-    const double step = present > 0 ? kCorrelationStep : 1;
-    const double revised = std::min(kMaxCorrelation, present + step * (asked - present));
-    // Alternating noise is not of this kind; white noise is the nearest.
-    const double time_constant_s =
-        revised > kMinCorrelation ? -channel.MeanInterval() / std::log(revised) : 0;
-    if (std::abs(channel.Correlation({1, time_constant_s, true}) - present) < kMinCorrelation) {
-      return;
+  // Lets relative noise be that of the predictions at the minimum, when there are samples enough
+  // and the model follows them, and moves the point when the minimum has left it.
+  void RevisePredicted(int c, const NoiseModel& model) {
+    ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
+    if (!IsOfPrediction(model) || !problem_.problem().expansion.adaptive) return;
+    if (!noise.of_prediction) {
+      const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
+      if (sums.samples.count() < MinSamplesForNoise(problem_.dimension())) return;
+      if (expansion_.Discount(c) > kMaxDiscountOfPrediction * sums.Degrees()) return;
+      if (!model.unknown && sums.samples.ChiSquared(d_) > kMaxMisfit * sums.Degrees()) return;
+    } else {
+      const Vector moved = eta_ - expansion_.LinearizedAt();
+      if (!(moved.dot(cost_.Hessian(eta_) * moved) > kMovedPrediction * kMovedPrediction)) return;
     }
-    noise.time_constant_s = time_constant_s;
+    noise.of_prediction = true;
+    noise_.centre = expansion_.design().region.ToGerm(eta_);
+    changed_ = true;
+  }
+
+  // Revises the time constant together with the scale; returns false when the scale is left to be
+  // revised alone.
+  bool ReviseTimeConstant(int c, const ChannelSums& sums, bool scale_unknown, ChannelNoise& noise) {
+    const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
+    if (channel.intervals == 0) return false;
+    const CorrelationProfile& profile = expansion_.Profile(c);
+    if (profile.empty()) {
+      SetGrid(channel, noise);
+      return false;
+    }
+    if (expansion_.Discount(c) > kMaxDiscount * sums.Degrees()) return false;
+    const Matrix unit = to_local_ * problem_.prior().GermStandardDeviation().asDiagonal();
+    std::vector<ProfileValue> values;
+    const auto samples = static_cast<double>(sums.samples.count());
+    for (CorrelationProfile::Member member : profile.members()) {
+      member.gram /=
+          sums.degrees_factor;  // so that χ² is N in the mean, with outliers' weights too
+      values.push_back(EvaluateMember(member, samples, unit, scale_unknown));
+    }
+    const ProfileValue& present = values[CorrelationProfile::kPresent];
+    const ProfileValue& white = values[CorrelationProfile::kWhite];
+    LinearizeAgainIfCurved(profile, sums, present.scale);
+    NoiseChoice best = BestOfGrid(values, noise.grid);
+    const double worth = noise.time_constant_s > 0 ? 0 : kWorthCorrelation;
+    if (!(best.negative_log_likelihood < white.negative_log_likelihood - worth)) {
+      best = {0, white.scale, white.negative_log_likelihood, -1};
+    }
+    ExtendGrid(best.step, channel, noise);
+    if (!(best.negative_log_likelihood < present.negative_log_likelihood - kWorthRevision)) {
+      return false;
+    }
+    noise.time_constant_s = best.time_constant_s;
+    if (scale_unknown) noise.scale *= std::clamp(best.scale, kMaxFall, kMaxRise);
+    changed_ = true;
+    return true;
+  }
+
+  void SetGrid(const RecordSummary::Channel& channel, ChannelNoise& noise) {
+    noise.grid = {kShortestInIntervals * channel.least_interval_s, channel.longest_run_s};
+    changed_ = true;
+  }
+
+  // Extends the grid if the best time constant is at an end of it beyond which the record now
+  // reaches.
+  void ExtendGrid(int best, const RecordSummary::Channel& channel, ChannelNoise& noise) {
+    const bool longer = channel.longest_run_s > kGridGrowth * noise.grid.longest_s;
+    const bool finer =
+        kShortestInIntervals * channel.least_interval_s < noise.grid.shortest_s / kGridGrowth;
+    if ((best == TimeConstantGrid::kSteps - 1 && longer) || (best <= 0 && finer)) {
+      SetGrid(channel, noise);
+    }
+  }
+
+  // Compares the linearized χ² at the minimum of the cost with that of the expansion.
+  void LinearizeAgainIfCurved(const CorrelationProfile& profile, const ChannelSums& sums,
+                              double scale) {
+    Vector delta(eta_.size() + 1);
+    delta.head(eta_.size()) = eta_ - expansion_.LinearizedAt();
+    delta[eta_.size()] = -1;
+    const Matrix& gram = profile.members()[CorrelationProfile::kPresent].gram;
+    const double linear = delta.dot(gram.selfadjointView<Eigen::Upper>() * delta);
+    const double error = std::abs(linear - sums.samples.ChiSquared(d_));
+    if (error <= kMaxNonlinearity * scale * scale) return;
+    noise_.centre = expansion_.design().region.ToGerm(eta_);
     changed_ = true;
   }
 
@@ -171,16 +279,29 @@ LearnedNoise NoiseToBeginWith(const Problem& problem) {
   LearnedNoise noise;
   for (const MeasuredOutput& measured : problem.measured) {
     ChannelNoise channel;
-    if (measured.noise.unknown) channel.scale = NoiseModel::kMinStandardDeviation;
     channel.time_constant_s = measured.noise.time_constant_s;
     noise.channels.push_back(channel);
   }
   return noise;
 }
 
+std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel, double value,
+                                     double predicted, double present) {
+  const bool first = record.channels().empty() || record.channels()[channel].samples == 0;
+  const bool silent = first || record.channels()[channel].largest == 0;
+  const double size = value == 0 && silent ? predicted : value;
+  const double scale = kAboveSignal * size;
+  // Whether the scale is to be that of this sample, and is not yet.
+  const bool begins =
+      size > 0 && (first || (silent && value > 0)) && std::abs(present - scale) > 0.1 * size;
+  if (!begins && size <= present) return std::nullopt;
+  return scale;
+}
+
 bool LearnsNoise(const Problem& problem) {
-  return std::ranges::any_of(problem.measured,
-                             [](const MeasuredOutput& m) { return IsLearned(m.noise); });
+  return std::ranges::any_of(problem.measured, [&problem](const MeasuredOutput& m) {
+    return IsLearned(m.noise) || (problem.expansion.adaptive && IsOfPrediction(m.noise));
+  });
 }
 
 std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,

@@ -8,12 +8,14 @@
 //   scale        s² ← s² (χ² − D)/(N − D − p). D is the expansion's own share of χ², and p the
 //                channel's share of the number of fitted parameters Σ λ/(1 + λ). In one revision
 //                s² falls at most by a factor 4 and rises at most by a factor 16.
-//   correlation  a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval Δt. x is the noise
-//                correlation that explains the lag-1 correlation r which the whitened residuals
-//                still have (after removing its bias), r = (x − a)(1 − a x)/(1 − 2 a x + a²). The
-//                step is taken while x − a is significant. From white noise, a ← r.
+//   correlation  τ ← the most probable of white noise and a grid of time constants from a quarter
+//   of
+//                the least sampling interval to the record's length, by the likelihood over the
+//                actual intervals with the parameters following (correlation_profile.h). An unknown
+//                scale is revised together with it. The parameters follow linearly about a point
+//                that moves to the minimum where the model is curved.
 //
-// Neither is learned before there are kMinSamplesForNoise + 4 n samples.
+// Neither is learned before the channel has MinSamplesForNoise samples.
 
 #include <absl/status/statusor.h>
 
@@ -25,10 +27,20 @@
 
 namespace polyest::internal {
 
-inline constexpr int kMinSamplesForNoise = 10;
+// Returns the number of samples of a channel from which its noise is learned, for n unknowns. The
+// likelihood with the scale integrated out has (N − n)/2 degrees of freedom; with 4 to spare the
+// scale may still collapse onto a chance fit, with 6 it does not.
+inline int MinSamplesForNoise(int n) { return n + 6; }
 
 // Returns the initial noise: unknown scales are not learned yet, and correlations are as given.
 LearnedNoise NoiseToBeginWith(const Problem& problem);
+
+// Returns the scale of a channel whose scale is not learned yet that its next sample asks for, or
+// nullopt if the present one stays. `value` is |z| of that sample, in units of the noise that the
+// problem gives; it is twice the largest one's. Samples of 0 have no size: before there is another,
+// `predicted`, the size of the predictions in the same units, stands for it.
+std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel, double value,
+                                     double predicted, double present);
 
 // Whether anything of the problem's noise is learned from the record.
 bool LearnsNoise(const Problem& problem);

@@ -69,6 +69,7 @@ SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
           noise.channels[static_cast<size_t>(c)].scale *
           problem.problem().measured[static_cast<size_t>(c)].noise.StandardDeviation(
               outputs.col(column).mean(), largest[c]);
+      if (sigma <= 0) continue;  // an output that is always 0 has no relative noise
       const double slope = (outputs(1, column) - outputs(0, column)) / distance / sigma;
       by_phase[static_cast<Eigen::Index>(i) % kPhases] += slope * slope;
     }

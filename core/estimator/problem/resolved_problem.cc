@@ -45,7 +45,9 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
   const NoiseModel& noise = measured.noise;
   for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
                                      {"relative", noise.relative},
-                                     {"relative_to_max", noise.relative_to_max}}) {
+                                     {"relative_to_max", noise.relative_to_max},
+                                     {"full_scale", noise.full_scale},
+                                     {"least", noise.least}}) {
     if (!std::isfinite(value) || value < 0) {
       return InvalidField({"measured", index, "noise", field},
                           absl::StrFormat("%g must be a finite number ≥ 0", value));
@@ -55,6 +57,12 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
       (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
     return InvalidField(FieldPath{"measured", index, "noise", "correlation", "time_constant_s"},
                         absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
+  }
+  if (noise.full_scale > 0 && noise.relative_to_max == 0) {
+    return InvalidField(
+        FieldPath{"measured", index, "noise", "full_scale"},
+        absl::StrFormat("%g has no effect without relativeToMax, the noise as a fraction of it",
+                        noise.full_scale));
   }
   if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
     return InvalidField(FieldPath{"measured", index, "noise"},

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/common/types.h"
+#include "core/estimator/record/correlation_profile.h"
 
 namespace polyest::internal {
 
@@ -15,6 +16,10 @@ struct ChannelNoise {
   // Whether the unknown parts have been learned. Until then an unknown scale is as large as the
   // signal and treated as known, which overestimates the uncertainty.
   bool learned = false;
+  // Whether the part of the noise that is relative to a value is taken of the prediction at
+  // LearnedNoise::centre. It is taken of the sample until there is a prediction.
+  bool of_prediction = false;
+  TimeConstantGrid grid;  // from which an unknown time constant is chosen; empty if none is yet
 };
 
 // The position and spread of the posterior at the last revision; outliers are judged by their
@@ -30,6 +35,9 @@ struct LearnedNoise {
   // Mean square of the residuals ÷ that of the stated noise where the residuals contradict it
   // (misfit.h), else 1. The cost is divided by it.
   double misfit = 1;
+  // ξ at which noise is predicted and about which residuals are linearized (n); that of the
+  // expansion's reference if empty.
+  Vector centre;
 };
 
 }  // namespace polyest::internal

@@ -19,9 +19,14 @@ double RecordSummary::Channel::Correlation(const ChannelNoise& noise) const {
 
 void RecordSummary::Channel::AddTime(const SampleRow& row) {
   if (row.run == last_run) {
+    const double interval_s = row.time_s - last_time_s;
+    least_interval_s = intervals == 0 ? interval_s : std::min(least_interval_s, interval_s);
     ++intervals;
-    interval_sum_s += row.time_s - last_time_s;
+    interval_sum_s += interval_s;
+  } else {
+    run_began_s = row.time_s;
   }
+  longest_run_s = std::max(longest_run_s, row.time_s - run_began_s);
   last_run = row.run;
   last_time_s = row.time_s;
 }

@@ -19,6 +19,9 @@ class RecordSummary {
     double largest = 0;             // largest |z|
     int64_t intervals = 0;          // between successive samples of a run
     double interval_sum_s = 0;
+    double least_interval_s = 0;  // 0 without intervals
+    double longest_run_s = 0;     // from the first to the last sample of a run
+    double run_began_s = 0;
     double last_time_s = 0;
     int last_run = -1;
 

@@ -99,6 +99,10 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
       largest = std::max(largest, std::abs(z));
       const NoiseModel& noise = problem_.problem().measured[place].noise;
       const double sigma = noise.StandardDeviation(z, largest);
+      if (sigma <= 0) {  // 0 before any other value: without a size, it counts as missing
+        checked.values[k * width + place] = std::numeric_limits<double>::quiet_NaN();
+        continue;
+      }
       if (!noise.unknown && std::abs(z) > kMaxSignalToNoise * sigma) {
         return Refusal(ValueAt(samples, column, k),
                        "row %d, column %s: %g is more than %g times its noise of %g; check its "

@@ -150,6 +150,7 @@ class ModelMismatch {
   // Adds the rows [first, end) of one run. The model starts anew, with the run's own inputs.
   absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Sums& sums,
                       const Stop& stop) const {
+    sums.differences.array() += sums.previous.array().square();  // ends the run before
     sums.previous.setZero();
     InputSignals inputs = problem_.MakeInputs();
     std::vector<double> times;

@@ -30,7 +30,8 @@ struct Candidate {
 };
 
 absl::Status CheckNoise(const NoiseModel& noise, const FieldPath& field) {
-  for (const double number : {noise.absolute, noise.relative, noise.relative_to_max}) {
+  for (const double number :
+       {noise.absolute, noise.relative, noise.relative_to_max, noise.full_scale}) {
     if (number >= 0 && std::isfinite(number)) continue;
     return InvalidField(field.Then("noise"),
                         absl::StrFormat("%g must be a finite number ≥ 0", number));
@@ -162,14 +163,24 @@ class Outlook {
     const Vector y = record.coefficients.transpose() * phi;
     Matrix slopes =
         record.coefficients.transpose() * gradient * draws_.germ_standard_deviation().asDiagonal();
-    Vector largest = Vector::Zero(m_);
+    // An output at rest has the noise of a small part of its later range.
+    Vector largest(m_);
+    for (int i = 0; i < m_; ++i) {
+      largest[i] =
+          NoiseModel::kLeastMagnitude * y(Eigen::seq(i, y.size() - 1, m_)).cwiseAbs().maxCoeff();
+    }
     for (Eigen::Index row = 0; row < slopes.rows(); ++row) {
       const Eigen::Index i = row % m_;
       largest[i] = std::max(largest[i], std::abs(y[row]));
       const double sigma = noises[static_cast<size_t>(i)].StandardDeviation(y[row], largest[i]);
       noise_variance_[i] += sigma * sigma;
       // R = σ² + residual variance
-      slopes.row(row) /= std::sqrt(sigma * sigma + record.residual_variance[row]);
+      const double variance = sigma * sigma + record.residual_variance[row];
+      if (variance > 0) {
+        slopes.row(row) /= std::sqrt(variance);
+      } else {
+        slopes.row(row).setZero();  // an output that is always 0 has no relative noise
+      }
     }
     slopes_.push_back(std::move(slopes));
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
@@ -107,10 +108,14 @@ void TakeNoise(const NoiseModel* given, OutputSensitivity& output) {
   const NoiseModel noise =
       given != nullptr ? *given : AssumedNoise(output.mean, output.standard_deviation);
   output.noise.resize(output.mean.size());
-  double largest = 0;
+  // An output at rest has the noise of a small part of its later range.
+  double largest = NoiseModel::kLeastMagnitude *
+                   (output.mean.cwiseAbs() + 2 * output.standard_deviation).maxCoeff();
   for (Eigen::Index k = 0; k < output.mean.size(); ++k) {
     largest = std::max(largest, std::abs(output.mean[k]));
-    output.noise[k] = noise.StandardDeviation(output.mean[k], largest);
+    // An output that is always 0 has no noise to be compared with; any positive value does.
+    output.noise[k] = std::max(std::numeric_limits<double>::min(),
+                               noise.StandardDeviation(output.mean[k], largest));
   }
 }
 

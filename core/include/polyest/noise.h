@@ -25,27 +25,35 @@ enum class OutlierHandling {
 };
 
 // Standard deviation of the noise of one sample z:
-//   σ = max(10⁻⁶, absolute + relative·|z| + relative_to_max·max|z|),
+//   σ = absolute + relative·max(|z|, 10⁻⁴ max|z|) + relative_to_max·max|z|,
 // the maximum over the output's samples up to and including this one in time order, so that how
-// samples are cut into batches does not matter. If the size of the noise is unknown, a factor of σ
-// is estimated; without numbers σ is then 1.
+// samples are cut into batches does not matter. A known full scale takes the place of the last
+// term's maximum. Samples of 0 before any other, to which neither `absolute` nor a full scale gives
+// a σ above 0, are not used. Of the sample, the part proportional to |z| favours samples that
+// happen to be small: an adaptive expansion takes it of the model's prediction in place of z as
+// soon as there is one, unless the noise is correlated. If the size of the noise is unknown, a
+// factor of σ is estimated; without numbers σ is then 1.
 struct NoiseModel {
   double absolute = 0;         // ≥ 0, in the output's unit
   double relative = 0;         // ≥ 0, of |z|
-  double relative_to_max = 0;  // ≥ 0, of max |z|
+  double relative_to_max = 0;  // ≥ 0, of max |z| or of the full scale
   bool unknown = false;        // whether a factor of σ is estimated from the samples
   NoiseCorrelation correlation = NoiseCorrelation::kWhite;  // in time
   double time_constant_s = 0;                               // τ > 0 when the correlation is known
   OutlierHandling outliers = OutlierHandling::kNone;        // what is done about gross errors
+  double full_scale = 0;  // ≥ 0, in the output's unit; 0: not known
+  double least = 0;       // ≥ 0, the least σ, in the output's unit
 
-  // The least σ, in the output's unit.
-  static constexpr double kMinStandardDeviation = 1e-6;
+  // The least magnitude that counts in `relative`, as a fraction of max |z|: samples at the zeros
+  // of a signal are not arbitrarily accurate.
+  static constexpr double kLeastMagnitude = 1e-4;
 
   // Returns σ of a sample z. `largest_magnitude`: max |z| so far, this sample included.
   double StandardDeviation(double z, double largest_magnitude) const {
     if (unknown && absolute == 0 && relative == 0 && relative_to_max == 0) return 1;
-    return std::max(kMinStandardDeviation,
-                    absolute + relative * std::abs(z) + relative_to_max * largest_magnitude);
+    const double magnitude = std::max(std::abs(z), kLeastMagnitude * largest_magnitude);
+    const double scale = full_scale > 0 ? full_scale : largest_magnitude;
+    return std::max(least, absolute + relative * magnitude + relative_to_max * scale);
   }
 };
 

@@ -119,14 +119,28 @@ TEST(UnknownScale, IsLearnedOnAFixedExpansionToo) {
 }
 
 TEST(UnknownScale, SaysThatItHasNotBeenLearnedFromFewSamples) {
-  const Estimate estimate = EstimateOf(ProblemWith({.unknown = true}), Record(0.5, {}));
+  const Estimate estimate = EstimateOf(ProblemWith({.unknown = true}), Record(0.35, {}));
   EXPECT_THAT(Message(estimate, DiagnosticCode::kNoiseNotLearned),
-              HasSubstr("too few samples (10)"));
+              HasSubstr("too few samples (7), fewer than 8"));
   EXPECT_GT(estimate.channels[0].noise_std_dev, 1);  // about the size of the signal
   ExpectFinite(estimate);
 }
 
-TEST(UnknownScale, OfASignalThatIsZeroIsAsSmallAsANoiseMayBe) {
+TEST(UnknownScale, IsFoundInAnyUnit) {
+  for (const double unit : {1e-9, 1e9}) {
+    Samples record = Record(5, {});
+    for (double& value : record.columns[0].value) value *= unit;
+    Problem problem = ProblemWith({.unknown = true});
+    problem.fixed["x0"] = unit;
+    const Estimate estimate = EstimateOf(problem, record);
+    const Estimate oracle = EstimateOf(ProblemWith({.unknown = true}), Record(5, {}));
+    EXPECT_NEAR(estimate.channels[0].noise_std_dev / unit, oracle.channels[0].noise_std_dev,
+                0.01 * oracle.channels[0].noise_std_dev);
+    ExpectNear(estimate, oracle, 0.05, 0.03);
+  }
+}
+
+TEST(UnknownScale, OfASignalThatIsZeroIsNotLearned) {
   Samples record = Record(3, {});
   for (double& value : record.columns[0].value) value = 0;
   Problem problem = ProblemWith({.unknown = true});
@@ -134,6 +148,7 @@ TEST(UnknownScale, OfASignalThatIsZeroIsAsSmallAsANoiseMayBe) {
   const Estimate estimate = EstimateOf(problem, record);
   ExpectFinite(estimate);
   EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kNotIdentified);
+  EXPECT_THAT(Message(estimate, DiagnosticCode::kNoiseNotLearned), HasSubstr("all samples are 0"));
 }
 
 class NoiseThatIsLearned : public ::testing::TestWithParam<NoiseModel> {};

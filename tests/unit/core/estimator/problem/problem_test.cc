@@ -201,6 +201,11 @@ TEST(ResolvedProblem, RefusesANoiseThatIsNegativeOrNotFinite) {
             "measured[0].noise.relative: nan must be a finite number ≥ 0");
   EXPECT_EQ(Refusal([](Problem& p) { p.measured[0].noise.relative_to_max = kInfinity; }),
             "measured[0].noise.relative_to_max: inf must be a finite number ≥ 0");
+  EXPECT_EQ(Refusal([](Problem& p) { p.measured[0].noise.full_scale = -1; }),
+            "measured[0].noise.full_scale: -1 must be a finite number ≥ 0");
+  EXPECT_EQ(Refusal([](Problem& p) { p.measured[0].noise.full_scale = 10; }),
+            "measured[0].noise.full_scale: 10 has no effect without relativeToMax, the noise as a "
+            "fraction of it");
 }
 
 TEST(ResolvedProblem, RefusesValuesThatAreNotFinite) {

@@ -103,12 +103,29 @@ TEST_F(SampleChecksTest, IgnoreTheValueOfAMissingSample) {
   EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[0], 0.1 + 0.01 * 2 + 0.001 * 2);
 }
 
-TEST_F(SampleChecksTest, KeepTheNoiseAboveZero) {
-  Samples samples = ThreeRows();
-  samples.columns.push_back({"v", {0, 0, 4}, {}});
-  const CheckedSamples checked = checks_.Check(samples).value();
-  EXPECT_EQ(RowNoise(checked, 0)[1], NoiseModel::kMinStandardDeviation);
-  EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2);
+// Relative noise has no size before there is a value, whatever the unit.
+TEST_F(SampleChecksTest, TakeValuesOfZeroBeforeAnyOtherForMissing) {
+  for (const double unit : {1e-9, 1.0, 1e9}) {
+    Samples samples = ThreeRows();
+    samples.columns.push_back({"v", {0, 4 * unit, 0}, {}});
+    const CheckedSamples checked = checks_.Check(samples).value();
+    EXPECT_EQ(RowNoise(checked, 0)[1], 0);
+    EXPECT_TRUE(std::isnan(RowValues(checked, 0)[1]));
+    EXPECT_DOUBLE_EQ(RowNoise(checked, 1)[1], 2 * unit);
+    // Later the zeros have the noise of a small part of the range.
+    EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2 * NoiseModel::kLeastMagnitude * unit);
+    EXPECT_EQ(RowValues(checked, 2)[1], 0);
+  }
+}
+
+TEST(NoiseOfTheSamples, IsTheNumberGivenHoweverSmall) {
+  EXPECT_EQ(NoiseModel{.absolute = 1e-15}.StandardDeviation(1e-12, 1e-12), 1e-15);
+}
+
+TEST(NoiseOfTheSamples, IsThatOfTheFullScaleFromTheFirstSampleOn) {
+  const NoiseModel noise{.relative_to_max = 0.001, .full_scale = 50};
+  EXPECT_EQ(noise.StandardDeviation(0, 0), 0.05);
+  EXPECT_EQ(noise.StandardDeviation(20, 20), 0.05);
 }
 
 TEST_F(SampleChecksTest, ChangeNothingUntilAccepted) {

@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <cmath>
+
+#include "core/bayes/noise.h"
+#include "core/estimator/expansion/regional_expansion.h"
+
+namespace polyest::internal {
+
+// Residuals are linearized about the point at which the noise was last revised.
+void RegionalExpansion::Linearize() {
+  const Eigen::Index n = design_.points.cols();
+  linearized_at_ =
+      noise_.centre.size() == n ? design_.region.ToLocal(noise_.centre) : design_.reference;
+  linearized_phi_.resize(design_.basis->size());
+  linearized_gradient_.resize(design_.basis->size(), n);
+  slope_.resize(n);
+  design_.basis->EvaluateWithGradient(linearized_at_, linearized_phi_, linearized_gradient_);
+  for (size_t c = 0; c < noise_.channels.size(); ++c) {
+    const ChannelNoise& noise = noise_.channels[c];
+    if (noise.grid.empty()) continue;
+    absorbed_.profiles[c] = CorrelationProfile(noise.grid, noise.time_constant_s, n);
+  }
+}
+
+// Sets the noise of the fitted rows from `first` on to that of the prediction, where it is
+// relative. Such a channel is white, so that its rows are as they were measured.
+void RegionalExpansion::PredictNoise(int first) {
+  const size_t width = block_.values.size() / block_.rows.size();
+  for (int c = 0; c < channels_; ++c) {
+    const ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
+    if (!noise.of_prediction) continue;
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    for (int row = first; row < fitted_rows_; ++row) {
+      double& sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+      if (sigma <= 0) continue;  // no sample
+      const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
+      double& largest = absorbed_.largest[c];
+      largest = std::max(largest, std::abs(z));
+      const double y = coefficients_.col(row * channels_ + c).dot(linearized_phi_);
+      sigma = noise.scale * model.StandardDeviation(y, largest);
+    }
+  }
+}
+
+// Whether the samples of a channel tell of its predictions by their scatter, too: if their noise is
+// relative to the prediction, and known. Outliers would say anything.
+bool RegionalExpansion::IsScored(int channel) const {
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  return noise_.channels[static_cast<size_t>(channel)].of_prediction && !model.unknown &&
+         model.outliers == OutlierHandling::kNone;
+}
+
+ScoredSample RegionalExpansion::Scored(int channel, const ConstVectorRef& coefficients, double z,
+                                       double variance, double own_error) const {
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  const double y = coefficients.dot(linearized_phi_);
+  // Where the least noise applies, σ does not change with y.
+  const bool flat = variance <= model.least * model.least;
+  const double slope = flat ? 0 : std::copysign(model.relative, y) / std::sqrt(variance);
+  return Score(z, y, variance, slope, own_error);
+}
+
+// Adds a sample to the channel's likelihood for other time constants, if there is one.
+void RegionalExpansion::AddToProfile(int row, int channel, const ConstVectorRef& coefficients,
+                                     double z, double variance) {
+  CorrelationProfile& profile = absorbed_.profiles[static_cast<size_t>(channel)];
+  if (profile.empty()) return;
+  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
+  slope_.noalias() = (linearized_gradient_.transpose() * coefficients) / sigma;
+  // The whitening must be undone with the noise that it was done with; the weight comes after it.
+  profile.Add(block_.rows[static_cast<size_t>(row)].time_s, slope_,
+              (z - coefficients.dot(linearized_phi_)) / sigma, sigma * sigma / variance);
+}
+
+}  // namespace polyest::internal
