@@ -13,6 +13,9 @@ namespace {
 constexpr double kNoiseRange = 1e-3;
 // Probability below which the samples' spread is too small for their noise.
 constexpr double kUnlikely = 5e-3;
+// Rise of the noise with the largest value so far from which it is mentioned: the weights change by
+// its square.
+constexpr double kRiseOfNoise = 10;
 constexpr int64_t kMinConstant = 3;  // samples of one value before it is said never to change
 
 // Returns an upper bound of the probability that χ² with `degrees` degrees of freedom is at most
@@ -119,8 +122,7 @@ class Warnings {
     const double chi_squared = column.square_sum / (column.min_noise * column.min_noise);
     if (ProbabilityOfLess(chi_squared, static_cast<double>(column.samples - 1)) < kUnlikely) {
       Add("%s: its noise of %g is larger than the spread of its samples, %g; check its size and "
-          "its "
-          "unit",
+          "its unit",
           name, column.min_noise, column.Spread());
     }
     const double rounding = column.Resolution() / std::sqrt(12.0);
@@ -135,6 +137,18 @@ class Warnings {
           "an absolute part",
           name, column.min_noise);
     }
+    AddRunningMaximum(measured, column);
+  }
+
+  // Noise relative to the largest value so far is small during rest, and rises with the signal.
+  void AddRunningMaximum(const MeasuredOutput& measured, const ColumnFacts& column) {
+    const NoiseModel& noise = measured.noise;
+    if (noise.relative_to_max == 0 || noise.full_scale > 0 || noise.absolute > 0) return;
+    const double rise = column.max_noise / column.min_noise;
+    if (!(rise >= kRiseOfNoise)) return;
+    Add("%s: its noise rises with its largest value so far, from %g to %g, so that a sample before "
+        "counts up to %.2g times as much as one after; give it its sensor's fullScale",
+        measured.output, column.min_noise, column.max_noise, rise * rise);
   }
 
   // Noise that is not known, or has gross errors, is no measure of a sample's distance.

@@ -101,7 +101,9 @@ std::string DescribeNoise(const v1::MeasuredOutput::Noise& noise, const std::str
     parts.push_back(absl::StrCat(Number(100 * noise.relative()), " % of the value"));
   }
   if (noise.relative_to_max() > 0) {
-    parts.push_back(absl::StrCat(Number(100 * noise.relative_to_max()), " % of the largest"));
+    parts.push_back(absl::StrCat(
+        Number(100 * noise.relative_to_max()), " % of ",
+        noise.full_scale() > 0 ? WithUnit(noise.full_scale(), unit) : std::string("the largest")));
   }
   std::string text = absl::StrJoin(parts, " + ");
   if (noise.unknown()) text = parts.empty() ? "of unknown size" : "unknown times " + text;

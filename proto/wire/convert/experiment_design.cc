@@ -32,7 +32,8 @@ ExperimentOptions ToExperimentOptions(const v1::ComputeExperimentDesignRequest& 
     options.possible.push_back({possible.output(),
                                 {.absolute = noise.absolute(),
                                  .relative = noise.relative(),
-                                 .relative_to_max = noise.relative_to_max()}});
+                                 .relative_to_max = noise.relative_to_max(),
+                                 .full_scale = noise.full_scale()}});
   }
   return options;
 }

@@ -247,6 +247,7 @@ absl::StatusOr<OutlierHandling> ToOutlierHandling(const v1::MeasuredOutput::Nois
 
 absl::StatusOr<NoiseModel> ToNoise(const v1::MeasuredOutput::Noise& given) {
   NoiseModel noise{given.absolute(), given.relative(), given.relative_to_max(), given.unknown()};
+  noise.full_scale = given.full_scale();
   const auto& correlation = given.correlation();
   if (correlation.has_time_constant_s()) {
     noise.correlation = NoiseCorrelation::kKnown;

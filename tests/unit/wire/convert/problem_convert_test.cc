@@ -207,7 +207,8 @@ TEST(ToProblem, TakesTheNoiseOfEachOutput) {
   v1::Problem given = SmallProblem();
   given.clear_measured();
   given.MergeFrom(ProblemFromJson(R"({"measured": [
-    {"output": "x", "noise": {"absolute": 0.1, "relative": 0.2, "relativeToMax": 0.3}}]})"));
+    {"output": "x", "noise": {"absolute": 0.1, "relative": 0.2, "relativeToMax": 0.3,
+                               "fullScale": 50}}]})"));
   const auto resolved = ToProblem(given);
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   const MeasuredOutput& measured = resolved->problem().measured.at(0);
@@ -215,6 +216,7 @@ TEST(ToProblem, TakesTheNoiseOfEachOutput) {
   EXPECT_EQ(measured.noise.absolute, 0.1);
   EXPECT_EQ(measured.noise.relative, 0.2);
   EXPECT_EQ(measured.noise.relative_to_max, 0.3);
+  EXPECT_EQ(measured.noise.full_scale, 50);
 }
 
 TEST(ToProblem, NamesThePlaceOfABadPrior) {
