@@ -73,10 +73,11 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
     const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
     sums.scale_unknown = model.unknown && learned;
-    // A time constant that has been found is taken as known: the one lag that is integrated out is
-    // not that of irregular samples.
-    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned &&
-                               noise_.channels[static_cast<size_t>(c)].time_constant_s == 0;
+    // A time constant found by its likelihood is taken as known: the one lag that is integrated out
+    // is not that of irregular samples.
+    const bool found = noise_.channels[static_cast<size_t>(c)].time_constant_s > 0 &&
+                       model.outliers == OutlierHandling::kNone;
+    sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned && !found;
     sums.degrees_factor = DegreesFactor(model.outliers);
   }
   LookFromPosterior();

@@ -24,6 +24,12 @@ constexpr double kLeastNoiseToSignal = 1e-9;
 constexpr double kMaxDiscount = 0.8;
 // Factor by which a scale that is not learned yet exceeds the largest sample.
 constexpr double kAboveSignal = 2;
+constexpr double kSignificance = 2;  // in standard deviations, for giving up white noise
+constexpr double kMinCorrelation = 0.02;
+constexpr double kMaxCorrelation = 0.9999;
+// Fraction of the requested change. The whole change would be right for noise of the assumed kind,
+// but oscillates for other noise.
+constexpr double kCorrelationStep = 0.6;
 // Gains of log likelihood for which correlation is preferred to white noise, and for which a time
 // constant is revised: a standard deviation of log τ is worth ½.
 constexpr double kWorthCorrelation = 1;
@@ -45,6 +51,19 @@ constexpr double kGridGrowth = 1.3;
 // of its spread, as a factor.
 constexpr double kMoved = 0.2;
 constexpr double kSpread = 1.3;
+
+// Returns the correlation x of noise whose residuals have the lag-1 correlation r after whitening
+// with a:
+//   r = (x − a)(1 − a x)/(1 − 2 a x + a²).
+// This is a quadratic equation in x, with the root a for r = 0. If it has no real root, the noise
+// is not of this kind, and the first-order solution a + r is returned.
+double CorrelationBehind(double r, double a) {
+  if (a <= 0) return std::clamp(r, -kMaxCorrelation, kMaxCorrelation);
+  const double b = 1 + a * a + 2 * r * a;
+  const double discriminant = b * b - 4 * a * (a + r * (1 + a * a));
+  const double x = discriminant < 0 ? a + r : (b - std::sqrt(discriminant)) / (2 * a);
+  return std::clamp(x, -kMaxCorrelation, kMaxCorrelation);
+}
 
 // A time constant with the scale of the noise that goes with it.
 struct NoiseChoice {
@@ -105,10 +124,12 @@ class Revision {
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());
       ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
-      if (model.correlation != NoiseCorrelation::kUnknown ||
-          !ReviseTimeConstant(c, sums, model.unknown, noise)) {
-        if (model.unknown) ReviseScale(c, sums, share, noise);
-      }
+      const bool correlated = model.correlation == NoiseCorrelation::kUnknown;
+      const bool weighted = model.outliers != OutlierHandling::kNone;
+      const bool together =
+          correlated && !weighted && ReviseTimeConstant(c, sums, model.unknown, noise);
+      if (model.unknown && !together) ReviseScale(c, sums, share, noise);
+      if (correlated && weighted) ReviseCorrelation(c, sums, share, noise);
       if (!noise.learned) changed_ = noise.learned = true;
     }
     if (HandlesOutliers()) RevisePosterior();
@@ -201,6 +222,30 @@ class Revision {
     if (scale_unknown) noise.scale *= std::clamp(best.scale, kMaxFall, kMaxRise);
     changed_ = true;
     return true;
+  }
+
+  // Revises the time constant by the correlation left at the mean interval. An outlier spoils the
+  // likelihood of every other time constant, but only that of the present one has its weights.
+  void ReviseCorrelation(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
+    const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
+    const auto samples = static_cast<double>(sums.samples.count());
+    if (channel.intervals == 0) return;
+    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share, samples);
+    const double present = channel.Correlation(noise);
+    const double asked = CorrelationBehind(left, present);
+    // The standard error of a correlation a is √((1 − a²)/N).
+    const double significance = present > 0 ? 1 : kSignificance;
+    if (std::abs(asked - present) * std::sqrt(samples / (1 - asked * asked)) < significance) return;
+    const double step = present > 0 ? kCorrelationStep : 1;
+    const double revised = std::min(kMaxCorrelation, present + step * (asked - present));
+    // Alternating noise is not of this kind; white noise is the nearest.
+    const double time_constant_s =
+        revised > kMinCorrelation ? -channel.MeanInterval() / std::log(revised) : 0;
+    if (std::abs(channel.Correlation({1, time_constant_s, true}) - present) < kMinCorrelation) {
+      return;
+    }
+    noise.time_constant_s = time_constant_s;
+    changed_ = true;
   }
 
   void SetGrid(const RecordSummary::Channel& channel, ChannelNoise& noise) {

@@ -13,7 +13,9 @@
 //                the least sampling interval to the record's length, by the likelihood over the
 //                actual intervals with the parameters following (correlation_profile.h). An unknown
 //                scale is revised together with it. The parameters follow linearly about a point
-//                that moves to the minimum where the model is curved.
+//                that moves to the minimum where the model is curved. Where outliers are handled,
+//                a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval instead; x explains
+//                the lag-1 correlation r that is left, r = (x − a)(1 − a x)/(1 − 2 a x + a²).
 //
 // Neither is learned before the channel has MinSamplesForNoise samples.
 
