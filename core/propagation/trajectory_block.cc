@@ -212,7 +212,8 @@ void TrajectoryBlock::FailRowsBeyond(const Eigen::ArrayXXd& values, double time_
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
     if (!point_alive_[row] || (values.row(row).abs() <= kMaxOutput).all()) continue;
     const bool finite = values.row(row).isFinite().all();
-    Fail(row, time_s, 0, absl::StrCat(what, finite ? " exceeds 1e100 in magnitude" : " is not finite"));
+    Fail(row, time_s, 0,
+         absl::StrCat(what, finite ? " exceeds 1e100 in magnitude" : " is not finite"));
   }
 }
 

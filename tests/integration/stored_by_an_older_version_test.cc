@@ -55,7 +55,8 @@ class StoredByAnOlderVersionTest : public testing::Test {
     for (int i = 0; i < now.parameters_size(); ++i) {
       const v1::ParameterEstimate& parameter = then.parameters(i);
       EXPECT_EQ(now.parameters(i).name(), parameter.name());
-      // Another build rounds differently, which moves the draws and with them the expansion a little.
+      // Another build rounds differently, which moves the draws and with them the expansion a
+      // little.
       EXPECT_NEAR(now.parameters(i).map(), parameter.map(), 1e-3 * parameter.std_dev());
       EXPECT_NEAR(now.parameters(i).std_dev(), parameter.std_dev(), 1e-3 * parameter.std_dev());
     }

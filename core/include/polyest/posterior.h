@@ -27,7 +27,7 @@ enum class PosteriorMethod {
   // Weighted draws of a Gaussian, for a posterior that is nearly Gaussian, or of an even cover, in
   // at most three dimensions.
   kImportanceSampling,
-  kMarkovChains,        // differential evolution, started from draws of tempered posteriors
+  kMarkovChains,  // differential evolution, started from draws of tempered posteriors
 };
 
 // What to compute.
