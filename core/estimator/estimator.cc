@@ -80,6 +80,7 @@ class Estimator::Implementation {
   absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
                                                    size_t most, const Stop& stop);
   absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
+  void LeaveOut(size_t component);
   void Retire(const MixtureComponent& component);
   void MakeSnapshot(int64_t rows);
   absl::StatusOr<Components> ComponentsOf(EstimatorState& state, int64_t rows) const;
@@ -93,9 +94,10 @@ class Estimator::Implementation {
   std::function<void(EstimatorSnapshot)> snapshot_;
   Checkpoints checkpoints_;
   Components components_;
-  int64_t weighing_row_ = 0;  // row of the next weighing, if there are several components
-  double left_out_ = 0;       // largest share of components dropped for lack of room
-  int reexpansions_ = 0;      // by components that no longer exist
+  int64_t weighing_row_ = 0;   // row of the next weighing, if there are several components
+  double left_out_ = 0;        // largest share of components dropped for lack of room
+  int elements_left_out_ = 0;  // because too few of their trajectories could be integrated
+  int reexpansions_ = 0;       // by components that no longer exist
   int64_t propagated_rows_ = 0;
 };
 
@@ -148,6 +150,7 @@ void Estimator::Implementation::MakeSnapshot(int64_t rows) {
   for (const auto& component : components_) state.components.push_back(component->State());
   state.weighing_row = weighing_row_;
   state.left_out = left_out_;
+  state.elements_left_out = elements_left_out_;
   state.reexpansions = reexpansions_;
   state.propagated_rows = propagated_rows_;
   snapshot_({rows, EncodeState(state, rows, FingerprintOf(problem_.problem()))});
@@ -169,6 +172,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
   POLYEST_ASSIGN_OR_RETURN(components_, ComponentsOf(state, snapshot.rows));
   weighing_row_ = state.weighing_row;
   left_out_ = state.left_out;
+  elements_left_out_ = state.elements_left_out;
   reexpansions_ = state.reexpansions;
   propagated_rows_ = state.propagated_rows;
   checkpoints_.Pass(snapshot.rows);
@@ -192,11 +196,16 @@ absl::StatusOr<Estimator::Implementation::Components> Estimator::Implementation:
   return components;
 }
 
-// Returns true when a component has been divided or its division has failed; then not all
-// components have reached `rows`.
+// Returns true when a component has been divided or left out, or its division has failed; then not
+// all components have reached `rows`.
 absl::StatusOr<bool> Estimator::Implementation::TakeUpTo(int64_t rows, const Stop& stop) {
   for (size_t k = 0; k < components_.size(); ++k) {
-    POLYEST_RETURN_IF_ERROR(components_[k]->TakeUpTo(rows, stop));
+    const absl::Status taken = components_[k]->TakeUpTo(rows, stop);
+    if (absl::IsFailedPrecondition(taken) && components_.size() > 1) {
+      LeaveOut(k);
+      return true;
+    }
+    POLYEST_RETURN_IF_ERROR(taken);
     if (!components_[k]->must_divide()) continue;
     POLYEST_RETURN_IF_ERROR(Divide(k, stop));
     return true;
@@ -221,6 +230,13 @@ absl::Status Estimator::Implementation::Divide(size_t component, const Stop& sto
   components_.insert(place, std::make_move_iterator(parts.begin()),
                      std::make_move_iterator(parts.end()));
   return absl::OkStatus();
+}
+
+// Leaves out an element in which too few trajectories can be integrated to go on.
+void Estimator::Implementation::LeaveOut(size_t component) {
+  Retire(*components_[component]);
+  components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
+  ++elements_left_out_;
 }
 
 // Adds up what a component has done that is to be replaced.
@@ -296,7 +312,16 @@ absl::StatusOr<AssessedMixture> Estimator::Implementation::AssessAll(const Poste
   for (AssessmentRequest& request : requests) request.effort = effort;
   requests.front().reexpansions += reexpansions_;
   requests.front().propagated_rows += propagated_rows_;
-  return AssessMixture(std::move(requests), left_out_, stop);
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed,
+                           AssessMixture(std::move(requests), left_out_, stop));
+  if (elements_left_out_ > 0) {
+    assessed.whole.estimate.diagnostics.push_back(
+        {DiagnosticCode::kPointsFailed,
+         absl::StrFormat("%d parts of the prior were left out, because in each of them too few "
+                         "trajectories could be integrated",
+                         elements_left_out_)});
+  }
+  return assessed;
 }
 
 absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {

@@ -143,8 +143,8 @@ void serialize(Archive& archive, ComponentState& component) {
 
 template <class Archive>
 void serialize(Archive& archive, EstimatorState& state) {
-  archive(state.components, state.weighing_row, state.left_out, state.reexpansions,
-          state.propagated_rows);
+  archive(state.components, state.weighing_row, state.left_out, state.elements_left_out,
+          state.reexpansions, state.propagated_rows);
 }
 
 std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint) {

@@ -20,6 +20,7 @@ struct EstimatorState {
   std::vector<ComponentState> components;
   int64_t weighing_row = 0;
   double left_out = 0;
+  int elements_left_out = 0;
   int reexpansions = 0;
   int64_t propagated_rows = 0;
 };

@@ -8,8 +8,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kReach = 2.2;    // 1.4 % lie beyond so many standard deviations
-constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is looked for
+constexpr double kTail = 2.2;       // 1.4 % lie beyond so many standard deviations
+constexpr double kPastEdge = 1.12;  // factor of the half width at which Ω is looked for
 
 }  // namespace
 
@@ -27,11 +27,11 @@ bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& star
       // (H⁻¹)_jj = ‖L⁻¹ e_j‖²
       deviation = cholesky.SolveLower(Vector(Vector::Unit(n, j))).norm() / half[j];
     }
-    if (std::abs(place[j]) + kReach * deviation < kEdge) continue;
+    if (std::abs(place[j]) + kTail * deviation < kEdge) continue;
     for (const double side : {-1.0, 1.0}) {
-      if (side * place[j] + kReach * deviation < kEdge) continue;
+      if (side * place[j] + kTail * deviation < kEdge) continue;
       Vector beyond = minimum.point;
-      beyond[j] = middle[j] + side * kBeyond * half[j];
+      beyond[j] = middle[j] + side * kPastEdge * half[j];
       const Vector xi = design.region.ToGerm(beyond);
       if (cost.prior().Contains(xi) && design.element.Contains(xi)) return true;
     }

@@ -117,6 +117,8 @@ class RegionalExpansion {
   // Returns the number of trajectories × rows.
   int64_t propagated_rows() const { return absorbed_.propagated; }
   const std::vector<FailedTrajectory>& failures() const { return failures_; }
+  // Returns the indices of the collocation points that are still in the fit, ascending.
+  const std::vector<int>& kept_points() const { return kept_; }
 
   // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }

@@ -22,6 +22,19 @@ Eigen::Index AxisToCut(const Basis& basis, const Vector& weights) {
   return axis;
 }
 
+// Returns the axis on which the collocation points whose trajectories have failed differ most in
+// the mean from the others, in units of the region.
+Eigen::Index AxisOfFailures(const RegionalExpansion& expansion) {
+  const Matrix& points = expansion.design().points;
+  const std::vector<int>& kept = expansion.kept_points();
+  Eigen::Index axis = 0;
+  if (kept.empty()) return axis;
+  const Vector mean = points(kept, Eigen::all).colwise().mean().transpose();
+  const Vector half = 0.5 * (expansion.design().upper - expansion.design().lower);
+  (mean - points.colwise().mean().transpose()).cwiseQuotient(half).cwiseAbs().maxCoeff(&axis);
+  return axis;
+}
+
 // Returns the half of the region on one side, −1 or 1, of the middle of its axis.
 Region Half(const Region& whole, Eigen::Index axis, int side) {
   Vector centre = whole.centre() + 0.5 * side * whole.axes().col(axis);
@@ -43,7 +56,9 @@ Matrix ParticlesIn(const Element& element, const Matrix& particles) {
 std::vector<Piece> Bisect(const RegionalExpansion& expansion, const Matrix& particles) {
   const ExpansionDesign& design = expansion.design();
   const Region whole = TrustedRegion(design);
-  const Eigen::Index axis = AxisToCut(*design.basis, expansion.TermWeights());
+  const Eigen::Index axis = expansion.absorbed_rows() > 0
+                                ? AxisToCut(*design.basis, expansion.TermWeights())
+                                : AxisOfFailures(expansion);
   // e = axes⁻¹ (ξ − centre): the cut is e_axis = 0.
   const Vector normal = Inverse(whole.axes()).row(axis).transpose();
   auto [below, above] = design.element.Divide(normal, normal.dot(whole.centre()));

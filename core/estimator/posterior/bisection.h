@@ -14,6 +14,8 @@ namespace polyest::internal {
 
 // Returns the two halves of the expansion's element. `particles` (W × n, germ coordinates; may be
 // empty) are of its posterior.
+// If nothing has been absorbed, the cut separates the trajectories that could be integrated from
+// those that could not.
 std::vector<Piece> Bisect(const RegionalExpansion& expansion, const Matrix& particles);
 
 }  // namespace polyest::internal

@@ -10,10 +10,10 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kMinWall = 8;  // difference in cost: e^−8 ≈ 3·10⁻⁴
+constexpr double kWallOfPiece = 8;  // difference in cost: e^−8 ≈ 3·10⁻⁴
 // Distance from the bound at which the cost is taken, as a fraction of the element's extent: on the
 // bound itself rounding decides whether a point belongs to the element.
-constexpr double kOffBound = 1e-9;
+constexpr double kOffWall = 1e-9;
 
 bool AreOpposite(const Element::Bound& a, const Element::Bound& b) {
   return a.offset == -b.offset && a.normal == -b.normal;
@@ -25,7 +25,7 @@ double LeastAt(const Element::Bound& bound, const ElementCost& element) {
   const Vector normal = region.axes().transpose() * bound.normal;
   const MinimizationProblem search = SearchOf(*element.cost, *element.design);
   const double reach = normal.cwiseAbs().dot(search.upper - search.lower);
-  const double offset = bound.offset - bound.normal.dot(region.centre()) - kOffBound * reach;
+  const double offset = bound.offset - bound.normal.dot(region.centre()) - kOffWall * reach;
   const std::optional<Minimum> least =
       CostSlice(search, normal).Minimize(offset, {element.minimum.point}, Stop());
   return least && std::isfinite(least->value) ? least->value + element.height : kInfinity;
@@ -37,7 +37,7 @@ bool AreConnected(const ElementCost& a, const ElementCost& b) {
     for (const Element::Bound& other : b.design->element.bounds()) {
       if (!AreOpposite(bound, other)) continue;
       // Both sides must reach the bound, each at its own place if the expansions differ a little.
-      return LeastAt(bound, a) < peak + kMinWall && LeastAt(other, b) < peak + kMinWall;
+      return LeastAt(bound, a) < peak + kWallOfPiece && LeastAt(other, b) < peak + kWallOfPiece;
     }
   }
   return false;

@@ -215,7 +215,10 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
     if (moved) return true;
   }
   if (LookForPieces()) return true;
-  if (short_of_trajectories) return expansion_->shortage();
+  if (short_of_trajectories) {
+    if (BisectElement()) return true;
+    return expansion_->shortage();
+  }
   if (MayBisect()) return false;
   patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
   return false;

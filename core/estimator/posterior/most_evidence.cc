@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kCover = 512;
 constexpr Eigen::Index kGuesses = 64;
-constexpr int kStarts = 3;
+constexpr int kStartsOfBound = 3;
 
 }  // namespace
 
@@ -32,9 +32,9 @@ double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const 
   DifferentialEvolution(cost, lower, upper, 0).Evaluate(etas, costs);
   std::vector<Eigen::Index> order(static_cast<size_t>(etas.rows()));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::partial_sort(order.begin(), order.begin() + kStarts, order.end(),
+  std::partial_sort(order.begin(), order.begin() + kStartsOfBound, order.end(),
                     [&](Eigen::Index a, Eigen::Index b) { return costs[a] < costs[b]; });
-  order.resize(kStarts);
+  order.resize(kStartsOfBound);
   double least = costs[order.front()];
   if (!std::isfinite(least)) return -kInfinity;
   const Matrix starts = etas(order, Eigen::all);

@@ -16,7 +16,7 @@ namespace {
 
 using Rows = std::vector<Eigen::Index>;
 
-constexpr int kStarts = 12;
+constexpr int kStartsOfPieces = 12;
 constexpr double kMinShare = 0.02;  // fraction of the particles
 constexpr double kMinGap = 1;       // in standard deviations within the sets
 constexpr double kMinWall = 8;      // difference in cost: e^−8 ≈ 3·10⁻⁴
@@ -45,7 +45,7 @@ class PieceFinder {
     cost.EvaluateMany(particles_, costs_);
     const MinimizerOptions options;
     const Matrix starts =
-        ImprovedStarts(cost, search_, SpreadStarts(particles_, costs_, kStarts), options);
+        ImprovedStarts(cost, search_, SpreadStarts(particles_, costs_, kStartsOfPieces), options);
     for (Minimum& minimum : FindMinima(search_, starts, options, Stop())) {
       if (minimum.converged) minima_.push_back(std::move(minimum));
     }

@@ -1,0 +1,38 @@
+// Elements of the germ's space: parts on one side of hyperplanes.
+
+#include "core/bayes/element.h"
+
+#include <gtest/gtest.h>
+
+namespace polyest::internal {
+namespace {
+
+TEST(Element, OfNothingDividedHasEveryPoint) {
+  EXPECT_TRUE(Element().Contains(Vector{{1e6, -1e6}}));
+}
+
+TEST(Element, IsDividedIntoPartsThatCoverItAndMeetAtTheHyperplane) {
+  const auto [below, above] = Element().Divide(Vector{{1, 1}}, 1);
+  const auto [left, right] = above.Divide(Vector{{1, 0}}, 0);
+  int on_the_hyperplane = 0;
+  for (double a = -2; a <= 2; a += 0.25) {
+    for (double b = -2; b <= 2; b += 0.25) {
+      const Vector xi{{a, b}};
+      EXPECT_EQ(below.Contains(xi), a + b <= 1);
+      EXPECT_EQ(above.Contains(xi), a + b >= 1);
+      EXPECT_EQ(left.Contains(xi), a + b >= 1 && a <= 0);
+      EXPECT_EQ(right.Contains(xi), a + b >= 1 && a >= 0);
+      if (below.Contains(xi) && above.Contains(xi)) ++on_the_hyperplane;
+    }
+  }
+  EXPECT_GT(on_the_hyperplane, 0);
+}
+
+TEST(Element, IsNotBoundedInNewDimensions) {
+  const Element half = Element().Divide(Vector{{1.0}}, 0.5).first.WithDimension(2);
+  EXPECT_TRUE(half.Contains(Vector{{0.4, 1e9}}));
+  EXPECT_FALSE(half.Contains(Vector{{0.6, 0}}));
+}
+
+}  // namespace
+}  // namespace polyest::internal
