@@ -49,12 +49,14 @@ void ErrorScale::SetFloors(const Vector& largest_changes, const Vector& expected
   constexpr double kCancelled = 1e-10;
   constexpr double kRoundings = 100 * std::numeric_limits<double>::epsilon();
   block_scale_at_floors_ = block_scale_;
-  expected_ = expected_sizes;
+  // What was expected of a state at rest counts until it has grown: in a chain of masses the last
+  // one moves like a high power of the time, which no step follows relative to itself.
+  expected_ = expected_.cwiseMax(expected_sizes);
   for (Eigen::Index s = 0; s < floor_.size(); ++s) {
     const double change = largest_changes(s);
     const bool cancelled = block_scale_(s) < kCancelled * change;
     floor_(s) = cancelled ? kRoundings * change : 0;
-    if (block_scale_(s) == 0) {
+    if (block_scale_(s) <= kExpectedShare * expected_(s)) {
       floor_(s) = std::max(floor_(s), relative_tolerance_ * kExpectedShare * expected_(s));
     }
     SetScale(s);

@@ -66,10 +66,10 @@ double SundialsIntegrator::FirstStep(double span_s) {
 Vector SundialsIntegrator::ExpectedSizes(double span_s) {
   const Eigen::ArrayXXd& x = BlockValues(vector());
   Vector expected = Vector::Zero(x.cols());
-  // One pass finds what an input moves, the next what that moves in turn.
-  constexpr int kPasses = 3;
+  // One pass finds what an input moves, the next what that moves in turn, and so on to the end of
+  // the longest chain.
   constexpr double kOnTheWay[] = {0, 0.25, 0.5, 0.75, 1};
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (Eigen::Index pass = 0; pass <= x.cols(); ++pass) {
     moved_states_ = x.rowwise() + expected.transpose().array();
     const Vector before = expected;
     for (const double share : kOnTheWay) {

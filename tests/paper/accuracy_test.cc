@@ -30,12 +30,15 @@ struct Exact {
   double std_dev = 0;
 };
 
+// Where residuals contradict the noise, standard deviations are widened by as much as the scatter
+// of the windows asks for; then that of least squares is their lower bound.
 void ExpectNear(const ParameterEstimate& parameter, const Exact& exact, double max_map_error,
-                double max_mean_error, double max_std_dev_error) {
+                double max_mean_error, double max_std_dev_error, bool widened = false) {
   SCOPED_TRACE(parameter.name);
   EXPECT_NEAR((parameter.map - exact.value) / exact.std_dev, 0, max_map_error);
   EXPECT_NEAR((parameter.mean - exact.value) / exact.std_dev, 0, max_mean_error);
-  EXPECT_NEAR(parameter.std_dev / exact.std_dev, 1, max_std_dev_error);
+  EXPECT_GT(parameter.std_dev / exact.std_dev, 1 - max_std_dev_error);
+  if (!widened) EXPECT_LT(parameter.std_dev / exact.std_dev, 1 + max_std_dev_error);
 }
 
 bool Has(const Estimate& estimate, DiagnosticCode code) {
@@ -122,7 +125,8 @@ TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
   const int order = GetParam();
   const Estimate estimate = EstimateInBatches(AirTrack(order), *record, 30);
   for (size_t i = 0; i < exact.size(); ++i) {
-    ExpectNear(estimate.parameters[i], exact[i], 0.05, 0.1, 0.02);
+    ExpectNear(estimate.parameters[i], exact[i], 0.05, 0.1, 0.02,
+               Has(estimate, DiagnosticCode::kCorrelatedResiduals));
   }
   EXPECT_LT(estimate.expansion.trajectories, order == 2 ? 111 : 385);
   RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
@@ -143,9 +147,10 @@ TEST(TwoGlidersRecord, AgreesWithLeastSquaresOnTheExactModel) {
   for (size_t i = 0; i < exact.size(); ++i) {
     // The bound on the mean is the published 0.08 plus four sampling errors. The oracle's standard
     // deviations are given to three digits.
-    ExpectNear(estimate.parameters[i], exact[i], 0.1, 0.17, 0.03);
+    ExpectNear(estimate.parameters[i], exact[i], 0.1, 0.17, 0.03,
+               Has(estimate, DiagnosticCode::kCorrelatedResiduals));
   }
-  EXPECT_LT(estimate.expansion.trajectories, 1'350);
+  EXPECT_LT(estimate.expansion.trajectories, 1'500);
   RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   for (const ChannelEstimate& channel : estimate.channels) {
     EXPECT_NEAR(std::sqrt(channel.chi_squared / static_cast<double>(channel.samples)), 1, 0.06);

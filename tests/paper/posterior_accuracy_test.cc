@@ -141,7 +141,7 @@ Case Skewed() {
           Record("omega", values),
           {V({1}), V({100})},
           [=](const Vector& theta) { return Mismatch(values, std::sqrt(theta[0]), noise); },
-          PosteriorMethod::kMarkovChains,
+          PosteriorMethod::kImportanceSampling,
           true};
 }
 
@@ -172,7 +172,7 @@ Case AtABound() {
           samples,
           {V({39.6, 0.1}), V({40.4, 0.16})},
           [=](const Vector& theta) { return OscillatorCost(samples, theta); },
-          PosteriorMethod::kMarkovChains,
+          PosteriorMethod::kImportanceSampling,
           false};
 }
 
@@ -202,7 +202,7 @@ Case Banana() {
             return Mismatch(values, theta[1] - theta[0] * theta[0], noise) +
                    0.5 * std::pow(theta[0] - 0.2, 2) + 0.5 * std::pow(theta[1] / 2, 2);
           },
-          PosteriorMethod::kMarkovChains,
+          PosteriorMethod::kImportanceSampling,
           false};
 }
 
@@ -218,7 +218,7 @@ Case Bimodal() {
             return Mismatch(values, theta[0] * theta[0], noise) +
                    0.5 * std::pow((theta[0] - 0.15) / 0.7, 2);
           },
-          PosteriorMethod::kMarkovChains,
+          PosteriorMethod::kImportanceSampling,
           false};
 }
 

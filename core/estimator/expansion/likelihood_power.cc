@@ -13,6 +13,9 @@ constexpr double kMaxShift = 0.5;  // in standard deviations
 constexpr double kMostSpread = 1;  // of β (J_m − J)
 constexpr double kStep = 0.8;      // from one trial of β to the next
 constexpr double kLeastPower = 1e-12;
+// In more dimensions the collocation points are too few to confirm any posterior that is much
+// narrower than the region.
+constexpr int kMaxDimension = 6;
 
 // What is known at the collocation points.
 struct Points {
@@ -69,6 +72,7 @@ double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
       AgreementWithModel(expansion, cost).shift <= kMaxShift) {
     return cost.power();
   }
+  if (cost.dimension() > kMaxDimension) return cost.power();
   const Points points = PointsOf(expansion, cost);
   const auto count = static_cast<double>(points.least.size());
   // The fit has used up S of the Q points' differences.

@@ -71,8 +71,8 @@ class PriorExpansion {
   const std::vector<PointFailure>& failures() const { return ensemble_.failures(); }
 
   // Calls `visit` for successive stretches of times that cover the grid in order. May be called
-  // only once. Returns FailedPrecondition when at most S trajectories are left or an output exceeds
-  // 10¹⁴⁰, or the status of a stop request.
+  // only once. Returns FailedPrecondition when at most S trajectories are left, or the status of a
+  // stop request.
   absl::Status Run(const TimeGrid& grid, absl::FunctionRef<void(const ExpandedOutputs&)> visit,
                    const Stop& stop);
 

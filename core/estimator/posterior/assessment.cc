@@ -14,6 +14,7 @@
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
@@ -50,8 +51,9 @@ class Assessment {
       findings_.regularization_not_determined = choice.reason;
     }
     Cost cost = request_.expansion->MakeCost(regularization_);
-    if (request_.power) cost.set_power(*request_.power);
     if (problem_.problem().expansion.adaptive) {
+      cost.set_power(request_.power ? *request_.power
+                                    : 1 / Misfit(problem_, *request_.expansion, cost, stop));
       const double power = LikelihoodPower(*request_.expansion, cost);
       findings_.power = power / cost.power();
       cost.set_power(power);
@@ -255,15 +257,15 @@ class Assessment {
     if (findings_.windows.contradicted) WidenContradicted(curvature.contraction);
   }
 
-  // Widens the draws where residuals or windows contradict the estimate. The interval is then also
-  // at least as wide as the curvature's Gaussian, with standard deviations `contraction` relative
+  // Widens the draws where residuals or windows ask for it. The interval is then also at least as
+  // wide as the curvature's Gaussian, with standard deviations `contraction` relative
   // to the prior's: of two contradicting spreads the wider one counts.
   void WidenContradicted(const Vector& contraction) {
     Vector factors = findings_.windows.widening;
     for (int i = 0; i < prior_.dimension(); ++i) {
       const double present =
           WeightedStandardDeviation(posterior_.scores.col(i), posterior_.weights);
-      if (!(present > 0)) continue;
+      if (!(present > 0) || !(factors[i] > 1)) continue;
       const double most = prior_.GermStandardDeviation()[i] / present;
       const double curved = shift_widening_ * contraction[i] * most;
       factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));

@@ -19,8 +19,10 @@ bool IsTested(const ResolvedProblem& problem, size_t channel) {
 
 }  // namespace
 
-double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, const Cost& cost,
+double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, Cost cost,
               const Stop& stop) {
+  // A prior that had more weight would keep the minimum away from where the samples are.
+  cost.set_power(1);
   double degrees = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
     if (!IsTested(problem, c)) continue;

@@ -229,16 +229,21 @@ double MixtureComponent::CoarseResidual() const {
   return kResidualToNoise * std::sqrt(expansion_->noise().misfit);
 }
 
+void MixtureComponent::ReviseMisfit(const Stop& stop) {
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  expansion_->set_misfit(Misfit(problem_, *expansion_, cost, stop));
+}
+
 absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   bool moved = false;
   if (learns_noise_) {
     POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
   }
   if (adaptive()) {
-    const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    expansion_->set_misfit(Misfit(problem_, *expansion_, cost, stop));
+    ReviseMisfit(stop);
     POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    if (settled) ReviseMisfit(stop);
     moved = moved || tightened || settled;
   }
   window_end_ = NextWindow(taken_, windows_from_);

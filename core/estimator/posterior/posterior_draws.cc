@@ -22,7 +22,7 @@ constexpr int kStarts = 6;
 // A cover of the box has so many points for each of importance sampling's. Their effective number
 // must be this fraction of it: a cover of low discrepancy knows means far better than as many
 // random draws.
-constexpr int kCoverPerPoint = 2;
+constexpr int kCoverPerPoint = 4;
 constexpr double kMinEffectiveCover = 0.15;
 
 class Drawing {

@@ -16,13 +16,22 @@ const NoiseModel& NoiseOf(const ResolvedProblem& problem, size_t channel) {
   return problem.problem().measured[channel].noise;
 }
 
+// Whether the residuals, for all their correlation, are still smaller than the noise: χ²/N times
+// the ratio of samples to independent ones.
+bool AreSmall(const ChannelEstimate& channel, const NoiseModel& noise) {
+  const double r = std::clamp(channel.lag1_correlation, 0.0, 1.0);
+  return !noise.unknown &&
+         channel.chi_squared * (1 + r) < static_cast<double>(channel.samples) * (1 - r);
+}
+
 // Returns whether the residuals of any channel are larger than the noise, or correlated.
 bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& record,
                          const std::vector<ChannelEstimate>& channels) {
   for (size_t c = 0; c < channels.size(); ++c) {
     const NoiseModel& noise = NoiseOf(problem, c);
     if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers)) return true;
-    if (c < record.channels().size() && AreCorrelated(channels[c], record.channels()[c].Runs())) {
+    if (c < record.channels().size() && AreCorrelated(channels[c], record.channels()[c].Runs()) &&
+        !AreSmall(channels[c], noise)) {
       return true;
     }
   }

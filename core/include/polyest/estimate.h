@@ -79,8 +79,8 @@ struct ParameterEstimate {
 
 // One parameter in one window of the record, in its unit.
 struct WindowParameter {
-  int parameter = 0;  // index of the uncertain parameter
-  double value = 0;
+  int parameter = 0;   // index of the uncertain parameter
+  double value = 0;    // as this window and the prior alone give it
   double std_dev = 0;  // from the noise assumed
 };
 

@@ -80,8 +80,8 @@ class StateSpaceModel : public Model {
   // vary, and A, B and c depend on nothing but θ and the other inputs. It must hold for all θ whose
   // parameters marked in `zero_parameters` are 0; inputs marked in `constant_inputs` do not vary.
   // Such a model is stepped without error of integration. By default nothing is known, so false.
-  virtual bool IsLinear(const std::vector<bool>& /*zero_parameters*/,
-                        const std::vector<bool>& /*constant_inputs*/) const {
+  virtual bool IsLinear(const std::vector<bool>& /*zero_parameters*/,          // by parameter
+                        const std::vector<bool>& /*constant_inputs*/) const {  // by input
     return false;
   }
 

@@ -162,12 +162,18 @@ TEST(Elements, MoveToWhereANormalPriorHardlyReaches) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kExpansionInaccurate));
 }
 
-// exp(40 a) passes 10¹⁰⁰ for most of the prior. The part where it does not has the answer.
+// exp(a t) passes 10¹⁰⁰ before the first sample for most of the prior. The part where it does not
+// has the answer.
 TEST(Elements, LeaveOutWhereNothingCanBeIntegrated) {
   const Problem problem =
-      TextProblem("exp(40*a)", {UncertainParameter::Uniform("a", 0, 17.7).value()}, 0.1);
-  const Estimate estimate =
-      Processed(problem, std::vector<double>(20, std::exp(2.0)))->CurrentEstimate().value();
+      TextProblem("exp(a*t)", {UncertainParameter::Uniform("a", 0, 17.7).value()}, 0.1);
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  for (int i = 0; i < 20; ++i) {
+    samples.time_s.push_back(40 + 0.1 * i);
+    samples.columns.front().value.push_back(std::exp(0.05 * samples.time_s.back()));
+  }
+  const Estimate estimate = EstimateFrom(problem, samples);
   EXPECT_NEAR(estimate.parameters.front().mean, 0.05, 1e-4);
   EXPECT_THAT(Message(estimate, DiagnosticCode::kPointsFailed),
               HasSubstr("parts of the prior were left out"));

@@ -182,7 +182,9 @@ TEST(CorrelatedNoise, WidensTheUncertaintyWhenItIsKnown) {
   EXPECT_EQ(estimate.diagnostics.size(), 0u);
   // The power of the noise at the oscillator's frequency ω is (1 − a²)/(1 + a² − 2 a cos ωΔt) times
   // that of white noise: 2.6, with the root 1.6.
-  const double ratio = estimate.parameters[0].std_dev / overconfident.parameters[0].std_dev;
+  // White noise is right for a white record, whose uncertainty is therefore not widened.
+  const Estimate of_white = EstimateOf(ProblemWith(white), Record(20, {}));
+  const double ratio = estimate.parameters[0].std_dev / of_white.parameters[0].std_dev;
   const double cosine = std::cos(std::sqrt(kTrueK) / kOscillatorRate);
   EXPECT_NEAR(ratio, std::sqrt(0.36 / (1 + 0.64 - 1.6 * cosine)), 0.05 * ratio);
   EXPECT_NEAR(estimate.channels[0].effective_samples, 400 * 0.2 / 1.8, 0.5);

@@ -213,13 +213,14 @@ TEST(Sensitivity, SaysThatTrajectoriesFailed) {
   EXPECT_NEAR(result.outputs[0].total(4, 0), 1, 1e-9);
 }
 
-TEST(Sensitivity, SaysThatAnOutputIsTooLargeForItsVariance) {
+TEST(Sensitivity, SaysThatAnOutputIsTooLarge) {
   SensitivityOptions options;
   options.until_s = options.step_s = 1;
   const auto status = AnalyzeSensitivity(
       Resolve(ProblemOf({.outputs = {{"y", "1e200*a"}}}, {Uniform("a", 1, 2)})), options, {});
   EXPECT_EQ(status.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(status.status().message()), HasSubstr("1e+140"));
+  EXPECT_THAT(std::string(status.status().message()),
+              HasSubstr("an output exceeds 1e100 in magnitude"));
 }
 
 TEST(Sensitivity, RefusesCorrelatedParameters) {
