@@ -49,6 +49,8 @@ class SwitchingIntegrator final : public BlockIntegrator {
   void Accept(Eigen::Index row, double length_s, bool hits_stop);
   void Switch(Eigen::Index row);
   bool LeaveAtEdge(Eigen::Index row);
+  void SetFloors(double span_s);
+  void RatesBelow(Eigen::Index row, const Eigen::ArrayXXd& states);
   void FirstStep(Eigen::Index row, double span_s);
   void NoteStiffness(Eigen::Index row, double length_s);
   void WriteStates(double time_s, Block states);
@@ -74,6 +76,7 @@ class SwitchingIntegrator final : public BlockIntegrator {
   RowSteps::Stages stages_;         // of the last steps
   SwitchedRows::Modes step_modes_;  // in the last steps
   Eigen::ArrayXXd first_rates_;     // of the next steps
+  Eigen::ArrayXXd below_;           // rates on the lower side of surfaces
   Eigen::ArrayXXd tolerance_;       // rows × switches: an error of the arguments
 
   // Work space.
@@ -106,6 +109,7 @@ SwitchingIntegrator::SwitchingIntegrator(const SwitchingModel* model,
       begin_(states),
       end_(states),
       first_rates_(Eigen::ArrayXXd::Zero(states.rows(), states.cols())),
+      below_(first_rates_),
       times_s_(states.rows()),
       lengths_s_(states.rows()),
       smooth_from_s_(time_s) {
@@ -141,8 +145,40 @@ void SwitchingIntegrator::Begin(double span_s, double stop_s) {
   }
   step_modes_ = switched_.modes();
   if (span_s == 0) return;
+  SetFloors(span_s);
   begun_ = true;
   restart_ = false;
+}
+
+// Tells the error scale to what size a state at rest may grow within the span. Where forces cancel
+// along a surface, those on its lower side tell it.
+void SwitchingIntegrator::SetFloors(double span_s) {
+  Vector expected = Vector::Zero(end_.cols());
+  for (Eigen::Index pass = 0; pass <= end_.cols(); ++pass) {
+    const Vector before = expected;
+    const Eigen::ArrayXXd moved = end_.rowwise() + before.transpose().array();
+    for (Eigen::Index row = 0; row < rows(); ++row) {
+      RatesBelow(row, moved);
+      for (Eigen::Index s = 0; s < end_.cols(); ++s) {
+        const double size = span_s * std::abs(below_(row, s));
+        if (before(s) == 0 && std::isfinite(size)) expected(s) = std::max(expected(s), size);
+      }
+    }
+    if (expected == before) break;
+  }
+  scale_.SetFloors(expected, expected);
+}
+
+// Writes the row's rates at these states with the lower mode of every switch that slides.
+void SwitchingIntegrator::RatesBelow(Eigen::Index row, const Eigen::ArrayXXd& states) {
+  const SwitchedRows::Modes modes = switched_.modes();
+  for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
+    switched_.Decode(row, i, modes.values(row, 1 + i));
+  }
+  switched_.RatesOfRow(row, row_of(row).end_s, states, below_);
+  for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
+    switched_.Decode(row, i, switched_.Encoded(modes, row, i));
+  }
 }
 
 // h = (1/100) min_s S_s ÷ |ẋ_s|, at most a small part of the span. It is a guess.

@@ -15,7 +15,7 @@ constexpr double kStep = 0.8;      // from one trial of β to the next
 constexpr double kLeastPower = 1e-12;
 // In more dimensions the collocation points are too few to confirm any posterior that is much
 // narrower than the region.
-constexpr int kMaxDimension = 6;
+constexpr int kMaxDimension = 3;
 
 // What is known at the collocation points.
 struct Points {

@@ -53,7 +53,7 @@ class Assessment {
     Cost cost = request_.expansion->MakeCost(regularization_);
     if (problem_.problem().expansion.adaptive) {
       cost.set_power(request_.power ? *request_.power
-                                    : 1 / Misfit(problem_, *request_.expansion, cost, stop));
+                                    : 1 / Misfit(problem_, *request_.expansion, stop));
       const double power = LikelihoodPower(*request_.expansion, cost);
       findings_.power = power / cost.power();
       cost.set_power(power);
@@ -169,7 +169,8 @@ class Assessment {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
-      if (findings_.power < 1 && parameter.posterior_std_dev > parameter.prior_std_dev) {
+      if ((findings_.power < 1 || findings_.shift > kInaccurateShift) &&
+          parameter.posterior_std_dev > parameter.prior_std_dev) {
         DescribeByPrior(i, parameter);
       }
       estimate_.parameters.push_back(std::move(parameter));

@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/estimator/posterior/noise_learning.h"
@@ -27,6 +28,8 @@ constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
 // As kAtBound, for a correlated parameter: its score has no bound, and only approaches the
 // parameter's.
 constexpr double kNearBound = 1e-4;
+// As kAtBound, where residuals contradict the noise.
+constexpr double kNearBoundByMisfit = 1e-2;
 // Maximum ratio of the posterior's and the curvature's standard deviations, in either direction.
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
@@ -201,7 +204,8 @@ int BoundReached(const Findings& findings, int i) {
   const Germ germ(prior.parameters()[static_cast<size_t>(i)].germ);
   const double x = prior.MarginalGerm(i, prior.ToScores(findings.map_xi)[i]);
   const double width = germ.Upper() - germ.Lower();
-  const double part = prior.germs()[static_cast<size_t>(i)] == germ ? kAtBound : kNearBound;
+  double part = prior.germs()[static_cast<size_t>(i)] == germ ? kAtBound : kNearBound;
+  if (findings.expansion->noise().misfit > 1) part = std::max(part, kNearBoundByMisfit);
   const double near = part * (std::isfinite(width) ? width : 1);
   if (x - germ.Lower() < near) return -1;
   return germ.Upper() - x < near ? 1 : 0;

@@ -19,9 +19,11 @@ bool IsTested(const ResolvedProblem& problem, size_t channel) {
 
 }  // namespace
 
-double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, Cost cost,
+double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion,
               const Stop& stop) {
-  // A prior that had more weight would keep the minimum away from where the samples are.
+  // A prior of more weight, because it is regularized or the likelihood tempered, would keep the
+  // minimum away from where the samples are.
+  Cost cost = expansion.MakeCost(std::min(1.0, problem.problem().regularization));
   cost.set_power(1);
   double degrees = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {

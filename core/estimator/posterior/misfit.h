@@ -15,10 +15,9 @@
 
 namespace polyest::internal {
 
-// Returns χ²/N at the minimum of the cost on the expansion, with the noise as stated, if it is
-// larger than 1 by at least six standard deviations, else 1. Channels whose noise is learned or may
-// have outliers do not count.
-double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, Cost cost,
-              const Stop& stop);
+// Returns χ²/N at the minimum of the cost on the expansion, with the noise as stated and α² ≤ 1, if
+// it is larger than 1 by at least six standard deviations, else 1. Channels whose noise is learned
+// or may have outliers do not count.
+double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, const Stop& stop);
 
 }  // namespace polyest::internal

@@ -194,9 +194,12 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     bool moved = false;
     if (too_coarse) {
       POLYEST_ASSIGN_OR_RETURN(moved, ContractOrBisect(stop));
-    } else if (WindowEnds()) {
-      POLYEST_ASSIGN_OR_RETURN(moved, SettleAfterWindow(stop));
-    } else if (LooksAtEdges()) {
+    }
+    if (must_divide()) return false;
+    if (WindowEnds()) {
+      POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleAfterWindow(stop));
+      moved = moved || settled;
+    } else if (!moved && LooksAtEdges()) {
       POLYEST_ASSIGN_OR_RETURN(moved, SettleIfLeaning(stop));
     }
     if (moved) return false;
@@ -230,8 +233,7 @@ double MixtureComponent::CoarseResidual() const {
 }
 
 void MixtureComponent::ReviseMisfit(const Stop& stop) {
-  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  expansion_->set_misfit(Misfit(problem_, *expansion_, cost, stop));
+  expansion_->set_misfit(Misfit(problem_, *expansion_, stop));
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {

@@ -162,11 +162,17 @@ TEST(Elements, MoveToWhereANormalPriorHardlyReaches) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kExpansionInaccurate));
 }
 
-// exp(a t) passes 10¹⁰⁰ before the first sample for most of the prior. The part where it does not
-// has the answer.
+// x = exp(a t) passes 10¹⁰⁰ before the first sample for most of the prior. The part where it does
+// not has the answer.
 TEST(Elements, LeaveOutWhereNothingCanBeIntegrated) {
-  const Problem problem =
-      TextProblem("exp(a*t)", {UncertainParameter::Uniform("a", 0, 17.7).value()}, 0.1);
+  EquationSpecification equations;
+  equations.states = {{"x", "a*x"}};
+  equations.outputs = {{"y", "x"}};
+  Problem problem;
+  problem.model = MakeEquationModel(equations).value();
+  problem.fixed = {{"x_0", 1}};
+  problem.uncertain = {UncertainParameter::Uniform("a", 0, 17.7).value()};
+  problem.measured = {{"y", {.absolute = 0.1}}};
   Samples samples;
   samples.columns = {{"y", {}, {}}};
   for (int i = 0; i < 20; ++i) {
