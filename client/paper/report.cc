@@ -55,6 +55,8 @@ const char* NameOf(DiagnosticCode code) {
       return "INCONSISTENT_OVER_TIME";
     case DiagnosticCode::kWindowsDisagree:
       return "WINDOWS_DISAGREE";
+    case DiagnosticCode::kSuspiciousData:
+      return "SUSPICIOUS_DATA";
   }
   return "";
 }

@@ -48,6 +48,15 @@ std::vector<Estimate> EstimateEverySeed(const Experiment& experiment) {
   return estimates;
 }
 
+// The scenario's noise is relative to the largest value so far, as the paper's is, which makes the
+// samples before the bump count most. Nothing else is to be said of it.
+void ExpectOnlyTheRunningMaximum(const Estimate& estimate) {
+  for (const Diagnostic& diagnostic : estimate.diagnostics) {
+    EXPECT_EQ(diagnostic.code, DiagnosticCode::kSuspiciousData) << diagnostic.message;
+    EXPECT_THAT(diagnostic.message, testing::HasSubstr("largest value so far"));
+  }
+}
+
 // The oracle is that z = (map − true)/stdDev is standard normal, except for the bias above.
 TEST(ReferenceScenario, CoversTheTruthAsOftenAsItSays) {
   const auto experiment = MakeExperiment("reference");
@@ -74,7 +83,7 @@ TEST(ReferenceScenario, CoversTheTruthAsOftenAsItSays) {
     EXPECT_NEAR(squares / kSeeds - mean * mean, 1, 3 * std::sqrt(2.0 / kSeeds));
   }
   for (const Estimate& estimate : estimates) {
-    EXPECT_THAT(estimate.diagnostics, testing::IsEmpty());
+    ExpectOnlyTheRunningMaximum(estimate);
     EXPECT_LT(estimate.expansion.residual_to_noise, 0.1);
   }
 }
@@ -85,7 +94,7 @@ TEST(ReferenceScenario, IdentifiesMassAndPlace) {
     EXPECT_EQ(parameter.verdict, Verdict::kIdentified) << parameter.name;
     EXPECT_LT(parameter.contraction, 0.01) << parameter.name;
   }
-  EXPECT_THAT(variant.estimate.diagnostics, testing::IsEmpty());
+  ExpectOnlyTheRunningMaximum(variant.estimate);
 }
 
 }  // namespace

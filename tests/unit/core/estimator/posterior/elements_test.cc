@@ -135,8 +135,9 @@ TEST(Elements, AreTheSameBitsForAnyBatches) {
   const Estimate at_once = EstimateFrom(problem, samples);
   const auto estimator = MakeEstimator(problem);
   for (size_t i = 0; i < samples.time_s.size(); ++i) {
-    const Samples one{.time_s = {samples.time_s[i]},
-                      .columns = {{"y", {samples.columns.front().value[i]}, {}}}};
+    Samples one;
+    one.time_s = {samples.time_s[i]};
+    one.columns = {{"y", {samples.columns.front().value[i]}, {}}};
     ASSERT_TRUE(estimator->Append(one).ok());
     ASSERT_TRUE(estimator->Process().ok());
   }
@@ -175,7 +176,7 @@ TEST(Elements, LeaveOutWhereNothingCanBeIntegrated) {
   problem.measured = {{"y", {.absolute = 0.1}}};
   Samples samples;
   samples.columns = {{"y", {}, {}}};
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 50; ++i) {
     samples.time_s.push_back(40 + 0.1 * i);
     samples.columns.front().value.push_back(std::exp(0.05 * samples.time_s.back()));
   }
