@@ -108,7 +108,8 @@ TEST_P(MagnetorheologicalDamper, FollowsDahlsHysteresis) {
   const Estimate estimate = EstimateInBatches(problem, *record, 100);
   EXPECT_LT(Residual(estimate), GetParam().residual);
   for (const ParameterEstimate& parameter : estimate.parameters) {
-    // The hysteresis is not exactly Dahl's: the windows of the record disagree, which caps verdicts.
+    // The hysteresis is not exactly Dahl's: the windows of the record disagree, which caps
+    // verdicts.
     EXPECT_NE(parameter.verdict, Verdict::kNotIdentified) << parameter.name;
   }
 }

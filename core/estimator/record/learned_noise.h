@@ -19,7 +19,8 @@ struct ChannelNoise {
   // Whether the part of the noise that is relative to a value is taken of the prediction at
   // LearnedNoise::centre. It is taken of the sample until there is a prediction.
   bool of_prediction = false;
-  TimeConstantGrid grid = {};  // from which an unknown time constant is chosen; empty if none is yet
+  TimeConstantGrid grid =
+      {};  // from which an unknown time constant is chosen; empty if none is yet
 };
 
 // The position and spread of the posterior at the last revision; outliers are judged by their
