@@ -57,7 +57,7 @@ std::vector<size_t> ConnectedPieces(const std::vector<ElementCost>& elements) {
   }
   std::vector<size_t> numbers = pieces;
   std::ranges::sort(numbers);
-  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
   for (size_t& piece : pieces) {
     piece = static_cast<size_t>(std::ranges::lower_bound(numbers, piece) - numbers.begin());
   }
