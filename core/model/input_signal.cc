@@ -12,6 +12,7 @@
 #include "core/common/check.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/common/types.h"
 #include "core/model/interpolation.h"
 
 namespace polyest::internal {
