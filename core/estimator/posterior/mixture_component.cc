@@ -111,7 +111,7 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   if (must_divide()) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   // An earlier stop may have left the end of a window unprocessed.
-  if (WindowEnds()) POLYEST_RETURN_IF_ERROR(SettleAfterWindow(stop).status());
+  POLYEST_RETURN_IF_ERROR(FinishRow(stop).status());
   RowBlock block;
   while (taken_ < rows && !must_divide()) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
@@ -191,20 +191,29 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     summary_.Add(block, row, problem_.channels());
     AddPredictionsOf(*expansion_, row, summary_);
     ++taken_;
-    bool moved = false;
-    if (too_coarse) {
-      POLYEST_ASSIGN_OR_RETURN(moved, ContractOrBisect(stop));
-    }
-    if (must_divide()) return false;
-    if (WindowEnds()) {
-      POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleAfterWindow(stop));
-      moved = moved || settled;
-    } else if (!moved && LooksAtEdges()) {
-      POLYEST_ASSIGN_OR_RETURN(moved, SettleIfLeaning(stop));
-    }
+    contracts_ = too_coarse;
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, FinishRow(stop));
     if (moved) return false;
   }
   return true;
+}
+
+// Does what is due after the last row taken, all of which may be done again after a stop. Returns
+// true when the expansion has moved or must be divided.
+absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
+  bool moved = false;
+  if (contracts_) {
+    POLYEST_ASSIGN_OR_RETURN(moved, ContractOrBisect(stop));
+    contracts_ = false;
+  }
+  if (must_divide()) return true;
+  bool settled = false;
+  if (WindowEnds()) {
+    POLYEST_ASSIGN_OR_RETURN(settled, SettleAfterWindow(stop));
+  } else if (LooksAtEdges()) {
+    POLYEST_ASSIGN_OR_RETURN(settled, SettleIfLeaning(stop));
+  }
+  return moved || settled;
 }
 
 // Handles a next row at which the present expansion is too coarse or too few trajectories are left.
@@ -264,9 +273,12 @@ bool MixtureComponent::Leans() const {
 
 // Within a window the posterior may wander to an edge of the region, where it would be cut.
 absl::StatusOr<bool> MixtureComponent::SettleIfLeaning(const Stop& stop) {
+  bool settled = false;
+  if (Leans()) {
+    POLYEST_ASSIGN_OR_RETURN(settled, Settle(stop, /*may_raise_order=*/false));
+  }
   edges_row_ = NextLook();
-  if (!Leans()) return false;
-  return Settle(stop, /*may_raise_order=*/false);
+  return settled;
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {

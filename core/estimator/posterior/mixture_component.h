@@ -93,6 +93,7 @@ class MixtureComponent {
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
+  absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
@@ -123,6 +124,7 @@ class MixtureComponent {
   bool broken_ = false;        // whether a stop left the expansion between two rows
   Matrix particles_;           // of the last settlement, germ coordinates
   std::vector<Piece> pieces_;  // those to divide into
+  bool contracts_ = false;     // whether the last row was too coarse and not dealt with yet
   bool halves_ = false;        // whether the pieces are the halves of a bisection
   bool bisected_ = false;      // whether it came from a bisection; its order stays low
   int room_ = 1;

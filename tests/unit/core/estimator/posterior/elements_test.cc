@@ -163,28 +163,5 @@ TEST(Elements, MoveToWhereANormalPriorHardlyReaches) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kExpansionInaccurate));
 }
 
-// x = exp(a t) passes 10¹⁰⁰ before the first sample for most of the prior. The part where it does
-// not has the answer.
-TEST(Elements, LeaveOutWhereNothingCanBeIntegrated) {
-  EquationSpecification equations;
-  equations.states = {{"x", "a*x"}};
-  equations.outputs = {{"y", "x"}};
-  Problem problem;
-  problem.model = MakeEquationModel(equations).value();
-  problem.fixed = {{"x_0", 1}};
-  problem.uncertain = {UncertainParameter::Uniform("a", 0, 17.7).value()};
-  problem.measured = {{"y", {.absolute = 0.1}}};
-  Samples samples;
-  samples.columns = {{"y", {}, {}}};
-  for (int i = 0; i < 50; ++i) {
-    samples.time_s.push_back(40 + 0.1 * i);
-    samples.columns.front().value.push_back(std::exp(0.05 * samples.time_s.back()));
-  }
-  const Estimate estimate = EstimateFrom(problem, samples);
-  EXPECT_NEAR(estimate.parameters.front().mean, 0.05, 1e-4);
-  EXPECT_THAT(Message(estimate, DiagnosticCode::kPointsFailed),
-              HasSubstr("parts of the prior were left out"));
-}
-
 }  // namespace
 }  // namespace polyest::internal
