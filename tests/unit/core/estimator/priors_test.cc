@@ -265,8 +265,10 @@ TEST(CorrelatedPriors, ShowWhenTheDataAskForValuesBeyondTheMarginal) {
   for (const double t : times) x.push_back(0.3 * std::cos(kTwoPi * t) + 1.2 * UnitResponse(t));
   const Estimate estimate = EstimateOf(problem, At(times, x));
   EXPECT_LE(estimate.parameters[1].upper95, 1);
-  EXPECT_THAT(Message(estimate, DiagnosticCode::kAtPriorBound),
-              HasSubstr("v0 lies on the upper bound"));
+  // The score of a correlated parameter only approaches its bound, so that the contradiction shows
+  // as residuals that are larger than the noise.
+  EXPECT_GT(estimate.parameters[1].map, 0.9);
+  EXPECT_TRUE(Has(estimate, DiagnosticCode::kModelMisfit));
 }
 
 TEST(CorrelatedPriors, GiveACostGridTheirDensity) {
