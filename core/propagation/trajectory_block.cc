@@ -91,8 +91,8 @@ void TrajectoryBlock::StartIntegrator(double time_s) {
   }
   const double tolerance = specification_->integration.relative_tolerance;
   if (switching_ != nullptr && !stiff_) {
-    integrator_ = MakeSwitchingIntegrator(switching_, &parameters_, &inputs_, tolerance, time_s,
-                                          states_, &modes_);
+    integrator_ = std::make_unique<SwitchingIntegrator>(switching_, &parameters_, &inputs_,
+                                                        tolerance, time_s, states_, &modes_);
     return;
   }
   integrator_ = stiff_ ? MakeBdfIntegrator(this, tolerance, time_s, states_)
