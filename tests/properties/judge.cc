@@ -22,37 +22,6 @@ bool AdmitsFailure(DiagnosticCode code) {
          code == DiagnosticCode::kPointsFailed;
 }
 
-const char* CodeName(DiagnosticCode code) {
-  switch (code) {
-    case DiagnosticCode::kNotIdentified:
-      return "NOT_IDENTIFIED";
-    case DiagnosticCode::kUndersampled:
-      return "UNDERSAMPLED";
-    case DiagnosticCode::kExpansionInaccurate:
-      return "EXPANSION_INACCURATE";
-    case DiagnosticCode::kModelMisfit:
-      return "MODEL_MISFIT";
-    case DiagnosticCode::kAtPriorBound:
-      return "AT_PRIOR_BOUND";
-    case DiagnosticCode::kMultipleMinima:
-      return "MULTIPLE_MINIMA";
-    case DiagnosticCode::kNotConverged:
-      return "NOT_CONVERGED";
-    case DiagnosticCode::kPointsFailed:
-      return "POINTS_FAILED";
-    case DiagnosticCode::kNonGaussian:
-      return "NON_GAUSSIAN";
-    case DiagnosticCode::kCorrelatedResiduals:
-      return "CORRELATED_RESIDUALS";
-    case DiagnosticCode::kNoiseNotLearned:
-      return "NOISE_NOT_LEARNED";
-    case DiagnosticCode::kSuspiciousData:
-      return "SUSPICIOUS_DATA";
-    default:
-      return "other";
-  }
-}
-
 }  // namespace
 
 const char* NameOf(Judgement judgement) {
@@ -74,7 +43,7 @@ const char* NameOf(Judgement judgement) {
 std::string CodesOf(const Estimate& estimate) {
   std::string codes;
   for (const Diagnostic& diagnostic : estimate.diagnostics) {
-    const std::string name = CodeName(diagnostic.code);
+    const std::string name = NameOf(diagnostic.code);
     if (codes.find(name) != std::string::npos) continue;
     absl::StrAppend(&codes, codes.empty() ? "" : ",", name);
   }

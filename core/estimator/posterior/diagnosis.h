@@ -2,6 +2,7 @@
 
 // Warnings to the user about an estimate, each in one sentence.
 
+#include <string>
 #include <vector>
 
 #include "core/bayes/minimizer.h"
@@ -17,6 +18,8 @@ namespace polyest::internal {
 inline constexpr double kInaccurateShift = 0.25;
 
 struct Findings {
+  const std::string& NameOf(int parameter) const;
+
   const ResolvedProblem* problem = nullptr;
   const RegionalExpansion* expansion = nullptr;
   const RecordSummary* record = nullptr;

@@ -6,86 +6,35 @@
 #include <optional>
 #include <utility>
 
-#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/leaning.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
-#include "core/estimator/posterior/bisection.h"
-#include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/noise_learning.h"
-#include "core/estimator/problem/truncation.h"
 #include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr int64_t kBlockRows = 64;
-// A sample whose expansion residual exceeds this fraction of the noise ends the window before it.
-constexpr double kResidualToNoise = 0.1;
 // At the end of a window the expansion is compared with the model. It is settled again when the
 // posterior's means may be wrong by this many standard deviations.
 constexpr double kMaxShift = 0.1;
-// Pieces are accepted from an expansion that is too inaccurate for further samples, but only while
-// it cannot have created or omitted them: the shift must not exceed this value.
-constexpr double kMaxShiftInPieces = 1;
 constexpr double kWindowGrowth = 1.3;
-// The integration error must stay so far below the noise that over a long record it does not
-// accumulate to a noticeable share of the posterior's standard deviation. The error is the same at
-// every sample's parameters while the noise averages out, so N samples together see errors smaller
-// than one sample does by √N: relative tolerance ≤ kTolerancePerNoise × noise ÷ signal ÷ √N,
-// counting no fewer than kFewestSamples. The tolerance is checked where windows end, and never goes
-// below what double precision supports.
-constexpr double kTolerancePerNoise = 1e-4;
-constexpr double kFewestSamples = 100;
-constexpr double kTightestTolerance = 1e-12;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
 constexpr int64_t kPatience = 8;
 // The region's edges are looked at again after the record since the windows' beginning, divided by
 // this number.
 constexpr int64_t kLooksPerRecord = 20;
-constexpr int kMaxSettlementsAtRow = 4;
-// Maximum number of revisions of the noise at the end of a window. A scale that falls from the
-// signal's size to 10⁻⁶ of it takes 20 halvings.
-constexpr int kMaxRevisions = 24;
-
-// Trajectories that the components may propagate together, and components that they always may be.
-constexpr double kMostTrajectories = 2048;
-constexpr int kPiecesAtLeast = 4;
-// An element is bisected in at most so many dimensions: the number of halves that a posterior
-// touches doubles with each of them.
-constexpr int kMaxDimensionToBisect = 3;
-// At the end of a window an element is bisected when the posterior's means may be wrong by so many
-// standard deviations and moving has not helped.
-constexpr double kMinShiftToBisect = 0.25;
-
-// Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
-PosteriorSummary SummaryOf(const Matrix& particles) {
-  PosteriorSummary summary;
-  summary.centre = particles.colwise().mean().transpose();
-  const Matrix centred = particles.rowwise() - summary.centre.transpose();
-  const SymmetricEigen eigen =
-      DecomposeSymmetric(centred.transpose() * centred / static_cast<double>(particles.rows()));
-  summary.factor = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
-  return summary;
-}
 
 }  // namespace
 
 int64_t NextWindow(int64_t rows, int64_t from) {
   const auto window = static_cast<double>(rows - from);
   return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
-}
-
-int MostComponents(const ResolvedProblem& problem) {
-  const ExpansionOptions& options = problem.problem().expansion;
-  const int n = problem.dimension();
-  const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
-  const double points = options.points_per_term * static_cast<double>(terms);
-  return std::max(kPiecesAtLeast, static_cast<int>(kMostTrajectories / points));
 }
 
 MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleStore* store,
@@ -236,15 +185,6 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
   return false;
 }
 
-// The residual of the expansion from which on it is too coarse, in units of the stated noise.
-double MixtureComponent::CoarseResidual() const {
-  return kResidualToNoise * std::sqrt(expansion_->noise().misfit);
-}
-
-void MixtureComponent::ReviseMisfit(const Stop& stop) {
-  expansion_->set_misfit(Misfit(problem_, *expansion_, stop));
-}
-
 absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   bool moved = false;
   if (learns_noise_) {
@@ -300,203 +240,6 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   }
   if (accurate()) return moved;
   return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement()) || moved;
-}
-
-// Returns true when the posterior is in pieces on the present expansion, which no move makes
-// accurate. Does not look for pieces before the noise is learned, because the noise would decide
-// between them.
-bool MixtureComponent::LookForPieces() {
-  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
-  for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
-    const bool unknown = problem_.problem().measured[c].noise.unknown;
-    if (unknown && !expansion_->noise().channels[c].learned) return false;
-  }
-  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  if (AgreementWithModel(*expansion_, cost).shift > kMaxShiftInPieces) return false;
-  std::vector<Piece> pieces = FindPieces(cost, expansion_->design(), particles_);
-  if (pieces.size() > 1) pieces_ = std::move(pieces);
-  return must_divide();
-}
-
-bool MixtureComponent::MayBisect() const {
-  return adaptive() && taken_ >= whole_until_ && room_ > 1 &&
-         problem_.dimension() <= kMaxDimensionToBisect;
-}
-
-// Returns true when the element is to be bisected.
-bool MixtureComponent::BisectElement() {
-  if (!MayBisect()) return false;
-  pieces_ = Bisect(*expansion_, particles_);
-  halves_ = true;
-  return true;
-}
-
-// After a row that the expansion does not follow, which has been taken with its discount: if the
-// posterior contracts as far as the collocation points confirm it, the expansion moves there. That
-// costs far less than elements, but leaves separate modes where they are.
-absl::StatusOr<bool> MixtureComponent::ContractOrBisect(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, /*may_raise_order=*/false));
-  return moved || BisectElement();
-}
-
-absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
-    const Stop& stop) {
-  std::vector<std::unique_ptr<MixtureComponent>> parts;
-  const int room = std::max(1, room_ / static_cast<int>(pieces_.size()));
-  for (const Piece& piece : pieces_) {
-    std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
-    const absl::Status begun = part->BeginOn(*this, piece, stop);
-    if (absl::IsFailedPrecondition(begun)) {
-      pieces_.clear();
-      halves_ = false;
-      whole_until_ = NextWindow(taken_, windows_from_);
-      parts.clear();
-      return parts;
-    }
-    POLYEST_RETURN_IF_ERROR(begun);
-    part->room_ = room;
-    parts.push_back(std::move(part));
-  }
-  return parts;
-}
-
-absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const Piece& whole,
-                                                                          const Stop& stop) const {
-  std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
-  const absl::Status begun = united->ExpandOn(*this, whole, stop);
-  if (absl::IsFailedPrecondition(begun)) return nullptr;
-  POLYEST_RETURN_IF_ERROR(begun);
-  united->whole_until_ = 0;
-  united->bisected_ = false;
-  const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
-  if (!(LargestShift(*united->expansion_, cost) <= kMinShiftToBisect)) return nullptr;
-  return united;
-}
-
-// Returns the design over the piece's region. Its check points are particles of the piece, or cover
-// the region if the particles' density is unknown.
-ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
-                                           const Piece& piece) const {
-  const ExpansionDesign& before = parent.expansion_->design();
-  const Vector middle = piece.particles.rows() > 0
-                            ? Vector(piece.particles.colwise().mean().transpose())
-                            : NearestInside(problem_.prior(), piece.region.centre());
-  ExpansionDesign design =
-      DesignForRegion(problem_, before.basis->truncation(), piece.region, middle);
-  design.element = piece.element;
-  if (piece.costs.size() == 0) {
-    SpreadCheckPoints(problem_, middle, design);
-    return design;
-  }
-  const Eigen::Index count = std::min(before.check_points.rows(), piece.particles.rows());
-  design.check_points = design.region.ManyToLocal(piece.particles.topRows(count));
-  design.check_costs = piece.costs.head(count);
-  design.checks_are_draws = true;
-  return design;
-}
-
-// Starts at the parent's row, over the region of one of the parent's pieces.
-absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Piece& piece,
-                                        const Stop& stop) {
-  taken_ = window_end_ = parent.taken_;
-  windows_from_ = parent.windows_from_;
-  summary_ = parent.summary_;
-  settlements_ = parent.settlements_;
-  bisected_ = parent.bisected_ || parent.halves_;
-  if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
-  particles_ = piece.particles;
-  LearnedNoise noise = parent.expansion_->noise();
-  if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
-    noise.posterior = SummaryOf(particles_);
-  }
-  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
-                                              *store_, taken_, threads_, stop));
-  ++reexpansions_;
-  return absl::OkStatus();
-}
-
-// As ExpandOn, and moves the expansion to the piece's posterior.
-absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Piece& piece,
-                                       const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
-  bool moved = !parent.halves_;
-  for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
-    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
-  }
-  return absl::OkStatus();
-}
-
-// Raises scales that are not learned yet with the signal, so the first samples have little weight
-// however large they are. Returns true when the record was replayed.
-absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& block, int row,
-                                                            const Stop& stop) {
-  if (!learns_noise_) return false;
-  std::optional<LearnedNoise> raised;  // set only when needed: this runs for every sample
-  const std::vector<ChannelNoise>& present = expansion_->noise().channels;
-  const size_t width = block.values.size() / block.rows.size();
-  for (size_t c = 0; c < present.size(); ++c) {
-    const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
-    if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;
-    const double value = std::abs(block.values[static_cast<size_t>(row) * width + c]);
-    const double predicted = expansion_->Magnitude(row, static_cast<int>(c));
-    const std::optional<double> scale =
-        UnlearnedScale(summary_, c, value / shape, predicted / shape, present[c].scale);
-    if (!scale) continue;
-    if (!raised) raised = expansion_->noise();
-    raised->channels[c].scale = *scale;
-  }
-  if (!raised) return false;
-  POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(raised), stop));
-  return true;
-}
-
-// Returns whether the record was reweighed with another noise. Smaller noise requires a more
-// accurate expansion.
-absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
-  bool moved = false;
-  for (int i = 0; i < kMaxRevisions; ++i) {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    std::optional<LearnedNoise> revised = ReviseNoise(problem_, *expansion_, summary_, stop);
-    if (!revised) break;
-    POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(revised), stop));
-    moved = true;
-    if (!adaptive()) continue;
-    POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
-    POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
-  }
-  return moved;
-}
-
-// Propagates the expansion along the record so far again, with the samples weighed by `noise`.
-absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(auto replayed, Replay(problem_, expansion_->design(), std::move(noise),
-                                                 *store_, taken_, threads_, stop));
-  Adopt(std::move(replayed));
-  return absl::OkStatus();
-}
-
-// Returns true when the noise required a tighter tolerance and the record was propagated again with
-// it.
-absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
-  if (!problem_.problem().tolerance_follows_noise) return false;
-  const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
-  const double needed = std::max(
-      kTightestTolerance,
-      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples));
-  const double present = problem_.problem().integration.relative_tolerance;
-  if (needed >= present || expansion_->StepsExactly()) return false;
-  // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
-  // replays: four times as many samples come before the next.
-  problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
-  auto replayed =
-      Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
-  if (!replayed.ok()) {
-    problem_.set_relative_tolerance(present);
-    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays
-    return replayed.status();
-  }
-  Adopt(*std::move(replayed));
-  return true;
 }
 
 // Returns true when the expansion moved.

@@ -72,8 +72,8 @@ class MixtureComponent {
   // Prepares for weighing: settles again, at most once at a row, if the posterior has become so
   // narrow that the check points no longer determine the height of its cost (mixture_share.h).
   absl::Status MakeComparable(const Stop& stop);
-  // Returns the posterior probability of the component at the last weighing.
   const ResolvedProblem& problem() const { return problem_; }
+  // Returns the posterior probability of the component at the last weighing.
   double weight() const { return weight_; }
   void set_weight(double weight) { weight_ = weight; }
   const RegionalExpansion& expansion() const { return *expansion_; }
@@ -83,6 +83,11 @@ class MixtureComponent {
   AssessmentRequest RequestAssessment() const;
 
  private:
+  static constexpr int kMaxSettlementsAtRow = 4;
+  // At the end of a window an element is bisected when the posterior's means may be wrong by so
+  // many standard deviations and moving has not helped.
+  static constexpr double kMinShiftToBisect = 0.25;
+
   MixtureComponent(const ResolvedProblem& problem, const SampleStore* store, int threads);
 
   bool adaptive() const { return problem_.problem().expansion.adaptive; }

@@ -18,12 +18,16 @@ enum class DiagnosticCode {
   kPointsFailed,         // trajectories that could not be integrated were left out
   kNonGaussian,          // the posterior's spread is not that of the cost's curvature
   kCorrelatedResiduals,  // residuals are correlated in time; the noise is taken to be white
-  kNoiseNotLearned,      // too few samples to learn a noise of unknown size from
+  kNoiseNotLearned,      // the data do not determine a noise of unknown size or correlation
   kRegularizationNotDetermined,  // the rule asked for does not choose an α²; it stays 1
   kSuspiciousData,               // the data are allowed but probably not what was meant
   kInconsistentOverTime,         // a parameter differs between parts of the record
   kWindowsDisagree,              // windows of the record scatter by more than the noise explains
 };
+
+// Returns the code's name in messages and files, such as "NOT_IDENTIFIED": that of the value of
+// Diagnostic.Code in the API; empty if the code is none of these.
+const char* NameOf(DiagnosticCode code);
 
 // One warning.
 struct Diagnostic {

@@ -151,6 +151,7 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
     estimate.diagnostics = {{code, "why"}};
     const v1::Estimate proto = ToProto(estimate);
     EXPECT_EQ(proto.diagnostics(0).code(), expected);
+    EXPECT_EQ(NameOf(code), v1::Diagnostic::Code_Name(expected));
     EXPECT_EQ(proto.diagnostics(0).message(), "why");
   }
 }

@@ -1,0 +1,173 @@
+// Divides a mixture component into pieces of its posterior or halves of its element, and unites
+// what one expansion serves.
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
+#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/bisection.h"
+#include "core/estimator/posterior/mixture_component.h"
+#include "core/estimator/problem/truncation.h"
+
+namespace polyest::internal {
+namespace {
+
+// Pieces are accepted from an expansion that is too inaccurate for further samples, but only while
+// it cannot have created or omitted them: the shift must not exceed this value.
+constexpr double kMaxShiftInPieces = 1;
+// Trajectories that the components may propagate together, and components that they always may be.
+constexpr double kMostTrajectories = 2048;
+constexpr int kPiecesAtLeast = 4;
+// An element is bisected in at most so many dimensions: the number of halves that a posterior
+// touches doubles with each of them.
+constexpr int kMaxDimensionToBisect = 3;
+
+// Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
+PosteriorSummary SummaryOf(const Matrix& particles) {
+  PosteriorSummary summary;
+  summary.centre = particles.colwise().mean().transpose();
+  const Matrix centred = particles.rowwise() - summary.centre.transpose();
+  const SymmetricEigen eigen =
+      DecomposeSymmetric(centred.transpose() * centred / static_cast<double>(particles.rows()));
+  summary.factor = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+  return summary;
+}
+
+}  // namespace
+
+int MostComponents(const ResolvedProblem& problem) {
+  const ExpansionOptions& options = problem.problem().expansion;
+  const int n = problem.dimension();
+  const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
+  const double points = options.points_per_term * static_cast<double>(terms);
+  return std::max(kPiecesAtLeast, static_cast<int>(kMostTrajectories / points));
+}
+
+// Returns true when the posterior is in pieces on the present expansion, which no move makes
+// accurate. Does not look for pieces before the noise is learned, because the noise would decide
+// between them.
+bool MixtureComponent::LookForPieces() {
+  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
+  for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
+    const bool unknown = problem_.problem().measured[c].noise.unknown;
+    if (unknown && !expansion_->noise().channels[c].learned) return false;
+  }
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  if (AgreementWithModel(*expansion_, cost).shift > kMaxShiftInPieces) return false;
+  std::vector<Piece> pieces = FindPieces(cost, expansion_->design(), particles_);
+  if (pieces.size() > 1) pieces_ = std::move(pieces);
+  return must_divide();
+}
+
+bool MixtureComponent::MayBisect() const {
+  return adaptive() && taken_ >= whole_until_ && room_ > 1 &&
+         problem_.dimension() <= kMaxDimensionToBisect;
+}
+
+// Returns true when the element is to be bisected.
+bool MixtureComponent::BisectElement() {
+  if (!MayBisect()) return false;
+  pieces_ = Bisect(*expansion_, particles_);
+  halves_ = true;
+  return true;
+}
+
+// After a row that the expansion does not follow, which has been taken with its discount: if the
+// posterior contracts as far as the collocation points confirm it, the expansion moves there. That
+// costs far less than elements, but leaves separate modes where they are.
+absl::StatusOr<bool> MixtureComponent::ContractOrBisect(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, /*may_raise_order=*/false));
+  return moved || BisectElement();
+}
+
+absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
+    const Stop& stop) {
+  std::vector<std::unique_ptr<MixtureComponent>> parts;
+  const int room = std::max(1, room_ / static_cast<int>(pieces_.size()));
+  for (const Piece& piece : pieces_) {
+    std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
+    const absl::Status begun = part->BeginOn(*this, piece, stop);
+    if (absl::IsFailedPrecondition(begun)) {
+      pieces_.clear();
+      halves_ = false;
+      whole_until_ = NextWindow(taken_, windows_from_);
+      parts.clear();
+      return parts;
+    }
+    POLYEST_RETURN_IF_ERROR(begun);
+    part->room_ = room;
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const Piece& whole,
+                                                                          const Stop& stop) const {
+  std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
+  const absl::Status begun = united->ExpandOn(*this, whole, stop);
+  if (absl::IsFailedPrecondition(begun)) return nullptr;
+  POLYEST_RETURN_IF_ERROR(begun);
+  united->whole_until_ = 0;
+  united->bisected_ = false;
+  const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
+  if (!(LargestShift(*united->expansion_, cost) <= kMinShiftToBisect)) return nullptr;
+  return united;
+}
+
+// Returns the design over the piece's region. Its check points are particles of the piece, or cover
+// the region if the particles' density is unknown.
+ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
+                                           const Piece& piece) const {
+  const ExpansionDesign& before = parent.expansion_->design();
+  const Vector middle = piece.particles.rows() > 0
+                            ? Vector(piece.particles.colwise().mean().transpose())
+                            : NearestInside(problem_.prior(), piece.region.centre());
+  ExpansionDesign design =
+      DesignForRegion(problem_, before.basis->truncation(), piece.region, middle);
+  design.element = piece.element;
+  if (piece.costs.size() == 0) {
+    SpreadCheckPoints(problem_, middle, design);
+    return design;
+  }
+  const Eigen::Index count = std::min(before.check_points.rows(), piece.particles.rows());
+  design.check_points = design.region.ManyToLocal(piece.particles.topRows(count));
+  design.check_costs = piece.costs.head(count);
+  design.checks_are_draws = true;
+  return design;
+}
+
+// Starts at the parent's row, over the region of one of the parent's pieces.
+absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Piece& piece,
+                                        const Stop& stop) {
+  taken_ = window_end_ = parent.taken_;
+  windows_from_ = parent.windows_from_;
+  summary_ = parent.summary_;
+  settlements_ = parent.settlements_;
+  bisected_ = parent.bisected_ || parent.halves_;
+  if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
+  particles_ = piece.particles;
+  LearnedNoise noise = parent.expansion_->noise();
+  if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
+    noise.posterior = SummaryOf(particles_);
+  }
+  POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
+                                              *store_, taken_, threads_, stop));
+  ++reexpansions_;
+  return absl::OkStatus();
+}
+
+// As ExpandOn, and moves the expansion to the piece's posterior.
+absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Piece& piece,
+                                       const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
+  bool moved = !parent.halves_;
+  for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
+    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal

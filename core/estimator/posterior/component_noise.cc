@@ -1,0 +1,117 @@
+// What a mixture component does about its noise: it learns what is unknown, notices residuals that
+// contradict what is stated, and lets the integrators' tolerance follow.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/common/status.h"
+#include "core/estimator/expansion/prior_prediction.h"
+#include "core/estimator/posterior/misfit.h"
+#include "core/estimator/posterior/mixture_component.h"
+#include "core/estimator/posterior/noise_learning.h"
+
+namespace polyest::internal {
+namespace {
+
+// A sample whose expansion residual exceeds this fraction of the noise ends the window before it.
+constexpr double kResidualToNoise = 0.1;
+// The integration error must stay so far below the noise that over a long record it does not
+// accumulate to a noticeable share of the posterior's standard deviation. The error is the same at
+// every sample's parameters while the noise averages out, so N samples together see errors smaller
+// than one sample does by √N: relative tolerance ≤ kTolerancePerNoise × noise ÷ signal ÷ √N,
+// counting no fewer than kFewestSamples. The tolerance is checked where windows end, and never goes
+// below what double precision supports.
+constexpr double kTolerancePerNoise = 1e-4;
+constexpr double kFewestSamples = 100;
+constexpr double kTightestTolerance = 1e-12;
+// Maximum number of revisions of the noise at the end of a window. A scale that falls from the
+// signal's size to 10⁻⁶ of it takes 20 halvings.
+constexpr int kMaxRevisions = 24;
+
+}  // namespace
+
+// The residual of the expansion from which on it is too coarse, in units of the stated noise.
+double MixtureComponent::CoarseResidual() const {
+  return kResidualToNoise * std::sqrt(expansion_->noise().misfit);
+}
+
+void MixtureComponent::ReviseMisfit(const Stop& stop) {
+  expansion_->set_misfit(Misfit(problem_, *expansion_, stop));
+}
+
+// Raises scales that are not learned yet with the signal, so the first samples have little weight
+// however large they are. Returns true when the record was replayed.
+absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& block, int row,
+                                                            const Stop& stop) {
+  if (!learns_noise_) return false;
+  std::optional<LearnedNoise> raised;  // set only when needed: this runs for every sample
+  const std::vector<ChannelNoise>& present = expansion_->noise().channels;
+  const size_t width = block.values.size() / block.rows.size();
+  for (size_t c = 0; c < present.size(); ++c) {
+    const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
+    if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;
+    const double value = std::abs(block.values[static_cast<size_t>(row) * width + c]);
+    const double predicted = expansion_->Magnitude(row, static_cast<int>(c));
+    const std::optional<double> scale =
+        UnlearnedScale(summary_, c, value / shape, predicted / shape, present[c].scale);
+    if (!scale) continue;
+    if (!raised) raised = expansion_->noise();
+    raised->channels[c].scale = *scale;
+  }
+  if (!raised) return false;
+  POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(raised), stop));
+  return true;
+}
+
+// Returns whether the record was reweighed with another noise. Smaller noise requires a more
+// accurate expansion.
+absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
+  bool moved = false;
+  for (int i = 0; i < kMaxRevisions; ++i) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    std::optional<LearnedNoise> revised = ReviseNoise(problem_, *expansion_, summary_, stop);
+    if (!revised) break;
+    POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(revised), stop));
+    moved = true;
+    if (!adaptive()) continue;
+    POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
+    POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+  }
+  return moved;
+}
+
+// Propagates the expansion along the record so far again, with the samples weighed by `noise`.
+absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(auto replayed, Replay(problem_, expansion_->design(), std::move(noise),
+                                                 *store_, taken_, threads_, stop));
+  Adopt(std::move(replayed));
+  return absl::OkStatus();
+}
+
+// Returns true when the noise required a tighter tolerance and the record was propagated again with
+// it.
+absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
+  if (!problem_.problem().tolerance_follows_noise) return false;
+  const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
+  const double needed = std::max(
+      kTightestTolerance,
+      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples));
+  const double present = problem_.problem().integration.relative_tolerance;
+  if (needed >= present || expansion_->StepsExactly()) return false;
+  // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
+  // replays: four times as many samples come before the next.
+  problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
+  auto replayed =
+      Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
+  if (!replayed.ok()) {
+    problem_.set_relative_tolerance(present);
+    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays
+    return replayed.status();
+  }
+  Adopt(*std::move(replayed));
+  return true;
+}
+
+}  // namespace polyest::internal

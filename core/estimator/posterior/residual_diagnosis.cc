@@ -1,0 +1,194 @@
+#include "core/estimator/posterior/residual_diagnosis.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+
+#include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/residual_tests.h"
+
+namespace polyest::internal {
+namespace {
+
+// For a correct model, χ² has mean N and standard deviation √(2N). Residuals that are too small,
+// which is the less dangerous error, are reported when χ² is below N both by many standard
+// deviations and by a third.
+constexpr double kMisfitDeviations = 6;
+constexpr double kTooSmallRatio = 1.5;
+// Relative noise whose bias, if it is taken of the samples, is mentioned.
+constexpr double kLargeRelativeNoise = 0.05;
+// A record of fewer time constants than five hardly knows them: that of a random walk, which has
+// none, is mostly found to be a fifth of the record or more.
+constexpr double kMaxTimeConstant = 0.2;
+constexpr double kNoticeable = 1.05;  // factor of a standard deviation that is worth a word
+
+// Returns what has become of the uncertainty because residuals or windows contradict the estimate.
+std::string WideningText(const Findings& findings) {
+  const Vector& widening = findings.windows.widening;
+  Eigen::Index widest = 0;
+  const double factor = widening.size() > 0 ? widening.maxCoeff(&widest) : 1;
+  if (factor < kNoticeable) return "windows of the record ask for no wider uncertainty";
+  return absl::StrFormat(
+      "standard deviations and intervals have been widened, that of %s %.2g times",
+      findings.NameOf(static_cast<int>(widest)), factor);
+}
+
+// A learned scale is skipped: it was learned from χ², which is therefore no test of it.
+void AddMisfit(const Findings& findings, const Estimate& estimate,
+               std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    if (findings.problem->problem().measured[c].noise.unknown) continue;
+    const auto samples = static_cast<double>(channel.samples);
+    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
+                           "prior is wrong; %s",
+                           channel.output, std::sqrt(channel.chi_squared / samples),
+                           WideningText(findings))});
+    }
+    // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
+    const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
+    if (channel.chi_squared < expected / kTooSmallRatio &&
+        channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat(
+               "output %s: residuals are only %.3g times the noise assumed, which makes "
+               "the uncertainty reported too large; give the noise its own size or let "
+               "it be unknown",
+               channel.output, std::sqrt(channel.chi_squared / samples))});
+    }
+  }
+}
+
+// Reports residuals that are correlated in time, if the noise is assumed white or differently
+// correlated.
+void AddCorrelation(const Findings& findings, const Estimate& estimate,
+                    std::vector<Diagnostic>& diagnostics) {
+  if (findings.record->channels().empty()) return;  // no row yet
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    const double correlation = channel.lag1_correlation;
+    if (!AreCorrelated(channel, findings.record->channels()[c].Runs())) continue;
+    const NoiseModel& noise = findings.problem->problem().measured[c].noise;
+    if (noise.correlation != NoiseCorrelation::kWhite) {
+      diagnostics.push_back(
+          {DiagnosticCode::kModelMisfit,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f) even after the "
+                           "noise's own correlation is taken out; model or noise is wrong",
+                           channel.output, correlation)});
+    } else if (correlation > 0) {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat("output %s: successive residuals are correlated (%.2f), so that %d "
+                           "samples tell no more than %.0f independent ones; %s; let the noise "
+                           "have a correlation ({\"auto\": true}), or improve the model",
+                           channel.output, correlation, channel.samples, channel.effective_samples,
+                           WideningText(findings))});
+    } else {
+      diagnostics.push_back(
+          {DiagnosticCode::kCorrelatedResiduals,
+           absl::StrFormat(
+               "output %s: successive residuals alternate (correlation %.2f); the noise "
+               "is not white",
+               channel.output, correlation)});
+    }
+  }
+}
+
+// Returns why a channel's noise has not been learned; empty if it has or need not be.
+std::string ReasonNotLearned(const Findings& findings, size_t c) {
+  const NoiseModel& model = findings.problem->problem().measured[c].noise;
+  const bool correlation = model.correlation == NoiseCorrelation::kUnknown;
+  const RecordSummary::Channel& channel = findings.record->channels()[c];
+  if (channel.samples == 0) return "";
+  const ChannelNoise& noise = findings.expansion->noise().channels[c];
+  const double relative = noise.scale * model.relative;
+  if (relative > kLargeRelativeNoise && !noise.of_prediction) {
+    return absl::StrFormat(
+        "its relative noise of %.3g %% is taken of the samples and not of the predictions, which "
+        "makes predictions too small by about %.2g %%",
+        100 * relative, 200 * relative * relative);
+  }
+  if (!model.unknown && !correlation) return "";
+  if (!noise.learned) {
+    const std::string why =
+        model.unknown && channel.largest <= 0
+            ? "all samples are 0, from which its noise cannot be learned"
+            : absl::StrFormat("too few samples (%d), fewer than %d, to learn its noise from",
+                              channel.samples, MinSamplesForNoise(findings.problem->dimension()));
+    return absl::StrCat(why, "; it is taken to be ",
+                        model.unknown ? "as large as the signal"
+                                      : "white, and if it is not, the uncertainty is too small");
+  }
+  if (!correlation || noise.grid.empty()) return "";
+  if (noise.time_constant_s < kMaxTimeConstant * channel.longest_run_s) return "";
+  return absl::StrFormat(
+      "its noise is correlated over %.3g s or longer, a large part of the record of "
+      "%.3g s, so that its time constant and its size are hardly known",
+      noise.time_constant_s, channel.longest_run_s);
+}
+
+void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,
+                       std::vector<Diagnostic>& diagnostics) {
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    if (findings.record->channels().empty()) return;
+    const std::string reason = ReasonNotLearned(findings, c);
+    if (reason.empty()) continue;
+    diagnostics.push_back({DiagnosticCode::kNoiseNotLearned,
+                           absl::StrFormat("output %s: %s", estimate.channels[c].output, reason)});
+  }
+}
+
+// Returns "0.93 ± 0.01 (t = 0 to 10 s)", the value of parameter i in a window.
+std::string DescribeChange(const Findings& findings, int i, const WindowChange& window,
+                           bool name_runs) {
+  const WindowParameter changed = ChangedParameter(findings.problem->prior(), findings.map_xi, i,
+                                                   window.change, window.std_dev);
+  const WindowSpan& span = window.span;
+  const std::string first = name_runs ? absl::StrFormat("run %d, ", span.first_run) : "";
+  const std::string last =
+      span.last_run != span.first_run ? absl::StrFormat("run %d, ", span.last_run) : "";
+  return absl::StrFormat("%.6g ± %.2g (%st = %.6g to %s%.6g s)", changed.value, changed.std_dev,
+                         first, span.start_s, last, span.end_s);
+}
+
+// Reports a parameter that differs between windows of the record.
+void AddInconsistency(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.windows.inconsistency) return;
+  const Inconsistency& found = *findings.windows.inconsistency;
+  const bool name_runs = found.second.span.last_run > 0;
+  diagnostics.push_back(
+      {DiagnosticCode::kInconsistentOverTime,
+       absl::StrFormat(
+           "%s is not constant over the record: %s and %s, %.3g standard deviations apart; the "
+           "model or an input lacks what changes",
+           findings.NameOf(found.parameter),
+           DescribeChange(findings, found.parameter, found.first, name_runs),
+           DescribeChange(findings, found.parameter, found.second, name_runs), found.separation)});
+}
+
+// Reports scores of windows that scatter more than the noise explains.
+void AddDisagreement(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!findings.windows.Disagree()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kWindowsDisagree,
+       absl::StrFormat("windows of the record disagree %.2g times as much as the noise explains "
+                       "(1.1 to 1.7 is usual); model or noise is wrong; %s",
+                       findings.windows.robust.disagreement, WideningText(findings))});
+}
+
+}  // namespace
+
+void DiagnoseResiduals(const Findings& findings, const Estimate& estimate,
+                       std::vector<Diagnostic>& diagnostics) {
+  AddMisfit(findings, estimate, diagnostics);
+  AddCorrelation(findings, estimate, diagnostics);
+  AddInconsistency(findings, diagnostics);
+  AddDisagreement(findings, diagnostics);
+  AddUnlearnedNoise(findings, estimate, diagnostics);
+}
+
+}  // namespace polyest::internal
