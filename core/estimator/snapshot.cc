@@ -108,7 +108,7 @@ void serialize(Archive& archive, ChannelSums& sums) {
 
 template <class Archive>
 void serialize(Archive& archive, AbsorbedRows& absorbed) {
-  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
+  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount, absorbed.own_error,
           absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
           absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
           absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared,

@@ -19,6 +19,8 @@ constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ u
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
 constexpr double kGoesOnFraction = 0.2;  // minimum fraction of the particles at an edge
 constexpr double kWiden = 1.5;
+constexpr int kPointsPerDrawnCheck = 6;
+constexpr int kMaxDrawnChecks = 200;
 constexpr int kChecksPastDimension = 3;
 constexpr double kJustInside = 1 - 1e-12;  // keeps rounding from putting a point outside Ω
 
@@ -50,6 +52,11 @@ Matrix InBoxUnits(const ExpansionDesign& design, const Matrix& etas) {
 }  // namespace
 
 int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
+
+int DrawnCheckCount(const ExpansionDesign& design) {
+  const int part = static_cast<int>(design.points.rows()) / kPointsPerDrawnCheck;
+  return std::max(CheckCount(design.basis->dimension()), std::min(part, kMaxDrawnChecks));
+}
 
 std::pair<double, double> TrustedRange(const Germ& germ) {
   double lower = germ.Lower(), upper = germ.Upper();

@@ -42,8 +42,11 @@ struct ExpansionDesign {
 inline constexpr double kEdge = 0.97;
 inline constexpr double kOvershoot = 1.15;
 
-// Returns the number of check points: the dimension plus 3.
+// Returns the number of check points that cover the prior or a region: the dimension plus 3.
 int CheckCount(int dimension);
+// Returns the number of check points that are draws of a posterior, which also correct it
+// (posterior/model_correction.h): as many, or a sixth of the collocation points, at most 200.
+int DrawnCheckCount(const ExpansionDesign& design);
 // Returns the range in which an expansion in this germ is trusted: between its bounds, or its 0.1 %
 // and 99.9 % quantiles where it has none.
 std::pair<double, double> TrustedRange(const Germ& germ);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/model_agreement.h"
 
 namespace polyest::internal {
 namespace {
@@ -57,14 +57,6 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
 }
 
 }  // namespace
-
-double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
-  double discount = 0;
-  for (size_t c = 0; c < expansion.sums().size(); ++c) {
-    discount += expansion.Discount(static_cast<int>(c));
-  }
-  return std::sqrt(cost.power() * discount);
-}
 
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
   if (LargestShift(expansion, cost) <= kMaxShift) return cost.power();

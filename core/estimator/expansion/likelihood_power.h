@@ -16,13 +16,9 @@
 
 namespace polyest::internal {
 
-// Returns √(Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
-// deviations, that the residuals of the expansion at its collocation points allow.
-double LargestShift(const RegionalExpansion& expansion, const Cost& cost);
-
 // Returns β, at most the power that the cost already has, and that when the expansion is accurate:
-// when LargestShift is at most ½, or when check points drawn from a posterior show it
-// (reexpansion.h).
+// when LargestShift (model_agreement.h) is at most ½, or when check points drawn from a posterior
+// show it.
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost);
 
 }  // namespace polyest::internal

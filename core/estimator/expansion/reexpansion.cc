@@ -21,9 +21,6 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 // posterior.
 constexpr double kMaxErrorOfRaised = 0.05;
 constexpr int64_t kReplayRows = 256;
-constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be meaningful
-constexpr double kMaxSpread = 0.25;  // standard deviation of ΔJ at which its mean counts as known
-constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
 
 // Carries out one settlement; holds the state that changes between attempts.
 class Settler {
@@ -120,7 +117,7 @@ class Settler {
     ExpansionDesign design =
         DesignForRegion(*request_.problem, truncation, std::move(region), inside);
     const Eigen::Index checks =
-        std::min<Eigen::Index>(present_.design().check_points.rows(), result_.particles.rows());
+        std::min<Eigen::Index>(DrawnCheckCount(design), result_.particles.rows());
     design.element = present_.design().element;
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
     design.check_costs = particles_.costs.head(checks);
@@ -168,68 +165,6 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
     for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);
   }
   return expansion;
-}
-
-double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
-                     const ConstVectorRef& chi_squared) {
-  double mismatch = 0;
-  for (size_t c = 0; c < expansion.sums().size(); ++c) {
-    const ChannelSums& sums = expansion.sums()[c];
-    const double own = chi_squared[static_cast<Eigen::Index>(c)];
-    const double differences = 2 * own * (1 - sums.Lag1Correlation(d));
-    mismatch += NegativeLogLikelihood(sums.Degrees(), own, differences, sums.scale_unknown,
-                                      sums.correlation_unknown);
-  }
-  return mismatch;
-}
-
-Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
-  const ExpansionDesign& design = expansion.design();
-  const RegionalExpansion::Check check = expansion.Checks();
-  std::vector<double> log_weight, difference, residual;
-  for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
-    const Vector eta = design.check_points.row(i).transpose();
-    const CostValue value = cost.Evaluate(eta);
-    if (!check.valid[static_cast<size_t>(i)] || !std::isfinite(value.total)) continue;
-    log_weight.push_back(design.check_costs[i] - value.total);
-    difference.push_back(cost.power() * (ModelMismatch(expansion, cost.BasisDifference(eta),
-                                                       check.chi_squared.row(i).transpose()) -
-                                         value.mismatch));
-    residual.push_back(std::sqrt(cost.power()) * check.residual_to_noise[i]);
-  }
-  Agreement agreement;
-  if (log_weight.empty()) {
-    double discount = 0;
-    for (size_t c = 0; c < expansion.sums().size(); ++c) {
-      discount += expansion.Discount(static_cast<int>(c));
-    }
-    agreement.shift = std::sqrt(cost.power() * discount);
-    return agreement;
-  }
-  const double heaviest = *std::max_element(log_weight.begin(), log_weight.end());
-  double sum = 0, sum_of_squares = 0, mean = 0, worst = 0;
-  for (size_t i = 0; i < log_weight.size(); ++i) {
-    const double weight = std::exp(log_weight[i] - heaviest);
-    sum += weight;
-    sum_of_squares += weight * weight;
-    mean += weight * difference[i];
-    worst = std::max(worst, residual[i]);
-    if (weight > kNegligibleWeight) {
-      agreement.residual_to_noise = std::max(agreement.residual_to_noise, residual[i]);
-    }
-  }
-  mean /= sum;
-  double variance = 0;
-  for (size_t i = 0; i < log_weight.size(); ++i) {
-    const double weight = std::exp(log_weight[i] - heaviest) / sum;
-    variance += weight * (difference[i] - mean) * (difference[i] - mean);
-  }
-  agreement.shift = worst * std::sqrt(static_cast<double>(check.samples));
-  if (sum * sum / sum_of_squares >= kMinEffectiveChecks) {
-    agreement.shift = std::min(agreement.shift, std::sqrt(variance));
-    if (std::sqrt(variance) <= kMaxSpread) agreement.mean_difference = mean;
-  }
-  return agreement;
 }
 
 }  // namespace polyest::internal

@@ -16,7 +16,6 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
-#include <optional>
 
 #include "core/estimator/expansion/regional_expansion.h"
 
@@ -52,30 +51,5 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           LearnedNoise noise,
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop);
-
-// How accurate the posterior on the expansion is, judged at the check points. To first order the
-// error of a posterior mean, in units of its standard deviation, is bounded by each of
-//   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
-//   (at the expansion's lag-1 correlation, where that enters; times the power of the likelihood),
-//   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points.
-// Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
-// is sharper but needs check points where the posterior is. The second holds wherever they are.
-struct Agreement {
-  double shift = 0;  // the smaller of the available bounds, ≥ 0
-  // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the
-  // cost's height that the expansion's own error and its discount cause.
-  std::optional<double> mean_difference;
-  // Largest root mean square of (model − expansion)/σ over the check points of non-negligible
-  // weight.
-  double residual_to_noise = 0;
-};
-
-// Returns J_mismatch of the model itself at a point with the basis difference d (cost.h) from its
-// χ² of each channel (m), at the expansion's lag-1 correlation.
-double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
-                     const ConstVectorRef& chi_squared);
-
-// Returns the agreement of the expansion with the model. `cost` is the cost on the expansion.
-Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost);
 
 }  // namespace polyest::internal

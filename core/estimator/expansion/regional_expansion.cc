@@ -297,27 +297,28 @@ void RegionalExpansion::Absorb(int row) {
     if (sigma <= 0) continue;  // no sample
     double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
     const int column = row * channels_ + c;
+    const double own_error = residual_variance_[column] / noise_.misfit;
     const auto coefficients = coefficients_.col(column);
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
-    const double deviation =
-        DeviationFromCentre(c, coefficients, z, sigma * sigma + residual_variance_[column]);
+    const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
     const double weight = OutlierWeight(model.outliers, deviation);
-    // e = z − cᵀφ_0,  R = σ²/w + the residual's variance ρ
+    // e = z − cᵀφ_0,  R = σ²/w + ρ
     double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
     double lack = LackOfWeight(model.outliers, deviation);
     if (IsScored(c)) {
-      const ScoredSample scored = Scored(c, coefficients, z, noise, residual_variance_[column]);
+      const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
       z = scored.value;
       noise = scored.noise_variance;
       lack += scored.lack;
     }
-    const double variance = noise + residual_variance_[column];
+    const double variance = noise + own_error;
     const double error = z - coefficients.dot(reference_phi_);
     absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
     AddDifference(c, coefficients, error, variance);
     AddToProfile(row, c, coefficients, z, variance);
-    absorbed_.discount[c] += residual_variance_[column] / variance;
-    Normalize(VarianceFactor(model.outliers) * sigma * sigma, residual_variance_[column], lack);
+    absorbed_.discount[c] += own_error / variance;
+    absorbed_.own_error += residual_variance_[column] / variance;
+    Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
     // χ²_q += (z − y_q)²/R

@@ -4,11 +4,12 @@
 // coefficients c_k = A⁺ Y_k (10) of every measured output at every sample time, and the mismatch
 // sums that result. Memory does not grow with the number of samples.
 //
-// The expansion's own error is treated as noise: a sample enters the sums with R = σ² + the
-// residual variance of the fit at its time. A region that is still too wide thus gives a posterior
-// that is wide but not wrong. The noise is the noise learned so far (learned_noise.h). Correlated
-// samples are whitened first. Outliers lose weight according to their residual at the posterior's
-// centre, compared with the noise and the posterior's own spread there.
+// The expansion's own error is treated as noise: a sample enters the sums with R = σ² + ρ, ρ being
+// the residual variance of the fit at its time. A region that is still too wide thus gives a
+// posterior that is wide but not wrong. Where the cost is divided by a misfit (learned_noise.h), so
+// is ρ, because it is then small beside the residuals. The noise is the noise learned so far
+// (learned_noise.h). Correlated samples are whitened first. Outliers lose weight according to their
+// residual at the posterior's centre, compared with the noise and the posterior's own spread there.
 
 #include <absl/status/statusor.h>
 
@@ -48,7 +49,8 @@ struct AbsorbedRows {
   int64_t propagated = 0;         // trajectories × rows
   std::vector<ChannelSums> sums;  // per channel, over all runs
   WindowSums windows;             // the sums by windows of the record
-  Vector discount;                // per channel: Σ ρ_k/R_k
+  Vector discount;                // per channel: Σ ρ_k/R_k, with ρ divided by the misfit
+  double own_error = 0;           // Σ ρ_k/R_k over all channels, with ρ as it is
   double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
   double log_variance = 0;  // as log_noise, with R in place of σ²
   std::vector<int64_t> outliers;  // per channel
@@ -123,8 +125,10 @@ class RegionalExpansion {
   // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
   const WindowSums& windows() const { return absorbed_.windows; }
-  // Returns Σ ρ_k/R_k of a channel: the number of its samples lost to the expansion's own error ρ.
+  // Returns the number of a channel's samples lost to the expansion's own error.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
+  // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
+  double OwnError() const { return absorbed_.own_error; }
   // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
   const CorrelationProfile& Profile(int channel) const {
     return absorbed_.profiles[static_cast<size_t>(channel)];

@@ -11,10 +11,11 @@
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/misfit.h"
+#include "core/estimator/posterior/model_correction.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
@@ -52,8 +53,9 @@ class Assessment {
     }
     Cost cost = request_.expansion->MakeCost(regularization_);
     if (problem_.problem().expansion.adaptive) {
-      cost.set_power(request_.power ? *request_.power
-                                    : 1 / Misfit(problem_, *request_.expansion, stop));
+      const MisfitFound misfit = FindMisfit(problem_, *request_.expansion, stop);
+      findings_.leans = misfit.at_edge;
+      cost.set_power(request_.power ? *request_.power : 1 / misfit.ratio);
       const double power = LikelihoodPower(*request_.expansion, cost);
       findings_.power = power / cost.power();
       cost.set_power(power);
@@ -73,6 +75,7 @@ class Assessment {
     findings_.minimizer_reason = minima.front().reason;
     NoteOtherMinima(cost, minima);
     Summarize(cost, eta);
+    Correct(cost);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
@@ -123,6 +126,7 @@ class Assessment {
     const Matrix xis =
         posterior_.Germs(prior_)(EquallyWeighted(posterior_.weights, kDrawsForEdges), Eigen::all);
     findings_.leans =
+        findings_.leans ||
         !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
   }
 
@@ -130,12 +134,14 @@ class Assessment {
     const RecordSummary& record = *request_.record;
     const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
     findings_.shift = agreement.shift;
-    estimate_.expansion = {design_.basis->order(),       design_.basis->size(),
-                           request_.expansion->points(), agreement.residual_to_noise,
-                           request_.reexpansions,        0};
+    ExpansionSummary& expansion = estimate_.expansion;
+    expansion.order = design_.basis->order();
+    expansion.terms = design_.basis->size();
+    expansion.points = request_.expansion->points();
+    expansion.residual_to_noise = agreement.residual_to_noise;
+    expansion.reexpansions = request_.reexpansions;
     if (record.rows() > 0) {
-      estimate_.expansion.trajectories =
-          (request_.propagated_rows + record.rows() / 2) / record.rows();
+      expansion.trajectories = (request_.propagated_rows + record.rows() / 2) / record.rows();
     }
     estimate_.time_s = record.time_s();
     estimate_.samples = record.samples();
@@ -143,6 +149,18 @@ class Assessment {
     Cost stated = cost;
     stated.set_power(1);
     estimate_.cost = stated.Evaluate(eta);
+  }
+
+  // Reweights the draws by the model itself.
+  void Correct(const Cost& cost) {
+    if (!design_.checks_are_draws) return;
+    const Matrix etas = design_.region.ManyToLocal(posterior_.Germs(prior_));
+    const ModelCorrection correction =
+        CorrectByModel(DifferencesAtChecks(*request_.expansion, cost), etas, posterior_.weights);
+    estimate_.expansion.pareto_shape = correction.pareto_shape;
+    if (correction.degree == 0) return;
+    findings_.shift = std::min(findings_.shift, correction.shift);
+    Reweigh(correction.log_factors, posterior_);
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {

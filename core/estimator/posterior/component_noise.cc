@@ -30,6 +30,9 @@ constexpr double kTightestTolerance = 1e-12;
 // signal's size to 10⁻⁶ of it takes 20 halvings.
 constexpr int kMaxRevisions = 24;
 
+// Factor by which the misfit falls while the cost's minimum lies beyond the region.
+constexpr double kMisfitStep = 4;
+
 }  // namespace
 
 // The residual of the expansion from which on it is too coarse, in units of the stated noise.
@@ -37,8 +40,17 @@ double MixtureComponent::CoarseResidual() const {
   return kResidualToNoise * std::sqrt(expansion_->noise().misfit);
 }
 
-void MixtureComponent::ReviseMisfit(const Stop& stop) {
-  expansion_->set_misfit(Misfit(problem_, *expansion_, stop));
+// Returns whether the region must first move on to the minimum of the cost with the noise as
+// stated. The misfit then falls step by step, which lets the posterior go there.
+bool MixtureComponent::ReviseMisfit(const Stop& stop) {
+  const double before = expansion_->noise().misfit;
+  const MisfitFound found = FindMisfit(problem_, *expansion_, stop);
+  if (!found.at_edge) {
+    expansion_->set_misfit(found.ratio);
+    return false;
+  }
+  expansion_->set_misfit(std::clamp(before / kMisfitStep, 1.0, found.ratio));
+  return before > 1;
 }
 
 // Raises scales that are not learned yet with the signal, so the first samples have little weight

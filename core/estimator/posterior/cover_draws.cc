@@ -10,9 +10,12 @@ namespace {
 
 constexpr int kMaxDimension = 3;
 constexpr int kFirstPoints = 4096;
-constexpr int kMaxRefinements = 4;
+constexpr int kMaxRefinements = 8;
 // A point whose density is less than e^−18 of the highest has no noticeable weight.
 constexpr double kNegligibleCost = 18;
+// Effective number of points at which a cover resolves the density.
+constexpr double kResolved = 64;
+constexpr double kTemper = 0.5;
 
 struct Box {
   Vector lower, upper;
@@ -26,10 +29,21 @@ Matrix CoverOf(const Box& box, int points) {
   return cover;
 }
 
+// Returns the largest power of the density, in halves, that the cover resolves. A narrower density
+// lies between the points, where one of its pieces would be seen and another not.
+double ResolvedPower(const Vector& costs) {
+  double power = 1;
+  for (; power > 1e-12; power *= kTemper) {
+    const Vector weights = (power * (costs.minCoeff() - costs.array())).exp();
+    if (weights.sum() * weights.sum() >= kResolved * weights.squaredNorm()) break;
+  }
+  return power;
+}
+
 // Returns the box around the points that have noticeable weight, widened by the spacing of so many
 // points and cut to the box covered.
 Box BoxOfWeight(const Matrix& cover, const Vector& costs, const Box& covered) {
-  const double most = costs.minCoeff() + kNegligibleCost;
+  const double most = costs.minCoeff() + kNegligibleCost / ResolvedPower(costs);
   Box box{covered.upper, covered.lower};
   for (Eigen::Index i = 0; i < cover.rows(); ++i) {
     if (!(costs[i] < most)) continue;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/bayes/minimizer.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/posterior/window_assessment.h"
 #include "core/estimator/record/record_summary.h"
 #include "polyest/estimate.h"

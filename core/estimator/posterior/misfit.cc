@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr double kDeviations = 6;
+// Part of the excess of χ² that the prior alone must explain to be what is wrong.
+constexpr double kMostlyPrior = 0.5;
 
 // Whether the residuals of the channel test its noise: not where the noise is learned from them or
 // where large ones count as outliers.
@@ -17,10 +20,24 @@ bool IsTested(const ResolvedProblem& problem, size_t channel) {
   return !noise.unknown && noise.outliers == OutlierHandling::kNone;
 }
 
+// Returns by how much χ² would fall, to second order, if the prior let the parameters go: gᵀ H⁻¹ g
+// with the gradient g of J_prior and the Hessian H of the mismatch.
+double HeldByPrior(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta) {
+  Cost without_prior = expansion.MakeCost(0);
+  without_prior.set_power(1);
+  Vector both(eta.size()), mismatch(eta.size());
+  cost.EvaluateWithGradient(eta, both);
+  without_prior.EvaluateWithGradient(eta, mismatch);
+  const CholeskyFactor hessian(cost.MismatchHessian(eta));
+  if (!hessian.positive_definite()) return 0;
+  const double held = hessian.SolveLower(both - mismatch).squaredNorm();
+  return std::isfinite(held) ? held : 0;
+}
+
 }  // namespace
 
-double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion,
-              const Stop& stop) {
+MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& expansion,
+                       const Stop& stop) {
   // A prior of more weight, because it is regularized or the likelihood tempered, would keep the
   // minimum away from where the samples are.
   Cost cost = expansion.MakeCost(std::min(1.0, problem.problem().regularization));
@@ -31,7 +48,7 @@ double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion
     // Where the expansion's own error has been added to the noise, χ² is smaller by the discount.
     degrees += expansion.sums()[c].Degrees() - expansion.Discount(static_cast<int>(c));
   }
-  if (!(degrees > 0)) return 1;
+  if (!(degrees > 0)) return {};
   const ExpansionDesign& design = expansion.design();
   const Minimum minimum =
       FindMinima(SearchOf(cost, design), design.reference.transpose(), MinimizerOptions(), stop)
@@ -42,7 +59,10 @@ double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion
     if (IsTested(problem, c)) chi_squared += expansion.sums()[c].samples.ChiSquared(d);
   }
   const double excess = chi_squared - degrees;
-  return excess > kDeviations * std::sqrt(2 * degrees) ? chi_squared / degrees : 1;
+  if (!(excess > kDeviations * std::sqrt(2 * degrees))) return {};
+  if (HeldByPrior(expansion, cost, minimum.point) > kMostlyPrior * excess) return {};
+  const Matrix point = minimum.point.transpose();
+  return {chi_squared / degrees, !LeaningAxes(design, problem.prior(), point).empty()};
 }
 
 }  // namespace polyest::internal

@@ -15,9 +15,17 @@
 
 namespace polyest::internal {
 
-// Returns χ²/N at the minimum of the cost on the expansion, with the noise as stated and α² ≤ 1, if
-// it is larger than 1 by at least six standard deviations, else 1. Channels whose noise is learned
-// or may have outliers do not count.
-double Misfit(const ResolvedProblem& problem, const RegionalExpansion& expansion, const Stop& stop);
+// What the residuals say at the minimum of the cost on the expansion, with the noise as stated and
+// α² ≤ 1.
+struct MisfitFound {
+  // χ²/N if it is larger than 1 by at least six standard deviations, else 1. Channels whose noise
+  // is learned or may have outliers do not count.
+  double ratio = 1;
+  // Whether the minimum lies at an edge of the expansion's region that is no edge of Ω. Residuals
+  // there are no reason to doubt the noise before the region has moved on.
+  bool at_edge = false;
+};
+MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& expansion,
+                       const Stop& stop);
 
 }  // namespace polyest::internal

@@ -30,6 +30,10 @@ constexpr int64_t kPatience = 8;
 // this number.
 constexpr int64_t kLooksPerRecord = 20;
 
+// Maximum number of revisions of the misfit at the end of a window after the first. While the
+// cost's minimum lies beyond the region, each lets the region move on.
+constexpr int kMaxMisfitRevisions = 12;
+
 }  // namespace
 
 int64_t NextWindow(int64_t rows, int64_t from) {
@@ -191,11 +195,15 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
   }
   if (adaptive()) {
-    ReviseMisfit(stop);
+    bool goes_on = ReviseMisfit(stop);
     POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
-    if (settled) ReviseMisfit(stop);
+    POLYEST_ASSIGN_OR_RETURN(bool settled, SettleIfInaccurate(stop));
     moved = moved || tightened || settled;
+    for (int i = 0; settled && i < kMaxMisfitRevisions && !must_divide(); ++i) {
+      goes_on = ReviseMisfit(stop);
+      if (!goes_on) break;
+      POLYEST_ASSIGN_OR_RETURN(settled, SettleIfInaccurate(stop));
+    }
   }
   window_end_ = NextWindow(taken_, windows_from_);
   edges_row_ = NextLook();

@@ -107,7 +107,7 @@ class MixtureComponent {
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
   double CoarseResidual() const;
-  void ReviseMisfit(const Stop& stop);
+  bool ReviseMisfit(const Stop& stop);
   int64_t NextLook() const;
   bool Leans() const;
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);

@@ -7,13 +7,13 @@
 //   log Z_k = log ∫ e^{−J_k(ξ)} dξ − c_k.
 // c_k makes the costs comparable. It is Σ ½ log σ² of the component's own noise, plus the mean over
 // the check points of ΔJ, the change of the cost's height by the expansion's own error
-// (reexpansion.h). If the check points do not determine that mean, c_k instead uses R, which
+// (model_agreement.h). If the check points do not determine that mean, c_k instead uses R, which
 // includes the expansion's error, in place of σ². A discounted sample then neither gains nor loses
 // in the mean, to first order in the discount.
 
 #include <vector>
 
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/posterior/posterior_draws.h"
 
 namespace polyest::internal {

@@ -1,5 +1,6 @@
 #include "core/estimator/posterior/posterior_draws.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -143,6 +144,13 @@ Matrix PosteriorDraws::Germs(const Prior& prior) const {
     xis.row(i) = prior.OfScores(scores.row(i).transpose()).transpose();
   }
   return xis;
+}
+
+void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws) {
+  const double before = 1 / draws.weights.squaredNorm();
+  draws.weights.array() *= (log_factors.array() - log_factors.maxCoeff()).exp();
+  draws.weights /= draws.weights.sum();
+  draws.effective_size *= std::min(1.0, 1 / draws.weights.squaredNorm() / before);
 }
 
 absl::StatusOr<PosteriorDraws> DrawPosterior(const Cost& cost, const ExpansionDesign& design,

@@ -38,6 +38,9 @@ struct PosteriorDraws {
   Matrix Germs(const Prior& prior) const;             // returns the draws of ξ, draws × n
 };
 
+// Multiplies the weights by factors whose logarithms are given, up to a common constant.
+void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws);
+
 // Draws from the posterior. `guesses` (any number × n, may be empty; germ coordinates) tells where
 // the posterior was before. Returns FailedPrecondition when the cost is nowhere finite; otherwise
 // only a stop request returns an error.

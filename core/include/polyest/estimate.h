@@ -7,6 +7,7 @@
 // and e^{−J} is the posterior density up to a factor (α² = 1).
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -124,6 +125,10 @@ struct ExpansionSummary {
   // Root mean square over the samples of (model − expansion)/σ, at the worst of some draws of the
   // posterior at which the model itself is run; small beside 1 when the expansion can be trusted.
   double residual_to_noise = 0;
+  // Shape k̂ of the generalized Pareto distribution that the largest importance weights of those
+  // draws follow, by the model itself against the expansion: below 0.5 all is well, above 0.7 the
+  // draws do not represent the model's posterior. None for fewer than 25 draws.
+  std::optional<double> pareto_shape;
   int reexpansions = 0;      // how often the outputs were expanded again
   int64_t trajectories = 0;  // runs of the model in all, each over the whole record so far
 };

@@ -88,6 +88,7 @@ void ToProto(const ExpansionSummary& expansion, v1::ExpansionSummary& proto) {
   proto.set_residual_to_noise(expansion.residual_to_noise);
   proto.set_reexpansions(expansion.reexpansions);
   proto.set_trajectories(expansion.trajectories);
+  if (expansion.pareto_shape) proto.set_pareto_shape(*expansion.pareto_shape);
 }
 
 void AddComponents(const Estimate& estimate, v1::Estimate& proto) {

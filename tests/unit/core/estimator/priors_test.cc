@@ -107,6 +107,26 @@ TEST(CorrelatedPriors, TellOfOneWhatIsMeasuredOfTheOther) {
   EXPECT_EQ(estimate.directions[1].verdict, Verdict::kNotIdentified);
 }
 
+// The data contradict the prior by a hundred of its standard deviations. That is no reason to doubt
+// the noise, which would give the prior even more weight.
+TEST(CorrelatedPriors, AreNotTakenForWrongNoise) {
+  Samples samples = At({}, {});
+  for (int k = 0; k < 60; ++k) {
+    const double t = 0.05 * (k + 1);
+    samples.time_s.push_back(t);
+    samples.columns[0].value.push_back(0.4 * std::cos(kTwoPi * t) + 0.5 * UnitResponse(t));
+  }
+  const Estimate estimate = EstimateOf(PairProblem(0.9999, 0.02), samples);
+  const Gaussian exact = ExactPair(0.9999, 0.02, samples);
+  EXPECT_TRUE(Has(estimate, DiagnosticCode::kModelMisfit));
+  for (int i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const double deviation = std::sqrt(exact.covariance(i, i));
+    EXPECT_NEAR(parameter.map, exact.mean[i], 0.01 * deviation);
+    EXPECT_GE(parameter.std_dev, 0.99 * deviation);
+  }
+}
+
 TEST(CorrelatedPriors, AreWhatAnEstimateWithoutDataIs) {
   const Estimate estimate = MakeEstimator(PairProblem(0.9, 0.02))->CurrentEstimate().value();
   for (const ParameterEstimate& parameter : estimate.parameters) {

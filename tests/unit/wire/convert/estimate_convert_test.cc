@@ -33,6 +33,7 @@ Estimate TwoParameters() {
                         .terms = 10,
                         .points = 20,
                         .residual_to_noise = 0.02,
+                        .pareto_shape = 0.25,
                         .reexpansions = 1,
                         .trajectories = 40};
   estimate.disagreement = 1.25;
@@ -109,6 +110,7 @@ TEST(EstimateToProto, CarriesEverythingElse) {
   EXPECT_EQ(proto.expansion().residual_to_noise(), 0.02);
   EXPECT_EQ(proto.expansion().reexpansions(), 1);
   EXPECT_EQ(proto.expansion().trajectories(), 40);
+  EXPECT_EQ(proto.expansion().pareto_shape(), 0.25);
   EXPECT_EQ(proto.time(), 12);
   EXPECT_EQ(proto.samples(), 13);
   EXPECT_EQ(proto.sequence(), 0);

@@ -1,0 +1,82 @@
+#include "core/estimator/expansion/model_agreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be meaningful
+constexpr double kMaxSpread = 0.25;  // standard deviation of ΔJ at which its mean counts as known
+constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
+
+}  // namespace
+
+double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d,
+                     const ConstVectorRef& chi_squared) {
+  double mismatch = 0;
+  for (size_t c = 0; c < expansion.sums().size(); ++c) {
+    const ChannelSums& sums = expansion.sums()[c];
+    const double own = chi_squared[static_cast<Eigen::Index>(c)];
+    const double differences = 2 * own * (1 - sums.Lag1Correlation(d));
+    mismatch += NegativeLogLikelihood(sums.Degrees(), own, differences, sums.scale_unknown,
+                                      sums.correlation_unknown);
+  }
+  return mismatch;
+}
+
+double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
+  return std::sqrt(cost.power() * expansion.OwnError());
+}
+
+CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const Cost& cost) {
+  const ExpansionDesign& design = expansion.design();
+  const RegionalExpansion::Check check = expansion.Checks();
+  std::vector<Eigen::Index> rows;
+  std::vector<double> log_weights, differences, residuals;
+  for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
+    if (!check.valid[static_cast<size_t>(i)]) continue;
+    const Vector eta = design.check_points.row(i).transpose();
+    const CostValue value = cost.Evaluate(eta);
+    if (!std::isfinite(value.total)) continue;
+    rows.push_back(i);
+    log_weights.push_back(design.check_costs[i] - value.total);
+    differences.push_back(cost.power() * (ModelMismatch(expansion, cost.BasisDifference(eta),
+                                                        check.chi_squared.row(i).transpose()) -
+                                          value.mismatch));
+    residuals.push_back(std::sqrt(cost.power()) * check.residual_to_noise[i]);
+  }
+  const auto vector = [](const std::vector<double>& values) {
+    return Vector(Eigen::Map<const Vector>(values.data(), std::ssize(values)));
+  };
+  return {design.check_points(rows, Eigen::all), vector(log_weights), vector(differences),
+          vector(residuals)};
+}
+
+Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
+  const CheckDifferences checks = DifferencesAtChecks(expansion, cost);
+  Agreement agreement;
+  if (checks.log_weights.size() == 0) {
+    agreement.shift = LargestShift(expansion, cost);
+    return agreement;
+  }
+  Vector weights = (checks.log_weights.array() - checks.log_weights.maxCoeff()).exp();
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    if (!(weights[i] > kNegligibleWeight)) continue;
+    agreement.residual_to_noise = std::max(agreement.residual_to_noise, checks.residuals[i]);
+  }
+  weights /= weights.sum();
+  const double mean = weights.dot(checks.differences);
+  const double spread =
+      std::sqrt(weights.dot((checks.differences.array() - mean).square().matrix()));
+  const auto samples = static_cast<double>(expansion.Checks().samples);
+  agreement.shift = checks.residuals.maxCoeff() * std::sqrt(samples);
+  if (1 >= kMinEffectiveChecks * weights.squaredNorm()) {
+    agreement.shift = std::min(agreement.shift, spread);
+    if (spread <= kMaxSpread) agreement.mean_difference = mean;
+  }
+  return agreement;
+}
+
+}  // namespace polyest::internal
