@@ -13,6 +13,8 @@ constexpr int kMaxDegree = 2;
 constexpr double kChecksPerTerm = 2;
 // Part of the mean square left over that a higher degree must do without.
 constexpr double kGain = 0.7;
+// Mean square left over that is worth no higher degree: a thousandth of a standard deviation.
+constexpr double kNegligible = 1e-6;
 // Part of the draws' effective number that the correction must leave.
 constexpr double kLeastEffective = 0.2;
 
@@ -98,7 +100,7 @@ ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrix
   const Vector log_weights = weights.array().log();
   const double effective_draws = EffectiveNumber(log_weights);
   for (int degree = 1; degree <= kMaxDegree; ++degree) {
-    if (effective < kChecksPerTerm * TermsOf(degree, u.cols())) break;
+    if (left < kNegligible || effective < kChecksPerTerm * TermsOf(degree, u.cols())) break;
     const Fit fit = FitPolynomial(Monomials(u_checks, degree), checks.differences, at_checks);
     if (!(fit.left < kGain * left)) continue;
     const Vector factors = -(Monomials(u, degree) * fit.coefficients);
