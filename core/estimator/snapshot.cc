@@ -112,7 +112,8 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
           absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
           absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared,
-          absorbed.windows, absorbed.profiles, absorbed.largest);
+          absorbed.windows, absorbed.profiles, absorbed.largest, absorbed.control_scores,
+          absorbed.control_valid);
 }
 
 template <class Archive>
@@ -127,7 +128,7 @@ void serialize(Archive& archive, DesignState& design) {
 template <class Archive>
 void serialize(Archive& archive, ExpansionState& expansion) {
   archive(expansion.design, expansion.noise, expansion.absorbed, expansion.kept, expansion.failures,
-          expansion.run, expansion.ensemble, expansion.previous);
+          expansion.run, expansion.ensemble, expansion.previous, expansion.controls);
 }
 
 template <class Archive>

@@ -97,8 +97,10 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
          state.check_residual.size() == fresh.check_residual.size() &&
          state.check_valid.size() == fresh.check_valid.size() &&
          state.point_chi_squared.rows() == fresh.point_chi_squared.rows() &&
-         state.point_chi_squared.cols() == channels && state.rows >= 0 && state.samples >= 0 &&
-         state.propagated >= 0;
+         state.point_chi_squared.cols() == channels &&
+         IsMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
+         state.control_valid.size() == fresh.control_valid.size() && state.rows >= 0 &&
+         state.samples >= 0 && state.propagated >= 0;
 }
 
 bool IsAscendingBelow(const std::vector<int>& numbers, int end) {
@@ -156,6 +158,7 @@ ExpansionState RegionalExpansion::State() const {
   state.failures = failures_;
   state.run = run_;
   if (propagator_) state.ensemble = propagator_->State();
+  if (control_propagator_) state.controls = control_propagator_->State();
   state.previous = whitening_.State();
   return state;
 }
@@ -194,7 +197,12 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
     POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kKnotRows, rows - first), block_));
     AppendKnots(0);
   }
-  return propagator_->Restore(*state.ensemble) ? absl::OkStatus() : Inconsistent("ensemble");
+  const bool controls_fit =
+      controls_ == 0 ||
+      (state.controls && state.controls->samples == samples &&
+       state.controls->time_s == last.time_s && control_propagator_->Restore(*state.controls));
+  return controls_fit && propagator_->Restore(*state.ensemble) ? absl::OkStatus()
+                                                               : Inconsistent("ensemble");
 }
 
 // Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
@@ -209,7 +217,7 @@ absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
   }
   absorbed_ = std::move(state.absorbed);
   for (const PreviousSample& sample : state.previous) {
-    if (sample.output.size() != thetas_.rows()) return Inconsistent("correlated noise");
+    if (sample.output.size() != thetas_.rows() + controls_) return Inconsistent("correlated noise");
   }
   if (state.previous.size() != absorbed_.sums.size()) return Inconsistent("correlated noise");
   whitening_.Restore(std::move(state.previous));

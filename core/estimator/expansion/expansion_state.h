@@ -33,13 +33,14 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
 struct ExpansionState {
   DesignState design;
   LearnedNoise noise;
-  AbsorbedRows absorbed{0, 0, 0, 0};
+  AbsorbedRows absorbed{0, 0, 0, 0, 0};
   std::vector<int> kept;
   std::vector<FailedTrajectory> failures;
   // These describe the middle of a run; they are empty if a new run begins.
   int run = 0;
   std::optional<EnsembleState> ensemble;
-  std::vector<PreviousSample> previous;  // one per channel
+  std::optional<EnsembleState> controls;  // present if `ensemble` is and there are controls
+  std::vector<PreviousSample> previous;   // one per channel
 };
 
 }  // namespace polyest::internal

@@ -22,9 +22,19 @@ Matrix Stack(const Matrix& top, const Matrix& bottom) {
   return stacked;
 }
 
+// Returns the parameters of the collocation points, followed by those of the check points.
+Matrix ParametersOf(const ResolvedProblem& problem, const ExpansionDesign& design) {
+  Matrix points = design.region.ManyToGerm(Stack(design.points, design.check_points));
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    points.row(i) = problem.prior().ToParameters(points.row(i).transpose()).transpose();
+  }
+  return points;
+}
+
 }  // namespace
 
-AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points)
+AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
+                           int controls)
     : sums(static_cast<size_t>(channels), ChannelSums(terms)),
       discount(Vector::Zero(channels)),
       outliers(static_cast<size_t>(channels), 0),
@@ -35,7 +45,9 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::
       check_chi_squared(Matrix::Zero(check_points, channels)),
       check_residual(Vector::Zero(check_points)),
       check_valid(static_cast<size_t>(check_points), true),
-      point_chi_squared(Matrix::Zero(points, channels)) {}
+      point_chi_squared(Matrix::Zero(points, channels)),
+      control_scores(Matrix::Zero(terms, controls * channels)),
+      control_valid(static_cast<size_t>(controls), true) {}
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
@@ -54,20 +66,17 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDe
       threads_(threads),
       channels_(problem.channels()),
       reference_phi_(design_.basis->size()),
+      thetas_(ParametersOf(problem_, design_)),
       kept_(static_cast<size_t>(design_.points.rows())),
-      whitening_(noise_.channels, design_.points.rows() + design_.check_points.rows()),
+      controls_(CountControls()),
+      whitening_(noise_.channels, thetas_.rows() + controls_),
       absorbed_(design_.basis->size(), channels_, design_.points.rows(),
-                design_.check_points.rows()),
+                design_.check_points.rows(), controls_),
       difference_(design_.basis->size()) {
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
   design_.basis->EvaluateMany(design_.check_points, check_phi_);
-  const Matrix xis = design_.region.ManyToGerm(Stack(design_.points, design_.check_points));
-  thetas_.resize(xis.rows(), xis.cols());
-  for (Eigen::Index i = 0; i < xis.rows(); ++i) {
-    thetas_.row(i) = problem_.prior().ToParameters(xis.row(i).transpose()).transpose();
-  }
   for (int c = 0; c < channels_; ++c) {
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
@@ -107,9 +116,11 @@ void RegionalExpansion::StartRun(int run) {
   inputs_finished_ = false;
   whitening_.BeginRun();
   propagator_.reset();
+  control_propagator_.reset();
   inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), inputs_.get());
+  StartControls(run);
 }
 
 bool RegionalExpansion::StepsExactly() const {
@@ -121,7 +132,7 @@ bool RegionalExpansion::StepsExactly() const {
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
   block_ = block;
   fitted_rows_ = 0;
-  outputs_.resize(thetas_.rows(), channels_ * block.count());
+  outputs_.resize(thetas_.rows() + controls_, channels_ * block.count());
   coefficients_.resize(design_.basis->size(), channels_ * block.count());
   residual_variance_.resize(channels_ * block.count());
   for (int first = 0; first < block.count() && fitted_rows_ == first;) {
@@ -140,12 +151,7 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
 
 absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
   AppendKnots(first);
-  std::vector<double> times;
-  for (int k = first; k < first + count; ++k) {
-    times.push_back(block_.rows[static_cast<size_t>(k)].time_s);
-  }
-  POLYEST_RETURN_IF_ERROR(
-      propagator_->Advance(times, outputs_.middleCols(first * channels_, count * channels_), stop));
+  POLYEST_RETURN_IF_ERROR(Advance(first, count, stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
   PredictNoise(first);
@@ -321,6 +327,7 @@ void RegionalExpansion::Absorb(int row) {
     Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
+    CompareControls(column, variance);
     // χ²_q += (z − y_q)²/R
     absorbed_.point_chi_squared.col(c).array() +=
         (outputs_.col(column).head(points()).array() - z).square() / variance;
@@ -328,7 +335,7 @@ void RegionalExpansion::Absorb(int row) {
   }
   absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
   ++absorbed_.rows;
-  absorbed_.propagated += thetas_.rows();
+  absorbed_.propagated += thetas_.rows() + controls_;
 }
 
 // Returns the deviation of the sample in units of its possible error there, or 0 if outliers are
@@ -371,22 +378,6 @@ void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coeffic
       difference_, unit * error - absorbed_.previous_error[channel], 1);
   previous = unit * coefficients;
   absorbed_.previous_error[channel] = unit * error;
-}
-
-// Compares the check points' own trajectories with the expansion at one sample.
-void RegionalExpansion::Compare(int column, double z, double variance) {
-  const int channel = column % channels_;
-  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
-    if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
-    const double y = outputs_(points() + i, column);
-    if (!std::isfinite(y)) {
-      absorbed_.check_valid[static_cast<size_t>(i)] = false;
-      continue;
-    }
-    const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
-    absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
-    absorbed_.check_residual[i] += difference * difference / variance;
-  }
 }
 
 Cost RegionalExpansion::MakeCost(double regularization) const {

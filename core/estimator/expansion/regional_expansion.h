@@ -41,8 +41,9 @@ struct FailedTrajectory {
 
 // The accumulated contributions of the rows that an expansion has absorbed.
 struct AbsorbedRows {
-  // Starts from zero, for S terms, m channels, Q collocation points and C check points.
-  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points);
+  // Starts from zero, for S terms, m channels, and Q collocation, C check and K control points.
+  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
+               int controls);
 
   int64_t rows = 0;
   int64_t samples = 0;            // over all channels
@@ -67,6 +68,8 @@ struct AbsorbedRows {
   // χ² of the model itself at the collocation points, Q × m, with the variances R of the sums; not
   // finite where the trajectory could not be integrated.
   Matrix point_chi_squared;
+  Matrix control_scores;            // S × (K · m), column i · m + c (control_trajectories.h)
+  std::vector<bool> control_valid;  // whether the trajectory could be integrated; K
 };
 
 struct ExpansionState;
@@ -159,6 +162,15 @@ class RegionalExpansion {
   };
   Check Checks() const;
 
+  // Returns the number K of control trajectories, the i-th for the i-th check point.
+  int controls() const { return controls_; }
+  // Whether the i-th control trajectory and its check point's could be integrated.
+  bool IsControlValid(int i) const { return absorbed_.control_valid[static_cast<size_t>(i)]; }
+  // Returns Σ c_k δ_k/R_k (S) of a channel, δ_k the i-th control's output minus its check point's.
+  Vector ControlScore(int i, int channel) const {
+    return absorbed_.control_scores.col(i * channels_ + channel);
+  }
+
  private:
   RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise,
                     CollocationMatrix matrix, int threads);
@@ -187,6 +199,10 @@ class RegionalExpansion {
                     double variance);
   void Normalize(double noise, double own_error, double lack);
   void Compare(int column, double z, double variance);
+  int CountControls() const;
+  void StartControls(int run);
+  absl::Status Advance(int first, int count, const Stop& stop);
+  void CompareControls(int column, double variance);
 
   const ResolvedProblem& problem_;
   ExpansionDesign design_;
@@ -200,15 +216,17 @@ class RegionalExpansion {
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // collocation points that are still in the fit
   int run_ = -1;
+  int controls_;  // K
   std::unique_ptr<InputSignals> inputs_;
   double knot_time_s_ = 0;        // time of the last knot of the streamed inputs
   bool inputs_finished_ = false;  // whether the run has no more knots
   std::unique_ptr<EnsemblePropagator> propagator_;
+  std::unique_ptr<EnsemblePropagator> control_propagator_;  // null without controls
   std::vector<FailedTrajectory> failures_;
 
   // The block propagated last.
   RowBlock block_;
-  Matrix outputs_;            // (Q + C) × (m · rows)
+  Matrix outputs_;            // (Q + C + K) × (m · rows)
   Matrix coefficients_;       // S × (m · rows)
   Vector residual_variance_;  // m · rows
   int fitted_rows_ = 0;

@@ -10,6 +10,7 @@
 #include "core/bayes/weighted_samples.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/control_trajectories.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
@@ -76,6 +77,7 @@ class Assessment {
     NoteOtherMinima(cost, minima);
     Summarize(cost, eta);
     Correct(cost);
+    findings_.shift = std::hypot(findings_.shift, findings_.integration_shift);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
@@ -133,6 +135,7 @@ class Assessment {
   void Summarize(const Cost& cost, const Vector& eta) {
     const RecordSummary& record = *request_.record;
     const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
+    findings_.integration_shift = IntegrationShift(*request_.expansion, cost);
     findings_.shift = agreement.shift;
     ExpansionSummary& expansion = estimate_.expansion;
     expansion.order = design_.basis->order();

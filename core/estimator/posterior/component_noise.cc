@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/control_trajectories.h"
 #include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/mixture_component.h"
@@ -26,6 +27,12 @@ constexpr double kResidualToNoise = 0.1;
 constexpr double kTolerancePerNoise = 1e-4;
 constexpr double kFewestSamples = 100;
 constexpr double kTightestTolerance = 1e-12;
+// Where control trajectories show that the estimate may be off by more standard deviations than the
+// first, the tolerance is set so that it is off by the second: errors of integration are
+// proportional to the tolerance. An error of the phase moves the estimate by N^2.5, which a window
+// doubles, so that up to its end the estimate is off by a tenth.
+constexpr double kMaxIntegrationShift = 0.05;
+constexpr double kAimedIntegrationShift = 0.005;
 // Maximum number of revisions of the noise at the end of a window. A scale that falls from the
 // signal's size to 10⁻⁶ of it takes 20 halvings.
 constexpr int kMaxRevisions = 24;
@@ -102,19 +109,33 @@ absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
   return absl::OkStatus();
 }
 
-// Returns true when the noise required a tighter tolerance and the record was propagated again with
-// it.
+// Returns the tolerance that the control trajectories ask for, the present one if they do not
+// object. They are compared with the noise as stated, since errors of integration may be what the
+// misfit consists of.
+double MixtureComponent::ToleranceForControls() const {
+  const double present = problem_.problem().integration.relative_tolerance;
+  if (expansion_->controls() == 0) return present;
+  Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  cost.set_power(1);
+  const double shift = IntegrationShift(*expansion_, cost);
+  return shift > kMaxIntegrationShift ? present * kAimedIntegrationShift / shift : present;
+}
+
+// Returns true when the noise or the control trajectories required a tighter tolerance and the
+// record was propagated again with it.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
   const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
-  const double needed = std::max(
-      kTightestTolerance,
-      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples));
+  const double needed =
+      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples);
   const double present = problem_.problem().integration.relative_tolerance;
-  if (needed >= present || expansion_->StepsExactly()) return false;
+  double tolerance = present;
   // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
   // replays: four times as many samples come before the next.
-  problem_.set_relative_tolerance(std::max(kTightestTolerance, 0.5 * needed));
+  if (needed < present) tolerance = 0.5 * needed;
+  tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls()));
+  if (tolerance >= present || expansion_->StepsExactly()) return false;
+  problem_.set_relative_tolerance(tolerance);
   auto replayed =
       Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
   if (!replayed.ok()) {

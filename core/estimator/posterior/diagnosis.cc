@@ -189,7 +189,7 @@ void AddInaccuracy(const Findings& findings, const Estimate& estimate,
              "far as the model's own trajectories confirm it; %s",
              estimate.expansion.order, estimate.expansion.residual_to_noise, findings.power,
              remedy)});
-  } else if (findings.shift > kInaccurateShift) {
+  } else if (findings.shift > kInaccurateShift && !findings.IntegrationPrevails()) {
     diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat(
@@ -199,6 +199,28 @@ void AddInaccuracy(const Findings& findings, const Estimate& estimate,
              estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
              remedy)});
   }
+}
+
+std::string_view RemedyForIntegration(const Problem& problem) {
+  if (!problem.expansion.adaptive || !problem.tolerance_follows_noise) {
+    return "lower integration.relativeTolerance, or leave it and expansion.adaptive to their "
+           "defaults";
+  }
+  return "it is lowered where the record's next window ends, but not below 1e-12, where only a "
+         "shorter record helps";
+}
+
+void AddIntegrationError(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!(findings.shift > kInaccurateShift) || !findings.IntegrationPrevails()) return;
+  const Problem& problem = findings.problem->problem();
+  diagnostics.push_back(
+      {DiagnosticCode::kExpansionInaccurate,
+       absl::StrFormat(
+           "trajectories integrated with a tenth of integration.relativeTolerance = %.2g differ "
+           "so much that the error of integration may put estimates off by %.3g standard "
+           "deviations of the fit, by which the uncertainty has been widened; %s",
+           problem.integration.relative_tolerance, findings.integration_shift,
+           RemedyForIntegration(problem))});
 }
 
 void AddEdge(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
@@ -231,6 +253,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   std::vector<Diagnostic> diagnostics;
   AddIdentifiability(findings, estimate, diagnostics);
   AddInaccuracy(findings, estimate, diagnostics);
+  AddIntegrationError(findings, diagnostics);
   AddEdge(findings, diagnostics);
   DiagnoseResiduals(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);

@@ -18,6 +18,10 @@ namespace polyest::internal {
 inline constexpr double kInaccurateShift = 0.25;
 
 struct Findings {
+  // Whether more of the shift is due to the integration than to the expansion.
+  bool IntegrationPrevails() const {
+    return 2 * integration_shift * integration_shift > shift * shift;
+  }
   const std::string& NameOf(int parameter) const;
 
   const ResolvedProblem* problem = nullptr;
@@ -29,6 +33,7 @@ struct Findings {
   std::vector<Vector> other_minima;  // θ of other minima with comparable cost
   double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations
+  double integration_shift = 0;      // the part of it that the integration causes
   // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion

@@ -104,6 +104,7 @@ class MixtureComponent {
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
+  double ToleranceForControls() const;
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
   double CoarseResidual() const;

@@ -241,6 +241,8 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
     expansion.residual_to_noise =
         std::max(expansion.residual_to_noise, components[k].estimate.expansion.residual_to_noise);
     whole.findings.shift = std::max(whole.findings.shift, findings.shift);
+    whole.findings.integration_shift =
+        std::max(whole.findings.integration_shift, findings.integration_shift);
     whole.findings.power = std::min(whole.findings.power, findings.power);
     whole.findings.leans = whole.findings.leans || findings.leans;
   }

@@ -1,0 +1,151 @@
+#include "core/estimator/expansion/control_trajectories.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest::internal {
+namespace {
+
+// A block of so few trajectories takes as long as a block of one.
+constexpr Eigen::Index kMaxControls = kLanes;
+// The tolerance must leave room for one of at most half its size.
+constexpr double kLeastControllable = 2 * kLeastTolerance;
+// A tenth of the tolerance takes at most ten times the steps, with a method of order 1.
+constexpr int kMoreSteps = 10;
+constexpr double kControlWeight = 1e-3;     // that counts, relative to the heaviest check point
+constexpr double kLeastEigenvalue = 1e-14;  // relative to the largest
+
+// Returns by how much each channel's χ²/2 counts in the cost at d: an unknown scale is the one that
+// the residuals have there.
+Vector ChannelWeights(const RegionalExpansion& expansion, const Vector& d) {
+  const std::vector<ChannelSums>& sums = expansion.sums();
+  Vector weights = Vector::Ones(std::ssize(sums));
+  for (size_t c = 0; c < sums.size(); ++c) {
+    if (!sums[c].scale_unknown) continue;
+    const double chi_squared = sums[c].samples.ChiSquared(d);
+    if (chi_squared > 0) weights[static_cast<Eigen::Index>(c)] = sums[c].Degrees() / chi_squared;
+  }
+  return weights;
+}
+
+double ShiftAt(const RegionalExpansion& expansion, const Cost& cost, int control) {
+  const ExpansionDesign& design = expansion.design();
+  const Vector eta = design.check_points.row(control).transpose();
+  Vector phi(design.basis->size());
+  Matrix slope(design.basis->size(), eta.size());  // ∂φ
+  design.basis->EvaluateWithGradient(eta, phi, slope);
+  const Vector weights = cost.power() * ChannelWeights(expansion, cost.BasisDifference(eta));
+  // The prior's precision in local coordinates: ξ = centre + axes η.
+  const Matrix axes =
+      cost.prior().GermStandardDeviation().cwiseInverse().asDiagonal() * design.region.axes();
+  Matrix hessian = axes.transpose() * axes;
+  Vector score = Vector::Zero(eta.size());
+  for (int c = 0; c < static_cast<int>(expansion.sums().size()); ++c) {
+    const MismatchSums& sums = expansion.sums()[static_cast<size_t>(c)].samples;
+    hessian += weights[c] * (slope.transpose() * (sums.G() * slope));
+    score += weights[c] * (slope.transpose() * expansion.ControlScore(control, c));
+  }
+  if (!hessian.allFinite() || !score.allFinite()) return 0;
+  // √(sᵀ H⁻¹ s)
+  const SymmetricEigen eigen = DecomposeSymmetric(hessian);
+  const double least = kLeastEigenvalue * eigen.values.maxCoeff();
+  return (eigen.vectors.transpose() * score)
+      .cwiseQuotient(eigen.values.cwiseMax(least).cwiseSqrt())
+      .norm();
+}
+
+}  // namespace
+
+double IntegrationShift(const RegionalExpansion& expansion, const Cost& cost) {
+  const ExpansionDesign& design = expansion.design();
+  std::vector<double> log_weights, shifts;
+  for (int i = 0; i < expansion.controls(); ++i) {
+    if (!expansion.IsControlValid(i)) continue;
+    const double total = cost.Evaluate(design.check_points.row(i).transpose()).total;
+    if (!std::isfinite(total)) continue;
+    log_weights.push_back(design.check_costs[i] - total);
+    shifts.push_back(ShiftAt(expansion, cost, i));
+  }
+  if (shifts.empty()) return 0;
+  const double heaviest = *std::max_element(log_weights.begin(), log_weights.end());
+  double largest = 0;
+  for (size_t i = 0; i < shifts.size(); ++i) {
+    if (std::exp(log_weights[i] - heaviest) > kControlWeight) {
+      largest = std::max(largest, shifts[i]);
+    }
+  }
+  return largest;
+}
+
+int RegionalExpansion::CountControls() const {
+  const Problem& problem = problem_.problem();
+  const Model& model = *problem.model;
+  if (!HasCheckpointsInRuns(model) || model.description().states.empty()) return 0;
+  if (problem.integration.relative_tolerance < kLeastControllable || StepsExactly()) return 0;
+  return static_cast<int>(std::min(kMaxControls, design_.check_points.rows()));
+}
+
+// Starts the first check points once more, with a smaller tolerance.
+void RegionalExpansion::StartControls(int run) {
+  if (controls_ == 0) return;
+  EnsembleSpecification specification = problem_.MakeEnsemble(
+      thetas_.middleRows(points(), controls_), problem_.outputs(), threads_, run);
+  IntegrationOptions& integration = specification.integration;
+  integration.relative_tolerance =
+      std::max(kLeastTolerance, kControlTolerance * integration.relative_tolerance);
+  const int most = std::numeric_limits<int>::max();
+  integration.max_steps =
+      integration.max_steps > most / kMoreSteps ? most : kMoreSteps * integration.max_steps;
+  control_propagator_ =
+      std::make_unique<EnsemblePropagator>(std::move(specification), inputs_.get());
+}
+
+// Advances all trajectories over rows of the block that are of the present run.
+absl::Status RegionalExpansion::Advance(int first, int count, const Stop& stop) {
+  std::vector<double> times;
+  for (int k = first; k < first + count; ++k) {
+    times.push_back(block_.rows[static_cast<size_t>(k)].time_s);
+  }
+  auto outputs = outputs_.middleCols(first * channels_, count * channels_);
+  POLYEST_RETURN_IF_ERROR(propagator_->Advance(times, outputs.topRows(thetas_.rows()), stop));
+  if (controls_ == 0) return absl::OkStatus();
+  return control_propagator_->Advance(times, outputs.bottomRows(controls_), stop);
+}
+
+// Compares the check points' own trajectories with the expansion at one sample.
+void RegionalExpansion::Compare(int column, double z, double variance) {
+  const int channel = column % channels_;
+  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+    if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
+    const double y = outputs_(points() + i, column);
+    if (!std::isfinite(y)) {
+      absorbed_.check_valid[static_cast<size_t>(i)] = false;
+      continue;
+    }
+    const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
+    absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
+    absorbed_.check_residual[i] += difference * difference / variance;
+  }
+}
+
+// Adds c_k δ_k/R_k of one sample.
+void RegionalExpansion::CompareControls(int column, double variance) {
+  const int channel = column % channels_;
+  for (int i = 0; i < controls_; ++i) {
+    const double difference = outputs_(thetas_.rows() + i, column) - outputs_(points() + i, column);
+    if (!std::isfinite(difference)) {
+      absorbed_.control_valid[static_cast<size_t>(i)] = false;
+      continue;
+    }
+    absorbed_.control_scores.col(i * channels_ + channel) +=
+        (difference / variance) * coefficients_.col(column);
+  }
+}
+
+}  // namespace polyest::internal
