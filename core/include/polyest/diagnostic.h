@@ -10,7 +10,7 @@ namespace polyest {
 enum class DiagnosticCode {
   kNotIdentified,        // the verdict on a parameter is kNotIdentified
   kUndersampled,         // the samples miss what an uncertain parameter changes
-  kExpansionInaccurate,  // the expansion differs from the model by too much; uncertainty widened
+  kExpansionInaccurate,  // the expansion or integration is too inaccurate; uncertainty widened
   kModelMisfit,          // residuals far from what the noise would leave
   kAtPriorBound,         // the estimate lies on a bound of the prior
   kMultipleMinima,       // other minima of comparable cost, or a posterior in several pieces

@@ -25,6 +25,11 @@ struct IntegrationOptions {
   // relative_tolerance × the largest magnitude of this state so far. That magnitude is the
   // trajectory's own, but at least a thousandth of the largest in its block of trajectories.
   // Nothing is absolute: states of 1e-14 are as accurate as states of 1. Exact steps do not use it.
+  // The errors of the steps add up, so an estimator integrates up to eight more trajectories with a
+  // tenth of the tolerance, but at least 1e-13. From the difference it tells how far the estimate
+  // may be off, tightens the tolerance (Problem::tolerance_follows_noise) or says so
+  // (DiagnosticCode::kExpansionInaccurate). It does not for models that simulate themselves (FMUs)
+  // and for tolerances below 2e-13.
   double relative_tolerance = 1e-7;
   // Most steps from one sample to the next, ≥ 1; a trajectory that needs more has failed.
   int max_steps = 100'000;

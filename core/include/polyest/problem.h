@@ -62,8 +62,9 @@ struct Problem {
   double regularization = 1;             // α² ≥ 0 of the cost J_mismatch + α² J_prior
   RegularizationMode regularization_mode = RegularizationMode::kFixed;  // how α² is chosen
   IntegrationOptions integration;  // how trajectories are integrated
-  // Whether integration.relative_tolerance is tightened where the noise of the samples asks for it;
-  // set it to false with a tolerance of your own. Without effect on a fixed expansion.
+  // Whether integration.relative_tolerance is tightened, down to 1e-12, where the noise of the
+  // samples or the error of integration that it leaves asks for it; set it to false with a
+  // tolerance of your own. Without effect on a fixed expansion.
   bool tolerance_follows_noise = true;
 };
 
