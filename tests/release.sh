@@ -11,6 +11,8 @@
 #   calibration  asks of 1,008 campaigns whether the uncertainty is true (10 minutes)
 #   properties   compares estimates of 2,000 random small problems with exact posteriors
 #   adversary    asks for estimates of all problems made to mislead it, if their maker is there
+#   invariances  asks whether estimates depend on the assumed noise, the sampling rate or the half of a
+#                record, for measured records, if they are there, and the examples (10 minutes)
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
 #
@@ -19,7 +21,8 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-all_steps=(crashes sanitized fuzz threads calibration properties adversary package)
+all_steps=(crashes sanitized fuzz threads calibration properties adversary invariances
+  package)
 
 crashes() {
   deploy/install-packages.sh --tests
@@ -52,6 +55,14 @@ adversary() {
   cmake --build --preset release --parallel "$(nproc)" --target polyest
   # 77: the cases' maker is not there, as the step has said.
   python3 -B tests/adversary/run.py build/release/bin/polyest build/release/adversary ||
+    [[ $? -eq 77 ]]
+}
+
+invariances() {
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyest
+  # 77: the measured records are not there, as the step has said.
+  python3 -B tests/invariances/run.py build/release/bin/polyest build/release/invariances ||
     [[ $? -eq 77 ]]
 }
 
