@@ -13,6 +13,7 @@
 #   adversary    asks for estimates of all problems made to mislead it, if their maker is there
 #   invariances  asks whether estimates depend on the assumed noise, the sampling rate or the half of a
 #                record, for measured records, if they are there, and the examples (10 minutes)
+#   sbibm        compares posteriors with the reference draws of a public benchmark, which it downloads
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
 #
@@ -22,7 +23,7 @@ set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
 all_steps=(crashes sanitized fuzz threads calibration properties adversary invariances
-  package)
+  sbibm package)
 
 crashes() {
   deploy/install-packages.sh --tests
@@ -64,6 +65,12 @@ invariances() {
   # 77: the measured records are not there, as the step has said.
   python3 -B tests/invariances/run.py build/release/bin/polyest build/release/invariances ||
     [[ $? -eq 77 ]]
+}
+
+sbibm() {
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyest
+  python3 -B tests/sbibm/run.py build/release/bin/polyest build/release/sbibm
 }
 
 package() {
