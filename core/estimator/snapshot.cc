@@ -92,7 +92,7 @@ void serialize(Archive& archive, ChannelNoise& noise) {
 template <class Archive>
 void serialize(Archive& archive, LearnedNoise& noise) {
   archive(noise.channels, noise.posterior.centre, noise.posterior.factor, noise.misfit,
-          noise.centre);
+          noise.misfit_of_weights, noise.centre);
 }
 
 template <class Archive>

@@ -57,7 +57,9 @@ bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
 
 bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {
   if (std::ssize(noise.channels) != problem.channels()) return false;
-  if (!(noise.misfit >= 1 && std::isfinite(noise.misfit))) return false;
+  for (const double misfit : {noise.misfit, noise.misfit_of_weights}) {
+    if (!(misfit >= 1 && std::isfinite(misfit))) return false;
+  }
   for (const ChannelNoise& channel : noise.channels) {
     if (!(channel.scale > 0 && std::isfinite(channel.scale))) return false;
     if (!(channel.time_constant_s >= 0 && std::isfinite(channel.time_constant_s))) return false;

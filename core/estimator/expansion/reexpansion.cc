@@ -123,8 +123,8 @@ class Settler {
     design.check_costs = particles_.costs.head(checks);
     design.checks_are_draws = true;
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
-        Replay(*request_.problem, std::move(design), present_.noise(), *request_.store,
-               request_.rows, request_.threads, stop_);
+        Replay(*request_.problem, std::move(design), present_.noise().ForNewExpansion(),
+               *request_.store, request_.rows, request_.threads, stop_);
     if (absl::IsFailedPrecondition(moved.status())) return false;
     if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();

@@ -303,7 +303,7 @@ void RegionalExpansion::Absorb(int row) {
     if (sigma <= 0) continue;  // no sample
     double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
     const int column = row * channels_ + c;
-    const double own_error = residual_variance_[column] / noise_.misfit;
+    const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
     const auto coefficients = coefficients_.col(column);
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
     const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);

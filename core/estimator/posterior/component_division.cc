@@ -150,7 +150,7 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   bisected_ = parent.bisected_ || parent.halves_;
   if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
   particles_ = piece.particles;
-  LearnedNoise noise = parent.expansion_->noise();
+  LearnedNoise noise = parent.expansion_->noise().ForNewExpansion();
   if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
     noise.posterior = SummaryOf(particles_);
   }

@@ -50,7 +50,9 @@ double MixtureComponent::CoarseResidual() const {
 // Returns whether the region must first move on to the minimum of the cost with the noise as
 // stated. The misfit then falls step by step, which lets the posterior go there.
 bool MixtureComponent::ReviseMisfit(const Stop& stop) {
-  const double before = expansion_->noise().misfit;
+  // A stop may come before the posterior has gone there; the same step is then taken again.
+  if (!revised_from_) revised_from_ = expansion_->noise().misfit;
+  const double before = *revised_from_;
   const MisfitFound found = FindMisfit(problem_, *expansion_, stop);
   if (!found.at_edge) {
     expansion_->set_misfit(found.ratio);
@@ -103,8 +105,9 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
 
 // Propagates the expansion along the record so far again, with the samples weighed by `noise`.
 absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(auto replayed, Replay(problem_, expansion_->design(), std::move(noise),
-                                                 *store_, taken_, threads_, stop));
+  POLYEST_ASSIGN_OR_RETURN(auto replayed,
+                           Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_,
+                                  taken_, threads_, stop));
   Adopt(std::move(replayed));
   return absl::OkStatus();
 }
@@ -136,8 +139,8 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls()));
   if (tolerance >= present || expansion_->StepsExactly()) return false;
   problem_.set_relative_tolerance(tolerance);
-  auto replayed =
-      Replay(problem_, expansion_->design(), expansion_->noise(), *store_, taken_, threads_, stop);
+  auto replayed = Replay(problem_, expansion_->design(), expansion_->noise().ForNewExpansion(),
+                         *store_, taken_, threads_, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
     if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays

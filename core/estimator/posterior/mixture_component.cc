@@ -98,7 +98,7 @@ absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const St
 absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
-  LearnedNoise noise = expansion_->noise();
+  LearnedNoise noise = expansion_->noise().ForNewExpansion();
   noise.posterior = SummaryForNewRuns(grown, noise.posterior);
   noise.centre.resize(0);
   Matrix particles = ParticlesForNewRuns(grown, particles_);
@@ -195,18 +195,28 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
   }
   if (adaptive()) {
-    bool goes_on = ReviseMisfit(stop);
-    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
-    POLYEST_ASSIGN_OR_RETURN(bool settled, SettleIfInaccurate(stop));
-    moved = moved || tightened || settled;
-    for (int i = 0; settled && i < kMaxMisfitRevisions && !must_divide(); ++i) {
-      goes_on = ReviseMisfit(stop);
-      if (!goes_on) break;
-      POLYEST_ASSIGN_OR_RETURN(settled, SettleIfInaccurate(stop));
-    }
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleWithMisfit(stop));
+    moved = moved || settled;
   }
   window_end_ = NextWindow(taken_, windows_from_);
   edges_row_ = NextLook();
+  return moved;
+}
+
+// Returns true when the expansion has moved or must be divided.
+absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
+  bool moved = false;
+  for (int i = 0; i <= kMaxMisfitRevisions && !must_divide(); ++i) {
+    const bool goes_on = ReviseMisfit(stop);
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    if (i > 0 && !goes_on) break;
+    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    revised_from_.reset();
+    moved = moved || tightened || settled;
+    if (!settled) break;
+  }
+  revised_from_.reset();
   return moved;
 }
 

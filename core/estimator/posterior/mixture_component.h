@@ -8,6 +8,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/estimator/expansion/regional_expansion.h"
@@ -101,6 +102,7 @@ class MixtureComponent {
   absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::StatusOr<bool> SettleWithMisfit(const Stop& stop);
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
@@ -138,9 +140,10 @@ class MixtureComponent {
   int64_t taken_ = 0;
   int64_t windows_from_ = 0;  // row from which the present windows are counted
   int64_t window_end_ = 2;
-  int64_t edges_row_ = 2;      // row at which to look at the region's edges next
-  int64_t patient_until_ = 0;  // rows before this one are taken regardless of residual
-  int64_t whole_until_ = 0;    // no search for pieces before this row
+  int64_t edges_row_ = 2;               // row at which to look at the region's edges next
+  int64_t patient_until_ = 0;           // rows before this one are taken regardless of residual
+  int64_t whole_until_ = 0;             // no search for pieces before this row
+  std::optional<double> revised_from_;  // misfit from which it is being revised
   int64_t settled_row_ = -1;
   int settlements_at_row_ = 0;
   int64_t comparable_row_ = -1;

@@ -29,8 +29,8 @@ struct ModelCorrection {
 };
 
 // Returns the correction of the posterior that the draws represent: etas (draws × n, local
-// coordinates of the expansion) with `weights`, Σ = 1. `checks` are those at the cost that they were
-// drawn from, at check points that are draws of a posterior, too.
+// coordinates of the expansion) with `weights`, Σ = 1. `checks` are those at the cost that they
+// were drawn from, at check points that are draws of a posterior, too.
 ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrixRef& etas,
                                const ConstVectorRef& weights);
 

@@ -31,11 +31,21 @@ struct PosteriorSummary {
 };
 
 struct LearnedNoise {
+  // Returns this noise for another expansion.
+  LearnedNoise ForNewExpansion() const {
+    LearnedNoise noise = *this;
+    noise.misfit_of_weights = misfit;
+    return noise;
+  }
+
   std::vector<ChannelNoise> channels;
   PosteriorSummary posterior;
   // Mean square of the residuals ÷ that of the stated noise where the residuals contradict it
   // (misfit.h), else 1. The cost is divided by it.
   double misfit = 1;
+  // The misfit when the expansion was made, by which its own error is divided. It stays the same,
+  // so that all rows are weighed alike.
+  double misfit_of_weights = 1;
   // ξ at which noise is predicted and about which residuals are linearized (n); that of the
   // expansion's reference if empty.
   Vector centre;
