@@ -108,12 +108,12 @@ void serialize(Archive& archive, ChannelSums& sums) {
 
 template <class Archive>
 void serialize(Archive& archive, AbsorbedRows& absorbed) {
-  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount, absorbed.own_error,
-          absorbed.log_noise, absorbed.log_variance, absorbed.outliers, absorbed.summed_run,
-          absorbed.previous_coefficients, absorbed.previous_error, absorbed.check_chi_squared,
-          absorbed.check_residual, absorbed.check_valid, absorbed.point_chi_squared,
-          absorbed.windows, absorbed.profiles, absorbed.largest, absorbed.control_scores,
-          absorbed.control_valid);
+  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
+          absorbed.own_error, absorbed.log_noise, absorbed.log_variance, absorbed.outliers,
+          absorbed.summed_run, absorbed.previous_coefficients, absorbed.previous_error,
+          absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
+          absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.largest,
+          absorbed.control_scores, absorbed.control_valid);
 }
 
 template <class Archive>
@@ -143,9 +143,14 @@ void serialize(Archive& archive, ComponentState& component) {
 }
 
 template <class Archive>
-void serialize(Archive& archive, EstimatorState& state) {
+void serialize(Archive& archive, MixtureState& state) {
   archive(state.components, state.weighing_row, state.left_out, state.elements_left_out,
           state.reexpansions, state.propagated_rows);
+}
+
+template <class Archive>
+void serialize(Archive& archive, EstimatorState& state) {
+  archive(state.mixture, state.search);
 }
 
 std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint) {

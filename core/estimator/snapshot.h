@@ -9,20 +9,15 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "core/estimator/posterior/component_state.h"
+#include "core/estimator/mixture_state.h"
+#include "core/estimator/second_search.h"
 
 namespace polyest::internal {
 
-// The states of the mixture's components, all at the same row, and of the mixture.
 struct EstimatorState {
-  std::vector<ComponentState> components;
-  int64_t weighing_row = 0;
-  double left_out = 0;
-  int elements_left_out = 0;
-  int reexpansions = 0;
-  int64_t propagated_rows = 0;
+  MixtureState mixture;
+  SecondSearch::State search;
 };
 
 // Version of the format. Raise it with every change in the meaning of the bytes or in what is

@@ -148,6 +148,7 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   summary_ = parent.summary_;
   settlements_ = parent.settlements_;
   bisected_ = parent.bisected_ || parent.halves_;
+  tempered_ = parent.tempered_;
   if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
   particles_ = piece.particles;
   LearnedNoise noise = parent.expansion_->noise().ForNewExpansion();

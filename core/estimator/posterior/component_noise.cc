@@ -54,12 +54,23 @@ bool MixtureComponent::ReviseMisfit(const Stop& stop) {
   if (!revised_from_) revised_from_ = expansion_->noise().misfit;
   const double before = *revised_from_;
   const MisfitFound found = FindMisfit(problem_, *expansion_, stop);
-  if (!found.at_edge) {
-    expansion_->set_misfit(found.ratio);
-    return false;
+  const double revised =
+      found.at_edge ? std::clamp(before / kMisfitStep, 1.0, found.ratio) : found.ratio;
+  expansion_->set_misfit(std::max(revised, tempered_.misfit));
+  return found.at_edge && expansion_->noise().misfit < before;
+}
+
+// After the rows of a tempered beginning lets its misfit fall to 1.
+absl::Status MixtureComponent::WithdrawTempering(const Stop& stop) {
+  while (tempered_.misfit > 1 && taken_ >= tempered_.rows && !must_divide()) {
+    const TemperedBeginning before = tempered_;
+    tempered_.misfit = std::max(1.0, before.misfit / kMisfitStep);
+    const absl::Status settled = SettleWithMisfit(stop).status();
+    if (settled.ok()) continue;
+    tempered_ = before;
+    return settled;
   }
-  expansion_->set_misfit(std::clamp(before / kMisfitStep, 1.0, found.ratio));
-  return before > 1;
+  return absl::OkStatus();
 }
 
 // Raises scales that are not learned yet with the signal, so the first samples have little weight

@@ -50,12 +50,16 @@ MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleS
       particles_(0, problem_.dimension()) {}
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
-    const ResolvedProblem& problem, const SampleStore* store, int threads) {
+    const ResolvedProblem& problem, const SampleStore* store, int threads,
+    const TemperedBeginning& beginning) {
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(problem, store, threads));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(component->problem_));
+  LearnedNoise noise = NoiseToBeginWith(problem.problem());
+  noise.misfit = beginning.misfit;
+  component->tempered_ = beginning;
   POLYEST_ASSIGN_OR_RETURN(component->expansion_,
                            RegionalExpansion::Make(component->problem_, std::move(design),
-                                                   NoiseToBeginWith(problem.problem()), threads));
+                                                   noise.ForNewExpansion(), threads));
   component->room_ = MostComponents(problem);
   return component;
 }
@@ -74,7 +78,7 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
     if (through) broken_ = false;
   }
-  return absl::OkStatus();
+  return WithdrawTempering(stop);
 }
 
 // Reads the next rows, up to the first `rows` of the store, as far as the runs' parameters exist.

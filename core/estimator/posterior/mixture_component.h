@@ -29,13 +29,19 @@ int MostComponents(const ResolvedProblem& problem);
 
 struct ComponentState;
 
+// A beginning at the prior with the likelihood tempered.
+struct TemperedBeginning {
+  double misfit = 1;  // ≥ 1, by which the cost is divided at least
+  int64_t rows = 0;   // until so many rows have been taken; it then falls to 1 step by step
+};
+
 class MixtureComponent {
  public:
   // Makes a component over the whole prior. Returns FailedPrecondition when its expansion cannot be
   // factored. `store` must outlive the component.
-  static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(const ResolvedProblem& problem,
-                                                                   const SampleStore* store,
-                                                                   int threads);
+  static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(
+      const ResolvedProblem& problem, const SampleStore* store, int threads,
+      const TemperedBeginning& beginning = {});
 
   // Restores a component from a state that State returned. The store must hold at least its rows.
   // Returns DataLoss when the state cannot belong to such a problem, FailedPrecondition when the
@@ -102,6 +108,7 @@ class MixtureComponent {
   absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);
   absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::Status WithdrawTempering(const Stop& stop);
   absl::StatusOr<bool> SettleWithMisfit(const Stop& stop);
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
@@ -143,6 +150,7 @@ class MixtureComponent {
   int64_t edges_row_ = 2;               // row at which to look at the region's edges next
   int64_t patient_until_ = 0;           // rows before this one are taken regardless of residual
   int64_t whole_until_ = 0;             // no search for pieces before this row
+  TemperedBeginning tempered_;          // what is left of it
   std::optional<double> revised_from_;  // misfit from which it is being revised
   int64_t settled_row_ = -1;
   int settlements_at_row_ = 0;

@@ -1,0 +1,212 @@
+#include "core/estimator/component_mixture.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+
+absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::OfPrior(
+    const ResolvedProblem& problem, const SampleStore* store, int threads,
+    const TemperedBeginning& beginning) {
+  std::unique_ptr<ComponentMixture> mixture(new ComponentMixture);
+  POLYEST_ASSIGN_OR_RETURN(mixture->components_.emplace_back(),
+                           MixtureComponent::OfPrior(problem, store, threads, beginning));
+  return mixture;
+}
+
+absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
+    const ResolvedProblem& problem, MixtureState state, int64_t rows, const SampleStore* store,
+    int threads) {
+  const bool several = state.components.size() > 1;
+  if (state.components.empty() || std::ssize(state.components) > MostComponents(problem) ||
+      (several && state.weighing_row <= rows)) {
+    return absl::DataLossError("the snapshot's components cannot be of a mixture");
+  }
+  std::unique_ptr<ComponentMixture> mixture(new ComponentMixture);
+  for (ComponentState& one : state.components) {
+    if (one.taken != rows) return absl::DataLossError("the snapshot's components do not agree");
+    POLYEST_ASSIGN_OR_RETURN(mixture->components_.emplace_back(),
+                             MixtureComponent::FromState(problem, std::move(one), store, threads));
+  }
+  mixture->weighing_row_ = state.weighing_row;
+  mixture->left_out_ = state.left_out;
+  mixture->elements_left_out_ = state.elements_left_out;
+  mixture->reexpansions_ = state.reexpansions;
+  mixture->propagated_rows_ = state.propagated_rows;
+  return mixture;
+}
+
+MixtureState ComponentMixture::State() const {
+  MixtureState state;
+  for (const auto& component : components_) state.components.push_back(component->State());
+  state.weighing_row = weighing_row_;
+  state.left_out = left_out_;
+  state.elements_left_out = elements_left_out_;
+  state.reexpansions = reexpansions_;
+  state.propagated_rows = propagated_rows_;
+  return state;
+}
+
+absl::Status ComponentMixture::TakeUpTo(int64_t rows, const Stop& stop) {
+  while (true) {
+    const bool weighs = components_.size() > 1 && weighing_row_ <= rows;
+    POLYEST_ASSIGN_OR_RETURN(const bool divided, TakeOrDivide(weighs ? weighing_row_ : rows, stop));
+    if (divided) continue;
+    if (!weighs) return absl::OkStatus();
+    POLYEST_RETURN_IF_ERROR(Weigh(stop));
+  }
+}
+
+int64_t ComponentMixture::rows_taken() const {
+  int64_t rows = components_.front()->rows_taken();
+  for (const auto& component : components_) rows = std::min(rows, component->rows_taken());
+  return rows;
+}
+
+double ComponentMixture::Misfit() const {
+  double misfit = kInfinity;
+  for (const auto& component : components_) {
+    misfit = std::min(misfit, component->expansion().noise().misfit);
+  }
+  return misfit;
+}
+
+void ComponentMixture::AddWorkOf(const ComponentMixture& other) {
+  reexpansions_ += other.reexpansions_;
+  propagated_rows_ += other.propagated_rows_;
+  for (const auto& component : other.components_) Retire(*component);
+}
+
+// Returns true when a component has been divided or left out, or its division has failed; then not
+// all components have reached `rows`.
+absl::StatusOr<bool> ComponentMixture::TakeOrDivide(int64_t rows, const Stop& stop) {
+  for (size_t k = 0; k < components_.size(); ++k) {
+    const absl::Status taken = components_[k]->TakeUpTo(rows, stop);
+    if (absl::IsFailedPrecondition(taken) && components_.size() > 1) {
+      LeaveOut(k);
+      return true;
+    }
+    POLYEST_RETURN_IF_ERROR(taken);
+    if (!components_[k]->must_divide()) continue;
+    POLYEST_RETURN_IF_ERROR(Divide(k, stop));
+    return true;
+  }
+  return false;
+}
+
+absl::Status ComponentMixture::Divide(size_t component, const Stop& stop) {
+  MixtureComponent& whole = *components_[component];
+  POLYEST_ASSIGN_OR_RETURN(Components parts, whole.Divide(stop));
+  if (parts.empty()) return absl::OkStatus();
+  if (whole.bisects()) {
+    for (const auto& part : parts) part->set_weight(whole.weight() / 2);
+  } else {
+    const auto room = static_cast<size_t>(whole.room());
+    POLYEST_RETURN_IF_ERROR(KeepHeaviest(parts, whole.weight(), room, stop).status());
+  }
+  if (components_.size() == 1) weighing_row_ = NextWindow(whole.rows_taken());
+  Retire(whole);
+  const auto place =
+      components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
+  components_.insert(place, std::make_move_iterator(parts.begin()),
+                     std::make_move_iterator(parts.end()));
+  return absl::OkStatus();
+}
+
+// Leaves out an element in which too few trajectories can be integrated to go on.
+void ComponentMixture::LeaveOut(size_t component) {
+  Retire(*components_[component]);
+  components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
+  ++elements_left_out_;
+}
+
+// Adds up what a component has done that is to be replaced.
+void ComponentMixture::Retire(const MixtureComponent& component) {
+  reexpansions_ += component.reexpansions();
+  propagated_rows_ += component.propagated_rows();
+}
+
+absl::Status ComponentMixture::Weigh(const Stop& stop) {
+  for (const auto& component : components_) {
+    POLYEST_RETURN_IF_ERROR(component->MakeComparable(stop));
+  }
+  const int most = MostComponents(components_.front()->problem());
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles,
+                           KeepHeaviest(components_, 1, static_cast<size_t>(most), stop));
+  POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
+  for (const auto& component : components_) {
+    component->set_room(std::max(1, most / static_cast<int>(components_.size())));
+  }
+  weighing_row_ = NextWindow(weighing_row_);
+  return absl::OkStatus();
+}
+
+// Replaces the components by a single one if its expansion represents the posterior as well.
+// `particles` are those of each component.
+absl::Status ComponentMixture::Unite(const std::vector<Matrix>& particles, const Stop& stop) {
+  if (components_.size() < 2) return absl::OkStatus();
+  std::vector<double> weights;
+  for (const auto& component : components_) weights.push_back(component->weight());
+  const std::optional<Piece> whole = UnitePieces(particles, weights);
+  if (!whole) return absl::OkStatus();
+  const auto heaviest = std::ranges::max_element(weights) - weights.begin();
+  POLYEST_ASSIGN_OR_RETURN(auto united,
+                           components_[static_cast<size_t>(heaviest)]->Unite(*whole, stop));
+  if (!united) return absl::OkStatus();
+  for (const auto& component : components_) Retire(*component);
+  components_.clear();
+  components_.push_back(std::move(united));
+  return absl::OkStatus();
+}
+
+// Keeps the `most` heaviest components and returns the particles of each. `weight` is the weight of
+// all of them together.
+absl::StatusOr<std::vector<Matrix>> ComponentMixture::KeepHeaviest(Components& components,
+                                                                   double weight, size_t most,
+                                                                   const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(MixtureWeighing weighing,
+                           WeighMixture(Requests(components), most, stop));
+  Components kept;
+  for (size_t i = 0; i < weighing.kept.size(); ++i) {
+    kept.push_back(std::move(components[weighing.kept[i]]));
+    kept.back()->set_weight(weight * weighing.weights[i]);
+  }
+  for (const auto& component : components) {
+    if (component) Retire(*component);
+  }
+  left_out_ = std::max(left_out_, weight * weighing.left_out);
+  components = std::move(kept);
+  return std::move(weighing.particles);
+}
+
+std::vector<AssessmentRequest> ComponentMixture::Requests(const Components& components) {
+  std::vector<AssessmentRequest> requests;
+  for (const auto& component : components) requests.push_back(component->RequestAssessment());
+  return requests;
+}
+
+absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const PosteriorEffort& effort,
+                                                         const Stop& stop) const {
+  std::vector<AssessmentRequest> requests = Requests(components_);
+  for (AssessmentRequest& request : requests) request.effort = effort;
+  requests.front().reexpansions += reexpansions_;
+  requests.front().propagated_rows += propagated_rows_;
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed,
+                           AssessMixture(std::move(requests), left_out_, stop));
+  if (elements_left_out_ > 0) {
+    assessed.whole.estimate.diagnostics.push_back(
+        {DiagnosticCode::kPointsFailed,
+         absl::StrFormat("%d parts of the prior were left out, because in each of them too few "
+                         "trajectories could be integrated",
+                         elements_left_out_)});
+  }
+  return assessed;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,50 @@
+#include "core/estimator/second_search.h"
+
+#include <optional>
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kMinMisfit = 3;
+constexpr double kPatience = 4;
+// Ratio of the misfits from which on the second mixture is the better one.
+constexpr double kBetter = 0.8;
+
+}  // namespace
+
+bool SecondSearch::IsDue(double misfit) const {
+  if (misfit < kMinMisfit) return false;
+  return static_cast<double>(state_.row) >= kPatience * static_cast<double>(state_.tried_row) ||
+         misfit >= kPatience * state_.tried_misfit;
+}
+
+absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStore* store,
+                                int threads, const Stop& stop,
+                                std::unique_ptr<ComponentMixture>& mixture) {
+  const double misfit = mixture->Misfit();
+  if (problem.problem().expansion.adaptive && IsDue(misfit)) {
+    if (!second_) {
+      std::optional<ResolvedProblem> first_run;
+      if (problem.runs() > 1) {
+        POLYEST_ASSIGN_OR_RETURN(first_run, problem.WithRuns(1));
+      }
+      POLYEST_ASSIGN_OR_RETURN(
+          second_, ComponentMixture::OfPrior(first_run ? *first_run : problem, store, threads,
+                                             {.misfit = misfit, .rows = state_.row}));
+    }
+    const absl::Status taken = second_->TakeUpTo(state_.row, stop);
+    if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;
+    if (taken.ok() && second_->Misfit() < kBetter * misfit) std::swap(mixture, second_);
+    mixture->AddWorkOf(*second_);
+    second_.reset();
+    state_.tried_row = state_.row;
+    state_.tried_misfit = mixture->Misfit();
+  }
+  state_.row = NextWindow(state_.row);
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal
