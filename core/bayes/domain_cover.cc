@@ -53,7 +53,8 @@ Vector PointInside(const Region& region, const Prior& prior, const Vector& lower
   return inside;
 }
 
-// Returns the largest s ≤ 1 for which inside + s (xi − inside) lies in Ω; `inside` must lie in Ω.
+}  // namespace
+
 double FractionInDomain(const Prior& prior, const Vector& xi, const Vector& inside) {
   double fraction = 1;
   for (Eigen::Index j = 0; j < xi.size(); ++j) {
@@ -66,8 +67,6 @@ double FractionInDomain(const Prior& prior, const Vector& xi, const Vector& insi
   }
   return fraction;
 }
-
-}  // namespace
 
 Matrix CoverOfDomain(const Region& region, const Prior& prior, const Vector& lower,
                      const Vector& upper, const Matrix& guesses, int count) {

@@ -19,4 +19,7 @@ namespace polyest::internal {
 Matrix CoverOfDomain(const Region& region, const Prior& prior, const Vector& lower,
                      const Vector& upper, const Matrix& guesses, int count);
 
+// Returns the largest s ≤ 1 for which inside + s (ξ − inside) lies in Ω; `inside` must lie in Ω.
+double FractionInDomain(const Prior& prior, const Vector& xi, const Vector& inside);
+
 }  // namespace polyest::internal

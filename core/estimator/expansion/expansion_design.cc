@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "core/bayes/domain_cover.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -26,20 +27,6 @@ constexpr double kJustInside = 1 - 1e-12;  // keeps rounding from putting a poin
 
 int PointCount(const ResolvedProblem& problem, const Basis& basis) {
   return static_cast<int>(std::ceil(problem.problem().expansion.points_per_term * basis.size()));
-}
-
-// Returns the largest s ≤ 1 for which inside + s (xi − inside) lies in Ω.
-double FractionInside(const Prior& prior, const Vector& xi, const Vector& inside) {
-  double fraction = 1;
-  for (Eigen::Index j = 0; j < xi.size(); ++j) {
-    const double step = xi[j] - inside[j];
-    if (xi[j] > prior.upper()[j]) {
-      fraction = std::min(fraction, (prior.upper()[j] - inside[j]) / step);
-    } else if (xi[j] < prior.lower()[j]) {
-      fraction = std::min(fraction, (prior.lower()[j] - inside[j]) / step);
-    }
-  }
-  return fraction;
 }
 
 // Returns local coordinates in units of the trusted box: e with η = middle + half ∘ e.
@@ -104,7 +91,7 @@ namespace {
 void MoveInside(const Prior& prior, const Region& region, const Vector& inside, Matrix& points) {
   for (Eigen::Index q = 0; q < points.rows(); ++q) {
     const Vector xi = region.ToGerm(points.row(q).transpose());
-    const double fraction = FractionInside(prior, xi, inside);
+    const double fraction = FractionInDomain(prior, xi, inside);
     if (fraction < 1) {
       points.row(q) = region.ToLocal(inside + kJustInside * fraction * (xi - inside)).transpose();
     }

@@ -27,30 +27,6 @@ FmuEnsemble Oscillators(std::shared_ptr<const Model> model) {
   return ensemble;
 }
 
-// The built-in model as an FMU is to the integrator: nothing is known of its equations, so that it
-// is not stepped exactly, and no step is longer than the interval between two samples.
-class UnknownEquations final : public StateSpaceModel {
- public:
-  explicit UnknownEquations(std::shared_ptr<const Model> model)
-      : owner_(std::move(model)), model_(dynamic_cast<const StateSpaceModel&>(*owner_)) {}
-  const ModelDescription& description() const override { return model_.description(); }
-  void InitialStates(const ConstBlock& parameters, Block states) const override {
-    model_.InitialStates(parameters, states);
-  }
-  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
-                   const ConstBlock& inputs, Block derivatives) const override {
-    model_.Derivatives(time_s, states, parameters, inputs, derivatives);
-  }
-  void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
-               const ConstBlock& inputs, Block outputs) const override {
-    model_.Outputs(time_s, states, parameters, inputs, outputs);
-  }
-
- private:
-  std::shared_ptr<const Model> owner_;
-  const StateSpaceModel& model_;
-};
-
 FmuEnsemble BuiltIn() {
   FmuEnsemble ensemble =
       Oscillators(std::make_shared<UnknownEquations>(*FindBuiltinModel("mass_spring_damper")));
