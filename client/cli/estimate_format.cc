@@ -143,7 +143,12 @@ void PrintChannels(const v1::Estimate& estimate, std::ostream& out) {
   for (const v1::ChannelEstimate& c : estimate.channels()) {
     if (c.noise_time_constant_s() > 0) {
       out << absl::StrCat(c.output(), ": noise correlated over ",
-                          FormatNumber(c.noise_time_constant_s(), 3), " s\n");
+                          FormatNumber(c.noise_time_constant_s(), 3), " s");
+      if (c.noise_white_share() > 0) {
+        out << absl::StrCat(", but for the ", FormatNumber(100 * c.noise_white_share(), 3),
+                            " % of its variance that is white");
+      }
+      out << '\n';
     }
     if (c.outliers() > 0) out << absl::StrCat(c.output(), ": ", c.outliers(), " outliers\n");
   }

@@ -64,8 +64,8 @@ void Add(Archive& archive, const NamedInput& input) {
 void Add(Archive& archive, const MeasuredOutput& measured) {
   const NoiseModel& noise = measured.noise;
   archive(measured.output, noise.absolute, noise.relative, noise.relative_to_max, noise.unknown,
-          Number(noise.correlation), noise.time_constant_s, Number(noise.outliers),
-          noise.full_scale, noise.least);
+          Number(noise.correlation), noise.time_constant_s, noise.white_share,
+          Number(noise.outliers), noise.full_scale, noise.least);
 }
 
 void AddOptions(Archive& archive, const Problem& problem) {

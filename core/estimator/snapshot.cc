@@ -83,7 +83,7 @@ void serialize(Archive& archive, EnsembleState& ensemble) {
 
 template <class Archive>
 void serialize(Archive& archive, ChannelNoise& noise) {
-  archive(noise.scale, noise.time_constant_s);
+  archive(noise.scale, noise.time_constant_s, noise.white_share);
   Flag(archive, noise.learned);
   Flag(archive, noise.of_prediction);
   archive(noise.grid.shortest_s, noise.grid.longest_s);
@@ -98,7 +98,7 @@ void serialize(Archive& archive, LearnedNoise& noise) {
 template <class Archive>
 void serialize(Archive& archive, PreviousSample& sample) {
   Flag(archive, sample.known);
-  archive(sample.time_s, sample.value, sample.noise, sample.output);
+  archive(sample.time_s, sample.value, sample.noise, sample.variance, sample.output);
 }
 
 template <class Archive>

@@ -63,6 +63,7 @@ bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {
   for (const ChannelNoise& channel : noise.channels) {
     if (!(channel.scale > 0 && std::isfinite(channel.scale))) return false;
     if (!(channel.time_constant_s >= 0 && std::isfinite(channel.time_constant_s))) return false;
+    if (!(channel.white_share >= 0 && channel.white_share < 1)) return false;
     const TimeConstantGrid& grid = channel.grid;
     if (grid.empty()) continue;
     if (!(grid.shortest_s > 0 && std::isfinite(grid.longest_s))) return false;

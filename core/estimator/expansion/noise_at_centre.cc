@@ -18,7 +18,7 @@ void RegionalExpansion::Linearize() {
   for (size_t c = 0; c < noise_.channels.size(); ++c) {
     const ChannelNoise& noise = noise_.channels[c];
     if (noise.grid.empty()) continue;
-    absorbed_.profiles[c] = CorrelationProfile(noise.grid, noise.time_constant_s, n);
+    absorbed_.profiles[c] = CorrelationProfile(noise.grid, noise.shape(), n);
   }
 }
 

@@ -26,7 +26,8 @@ LearnedNoise NoiseOf(const ResolvedProblem& problem) {
   LearnedNoise noise;
   for (const MeasuredOutput& measured : problem.problem().measured) {
     const bool correlated = measured.noise.correlation == NoiseCorrelation::kKnown;
-    noise.channels.push_back({.time_constant_s = correlated ? measured.noise.time_constant_s : 0});
+    noise.channels.push_back({.time_constant_s = correlated ? measured.noise.time_constant_s : 0,
+                              .white_share = correlated ? measured.noise.white_share : 0});
   }
   return noise;
 }

@@ -15,6 +15,7 @@
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/model_correction.h"
 #include "core/estimator/posterior/noise_learning.h"
@@ -351,27 +352,13 @@ class Assessment {
     channel.lag1_correlation =
         std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
     channel.noise_time_constant_s = noise.time_constant_s;
+    channel.noise_white_share = noise.white_share;
     channel.outliers = request_.expansion->Outliers(c);
     const double a = std::max(0.0, channel.lag1_correlation);
     channel.effective_samples =
-        samples * (noise.time_constant_s > 0 ? IndependentShare(c, noise) : (1 - a) / (1 + a));
-  }
-
-  // Returns the mean of (1 − a)/(1 + a) over the intervals of the record's beginning, a =
-  // exp(−Δt/τ): what a sample tells of a mean in the presence of the sample before.
-  double IndependentShare(int c, const ChannelNoise& noise) const {
-    const RowBlock& block = request_.record->beginning();
-    const auto m = static_cast<size_t>(problem_.channels());
-    double sum = 0, before_s = 0;
-    int samples = 0;
-    for (size_t k = 0; k < block.rows.size(); ++k) {
-      if (block.noise[k * m + static_cast<size_t>(c)] <= 0) continue;  // no sample
-      const double decay = (block.rows[k].time_s - before_s) / noise.time_constant_s;
-      // (1 − e^−x)/(1 + e^−x) = tanh ½x
-      if (samples++ > 0) sum += std::tanh(0.5 * decay);
-      before_s = block.rows[k].time_s;
-    }
-    return samples > 1 ? sum / (samples - 1) : 1;
+        samples * (noise.time_constant_s > 0
+                       ? IndependentShare(request_.record->beginning(), c, noise.shape())
+                       : (1 - a) / (1 + a));
   }
 
   // Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.

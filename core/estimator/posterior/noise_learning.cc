@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "core/bayes/noise.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/noise_choice.h"
 
 namespace polyest::internal {
 namespace {
@@ -30,9 +30,8 @@ constexpr double kMaxCorrelation = 0.9999;
 // Fraction of the requested change. The whole change would be right for noise of the assumed kind,
 // but oscillates for other noise.
 constexpr double kCorrelationStep = 0.6;
-// Gains of log likelihood for which correlation is preferred to white noise, and for which a time
-// constant is revised: a standard deviation of log τ is worth ½.
-constexpr double kWorthCorrelation = 1;
+// Gain of log likelihood for which the correlation is revised: a standard deviation of log τ is
+// worth ½.
 constexpr double kWorthRevision = 0.25;
 // Error of the linearized χ², in units of the noise's variance, from which it is linearized anew.
 constexpr double kMaxNonlinearity = 0.5;
@@ -42,9 +41,6 @@ constexpr double kMaxNonlinearity = 0.5;
 constexpr double kMaxDiscountOfPrediction = 0.2;
 constexpr double kMaxMisfit = 2;
 constexpr double kMovedPrediction = 1;
-// The shortest time constant of the grid, in least intervals: successive samples are then
-// correlated by e⁻⁴ = 0.02.
-constexpr double kShortestInIntervals = 0.25;
 // Factor by which the record must exceed the grid before that is extended.
 constexpr double kGridGrowth = 1.3;
 // Changes from which the posterior counts as different: of its centre, in standard deviations, and
@@ -63,39 +59,6 @@ double CorrelationBehind(double r, double a) {
   const double discriminant = b * b - 4 * a * (a + r * (1 + a * a));
   const double x = discriminant < 0 ? a + r : (b - std::sqrt(discriminant)) / (2 * a);
   return std::clamp(x, -kMaxCorrelation, kMaxCorrelation);
-}
-
-// A time constant with the scale of the noise that goes with it.
-struct NoiseChoice {
-  double time_constant_s = 0;
-  double scale = 1;  // in units of the working noise
-  double negative_log_likelihood = std::numeric_limits<double>::infinity();
-  int step = -1;  // of the grid, the nearest; −1 for white noise
-};
-
-// Returns the best time constant of the profile; where it lies between two steps of the grid, by
-// the parabola through the best step and its neighbours.
-NoiseChoice BestOfGrid(const std::vector<ProfileValue>& values, const TimeConstantGrid& grid) {
-  const auto at = [&](int step) -> const ProfileValue& {
-    return values[CorrelationProfile::kFirstOfGrid + static_cast<size_t>(step)];
-  };
-  NoiseChoice best;
-  for (int step = 0; step < TimeConstantGrid::kSteps; ++step) {
-    if (!(at(step).negative_log_likelihood < best.negative_log_likelihood)) continue;
-    best = {grid.At(step), at(step).scale, at(step).negative_log_likelihood, step};
-  }
-  if (best.step <= 0 || best.step == TimeConstantGrid::kSteps - 1) return best;
-  const double below = at(best.step - 1).negative_log_likelihood - best.negative_log_likelihood;
-  const double above = at(best.step + 1).negative_log_likelihood - best.negative_log_likelihood;
-  if (!std::isfinite(below + above) || below + above <= 0) return best;
-  // With f(−1) = below, f(0) = 0 and f(1) = above, the minimum is at x, |x| ≤ ½, of height −x²
-  // (…)/2.
-  const double x = 0.5 * (below - above) / (below + above);
-  const double ratio = grid.At(1) / grid.At(0);
-  best.time_constant_s *= std::pow(ratio, x);
-  best.scale *= std::pow(at(best.step + (x < 0 ? -1 : 1)).scale / best.scale, std::abs(x));
-  best.negative_log_likelihood -= 0.5 * x * x * (below + above);
-  return best;
 }
 
 class Revision {
@@ -187,8 +150,8 @@ class Revision {
     changed_ = true;
   }
 
-  // Revises the time constant together with the scale; returns false when the scale is left to be
-  // revised alone.
+  // Revises the noise's correlation together with the scale; returns false when the scale is left
+  // to be revised alone.
   bool ReviseTimeConstant(int c, const ChannelSums& sums, bool scale_unknown, ChannelNoise& noise) {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     if (channel.intervals == 0) return false;
@@ -199,26 +162,25 @@ class Revision {
     }
     if (expansion_.Discount(c) > kMaxDiscount * sums.Degrees()) return false;
     const Matrix unit = to_local_ * problem_.prior().GermStandardDeviation().asDiagonal();
+    std::vector<CorrelationProfile::Member> members = profile.Members();
     std::vector<ProfileValue> values;
     const auto samples = static_cast<double>(sums.samples.count());
-    for (CorrelationProfile::Member member : profile.members()) {
+    const Matrix gram = members[CorrelationProfile::kPresent].gram;
+    for (CorrelationProfile::Member& member : members) {
       member.gram /=
           sums.degrees_factor;  // so that χ² is N in the mean, with outliers' weights too
       values.push_back(EvaluateMember(member, samples, unit, scale_unknown));
     }
     const ProfileValue& present = values[CorrelationProfile::kPresent];
-    const ProfileValue& white = values[CorrelationProfile::kWhite];
-    LinearizeAgainIfCurved(profile, sums, present.scale);
-    NoiseChoice best = BestOfGrid(values, noise.grid);
-    const double worth = noise.time_constant_s > 0 ? 0 : kWorthCorrelation;
-    if (!(best.negative_log_likelihood < white.negative_log_likelihood - worth)) {
-      best = {0, white.scale, white.negative_log_likelihood, -1};
-    }
+    LinearizeAgainIfCurved(gram, sums, present.scale);
+    const NoiseChoice best = ChooseNoise(profile, values, noise.grid);
     ExtendGrid(best.step, channel, noise);
+    if (IsAbout(best.noise, noise.shape())) return false;
     if (!(best.negative_log_likelihood < present.negative_log_likelihood - kWorthRevision)) {
       return false;
     }
-    noise.time_constant_s = best.time_constant_s;
+    noise.time_constant_s = best.noise.time_constant_s;
+    noise.white_share = best.noise.white_share;
     if (scale_unknown) noise.scale *= std::clamp(best.scale, kMaxFall, kMaxRise);
     changed_ = true;
     return true;
@@ -249,7 +211,8 @@ class Revision {
   }
 
   void SetGrid(const RecordSummary::Channel& channel, ChannelNoise& noise) {
-    noise.grid = {kShortestInIntervals * channel.least_interval_s, channel.longest_run_s};
+    noise.grid = {TimeConstantGrid::kShortestInIntervals * channel.least_interval_s,
+                  channel.longest_run_s};
     changed_ = true;
   }
 
@@ -257,20 +220,18 @@ class Revision {
   // reaches.
   void ExtendGrid(int best, const RecordSummary::Channel& channel, ChannelNoise& noise) {
     const bool longer = channel.longest_run_s > kGridGrowth * noise.grid.longest_s;
-    const bool finer =
-        kShortestInIntervals * channel.least_interval_s < noise.grid.shortest_s / kGridGrowth;
+    const bool finer = TimeConstantGrid::kShortestInIntervals * channel.least_interval_s <
+                       noise.grid.shortest_s / kGridGrowth;
     if ((best == TimeConstantGrid::kSteps - 1 && longer) || (best <= 0 && finer)) {
       SetGrid(channel, noise);
     }
   }
 
   // Compares the linearized χ² at the minimum of the cost with that of the expansion.
-  void LinearizeAgainIfCurved(const CorrelationProfile& profile, const ChannelSums& sums,
-                              double scale) {
+  void LinearizeAgainIfCurved(const Matrix& gram, const ChannelSums& sums, double scale) {
     Vector delta(eta_.size() + 1);
     delta.head(eta_.size()) = eta_ - expansion_.LinearizedAt();
     delta[eta_.size()] = -1;
-    const Matrix& gram = profile.members()[CorrelationProfile::kPresent].gram;
     const double linear = delta.dot(gram.selfadjointView<Eigen::Upper>() * delta);
     const double error = std::abs(linear - sums.samples.ChiSquared(d_));
     if (error <= kMaxNonlinearity * scale * scale) return;
@@ -325,6 +286,7 @@ LearnedNoise NoiseToBeginWith(const Problem& problem) {
   for (const MeasuredOutput& measured : problem.measured) {
     ChannelNoise channel;
     channel.time_constant_s = measured.noise.time_constant_s;
+    channel.white_share = measured.noise.white_share;
     noise.channels.push_back(channel);
   }
   return noise;

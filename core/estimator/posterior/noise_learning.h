@@ -1,18 +1,18 @@
 #pragma once
 
 // Learns the noise from the residuals at the minimum of the cost on the present expansion: its
-// scale if unknown, the time constant of its correlation, and the point at which outliers are
+// scale if unknown, its correlation, and the point at which outliers are
 // judged. The result is the noise with which to weigh the record next. Taking the sums again with
 // it changes the minimum, so the caller repeats this until nothing is left to revise.
 //
 //   scale        s² ← s² (χ² − D)/(N − D − p). D is the expansion's own share of χ², and p the
 //                channel's share of the number of fitted parameters Σ λ/(1 + λ). In one revision
 //                s² falls at most by a factor 4 and rises at most by a factor 16.
-//   correlation  τ ← the most probable of white noise and a grid of time constants from a quarter
-//   of
-//                the least sampling interval to the record's length, by the likelihood over the
-//                actual intervals with the parameters following (correlation_profile.h). An unknown
-//                scale is revised together with it. The parameters follow linearly about a point
+//   correlation  τ and the white share f ← the most probable of white noise and a grid of time
+//                constants from a quarter of the least sampling interval to the record's length,
+//                without a white share and with some, by the likelihood over the actual intervals
+//                with the parameters following (correlation_profile.h, noise_choice.h). An unknown
+//                scale is revised together with them. The parameters follow linearly about a point
 //                that moves to the minimum where the model is curved. Where outliers are handled,
 //                a ← a + 0.6 (x − a) for a = exp(−Δt/τ) at the mean interval instead; x explains
 //                the lag-1 correlation r that is left, r = (x − a)(1 − a x)/(1 − 2 a x + a²).

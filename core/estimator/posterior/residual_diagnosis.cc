@@ -125,10 +125,14 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
   }
   if (!correlation || noise.grid.empty()) return "";
   if (noise.time_constant_s < kMaxTimeConstant * channel.longest_run_s) return "";
+  const std::string part =
+      noise.white_share > 0
+          ? absl::StrFormat("a share of %.3g of its variance", 1 - noise.white_share)
+          : "its noise";
   return absl::StrFormat(
-      "its noise is correlated over %.3g s or longer, a large part of the record of "
+      "%s is correlated over %.3g s or longer, a large part of the record of "
       "%.3g s, so that its time constant and its size are hardly known",
-      noise.time_constant_s, channel.longest_run_s);
+      part, noise.time_constant_s, channel.longest_run_s);
 }
 
 void AddUnlearnedNoise(const Findings& findings, const Estimate& estimate,

@@ -15,6 +15,7 @@
 #include "core/common/status.h"
 #include "core/estimator/problem/parameters_of_runs.h"
 #include "core/estimator/problem/truncation.h"
+#include "core/estimator/problem/validate_noise.h"
 #include "core/estimator/problem/validate_regularization.h"
 #include "core/model/list_names.h"
 
@@ -37,38 +38,6 @@ absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) 
         absl::StrFormat("%d must be at most %d with the truncated normal prior of %s", order,
                         Germ::kMaxTruncatedNormalOrder,
                         prior.parameters()[static_cast<size_t>(i)].name));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
-  const NoiseModel& noise = measured.noise;
-  for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
-                                     {"relative", noise.relative},
-                                     {"relative_to_max", noise.relative_to_max},
-                                     {"full_scale", noise.full_scale},
-                                     {"least", noise.least}}) {
-    if (!std::isfinite(value) || value < 0) {
-      return InvalidField({"measured", index, "noise", field},
-                          absl::StrFormat("%g must be a finite number ≥ 0", value));
-    }
-  }
-  if (!std::isfinite(noise.time_constant_s) || noise.time_constant_s < 0 ||
-      (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
-    return InvalidField(FieldPath{"measured", index, "noise", "correlation", "time_constant_s"},
-                        absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
-  }
-  if (noise.full_scale > 0 && noise.relative_to_max == 0) {
-    return InvalidField(
-        FieldPath{"measured", index, "noise", "full_scale"},
-        absl::StrFormat("%g has no effect without relativeToMax, the noise as a fraction of it",
-                        noise.full_scale));
-  }
-  if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
-    return InvalidField(FieldPath{"measured", index, "noise"},
-                        absl::StrFormat("output %s needs a noise: at least one of absolute, "
-                                        "relative, relativeToMax must be above 0",
-                                        measured.output));
   }
   return absl::OkStatus();
 }

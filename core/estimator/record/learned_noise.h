@@ -19,8 +19,11 @@ struct ChannelNoise {
   // Whether the part of the noise that is relative to a value is taken of the prediction at
   // LearnedNoise::centre. It is taken of the sample until there is a prediction.
   bool of_prediction = false;
+  double white_share = 0;  // of σ², uncorrelated; 0 ≤ … < 1, and 0 for white noise, too
   TimeConstantGrid grid =
       {};  // from which an unknown time constant is chosen; empty if none is yet
+
+  NoiseShape shape() const { return {time_constant_s, white_share}; }
 };
 
 // The position and spread of the posterior at the last revision; outliers are judged by their

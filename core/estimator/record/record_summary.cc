@@ -5,6 +5,17 @@
 
 namespace polyest::internal {
 
+namespace {
+
+// Returns S of whitening.h for samples at equal distances, in the long run: P⁻ solves
+//   P⁻ = a² P⁻ f/(P⁻ + f) + (1 − a²)(1 − f).
+double StationaryInnovation(double a, double share) {
+  const double b = 0.5 * (1 - a * a) * (1 - 2 * share);
+  return b + std::sqrt(b * b + share * (1 - share) * (1 - a * a)) + share;
+}
+
+}  // namespace
+
 double RecordSummary::Channel::RootMeanSquareNoise() const {
   return samples == 0 ? 0 : std::sqrt(noise_variance_sum / static_cast<double>(samples));
 }
@@ -62,7 +73,8 @@ double RecordSummary::NoiseToSignal(const LearnedNoise& noise) const {
   for (size_t c = 0; c < channels_.size(); ++c) {
     if (channels_[c].largest <= 0) continue;
     const double a = channels_[c].Correlation(noise.channels[c]);
-    const double innovation = noise.channels[c].scale * std::sqrt(1 - a * a);
+    const double variance = StationaryInnovation(a, noise.channels[c].white_share);
+    const double innovation = noise.channels[c].scale * std::sqrt(variance);
     least = std::min(least, innovation * channels_[c].RootMeanSquareNoise() / channels_[c].largest);
   }
   return least;

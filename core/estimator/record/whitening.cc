@@ -12,6 +12,7 @@ Whitening::Whitening(const std::vector<ChannelNoise>& noise, Eigen::Index trajec
     Channel channel;
     channel.scale = of_channel.scale;
     channel.time_constant_s = of_channel.time_constant_s;
+    channel.white_share = of_channel.white_share;
     channel.previous.output = Vector::Zero(trajectories);
     channel.scratch.resize(trajectories);
     channels_.push_back(std::move(channel));
@@ -41,20 +42,27 @@ void Whitening::Apply(int first, int count, RowBlock& block, MatrixRef outputs) 
 void Whitening::Whiten(Channel& channel, double time_s, double& value, double& noise,
                        VectorRef output) {
   const double raw_value = value, raw_noise = noise;
+  const double share = channel.white_share;  // f
+  double variance = 1 - share;               // P⁻
   channel.scratch = output;
   PreviousSample& previous = channel.previous;
   if (previous.known) {
     const double decay = (time_s - previous.time_s) / channel.time_constant_s;
-    const double g = std::exp(-decay) * noise / previous.noise;
+    const double a = std::exp(-decay);
+    const double g = a * noise / previous.noise;
     value -= g * previous.value;
     output -= g * previous.output;
-    noise *= std::sqrt(-std::expm1(-2 * decay));  // σ √(1 − a²)
+    variance = a * a * previous.variance - std::expm1(-2 * decay) * (1 - share);
   }
+  const double innovation = variance + share;  // S
+  const double kept = share / innovation;
+  noise *= std::sqrt(innovation);
   previous.known = true;
   previous.time_s = time_s;
-  previous.value = raw_value;
+  previous.value = raw_value - kept * value;
   previous.noise = raw_noise;
-  previous.output.swap(channel.scratch);
+  previous.variance = variance * kept;
+  previous.output = channel.scratch - kept * output;
 }
 
 std::vector<PreviousSample> Whitening::State() const {

@@ -115,6 +115,9 @@ struct ChannelEstimate {
   double effective_samples = 0;  // number of independent samples that would tell as much
   double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
   int64_t outliers = 0;              // number of samples with less than half their weight
+  // Share of the noise's variance that is uncorrelated where the rest is correlated over
+  // noise_time_constant_s, 0 ≤ … < 1; 0 for white noise, too.
+  double noise_white_share = 0;
 };
 
 // The expansion that the estimate was computed on.

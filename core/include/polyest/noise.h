@@ -8,12 +8,14 @@
 namespace polyest {
 
 // How the noise of an output's samples is correlated in time: e_k, in units of its standard
-// deviation, is first-order autoregressive (an Ornstein–Uhlenbeck process at the sample times),
-//   corr(e_k, e_j) = exp(−|t_k − t_j|/τ).
+// deviation, is white to the share f of its variance, and for the rest first-order autoregressive
+// (an Ornstein–Uhlenbeck process at the sample times),
+//   corr(e_k, e_j) = (1 − f) exp(−|t_k − t_j|/τ) for k ≠ j.
+// With f = 0 it is first-order autoregressive alone.
 enum class NoiseCorrelation {
   kWhite,    // none
-  kKnown,    // τ = time_constant_s
-  kUnknown,  // τ from the residuals; white until they show otherwise
+  kKnown,    // τ = time_constant_s and f = white_share
+  kUnknown,  // τ and f from the residuals; white until they show otherwise
 };
 
 // What is done about gross errors: a sample's noise variance is divided by a weight, a function of
@@ -43,6 +45,9 @@ struct NoiseModel {
   OutlierHandling outliers = OutlierHandling::kNone;        // what is done about gross errors
   double full_scale = 0;  // ≥ 0, in the output's unit; 0: not known
   double least = 0;       // ≥ 0, the least σ, in the output's unit
+  // f, 0 ≤ f < 1: the share of the variance that is white when the correlation is known. A sensor's
+  // noise on top of a model's slow error has both parts.
+  double white_share = 0;
 
   // The least magnitude that counts in `relative`, as a fraction of max |z|: samples at the zeros
   // of a signal are not arbitrarily accurate.

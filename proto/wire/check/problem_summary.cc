@@ -110,6 +110,10 @@ std::string DescribeNoise(const v1::MeasuredOutput::Noise& noise, const std::str
   if (noise.correlation().has_time_constant_s()) {
     absl::StrAppend(&text, ", correlated over ",
                     WithUnit(noise.correlation().time_constant_s(), "s"));
+    if (noise.correlation().white_share() > 0) {
+      absl::StrAppend(&text, " but for ", Number(100 * noise.correlation().white_share()),
+                      " % of its variance");
+    }
   } else if (noise.correlation().auto_()) {
     absl::StrAppend(&text, ", perhaps correlated");
   }

@@ -78,6 +78,7 @@ void ToProto(const ChannelEstimate& channel, v1::ChannelEstimate& proto) {
   proto.set_lag1_correlation(channel.lag1_correlation);
   proto.set_effective_samples(channel.effective_samples);
   proto.set_noise_time_constant_s(channel.noise_time_constant_s);
+  proto.set_noise_white_share(channel.noise_white_share);
   proto.set_outliers(channel.outliers);
 }
 

@@ -249,6 +249,7 @@ absl::StatusOr<NoiseModel> ToNoise(const v1::MeasuredOutput::Noise& given) {
   NoiseModel noise{given.absolute(), given.relative(), given.relative_to_max(), given.unknown()};
   noise.full_scale = given.full_scale();
   const auto& correlation = given.correlation();
+  noise.white_share = correlation.white_share();
   if (correlation.has_time_constant_s()) {
     noise.correlation = NoiseCorrelation::kKnown;
     noise.time_constant_s = correlation.time_constant_s();

@@ -124,6 +124,18 @@ TEST(PrintEstimate, DividesByNoSamples) {
   EXPECT_THAT(out.str(), HasSubstr("x        0        -   -           -         -      -\n"));
 }
 
+TEST(PrintEstimate, SaysHowTheNoiseIsCorrelated) {
+  v1::Estimate estimate = ExampleEstimate();
+  estimate.mutable_channels(0)->set_noise_time_constant_s(2);
+  std::ostringstream all, in_part;
+  PrintEstimate(estimate, all);
+  EXPECT_THAT(all.str(), HasSubstr("\nx: noise correlated over 2 s\n"));
+  estimate.mutable_channels(0)->set_noise_white_share(0.3);
+  PrintEstimate(estimate, in_part);
+  EXPECT_THAT(in_part.str(), HasSubstr("\nx: noise correlated over 2 s, but for the 30 % of its "
+                                       "variance that is white\n"));
+}
+
 TEST(EstimateLine, ShowsTimeAndEveryParameter) {
   EXPECT_EQ(EstimateLine(ExampleEstimate()),
             "t = 10 s  k = 40.6612 ± 0.0052 N/m  mu = 40.6612 ± 0.0052");

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "core/estimator/record/checkpoints.h"
 #include "core/model/equations/equation_model.h"
@@ -23,7 +24,7 @@ std::vector<double> AllNumbersOf(const Estimate& estimate) {
   std::vector<double> numbers = NumbersOf(estimate);
   for (const ChannelEstimate& c : estimate.channels) {
     numbers.insert(numbers.end(), {c.lag1_correlation, c.effective_samples, c.noise_time_constant_s,
-                                   static_cast<double>(c.outliers)});
+                                   c.noise_white_share, static_cast<double>(c.outliers)});
   }
   for (const ComponentEstimate& component : estimate.components) {
     numbers.push_back(component.weight);
@@ -122,6 +123,28 @@ TEST(Snapshot, HoldsTheSampleBeforeOfCorrelatedNoise) {
   for (const double t : samples.time_s)
     samples.columns[1].value.push_back(-3.4 * std::sin(3.1 * t));
   ExpectSameBitsThroughRestarts(problem, samples);
+}
+
+TEST(Snapshot, HoldsNoiseThatIsWhiteInPart) {
+  Problem problem = OscillatorProblem();
+  problem.measured = {{"x",
+                       {.absolute = 0.02,
+                        .correlation = NoiseCorrelation::kKnown,
+                        .time_constant_s = 0.3,
+                        .white_share = 0.4}},
+                      {"v", {.unknown = true, .correlation = NoiseCorrelation::kUnknown}}};
+  Samples samples = OscillatorRecord();
+  samples.columns.push_back({"v", {}, {}});
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  double slow = 0;
+  for (const double t : samples.time_s) {
+    slow = 0.95 * slow + 0.3 * normal(random);
+    samples.columns[1].value.push_back(-3.4 * std::sin(3.1 * t) + 0.1 * (slow + normal(random)));
+  }
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, samples);
+  EXPECT_EQ(outcome.estimates.back().channels[0].noise_white_share, 0.4);
+  EXPECT_GT(outcome.estimates.back().channels[1].noise_white_share, 0);
 }
 
 TEST(Snapshot, HoldsAnOrderChosenOnTheWay) {

@@ -25,7 +25,12 @@ Estimate TwoParameters() {
   estimate.covariance = (Matrix(2, 2) << 1, 2, 3, 4).finished();
   estimate.cost = {.mismatch = 10, .prior = 20, .total = 30};
   estimate.regularization = 0.25;
-  estimate.channels = {{.output = "x", .samples = 8, .chi_squared = 9, .noise_std_dev = 0.1}};
+  estimate.channels = {{.output = "x",
+                        .samples = 8,
+                        .chi_squared = 9,
+                        .noise_std_dev = 0.1,
+                        .noise_time_constant_s = 12,
+                        .noise_white_share = 0.75}};
   estimate.directions = {{.information = 11,
                           .coefficients = (Vector(2) << 0.6, 0.8).finished(),
                           .verdict = Verdict::kNotIdentified}};
@@ -96,6 +101,8 @@ TEST(EstimateToProto, CarriesEverythingElse) {
   EXPECT_EQ(proto.channels(0).samples(), 8);
   EXPECT_EQ(proto.channels(0).chi_squared(), 9);
   EXPECT_EQ(proto.channels(0).noise_std_dev(), 0.1);
+  EXPECT_EQ(proto.channels(0).noise_time_constant_s(), 12);
+  EXPECT_EQ(proto.channels(0).noise_white_share(), 0.75);
   ASSERT_EQ(proto.directions_size(), 1);
   EXPECT_EQ(proto.directions(0).information(), 11);
   ASSERT_EQ(proto.directions(0).coefficients_size(), 2);

@@ -219,6 +219,19 @@ TEST(ToProblem, TakesTheNoiseOfEachOutput) {
   EXPECT_EQ(measured.noise.full_scale, 50);
 }
 
+TEST(ToProblem, TakesTheCorrelationOfTheNoise) {
+  v1::Problem given = SmallProblem();
+  given.clear_measured();
+  given.MergeFrom(ProblemFromJson(R"({"measured": [{"output": "x", "noise": {
+      "absolute": 0.1, "correlation": {"timeConstantS": 2, "whiteShare": 0.25}}}]})"));
+  const auto resolved = ToProblem(given);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  const NoiseModel& noise = resolved->problem().measured.at(0).noise;
+  EXPECT_EQ(noise.correlation, NoiseCorrelation::kKnown);
+  EXPECT_EQ(noise.time_constant_s, 2);
+  EXPECT_EQ(noise.white_share, 0.25);
+}
+
 TEST(ToProblem, NamesThePlaceOfABadPrior) {
   EXPECT_EQ(MessageWith(R"({"uncertain": [{"name": "k", "uniform": {"lower": 5, "upper": 3}}]})"),
             "uncertain[0].uniform: lower 5 must be below upper 3");
@@ -256,6 +269,13 @@ TEST(ToProblem, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(MessageWith(R"({"measured": [{"output": "x"}]})"), StartsWith("measured[0].noise: "));
   EXPECT_THAT(MessageWith(R"({"measured": [{"output": "x", "noise": {"relative": -1}}]})"),
               StartsWith("measured[0].noise.relative: -1"));
+  EXPECT_EQ(MessageWith(R"({"measured": [{"output": "x", "noise": {
+                "absolute": 1, "correlation": {"timeConstantS": 2, "whiteShare": 1}}}]})"),
+            "measured[0].noise.correlation.whiteShare: 1 must be at least 0 and below 1");
+  EXPECT_THAT(MessageWith(R"({"measured": [{"output": "x", "noise": {
+                  "absolute": 1, "correlation": {"auto": true, "whiteShare": 0.5}}}]})"),
+              StartsWith("measured[0].noise.correlation.whiteShare: 0.5 has no effect without "
+                         "timeConstantS"));
   EXPECT_THAT(MessageWith(R"({"inputs": [{"name": "force"}]})"),
               StartsWith("inputs[0]: force needs a signal"));
   EXPECT_THAT(MessageWith(R"({"inputs": [{"name": "wind", "constant": {}}]})"),

@@ -283,5 +283,21 @@ TEST(ProblemOfUnknownNoise, RefusesACorrelationWithoutATimeConstant) {
   }
 }
 
+TEST(ProblemOfUnknownNoise, RefusesAWhiteShareThatIsNone) {
+  NoiseModel noise{.absolute = 1, .correlation = NoiseCorrelation::kKnown, .time_constant_s = 1};
+  for (const double bad : {-0.1, 1.0, std::nan("")}) {
+    noise.white_share = bad;
+    EXPECT_THAT(std::string(ResolvedProblem::Make(ProblemWith(noise)).status().message()),
+                HasSubstr("measured[0].noise.correlation.white_share: "));
+  }
+  noise.white_share = 0.5;
+  EXPECT_TRUE(ResolvedProblem::Make(ProblemWith(noise)).ok());
+  for (const NoiseCorrelation other : {NoiseCorrelation::kWhite, NoiseCorrelation::kUnknown}) {
+    noise.correlation = other;
+    EXPECT_THAT(std::string(ResolvedProblem::Make(ProblemWith(noise)).status().message()),
+                HasSubstr("white_share: 0.5 has no effect without timeConstantS"));
+  }
+}
+
 }  // namespace
 }  // namespace polyest::internal

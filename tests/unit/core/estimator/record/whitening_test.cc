@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace polyest::internal {
 namespace {
@@ -31,7 +32,10 @@ struct Record {
   Matrix outputs;  // of two trajectories
 };
 
-TEST(Whitening, IsThatOfTheCholeskyFactor) {
+class WhiteningWithAShare : public ::testing::TestWithParam<double> {};
+
+TEST_P(WhiteningWithAShare, IsThatOfTheCholeskyFactor) {
+  const double share = GetParam();
   Record record;
   const Record raw;
   const double scale = 2;
@@ -46,15 +50,16 @@ TEST(Whitening, IsThatOfTheCholeskyFactor) {
     for (int j = 0; j < 5; ++j) {
       const auto l = static_cast<size_t>(there[static_cast<size_t>(j)]);
       const double lag = std::abs(raw.block.rows[k].time_s - raw.block.rows[l].time_s);
-      covariance(i, j) =
-          scale * scale * raw.block.noise[k] * raw.block.noise[l] * std::exp(-lag / kTimeConstant);
+      const double correlation = k == l ? 1 : (1 - share) * std::exp(-lag / kTimeConstant);
+      covariance(i, j) = scale * scale * raw.block.noise[k] * raw.block.noise[l] * correlation;
     }
   }
   const Matrix factor = covariance.llt().matrixL();
   const Vector white = factor.triangularView<Eigen::Lower>().solve(z);
   const Matrix white_outputs = factor.triangularView<Eigen::Lower>().solve(y);
 
-  Whitening whitening({{scale, kTimeConstant, true}}, 2);
+  Whitening whitening({{.scale = scale, .time_constant_s = kTimeConstant, .white_share = share}},
+                      2);
   whitening.BeginRun();
   // The whitening takes the block in two pieces.
   whitening.Apply(0, 4, record.block, record.outputs.leftCols(4));
@@ -69,6 +74,8 @@ TEST(Whitening, IsThatOfTheCholeskyFactor) {
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(OfWhiteNoise, WhiteningWithAShare, ::testing::Values(0, 0.02, 0.4, 0.98));
+
 TEST(Whitening, BeginsAnewWithARun) {
   Record record;
   const Record raw;
@@ -81,6 +88,20 @@ TEST(Whitening, BeginsAnewWithARun) {
   EXPECT_EQ(record.block.noise[3], raw.block.noise[3]);
   EXPECT_EQ(record.outputs.col(3), raw.outputs.col(3));
   EXPECT_NE(record.block.values[4], raw.block.values[4]);
+}
+
+TEST(Whitening, ContinuesFromAState) {
+  Record whole, restored;
+  const std::vector<ChannelNoise> noise = {{.time_constant_s = kTimeConstant, .white_share = 0.4}};
+  Whitening first(noise, 2), second(noise, 2);
+  first.Apply(0, 6, whole.block, whole.outputs);
+  Whitening before(noise, 2);
+  before.Apply(0, 4, restored.block, restored.outputs.leftCols(4));
+  second.Restore(before.State());
+  second.Apply(4, 2, restored.block, restored.outputs.rightCols(2));
+  EXPECT_EQ(restored.block.values[5], whole.block.values[5]);
+  EXPECT_EQ(restored.block.noise[5], whole.block.noise[5]);
+  EXPECT_EQ(restored.outputs.col(5), whole.outputs.col(5));
 }
 
 TEST(Whitening, OnlyScalesWhiteNoise) {

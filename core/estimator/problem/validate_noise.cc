@@ -1,0 +1,66 @@
+#include "core/estimator/problem/validate_noise.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/common/field_error.h"
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::Status ValidateCorrelation(int index, const NoiseModel& noise) {
+  const auto field = [index](const char* name) {
+    return FieldPath{"measured", index, "noise", "correlation", name};
+  };
+  if (!std::isfinite(noise.time_constant_s) || noise.time_constant_s < 0 ||
+      (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
+    return InvalidField(field("time_constant_s"),
+                        absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
+  }
+  if (!(noise.white_share >= 0 && noise.white_share < 1)) {
+    return InvalidField(field("white_share"),
+                        absl::StrFormat("%g must be at least 0 and below 1", noise.white_share));
+  }
+  if (noise.white_share > 0 && noise.correlation != NoiseCorrelation::kKnown) {
+    return InvalidField(field("white_share"),
+                        absl::StrFormat("%g has no effect without timeConstantS, over which the "
+                                        "rest of the noise is correlated",
+                                        noise.white_share));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
+  const NoiseModel& noise = measured.noise;
+  for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
+                                     {"relative", noise.relative},
+                                     {"relative_to_max", noise.relative_to_max},
+                                     {"full_scale", noise.full_scale},
+                                     {"least", noise.least}}) {
+    if (!std::isfinite(value) || value < 0) {
+      return InvalidField({"measured", index, "noise", field},
+                          absl::StrFormat("%g must be a finite number ≥ 0", value));
+    }
+  }
+  POLYEST_RETURN_IF_ERROR(ValidateCorrelation(index, noise));
+  if (noise.full_scale > 0 && noise.relative_to_max == 0) {
+    return InvalidField(
+        FieldPath{"measured", index, "noise", "full_scale"},
+        absl::StrFormat("%g has no effect without relativeToMax, the noise as a fraction of it",
+                        noise.full_scale));
+  }
+  if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
+    return InvalidField(FieldPath{"measured", index, "noise"},
+                        absl::StrFormat("output %s needs a noise: at least one of absolute, "
+                                        "relative, relativeToMax must be above 0",
+                                        measured.output));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace polyest::internal
