@@ -4,7 +4,7 @@
 
 #include <absl/status/status.h>
 
-#include "polyest/estimator.h"
+#include "polyest/problem.h"
 
 namespace polyest::internal {
 
