@@ -10,7 +10,8 @@ Every prior is made uniform over the range of its own, and every noise absolute.
     noise F       The assumed noise is F times the residual. With flat priors the minimum of the cost stays
                   where it is, so `map` must be within 0.1 standard deviations of that of factor 1. So must
                   the mean for factors up to 1, where the posterior is that of the residuals. For larger
-                  ones it is not compared: a wider posterior is more skewed, and its mean moves.
+                  ones it is not compared: a wider posterior is more skewed, and its mean moves. An answer
+                  that carries EXPANSION_INACCURATE or NOT_CONVERGED says so itself and passes.
     thinned by K  Only every K-th row has samples; streamed inputs keep all rows. Every mean of the whole
                   record must be within the thinned record's interval in which all n parameters together
                   would be with a probability of 95 %: the 95 % interval of each, widened by Bonferroni's
@@ -47,6 +48,8 @@ THINNINGS = (2, 5)
 MISSED = "MISSED"
 NOISE_LIMIT = 0.1  # standard deviations
 ADMITTED = {"WINDOWS_DISAGREE", "INCONSISTENT_OVER_TIME"}
+# With these an answer says itself that its numbers are off.
+NOT_TO_BE_BELIEVED = {"EXPANSION_INACCURATE", "NOT_CONVERGED"}
 WALL_SECONDS = 1200
 
 
@@ -237,7 +240,7 @@ def judge_noise(reference, answer, factor):
             sd = max(sd, float(parameter["stdDev"]))
         for key in ("map", "mean") if factor <= 1 else ("map",):
             shifts[f"{name}.{key}"] = ratio(abs(float(parameter[key]) - float(known[key])), sd)
-    return *worst(shifts), NOISE_LIMIT, None
+    return *worst(shifts), NOISE_LIMIT, ", ".join(sorted(codes(answer) & NOT_TO_BE_BELIEVED))
 
 
 def judge_thinned(whole, thinned):
