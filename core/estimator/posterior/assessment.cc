@@ -14,8 +14,8 @@
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/channel_description.h"
 #include "core/estimator/posterior/diagnosis.h"
-#include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/model_correction.h"
 #include "core/estimator/posterior/noise_learning.h"
@@ -25,11 +25,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr Eigen::Index kDrawsForNoise = 200;
 constexpr int kDrawsForEdges = 2'000;
 // Fraction of the posterior at an edge of the region from which on its being cut there matters.
 constexpr double kOverEdge = 0.03;
-constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
 // Other minima count when their density is at least this fraction of the best one's: e^−7 ≈ 10⁻³.
 constexpr double kComparableCost = 7;
 // An isolated minimum has all curvatures above the prior's; the floor of a valley does not.
@@ -82,7 +80,7 @@ class Assessment {
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
-    DescribeChannels(cost, eta);
+    estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
     DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);
     DescribeBias(cost, eta, stop);
@@ -323,56 +321,6 @@ class Assessment {
       scores =
           (centre + widening * (scores - centre)).max(prior_.lower()[i]).min(prior_.upper()[i]);
     }
-  }
-
-  void DescribeChannels(const Cost& cost, const Vector& eta) {
-    const Vector d = cost.BasisDifference(eta);
-    for (int c = 0; c < problem_.channels(); ++c) {
-      ChannelEstimate channel;
-      channel.output = problem_.problem().measured[static_cast<size_t>(c)].output;
-      if (!request_.record->channels().empty()) DescribeChannel(cost, d, c, channel);
-      estimate_.channels.push_back(std::move(channel));
-    }
-  }
-
-  void DescribeChannel(const Cost& cost, const Vector& d, int c, ChannelEstimate& channel) const {
-    const RecordSummary::Channel& summary = request_.record->channels()[static_cast<size_t>(c)];
-    const ChannelSums& sums = request_.expansion->sums()[static_cast<size_t>(c)];
-    const ChannelNoise& noise = request_.expansion->noise().channels[static_cast<size_t>(c)];
-    channel.samples = summary.samples;
-    if (summary.samples == 0) return;
-    const auto samples = static_cast<double>(summary.samples);
-    // With N degrees of freedom, χ²/N has the mean 1 if the working noise has the right size.
-    const double mean_square =
-        sums.scale_unknown ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums) / sums.Degrees())
-                           : 1;
-    channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
-    channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
-    const double share = fitted_ * samples / static_cast<double>(request_.record->samples());
-    channel.lag1_correlation =
-        std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
-    channel.noise_time_constant_s = noise.time_constant_s;
-    channel.noise_white_share = noise.white_share;
-    channel.outliers = request_.expansion->Outliers(c);
-    const double a = std::max(0.0, channel.lag1_correlation);
-    channel.effective_samples =
-        samples * (noise.time_constant_s > 0
-                       ? IndependentShare(request_.record->beginning(), c, noise.shape())
-                       : (1 - a) / (1 + a));
-  }
-
-  // Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
-  double MeanChiSquared(const Cost& cost, const ChannelSums& sums) const {
-    const Eigen::Index stride =
-        std::max<Eigen::Index>(1, posterior_.scores.rows() / kDrawsForNoise);
-    double sum = 0, weights = 0;
-    for (Eigen::Index i = 0; i < posterior_.scores.rows(); i += stride) {
-      const Vector xi = prior_.OfScores(posterior_.scores.row(i).transpose());
-      const double weight = posterior_.weights[i];
-      sum += weight * sums.samples.ChiSquared(cost.BasisDifference(design_.region.ToLocal(xi)));
-      weights += weight;
-    }
-    return sum / weights;
   }
 
   const ResolvedProblem& problem_;

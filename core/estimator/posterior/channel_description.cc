@@ -1,0 +1,76 @@
+#include "core/estimator/posterior/channel_description.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/estimator/posterior/independent_share.h"
+#include "core/estimator/posterior/noise_learning.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr Eigen::Index kDrawsForNoise = 200;
+constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
+
+// Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
+double MeanChiSquared(const Cost& cost, const ChannelSums& sums, const PosteriorDraws& posterior) {
+  const Eigen::Index stride = std::max<Eigen::Index>(1, posterior.scores.rows() / kDrawsForNoise);
+  double sum = 0, weights = 0;
+  for (Eigen::Index i = 0; i < posterior.scores.rows(); i += stride) {
+    const Vector xi = cost.prior().OfScores(posterior.scores.row(i).transpose());
+    const double weight = posterior.weights[i];
+    sum += weight * sums.samples.ChiSquared(cost.BasisDifference(cost.region().ToLocal(xi)));
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& d,
+                     const PosteriorDraws& posterior, double fitted, int c,
+                     ChannelEstimate& channel) {
+  const RecordSummary::Channel& summary = request.record->channels()[static_cast<size_t>(c)];
+  const ChannelSums& sums = request.expansion->sums()[static_cast<size_t>(c)];
+  const ChannelNoise& noise = request.expansion->noise().channels[static_cast<size_t>(c)];
+  channel.samples = summary.samples;
+  if (summary.samples == 0) return;
+  const auto samples = static_cast<double>(summary.samples);
+  // With N degrees of freedom, χ²/N has the mean 1 if the working noise has the right size.
+  const double mean_square =
+      sums.scale_unknown
+          ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums, posterior) / sums.Degrees())
+          : 1;
+  channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
+  channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
+  const double share = fitted * samples / static_cast<double>(request.record->samples());
+  channel.lag1_correlation =
+      std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
+  channel.noise_time_constant_s = noise.time_constant_s;
+  channel.noise_white_share = noise.white_share;
+  channel.outliers = request.expansion->Outliers(c);
+  const double a = std::max(0.0, channel.lag1_correlation);
+  channel.effective_samples =
+      samples * (noise.time_constant_s > 0
+                     ? IndependentShare(request.record->beginning(), c, noise.shape())
+                     : (1 - a) / (1 + a));
+}
+
+}  // namespace
+
+std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, const Cost& cost,
+                                              const Vector& eta, const PosteriorDraws& posterior,
+                                              double fitted) {
+  const Vector d = cost.BasisDifference(eta);
+  std::vector<ChannelEstimate> channels;
+  for (int c = 0; c < request.problem->channels(); ++c) {
+    ChannelEstimate channel;
+    channel.output = request.problem->problem().measured[static_cast<size_t>(c)].output;
+    if (!request.record->channels().empty()) {
+      DescribeChannel(request, cost, d, posterior, fitted, c, channel);
+    }
+    channels.push_back(std::move(channel));
+  }
+  return channels;
+}
+
+}  // namespace polyest::internal
