@@ -185,7 +185,9 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
   }
   if (LookForPieces()) return true;
   if (short_of_trajectories) {
-    if (BisectElement()) return true;
+    // Where not one trajectory is left in an element and in its halves, it is not searched further.
+    const bool hopeless = bisected_ && expansion_->kept_points().empty();
+    if (!hopeless && BisectElement()) return true;
     return expansion_->shortage();
   }
   if (MayBisect()) return false;
