@@ -67,8 +67,8 @@ TEST(SecondSearch, KeepsWhatItCannotBetter) {
     samples.time_s.push_back(0.1 * k);
     samples.columns[0].value.push_back(k % 2 == 0 ? 2 : -2);
   }
-  const Estimate estimate = EstimateOf(
-      TextProblem("a", {*UncertainParameter::Uniform("a", -3, 3)}, kNoise), samples);
+  const Estimate estimate =
+      EstimateOf(TextProblem("a", {*UncertainParameter::Uniform("a", -3, 3)}, kNoise), samples);
   EXPECT_TRUE(Has(estimate, DiagnosticCode::kModelMisfit));
   EXPECT_NEAR(estimate.parameters[0].map, 0, 1e-6);
 }
