@@ -77,6 +77,10 @@ class LocalBackend : public Backend {
     return polyest::internal::ComputeRegularizationSweep(request, threads_, stop_, *models_, {},
                                                          MakeStore());
   }
+  absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request) override {
+    POLYEST_RETURN_IF_ERROR(models_.status());
+    return polyest::internal::Predict(request, threads_, stop_, *models_, {}, MakeStore());
+  }
 
  private:
   std::shared_ptr<SampleStore> MakeStore() const {
@@ -145,6 +149,9 @@ class RemoteBackend : public Backend {
   absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request) override {
     return WithSizeHint(client_.ComputeRegularizationSweep(request));
+  }
+  absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request) override {
+    return WithSizeHint(client_.Predict(request));
   }
 
  private:

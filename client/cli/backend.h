@@ -37,6 +37,7 @@ class Backend {
       const v1::ComputeCostProfilesRequest& request) = 0;
   virtual absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request) = 0;
+  virtual absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request) = 0;
 };
 
 // Returns the options for the client of a place. The token comes from the environment variable

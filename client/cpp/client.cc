@@ -165,6 +165,10 @@ absl::StatusOr<v1::ComputeRegularizationSweepResponse> Client::ComputeRegulariza
   return Call(studies_.get(), &v1::StudyService::Stub::ComputeRegularizationSweep, request);
 }
 
+absl::StatusOr<v1::PredictResponse> Client::Predict(const v1::PredictRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::Predict, request);
+}
+
 absl::StatusOr<v1::Operation> Client::StartComputation(const v1::StartComputationRequest& request) {
   return Call(operations_.get(), &v1::OperationService::Stub::StartComputation, request);
 }

@@ -19,6 +19,7 @@
 #include "core/estimator/snapshot.h"
 #include "core/estimator/studies/cost_profile.h"
 #include "core/estimator/studies/posterior_study.h"
+#include "core/estimator/studies/prediction.h"
 #include "core/estimator/studies/regularization_sweep.h"
 
 namespace polyest {
@@ -62,9 +63,13 @@ class Estimator::Implementation {
                                                const Stop& stop) const;
   absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
       const RegularizationOptions& options, const Stop& stop) const;
+  absl::StatusOr<Prediction> CurrentPrediction(const PredictionOptions& options,
+                                               const Stop& stop) const;
 
  private:
   int64_t SettledRows() const;
+  absl::StatusOr<Prediction> PredictOther(PredictionSubject subject,
+                                          const PredictionOptions& options, const Stop& stop) const;
   void MakeSnapshot(int64_t rows);
 
   ResolvedProblem problem_;
@@ -184,6 +189,47 @@ absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegulariza
   return SweepRegularization(problem_, expansion, assessed.whole, options, stop);
 }
 
+absl::StatusOr<Prediction> Estimator::Implementation::CurrentPrediction(
+    const PredictionOptions& options, const Stop& stop) const {
+  POLYEST_RETURN_IF_ERROR(Validate(options, problem_, rows_processed()));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
+                           mixture_->Assess(PosteriorEffort(), stop));
+  const AssessmentRequest heaviest =
+      mixture_->component(assessed.order.front()).RequestAssessment();
+  PredictionSubject subject;
+  subject.problem = &problem_;
+  subject.store = store_.get();
+  subject.rows = rows_processed();
+  subject.thetas = EquallyWeightedThetas(assessed.whole.posterior, problem_.prior(), options.draws);
+  subject.noise = NoiseOf(assessed.whole, *heaviest.record, heaviest.expansion->noise(), problem_);
+  absl::StatusOr<Prediction> prediction = options.record
+                                              ? PredictOther(std::move(subject), options, stop)
+                                              : Predict(subject, options, threads_, stop);
+  POLYEST_RETURN_IF_ERROR(prediction.status());
+  prediction->diagnostics = assessed.whole.estimate.diagnostics;
+  return prediction;
+}
+
+// Predicts another record with the subject's values.
+absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSubject subject,
+                                                                   const PredictionOptions& options,
+                                                                   const Stop& stop) const {
+  const std::vector<int>& runs = options.record->run;
+  const int last_run = runs.empty() ? 0 : *std::max_element(runs.begin(), runs.end());
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem other,
+                           problem_.WithRuns(problem_.per_run() ? std::max(0, last_run) + 1 : 1));
+  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked,
+                           SampleChecks(other).Check(*options.record));
+  MemoryStore store;
+  POLYEST_RETURN_IF_ERROR(store.Append(checked));
+  POLYEST_RETURN_IF_ERROR(Validate(options, other, store.rows()));
+  subject.thetas = ThetasOfOtherRuns(problem_, subject.thetas, other);
+  subject.problem = &other;
+  subject.store = &store;
+  subject.rows = store.rows();
+  return Predict(subject, options, threads_, stop);
+}
+
 Estimator::Estimator(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 Estimator::~Estimator() = default;
@@ -211,6 +257,10 @@ absl::StatusOr<CostProfiles> Estimator::CurrentProfiles(const ProfileOptions& op
 absl::StatusOr<RegularizationSweep> Estimator::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {
   return implementation_->CurrentRegularizationSweep(options, stop);
+}
+absl::StatusOr<Prediction> Estimator::CurrentPrediction(const PredictionOptions& options,
+                                                        const Stop& stop) const {
+  return implementation_->CurrentPrediction(options, stop);
 }
 absl::Status Estimator::Restore(const EstimatorSnapshot& snapshot) {
   return implementation_->Restore(snapshot);

@@ -45,6 +45,7 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"ComputePosterior", Role::kReader},
     {"ComputeCostProfiles", Role::kReader},
     {"ComputeRegularizationSweep", Role::kReader},
+    {"Predict", Role::kReader},
     {"StartComputation", Role::kReader},
     {"GetOperation", Role::kReader},
     {"ListOperations", Role::kReader},

@@ -41,6 +41,7 @@ auto Run(const v1::ComputeCostProfilesRequest& request, auto&&... of) {
 auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
   return ComputeRegularizationSweep(request, of...);
 }
+auto Run(const v1::PredictRequest& request, auto&&... of) { return Predict(request, of...); }
 
 // Selects the studies of a session that run the model themselves, from its problem and its rows,
 // and need no estimator.
@@ -177,6 +178,8 @@ template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
 template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
                                       const v1::ComputeRegularizationSweepRequest*,
                                       v1::ComputeRegularizationSweepResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::PredictRequest*, v1::PredictResponse*);
 
 absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& caller,
                                    const v1::StartComputationRequest* request,
@@ -201,6 +204,8 @@ absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& 
       return job(request->cost_profiles(), result->mutable_cost_profiles());
     case v1::StartComputationRequest::kRegularizationSweep:
       return job(request->regularization_sweep(), result->mutable_regularization_sweep());
+    case v1::StartComputationRequest::kPrediction:
+      return job(request->prediction(), result->mutable_prediction());
     case v1::StartComputationRequest::COMPUTATION_NOT_SET:
       break;
   }

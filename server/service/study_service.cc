@@ -45,6 +45,10 @@ class StudyService final : public v1::StudyService::CallbackService {
                                     v1::ComputeRegularizationSweepResponse* response) override {
     return Compute(call, "ComputeRegularizationSweep", request, response);
   }
+  Unary* Predict(Context* call, const v1::PredictRequest* request,
+                 v1::PredictResponse* response) override {
+    return Compute(call, "Predict", request, response);
+  }
 
  private:
   template <typename Request, typename Response>

@@ -103,7 +103,7 @@ void RegionalExpansion::StartControls(int run) {
   integration.max_steps =
       integration.max_steps > most / kMoreSteps ? most : kMoreSteps * integration.max_steps;
   control_propagator_ =
-      std::make_unique<EnsemblePropagator>(std::move(specification), inputs_.get());
+      std::make_unique<EnsemblePropagator>(std::move(specification), &inputs_->signals());
 }
 
 // Advances all trajectories over rows of the block that are of the present run.

@@ -198,7 +198,7 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
   const bool streamed = !problem_.streamed_inputs().empty();
   for (int64_t first = begin; streamed && first < rows; first += kKnotRows) {
     POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kKnotRows, rows - first), block_));
-    AppendKnots(0);
+    inputs_->Append(block_, 0);
   }
   const bool controls_fit =
       controls_ == 0 ||

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "core/bayes/noise.h"
@@ -112,14 +111,12 @@ void RegionalExpansion::LookFromPosterior() {
 // Each run begins at t = 0 from the initial states, with its own inputs.
 void RegionalExpansion::StartRun(int run) {
   run_ = run;
-  knot_time_s_ = -std::numeric_limits<double>::infinity();
-  inputs_finished_ = false;
   whitening_.BeginRun();
   propagator_.reset();
   control_propagator_.reset();
-  inputs_ = std::make_unique<InputSignals>(problem_.MakeInputs());
+  inputs_ = std::make_unique<RunInputs>(problem_, run);
   propagator_ = std::make_unique<EnsemblePropagator>(
-      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), inputs_.get());
+      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), &inputs_->signals());
   StartControls(run);
 }
 
@@ -150,34 +147,12 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
 }
 
 absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
-  AppendKnots(first);
+  inputs_->Append(block_, static_cast<size_t>(first));
   POLYEST_RETURN_IF_ERROR(Advance(first, count, stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
   PredictNoise(first);
   return absl::OkStatus();
-}
-
-// Appends the knots of the present run's streamed inputs that the block contains, from this row on.
-// Rows ahead come again with the next block.
-void RegionalExpansion::AppendKnots(int row) {
-  const std::vector<int>& streamed = problem_.streamed_inputs();
-  if (streamed.empty()) return;
-  const size_t width = block_.values.size() / block_.rows.size();
-  auto k = static_cast<size_t>(row);
-  for (; k < block_.rows.size() && block_.rows[k].run == run_; ++k) {
-    const double time_s = block_.rows[k].time_s;
-    if (time_s <= knot_time_s_) continue;
-    for (size_t i = 0; i < streamed.size(); ++i) {
-      const double value = block_.values[k * width + static_cast<size_t>(channels_) + i];
-      (*inputs_)[static_cast<size_t>(streamed[i])].Append(time_s, value);
-    }
-    knot_time_s_ = time_s;
-  }
-  const bool complete = k < block_.rows.size() || block_.run_ended;
-  if (!complete || inputs_finished_) return;
-  for (const int input : streamed) (*inputs_)[static_cast<size_t>(input)].Finish();
-  inputs_finished_ = true;
 }
 
 // Fits each stretch of rows over which the same trajectories are valid.

@@ -24,6 +24,7 @@
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
+#include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/whitening.h"
 #include "core/estimator/record/window_sums.h"
 #include "polyest/samples.h"
@@ -179,7 +180,6 @@ class RegionalExpansion {
   absl::Status PropagateRun(int first, int count, const Stop& stop);
   absl::Status RestoreFit(ExpansionState& state);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
-  void AppendKnots(int row);
   void FitRows(int first, int count);
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
@@ -216,10 +216,8 @@ class RegionalExpansion {
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // collocation points that are still in the fit
   int run_ = -1;
-  int controls_;  // K
-  std::unique_ptr<InputSignals> inputs_;
-  double knot_time_s_ = 0;        // time of the last knot of the streamed inputs
-  bool inputs_finished_ = false;  // whether the run has no more knots
+  int controls_;                       // K
+  std::unique_ptr<RunInputs> inputs_;  // of the present run
   std::unique_ptr<EnsemblePropagator> propagator_;
   std::unique_ptr<EnsemblePropagator> control_propagator_;  // null without controls
   std::vector<FailedTrajectory> failures_;

@@ -22,6 +22,7 @@
 #include "polyest/cost_profile.h"
 #include "polyest/estimate.h"
 #include "polyest/posterior.h"
+#include "polyest/prediction.h"
 #include "polyest/problem.h"
 #include "polyest/regularization.h"
 #include "polyest/samples.h"
@@ -102,6 +103,14 @@ class Estimator {
   // its value and the rule; otherwise as CurrentEstimate.
   absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
       const RegularizationOptions& options, const Stop& stop = {}) const;
+
+  // Returns what the posterior of the same samples predicts for the signals, over the processed
+  // rows or another record. INVALID_ARGUMENT names the option, its value and the rule, or of the
+  // other record the row and the column; RESOURCE_EXHAUSTED for an answer that is too large;
+  // FAILED_PRECONDITION if too few of its trajectories can be integrated; otherwise as
+  // CurrentEstimate.
+  absl::StatusOr<Prediction> CurrentPrediction(const PredictionOptions& options,
+                                               const Stop& stop = {}) const;
 
   // The number of rows appended.
   int64_t rows_appended() const;

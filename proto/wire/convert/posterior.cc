@@ -2,25 +2,10 @@
 
 #include "core/common/check.h"
 #include "proto/wire/convert/estimate.h"
+#include "proto/wire/convert/repeated.h"
 
 namespace polyest::internal {
 namespace {
-
-using Doubles = google::protobuf::RepeatedField<double>;
-
-void Append(const Vector& values, Doubles& added) {
-  added.Add(values.data(), values.data() + values.size());
-}
-
-// Appends a matrix in row-major order, whatever its storage order.
-void Append(const Matrix& values, Doubles& added) {
-  added.Reserve(static_cast<int>(values.size()));
-  for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    for (Eigen::Index column = 0; column < values.cols(); ++column) {
-      added.Add(values(row, column));
-    }
-  }
-}
 
 v1::ComputePosteriorResponse::Method ToProto(PosteriorMethod method) {
   switch (method) {

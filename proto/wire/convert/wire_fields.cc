@@ -17,8 +17,11 @@ using Names = std::map<std::string, std::string>;
 // where the names of counts end in "Count", and fields of measurements. Structures inside of a
 // request, such as `expansion.points`, have the core's names.
 const Names kNamesOfRequests{{"density_bins", "densityBinCount"},
+                             {"draws", "drawCount"},
                              {"grid_points", "pointCount"},
                              {"joint_bins", "jointBinCount"},
+                             {"lags", "lagCount"},
+                             {"max_rows", "maxRowCount"},
                              {"points", "pointCount"},
                              {"samples", "sampleCount"}};
 const Names kNamesOfMeasurements{{"columns", "channels"}, {"value", "values"}};

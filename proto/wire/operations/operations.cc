@@ -18,6 +18,7 @@
 #include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/model.h"
 #include "proto/wire/convert/posterior.h"
+#include "proto/wire/convert/prediction.h"
 #include "proto/wire/convert/problem_limits.h"
 #include "proto/wire/convert/regularization.h"
 #include "proto/wire/convert/studies.h"
@@ -240,6 +241,25 @@ absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSwee
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
                            TakeAll(*experiment, threads, models, limits, std::move(store)));
   return ComputeRegularizationSweep(request, *estimator, stop);
+}
+
+absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, Estimator& estimator,
+                                            const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const PredictionOptions options, ToPredictionOptions(request));
+  POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const Prediction prediction,
+                           WireFields(estimator.CurrentPrediction(options, stop)));
+  return ToProto(prediction, options);
+}
+
+absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, int threads,
+                                            const Stop& stop, const ModelLibrary& models,
+                                            const ProblemLimits& limits,
+                                            std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  return Predict(request, *estimator, stop);
 }
 
 absl::StatusOr<v1::ListModelsResponse> ListModels(const v1::ListModelsRequest& request,

@@ -53,6 +53,10 @@ absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSwee
     const v1::ComputeRegularizationSweepRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models = {}, const ProblemLimits& limits = {},
     std::shared_ptr<SampleStore> store = nullptr);
+absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, int threads,
+                                            const Stop& stop, const ModelLibrary& models = {},
+                                            const ProblemLimits& limits = {},
+                                            std::shared_ptr<SampleStore> store = nullptr);
 
 // The following functions compute the same responses from an estimator that holds the measurements,
 // such as that of a session. They ignore the subject of the request. They first process the
@@ -64,6 +68,8 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
     const v1::ComputeCostProfilesRequest& request, Estimator& estimator, const Stop& stop);
 absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
     const v1::ComputeRegularizationSweepRequest& request, Estimator& estimator, const Stop& stop);
+absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, Estimator& estimator,
+                                            const Stop& stop);
 // Computes the response from `known`, the estimate so far; without one, from the problem's prior.
 absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
     const v1::ComputeExperimentDesignRequest& request, const v1::Problem& problem,

@@ -1,0 +1,71 @@
+#pragma once
+
+// Trajectories of the model over a record, for given values of the uncertain parameters. Beside the
+// record's rows, outputs may be asked for at other times.
+
+#include <absl/functional/function_ref.h>
+#include <absl/status/status.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/run_inputs.h"
+#include "core/propagation/ensemble_propagator.h"
+#include "polyest/samples.h"
+#include "polyest/stop.h"
+
+namespace polyest::internal {
+
+// A time at which trajectories have outputs.
+struct TrajectoryInstant {
+  SampleRow place;
+  int64_t row = -1;  // of the record; −1 for a time asked for
+  // The row's samples, one for each measured output, NaN where missing; empty for a time asked for.
+  std::span<const double> samples;
+};
+
+class RecordTrajectories {
+ public:
+  // Receives the outputs at an instant, trajectories × outputs; NaN from a trajectory's failure on.
+  using Visit =
+      absl::FunctionRef<absl::Status(const TrajectoryInstant&, const ConstMatrixRef& outputs)>;
+
+  // `thetas`: one trajectory for each row, trajectories × n. `outputs`: columns of the model's
+  // outputs. `problem` and `store` must outlive the trajectories.
+  RecordTrajectories(const ResolvedProblem& problem, const SampleStore& store, Matrix thetas,
+                     std::vector<int> outputs, int threads);
+
+  // Integrates over the first `rows` ≥ 1 rows, and visits every row and every time of `times`, in
+  // time order. Returns InvalidArgument that names the element if `times` is not in time order,
+  // names a run without rows, or lies after the last row of a run with streamed inputs. Otherwise
+  // returns an error only on a stop request or of `visit`.
+  absl::Status Run(int64_t rows, std::span<const SampleRow> times, Visit visit, const Stop& stop);
+
+  // The number of trajectories that failed in any run.
+  int failed() const;
+
+ private:
+  absl::Status CheckTimes(std::span<const SampleRow> times) const;
+  void StartRun(int run);
+  absl::Status FinishRun(Visit visit, const Stop& stop);
+  absl::Status Advance(const RowBlock& block, int first, int count, int64_t row, Visit visit,
+                       const Stop& stop);
+  absl::Status VisitAll(std::span<const TrajectoryInstant> instants, Visit visit, const Stop& stop);
+
+  const ResolvedProblem& problem_;
+  const SampleStore& store_;
+  Matrix thetas_;
+  std::vector<int> outputs_;
+  int threads_;
+
+  int run_ = -1;
+  std::unique_ptr<RunInputs> inputs_;  // of the present run
+  std::unique_ptr<EnsemblePropagator> propagator_;
+  std::vector<bool> failed_;  // by trajectory
+  std::span<const SampleRow> times_;
+  size_t next_time_ = 0;  // the first of `times_` not visited yet
+};
+
+}  // namespace polyest::internal
