@@ -2,6 +2,7 @@
 
 // Parses the command line into one struct for each command.
 
+#include <cstdint>
 #include <ostream>
 #include <string>
 #include <variant>
@@ -128,6 +129,20 @@ struct PosteriorArguments {
   Format format = Format::kTable;
 };
 
+struct FitArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  std::string session;          // its id, in place of the files; empty: none
+  std::string validation_file;  // another record to predict; empty: none
+  std::vector<std::string> outputs;
+  std::vector<double> probabilities;  // of the quantiles; empty: the default
+  int draws = 0;                      // 0: the default
+  int64_t rows = 0;                   // 0: the default
+  std::string plot_file;              // empty: none
+  Format format = Format::kTable;
+};
+
 struct ProfileArguments {
   Place place;
   std::string problem_file;
@@ -185,12 +200,12 @@ struct TopArguments {
   double interval_s = 2;
 };
 
-using Command =
-    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                 SensitivityArguments, DesignArguments, PosteriorArguments, ProfileArguments,
-                 RegularizationArguments, ExplainArguments, ExportArguments, ImportArguments,
-                 DeleteArguments, ListArguments, WatchArguments, TopArguments, PaperOptions>;
+using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                             SensitivityArguments, DesignArguments, PosteriorArguments,
+                             FitArguments, ProfileArguments, RegularizationArguments,
+                             ExplainArguments, ExportArguments, ImportArguments, DeleteArguments,
+                             ListArguments, WatchArguments, TopArguments, PaperOptions>;
 
 struct CommandLine {
   Command command;

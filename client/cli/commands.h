@@ -21,6 +21,7 @@ int RunCommand(const SensitivityArguments& arguments, std::ostream& out, std::os
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const FitArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ExportArguments& arguments, std::ostream& out, std::ostream& err);

@@ -59,6 +59,35 @@ void AddPosterior(CommandRegistry& registry) {
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
+void AddFit(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<FitArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "fit",
+       .summary = "The model against the measurements: bands, residuals, scores",
+       .examples = {"fit problem.json data.csv --plot fit.svg",
+                    "fit problem.json data.csv --validate other.csv",
+                    "fit --session rig-1 --server rig:50051 --format csv > fit.csv"},
+       .notes =
+           "Trajectories of the model are computed at draws of the posterior. The log score is\n"
+           "the mean logarithm of the predictive density at the samples: the higher, the\n"
+           "better."},
+      arguments);
+  AddStudyInput(command, *arguments);
+  command.add_option("--validate", arguments->validation_file,
+                     "Predict and score this CSV file, whose samples are not used to estimate");
+  AddOutputs(command, arguments->outputs, "Outputs to predict (default: the measured ones)");
+  command
+      .add_option("--quantiles", arguments->probabilities,
+                  "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
+      ->delimiter(',');
+  command.add_option("--draws", arguments->draws, "Trajectories of the model (default 400)")
+      ->check(CLI::Range(2, 10'000));
+  command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--plot", arguments->plot_file, "Draw the fit into this .svg or .png file");
+  AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
 void AddProfile(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ProfileArguments>();
   CLI::App& command = registry.Add(
@@ -122,7 +151,7 @@ void AddRegularization(CommandRegistry& registry) {
       ->check(CLI::Range(1e-8, 1e8));
   command.add_option("--points", arguments->points, "Values of α² (default 33)")
       ->check(CLI::Range(2, 1'001));
-  command.add_option("--plot", arguments->plot_file, "Draw the sweep into this SVG file");
+  command.add_option("--plot", arguments->plot_file, "Draw the sweep into this .svg or .png file");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
@@ -133,6 +162,7 @@ void AddEstimationCommands(CommandRegistry& registry) {
   AddEstimate(registry);
   AddExplain(registry);
   AddPosterior(registry);
+  AddFit(registry);
   AddProfile(registry);
   AddCost(registry);
   AddRegularization(registry);

@@ -128,7 +128,7 @@ void AddOtherCommands(CommandRegistry& registry) {
                                     .examples = {"paper 14 --plot figure14.svg"}},
                                    paper);
   command.add_option("figure", paper->figure, "One experiment's name (default: all)");
-  command.add_option("--plot", paper->plot_file, "Draw the figure into this SVG file");
+  command.add_option("--plot", paper->plot_file, "Draw the figure into this .svg or .png file");
   AddThreads(command, paper->threads);
 }
 

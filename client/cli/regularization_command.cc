@@ -2,8 +2,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include <fstream>
-
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
@@ -13,6 +11,7 @@
 #include "client/cli/problem_input.h"
 #include "client/cli/regularization_plot.h"
 #include "client/cli/text_table.h"
+#include "client/plot/plot_file.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
 
@@ -22,6 +21,7 @@ namespace {
 using Sweep = v1::ComputeRegularizationSweepResponse;
 
 absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeRegularizationSweepRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.set_lowest(arguments.lowest);
@@ -96,21 +96,13 @@ void PrintCsv(const Sweep& sweep, std::ostream& out) {
   }
 }
 
-absl::Status WritePlot(const Sweep& sweep, const std::string& file) {
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << RenderSvg(MakePlot(sweep));
-  stream.close();
-  if (!stream) return absl::UnknownError(absl::StrCat("--plot: cannot write ", file));
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err) {
   const auto sweep = SweepRegularization(arguments);
   if (!sweep.ok()) return Report(sweep.status(), arguments.place.server, err);
   if (!arguments.plot_file.empty()) {
-    const absl::Status written = WritePlot(*sweep, arguments.plot_file);
+    const absl::Status written = WritePlot(MakePlot(*sweep), arguments.plot_file);
     if (!written.ok()) return Report(written, "", err);
   }
   return PrintAnswer(sweep, arguments, PrintTable, PrintCsv, out, err);

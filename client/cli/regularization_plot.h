@@ -1,6 +1,6 @@
 #pragma once
 
-#include "client/paper/svg_plot.h"
+#include "client/plot/svg_plot.h"
 #include "polyest/v1/study_service.pb.h"
 
 namespace polyest::internal {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "client/paper/contours.h"
+#include "client/plot/contours.h"
 
 namespace polyest::internal {
 namespace {

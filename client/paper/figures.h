@@ -1,7 +1,7 @@
 #pragma once
 
 #include "client/paper/experiments.h"
-#include "client/paper/svg_plot.h"
+#include "client/plot/svg_plot.h"
 
 namespace polyest::internal {
 

@@ -3,25 +3,17 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
-#include <fstream>
-
 #include "client/paper/experiments.h"
 #include "client/paper/figures.h"
 #include "client/paper/report.h"
+#include "client/plot/plot_file.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
 namespace {
 
-absl::Status WriteFile(const std::string& file, const std::string& text) {
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << text;
-  stream.close();
-  if (!stream) return absl::UnavailableError(absl::StrCat("--plot: cannot write ", file));
-  return absl::OkStatus();
-}
-
 absl::Status RunFigure(const std::string& figure, const PaperOptions& options, std::ostream& out) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(options.plot_file));
   POLYEST_ASSIGN_OR_RETURN(Experiment experiment, MakeExperiment(figure));
   absl::StatusOr<ExperimentResult> result = RunExperiment(experiment, options.threads);
   if (!result.ok()) {
@@ -30,7 +22,7 @@ absl::Status RunFigure(const std::string& figure, const PaperOptions& options, s
   }
   PrintExperiment(*result, out);
   if (options.plot_file.empty()) return absl::OkStatus();
-  return WriteFile(options.plot_file, RenderSvg(MakePlot(*result)));
+  return WritePlot(MakePlot(*result), options.plot_file);
 }
 
 int Fail(const absl::Status& status, std::ostream& err) {

@@ -9,11 +9,11 @@
 #include <regex>
 #include <sstream>
 
-#include "client/paper/contours.h"
+#include "client/plot/contours.h"
 #include "client/paper/figures.h"
 #include "client/paper/paper_command.h"
-#include "client/paper/svg_axis.h"
-#include "client/paper/svg_writer.h"
+#include "client/plot/svg_axis.h"
+#include "client/plot/svg_writer.h"
 #include "tests/paper/paper_experiments.h"
 
 namespace polyest::internal {

@@ -4,6 +4,7 @@
 // one legend for all panels. The text is self-contained: it has no script, no style sheet, and no
 // font but the viewer's sans-serif.
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -23,11 +24,27 @@ struct LineSeries {
   std::vector<double> y;  // the line has a gap where y is not finite
 };
 
+// The area between two lines.
+struct BandSeries {
+  std::string label;
+  std::string color;
+  std::vector<double> x;
+  std::vector<double> lower;  // the area has a gap where lower or upper is not finite
+  std::vector<double> upper;
+};
+
 // A vertical line across a panel.
 struct VerticalLine {
   std::string label;
   std::string color;
   double x = 0;
+};
+
+// A horizontal line across a panel.
+struct HorizontalLine {
+  std::string label;
+  std::string color;
+  double y = 0;
 };
 
 // A vertical band across a panel, cut to its range.
@@ -43,8 +60,13 @@ struct LinePanel {
   std::string x_label;
   std::string y_label;
   std::vector<VerticalBand> bands;
+  std::vector<BandSeries> areas;
   std::vector<VerticalLine> vertical_lines;
+  std::vector<HorizontalLine> horizontal_lines;
   std::vector<LineSeries> series;
+  // The ranges of the axes; by default those of the content.
+  std::optional<std::pair<double, double>> x_range;
+  std::optional<std::pair<double, double>> y_range;
 };
 
 struct PointMark {
@@ -65,13 +87,22 @@ struct ContourPanel {
   std::vector<PointMark> points;
 };
 
-using Panel = std::variant<LinePanel, ContourPanel>;
+// A place in the grid that is left free.
+struct EmptyPanel {};
+
+using Panel = std::variant<LinePanel, ContourPanel, EmptyPanel>;
+
+// The opacity of all bands and areas.
+inline constexpr double kBandOpacity = 0.25;
 
 struct Plot {
   std::string title;
-  std::string description;  // for screen readers
-  int columns = 2;          // panels side by side
-  std::vector<Panel> panels;
+  std::string description;            // for screen readers
+  int columns = 2;                    // panels side by side
+  double panel_width = 420;           // with its labels, pixels
+  double panel_height = 320;          // with its labels, pixels
+  std::vector<double> column_widths;  // of the first columns, where they differ from panel_width
+  std::vector<Panel> panels;          // row by row
 };
 
 // Returns the SVG file of a plot. Coordinates are rounded to a hundredth of a pixel, so that equal

@@ -22,6 +22,19 @@ struct ContourLine {
 std::vector<ContourLine> ContourLines(const Vector& x, const Vector& y, const Matrix& value,
                                       double level);
 
+// A function on a grid: value is x.size() × y.size().
+struct ContourGrid {
+  Vector x;
+  Vector y;
+  Matrix value;
+};
+
+// Returns the function on a grid with `parts` cells in each cell, by cubic interpolation along x
+// and then along y (Catmull and Rom; exact for quadratics on even grids, so the contours of a
+// quadratic bowl stay ellipses). Where one of the values it needs is not finite, the interpolation
+// is linear.
+ContourGrid RefinedGrid(const Vector& x, const Vector& y, const Matrix& value, Eigen::Index parts);
+
 // Returns `count` levels between the least and the largest finite value. Their distances from the
 // least value grow as squares, so that the contours of a quadratic bowl are evenly spaced. Returns
 // none when the values do not vary.

@@ -1,8 +1,9 @@
-#include "client/paper/svg_writer.h"
+#include "client/plot/svg_writer.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace polyest::internal {
@@ -23,6 +24,14 @@ std::string StrokeAttributes(const SvgStroke& stroke) {
     absl::StrAppend(&text, " stroke-dasharray=\"", EscapeXml(stroke.dashes), "\"");
   }
   return text;
+}
+
+void AppendPoints(const std::vector<std::array<double, 2>>& points, std::string& text) {
+  const char* separator = "";
+  for (const auto& [x, y] : points) {
+    absl::StrAppend(&text, separator, Number(x), ",", Number(y));
+    separator = " ";
+  }
 }
 
 }  // namespace
@@ -70,17 +79,28 @@ void SvgWriter::Line(double x1, double y1, double x2, double y2, const SvgStroke
                   "\" y2=\"", Number(y2), "\"", StrokeAttributes(stroke), "/>\n");
 }
 
+double VisibleLength(std::string_view text) {
+  return static_cast<double>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
+  }));
+}
+
+void SvgWriter::Area(const std::vector<std::array<double, 2>>& border, std::string_view fill,
+                     double opacity) {
+  if (border.size() < 3) return;
+  absl::StrAppend(&text_, "<polygon fill=\"", EscapeXml(fill), "\" fill-opacity=\"",
+                  Number(opacity), "\" points=\"");
+  AppendPoints(border, text_);
+  absl::StrAppend(&text_, "\"/>\n");
+}
+
 void SvgWriter::Polyline(const std::vector<std::array<double, 2>>& points, bool closed,
                          const SvgStroke& stroke) {
   if (points.size() < 2) return;
   absl::StrAppend(&text_, closed ? "<polygon" : "<polyline",
                   " fill=\"none\" stroke-linejoin=\"round\"", StrokeAttributes(stroke),
                   " points=\"");
-  const char* separator = "";
-  for (const auto& [x, y] : points) {
-    absl::StrAppend(&text_, separator, Number(x), ",", Number(y));
-    separator = " ";
-  }
+  AppendPoints(points, text_);
   absl::StrAppend(&text_, "\"/>\n");
 }
 

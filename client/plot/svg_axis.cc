@@ -1,4 +1,4 @@
-#include "client/paper/svg_axis.h"
+#include "client/plot/svg_axis.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -30,6 +30,9 @@ class SvgWriter {
   void Line(double x1, double y1, double x2, double y2, const SvgStroke& stroke);
   void Polyline(const std::vector<std::array<double, 2>>& points, bool closed,
                 const SvgStroke& stroke);
+  // Fills a closed line.
+  void Area(const std::vector<std::array<double, 2>>& border, std::string_view fill,
+            double opacity);
   void Rectangle(double x, double y, double width, double height, std::string_view fill,
                  double opacity = 1);
   void Circle(double x, double y, double radius, std::string_view fill, std::string_view stroke);
@@ -45,6 +48,9 @@ class SvgWriter {
   std::string text_;
   int clips_ = 0;
 };
+
+// Returns the number of characters of a text in UTF-8.
+double VisibleLength(std::string_view text);
 
 // Returns the text for a node or an attribute: & < > " ' as entities, control characters as spaces.
 std::string EscapeXml(std::string_view text);

@@ -1,5 +1,6 @@
-#include "client/paper/contours.h"
+#include "client/plot/contours.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -109,7 +110,59 @@ class Tracer {
   std::map<EdgeId, bool> visited_;
 };
 
+// Interpolates the rows of `value`, at x, at part/parts of each cell of x.
+Matrix RefinedRows(const Vector& x, const Matrix& value, Eigen::Index parts) {
+  const Eigen::Index cells = x.size() - 1;
+  Matrix fine(cells * parts + 1, value.cols());
+  for (Eigen::Index i = 0; i < cells; ++i) {
+    // The slopes at the ends of the cell; at the grid's border that of the parabola through the
+    // next three rows.
+    const auto slope = [&](Eigen::Index k) -> Eigen::RowVectorXd {
+      if (x.size() < 3) return (value.row(1) - value.row(0)) / (x[1] - x[0]);
+      const Eigen::Index m = std::clamp<Eigen::Index>(k, 1, cells - 1);
+      const double left = x[m] - x[m - 1], right = x[m + 1] - x[m];
+      const Eigen::RowVectorXd before = (value.row(m) - value.row(m - 1)) / left;
+      const Eigen::RowVectorXd after = (value.row(m + 1) - value.row(m)) / right;
+      if (k < m) return before - (after - before) * (left / (left + right));
+      if (k > m) return after + (after - before) * (right / (left + right));
+      return (before * right + after * left) / (left + right);
+    };
+    const double h = x[i + 1] - x[i];
+    const Eigen::RowVectorXd first = h * slope(i), last = h * slope(i + 1);
+    for (Eigen::Index part = 0; part < parts; ++part) {
+      const double u = static_cast<double>(part) / static_cast<double>(parts);
+      const Eigen::RowVectorXd linear = (1 - u) * value.row(i) + u * value.row(i + 1);
+      const Eigen::RowVectorXd rise = value.row(i + 1) - value.row(i);
+      // Hermite's cubic with these slopes.
+      const Eigen::RowVectorXd cubic =
+          linear + u * (1 - u) * ((1 - u) * (first - rise) - u * (last - rise));
+      fine.row(i * parts + part) = cubic.array().isFinite().select(cubic, linear);
+    }
+  }
+  fine.row(cells * parts) = value.row(cells);
+  return fine;
+}
+
+Vector RefinedAxis(const Vector& x, Eigen::Index parts) {
+  Vector fine((x.size() - 1) * parts + 1);
+  for (Eigen::Index k = 0; k < fine.size() - 1; ++k) {
+    const Eigen::Index i = k / parts;
+    fine[k] =
+        x[i] + (x[i + 1] - x[i]) * static_cast<double>(k % parts) / static_cast<double>(parts);
+  }
+  fine[fine.size() - 1] = x[x.size() - 1];
+  return fine;
+}
+
 }  // namespace
+
+ContourGrid RefinedGrid(const Vector& x, const Vector& y, const Matrix& value, Eigen::Index parts) {
+  POLYEST_CHECK(parts >= 1 && x.size() >= 2 && y.size() >= 2);
+  POLYEST_CHECK(value.rows() == x.size() && value.cols() == y.size());
+  const Matrix along_x = RefinedRows(x, value, parts);
+  return {RefinedAxis(x, parts), RefinedAxis(y, parts),
+          RefinedRows(y, along_x.transpose(), parts).transpose()};
+}
 
 std::vector<ContourLine> ContourLines(const Vector& x, const Vector& y, const Matrix& value,
                                       double level) {

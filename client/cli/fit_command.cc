@@ -1,0 +1,155 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <utility>
+
+#include "client/cli/answer.h"
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/estimate_format.h"
+#include "client/cli/fit_plot.h"
+#include "client/cli/number_format.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/text_table.h"
+#include "client/plot/plot_file.h"
+#include "core/common/status.h"
+#include "polyest/data_file.h"
+
+namespace polyest::internal {
+namespace {
+
+using Output = v1::PredictResponse::Output;
+
+constexpr int kShownLags = 3;
+
+absl::StatusOr<v1::Problem> ProblemOf(const FitArguments& arguments,
+                                      const v1::PredictRequest& request) {
+  if (arguments.session.empty()) return request.subject().experiment().problem();
+  Client client(arguments.place.server, ToClientOptions(arguments.place));
+  v1::GetSessionRequest get;
+  get.set_name(absl::StrCat("sessions/", arguments.session));
+  POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client.GetSession(get));
+  return session.problem();
+}
+
+absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
+  v1::PredictRequest request;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  if (!arguments.validation_file.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ProblemOf(arguments, request));
+    POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
+                             ReadDataFile(arguments.validation_file, ColumnsOf(problem)));
+  }
+  request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
+  request.mutable_probabilities()->Add(arguments.probabilities.begin(),
+                                       arguments.probabilities.end());
+  request.set_draw_count(arguments.draws);
+  request.set_max_row_count(arguments.rows);
+  auto response = MakeBackend(arguments.place)->Predict(request);
+  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!arguments.plot_file.empty()) {
+    POLYEST_RETURN_IF_ERROR(WritePlot(MakePlot(*response), arguments.plot_file));
+  }
+  return response;
+}
+
+std::string FormatAutocorrelation(const v1::PredictResponse::Score& score) {
+  std::vector<std::string> values;
+  for (int lag = 0; lag < std::min(kShownLags, score.autocorrelation_size()); ++lag) {
+    values.push_back(absl::StrFormat("%.2f", score.autocorrelation(lag)));
+  }
+  return absl::StrJoin(values, ", ");
+}
+
+void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
+  TextTable table({"output", "samples", "rms residual", "unit", "within 95 %", "log score",
+                   "autocorrelation 1, 2, 3"});
+  for (const Output& output : prediction.outputs()) {
+    const v1::PredictResponse::Score& score = output.score();
+    if (!output.has_score() || score.sample_count() == 0) {
+      table.AddRow(
+          {output.output(), "0", "-", output.unit() == "1" ? "" : output.unit(), "-", "-", "-"});
+      continue;
+    }
+    table.AddRow({output.output(), absl::StrCat(score.sample_count()),
+                  FormatNumber(score.root_mean_square()), output.unit() == "1" ? "" : output.unit(),
+                  FormatPercent(score.coverage95()), absl::StrFormat("%.4f", score.log_score()),
+                  FormatAutocorrelation(score)});
+  }
+  table.Print(out);
+  out << absl::StrFormat("\n%d rows; %d trajectories of the model at draws of the posterior%s\n",
+                         prediction.row_count(), prediction.draw_count(),
+                         prediction.failed_draw_count() == 0
+                             ? ""
+                             : absl::StrFormat(", of which %d could not be integrated to the end",
+                                               prediction.failed_draw_count()));
+  PrintDiagnostics(prediction.diagnostics(), out);
+}
+
+void PrintHeader(const v1::PredictResponse& prediction, std::ostream& out) {
+  out << "run,t";
+  for (const Output& output : prediction.outputs()) {
+    const std::string& name = output.output();
+    out << ',' << name << "_mean," << name << "_stdDev";
+    for (const double p : prediction.probabilities()) {
+      out << ',' << name << "_q" << FormatExact(p);
+    }
+    if (!output.sample_std_dev().empty()) {
+      out << ',' << name << "_sampleStdDev";
+      for (const double p : prediction.probabilities()) {
+        out << ',' << name << "_sample_q" << FormatExact(p);
+      }
+    }
+    out << ',' << name << "_measured," << name << "_residual," << name << "_standardizedResidual";
+  }
+  out << '\n';
+}
+
+// Prints the values of one output at time k. `sample`: the place of its next sample.
+void PrintValues(const Output& output, int k, int probabilities, int& sample, std::ostream& out) {
+  out << ',' << FormatExact(output.mean(k)) << ',' << FormatExact(output.std_dev(k));
+  for (int i = 0; i < probabilities; ++i) {
+    out << ',' << FormatExact(output.quantiles(k * probabilities + i));
+  }
+  if (!output.sample_std_dev().empty()) {
+    out << ',' << FormatExact(output.sample_std_dev(k));
+    for (int i = 0; i < probabilities; ++i) {
+      out << ',' << FormatExact(output.sample_quantiles(k * probabilities + i));
+    }
+  }
+  if (sample >= output.measured_rows_size() || output.measured_rows(sample) != k) {
+    out << ",,,";
+    return;
+  }
+  out << ',' << FormatExact(output.measured(sample)) << ',' << FormatExact(output.residual(sample))
+      << ',';
+  if (!output.standardized_residual().empty()) {
+    out << FormatExact(output.standardized_residual(sample));
+  }
+  ++sample;
+}
+
+// Prints one row for each time; cells of missing samples are empty.
+void PrintCsv(const v1::PredictResponse& prediction, std::ostream& out) {
+  PrintHeader(prediction, out);
+  std::vector<int> samples(static_cast<size_t>(prediction.outputs_size()), 0);
+  for (int k = 0; k < prediction.time_s_size(); ++k) {
+    out << (prediction.run().empty() ? 0 : prediction.run(k)) << ','
+        << FormatExact(prediction.time_s(k));
+    for (int i = 0; i < prediction.outputs_size(); ++i) {
+      PrintValues(prediction.outputs(i), k, prediction.probabilities_size(),
+                  samples[static_cast<size_t>(i)], out);
+    }
+    out << '\n';
+  }
+}
+
+}  // namespace
+
+int RunCommand(const FitArguments& arguments, std::ostream& out, std::ostream& err) {
+  return PrintAnswer(Fit(arguments), arguments, PrintTable, PrintCsv, out, err);
+}
+
+}  // namespace polyest::internal
