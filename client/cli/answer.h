@@ -10,11 +10,22 @@
 #include "client/cli/arguments.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
+#include "client/plot/plot_file.h"
+#include "core/common/status.h"
 
 namespace polyest::internal {
 
 template <typename Answer>
 using Printer = void (*)(const Answer&, std::ostream&);
+
+// Returns the answer after its plot has been drawn into the file, if one is given.
+template <typename Answer>
+absl::StatusOr<Answer> Plotted(Answer answer,
+                               std::type_identity_t<Plot (*)(const Answer&)> make_plot,
+                               const std::string& file) {
+  if (!file.empty()) POLYEST_RETURN_IF_ERROR(WritePlot(make_plot(answer), file));
+  return answer;
+}
 
 // Prints the answer as a table, as CSV or as JSON, as `arguments` say, or reports why there is
 // none. Returns the exit status. A printer is null for a command whose options do not offer its

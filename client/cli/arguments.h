@@ -37,6 +37,7 @@ struct EstimateArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
@@ -103,6 +104,7 @@ struct SensitivityArguments {
   double until_s = 0;
   double step_s = 0;  // 0: the default
   std::vector<std::string> outputs;
+  std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
@@ -115,6 +117,7 @@ struct DesignArguments {
   int samples = 0;    // 0: the default
   std::vector<std::string> candidate_files;
   std::vector<std::string> outputs;
+  std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
@@ -126,6 +129,7 @@ struct PosteriorArguments {
   int samples = 0;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
   std::vector<std::string> joints;    // pairs of parameters, "k,c"
+  std::string plot_file;              // empty: none
   Format format = Format::kTable;
 };
 
@@ -143,13 +147,22 @@ struct FitArguments {
   Format format = Format::kTable;
 };
 
+struct ReportArguments {
+  Place place;
+  std::string problem_file;
+  std::string data_file;
+  std::string session;  // its id, in place of the files; empty: none
+  std::string output_file = "report.html";
+};
+
 struct ProfileArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
   std::string session;  // its id, in place of the files; empty: none
   std::vector<std::string> parameters;
-  int points = 0;  // 0: the default
+  int points = 0;         // 0: the default
+  std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
@@ -200,12 +213,13 @@ struct TopArguments {
   double interval_s = 2;
 };
 
-using Command = std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
-                             ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
-                             SensitivityArguments, DesignArguments, PosteriorArguments,
-                             FitArguments, ProfileArguments, RegularizationArguments,
-                             ExplainArguments, ExportArguments, ImportArguments, DeleteArguments,
-                             ListArguments, WatchArguments, TopArguments, PaperOptions>;
+using Command =
+    std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
+                 ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
+                 SensitivityArguments, DesignArguments, PosteriorArguments, FitArguments,
+                 ReportArguments, ProfileArguments, RegularizationArguments, ExplainArguments,
+                 ExportArguments, ImportArguments, DeleteArguments, ListArguments, WatchArguments,
+                 TopArguments, PaperOptions>;
 
 struct CommandLine {
   Command command;

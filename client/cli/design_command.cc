@@ -14,6 +14,7 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/study_plots.h"
 #include "client/cli/text_table.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
@@ -67,6 +68,7 @@ absl::Status InInputFile(const absl::Status& status, const DesignArguments& argu
 }
 
 absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeExperimentDesignRequest request;
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
@@ -83,7 +85,7 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   for (const std::string& output : arguments.outputs) request.add_possible()->set_output(output);
   auto response = MakeBackend(arguments.place)->ComputeExperimentDesign(request);
   if (!response.ok()) return InInputFile(response.status(), arguments, request);
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 // Adds the gain and the expected standard deviation of each parameter.

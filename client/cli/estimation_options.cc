@@ -19,6 +19,7 @@ void AddEstimate(CommandRegistry& registry) {
   AddProblem(command, arguments->problem_file);
   AddData(command, arguments->data_file);
   AddPlace(command, arguments->place);
+  AddPlot(command, arguments->plot_file, "how the estimate came about");
   AddFormat(command, arguments->format, {"table", "json"});
 }
 
@@ -56,6 +57,7 @@ void AddPosterior(CommandRegistry& registry) {
                   "Two parameters whose joint density is wanted, NAME,NAME; may be repeated")
       ->expected(1)
       ->take_all();
+  AddPlot(command, arguments->plot_file, "the densities of parameters and pairs");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
@@ -84,8 +86,20 @@ void AddFit(CommandRegistry& registry) {
       ->check(CLI::Range(2, 10'000));
   command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--plot", arguments->plot_file, "Draw the fit into this .svg or .png file");
+  AddPlot(command, arguments->plot_file, "the fit");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
+}
+
+void AddReport(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<ReportArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "report",
+       .summary = "Write a report: estimates, fit, history, posterior, warnings in one HTML file",
+       .examples = {"report problem.json data.csv -o report.html",
+                    "report --session rig-1 --server rig:50051 -o report.html"}},
+      arguments);
+  AddStudyInput(command, *arguments);
+  command.add_option("-o,--output", arguments->output_file, "The file (default: report.html)");
 }
 
 void AddProfile(CommandRegistry& registry) {
@@ -107,6 +121,7 @@ void AddProfile(CommandRegistry& registry) {
       ->take_all();
   command.add_option("--points", arguments->points, "Values of each parameter (default 41)")
       ->check(CLI::Range(3, 1'001));
+  AddPlot(command, arguments->plot_file, "the profiles");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
@@ -151,7 +166,7 @@ void AddRegularization(CommandRegistry& registry) {
       ->check(CLI::Range(1e-8, 1e8));
   command.add_option("--points", arguments->points, "Values of α² (default 33)")
       ->check(CLI::Range(2, 1'001));
-  command.add_option("--plot", arguments->plot_file, "Draw the sweep into this .svg or .png file");
+  AddPlot(command, arguments->plot_file, "the sweep");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
@@ -163,6 +178,7 @@ void AddEstimationCommands(CommandRegistry& registry) {
   AddExplain(registry);
   AddPosterior(registry);
   AddFit(registry);
+  AddReport(registry);
   AddProfile(registry);
   AddCost(registry);
   AddRegularization(registry);

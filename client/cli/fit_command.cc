@@ -12,7 +12,6 @@
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
-#include "client/plot/plot_file.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
 
@@ -49,10 +48,7 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   request.set_max_row_count(arguments.rows);
   auto response = MakeBackend(arguments.place)->Predict(request);
   if (!response.ok()) return InInput(response.status(), arguments);
-  if (!arguments.plot_file.empty()) {
-    POLYEST_RETURN_IF_ERROR(WritePlot(MakePlot(*response), arguments.plot_file));
-  }
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 std::string FormatAutocorrelation(const v1::PredictResponse::Score& score) {

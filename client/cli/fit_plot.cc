@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "client/cli/number_format.h"
+#include "client/plot/colors.h"
 
 namespace polyest::internal {
 namespace {
 
 using Output = v1::PredictResponse::Output;
 
-constexpr char kMeasuredColor[] = "#555555", kModelColor[] = "#1f4e9c", kBandColor[] = "#1f4e9c",
-               kSampleColor[] = "#6ba3e0", kResidualColor[] = "#d95f02", kLimitColor[] = "#888888";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kGaussian95 = 1.96;
 constexpr double kLimit = 4;  // of standardized residuals that are shown, at least
@@ -72,18 +71,18 @@ LinePanel FitPanel(const v1::PredictResponse& prediction, const Output& output) 
     if (!output.sample_quantiles().empty()) {
       panel.areas.push_back(Band(prediction, output.sample_quantiles()));
       panel.areas.back().label = absl::StrCat(BandText(prediction), " of new samples");
-      panel.areas.back().color = kSampleColor;
+      panel.areas.back().color = kLightBlue;
     }
     panel.areas.push_back(Band(prediction, output.quantiles()));
     panel.areas.back().label = absl::StrCat(BandText(prediction), " of the model");
-    panel.areas.back().color = kBandColor;
+    panel.areas.back().color = kBlue;
   }
-  LineSeries measured{"measured", kMeasuredColor, LineStyle::kMarkers, {}, {}};
+  LineSeries measured{"measured", kDarkGray, LineStyle::kMarkers, {}, {}};
   for (int i = 0; i < output.measured_rows_size(); ++i) {
     measured.x.push_back(prediction.time_s(output.measured_rows(i)));
     measured.y.push_back(output.measured(i));
   }
-  LineSeries model{"model", kModelColor, LineStyle::kSolid, {}, {}};
+  LineSeries model{"model", kBlue, LineStyle::kSolid, {}, {}};
   ForEachTime(prediction, [&](int k, double time_s) {
     model.x.push_back(time_s);
     model.y.push_back(k < 0 ? kNaN : output.mean(k));
@@ -97,7 +96,7 @@ LinePanel ResidualPanel(const v1::PredictResponse& prediction, const Output& out
   panel.title = "residuals";
   panel.x_label = "t (s)";
   panel.y_label = "residual ÷ its spread";
-  LineSeries series{"", kResidualColor, LineStyle::kMarkers, {}, {}};
+  LineSeries series{"", kOrange, LineStyle::kMarkers, {}, {}};
   double largest = kLimit;
   for (int i = 0; i < output.standardized_residual_size(); ++i) {
     series.x.push_back(prediction.time_s(output.measured_rows(i)));
@@ -106,7 +105,7 @@ LinePanel ResidualPanel(const v1::PredictResponse& prediction, const Output& out
   }
   panel.y_range = std::pair{-1.05 * largest, 1.05 * largest};
   panel.series = {std::move(series)};
-  panel.horizontal_lines = {{"", kLimitColor, -kGaussian95}, {"", kLimitColor, kGaussian95}};
+  panel.horizontal_lines = {{"", kGray, -kGaussian95}, {"", kGray, kGaussian95}};
   return panel;
 }
 
@@ -115,7 +114,7 @@ LinePanel AutocorrelationPanel(const Output& output) {
   panel.title = "autocorrelation";
   panel.x_label = "samples apart";
   panel.y_label = "correlation of residuals";
-  LineSeries series{"", kResidualColor, LineStyle::kSolid, {0}, {1}};
+  LineSeries series{"", kOrange, LineStyle::kSolid, {0}, {1}};
   for (int lag = 0; lag < output.score().autocorrelation_size(); ++lag) {
     series.x.push_back(lag + 1);
     series.y.push_back(output.score().autocorrelation(lag));
@@ -125,7 +124,7 @@ LinePanel AutocorrelationPanel(const Output& output) {
   const auto samples = static_cast<double>(output.score().sample_count());
   if (samples > 0) {
     const double limit = kGaussian95 / std::sqrt(samples);
-    panel.horizontal_lines = {{"", kLimitColor, -limit}, {"", kLimitColor, limit}};
+    panel.horizontal_lines = {{"", kGray, -limit}, {"", kGray, limit}};
   }
   return panel;
 }

@@ -74,6 +74,7 @@ void AddSensitivity(CommandRegistry& registry) {
   command.add_option("--step", arguments->step_s, "Time step, s (default: a hundredth of --until)");
   AddOutputs(command, arguments->outputs, "The outputs, comma-separated (default: measured)");
   AddPlace(command, arguments->place);
+  AddPlot(command, arguments->plot_file, "outputs and shares over time");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
@@ -100,6 +101,7 @@ void AddDesign(CommandRegistry& registry) {
   AddOutputs(command, arguments->outputs,
              "Further outputs that could be measured, comma-separated (default: all)");
   AddPlace(command, arguments->place);
+  AddPlot(command, arguments->plot_file, "gains and standard deviations");
   AddFormat(command, arguments->format, {"table", "json"});
 }
 

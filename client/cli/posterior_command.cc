@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <utility>
 
 #include "client/cli/answer.h"
@@ -12,6 +13,7 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/study_plots.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
@@ -19,9 +21,11 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kSketchWidth = 30;  // characters
+constexpr int kSketchWidth = 30;                // characters
+constexpr int kPlottedBins = 3 * kSketchWidth;  // of each density
 
 absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputePosteriorRequest request;
   for (const std::string& joint : arguments.joints) {
     const std::vector<std::string> names = absl::StrSplit(joint, ',');
@@ -37,18 +41,28 @@ absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArgumen
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
                                        arguments.probabilities.end());
   request.set_sample_count(arguments.samples);
-  if (arguments.format == Format::kTable) request.set_density_bin_count(kSketchWidth);
+  request.set_all_joints(!arguments.plot_file.empty());
+  if (arguments.format == Format::kTable) {
+    request.set_density_bin_count(arguments.plot_file.empty() ? kSketchWidth : kPlottedBins);
+  }
   auto response = MakeBackend(arguments.place)->ComputePosterior(request);
   if (!response.ok()) return InInput(response.status(), arguments);
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 // Draws a density as a line of bars.
 std::string Sketch(const google::protobuf::RepeatedField<double>& density) {
   static constexpr std::array<const char*, 9> kBars = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
-  const double highest = density.empty() ? 0 : *std::max_element(density.begin(), density.end());
+  // Several bins may share a character.
+  const int group = std::max(1, density.size() / kSketchWidth);
+  std::vector<double> heights(static_cast<size_t>(density.size() / group), 0);
+  for (size_t i = 0; i < heights.size(); ++i) {
+    const auto first = density.begin() + static_cast<int>(i) * group;
+    heights[i] = std::accumulate(first, first + group, 0.0);
+  }
+  const double highest = heights.empty() ? 0 : *std::max_element(heights.begin(), heights.end());
   std::string text;
-  for (const double value : density) {
+  for (const double value : heights) {
     const double height = highest > 0 ? value / highest * (kBars.size() - 1) : 0;
     text += kBars[static_cast<size_t>(height + 0.5)];
   }

@@ -10,6 +10,7 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/study_plots.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
@@ -18,16 +19,18 @@ namespace polyest::internal {
 namespace {
 
 absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeCostProfilesRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.points);
   // A table needs fewer points than a plot.
-  if (arguments.format == Format::kTable && arguments.points == 0)
+  if (arguments.format == Format::kTable && arguments.points == 0 && arguments.plot_file.empty()) {
     request.set_point_count(kTablePoints);
+  }
   auto response = MakeBackend(arguments.place)->ComputeCostProfiles(request);
   if (!response.ok()) return InInput(response.status(), arguments);
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 // Returns the rise of the cost above its least value; 0 if it would be printed as 0, so that a

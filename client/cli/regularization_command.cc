@@ -33,7 +33,7 @@ absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& argumen
   }
   auto response = MakeBackend(arguments.place)->ComputeRegularizationSweep(request);
   if (!response.ok()) return InInput(response.status(), arguments);
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 std::string WithUnit(const std::string& name, const std::string& unit) {
@@ -99,13 +99,7 @@ void PrintCsv(const Sweep& sweep, std::ostream& out) {
 }  // namespace
 
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err) {
-  const auto sweep = SweepRegularization(arguments);
-  if (!sweep.ok()) return Report(sweep.status(), arguments.place.server, err);
-  if (!arguments.plot_file.empty()) {
-    const absl::Status written = WritePlot(MakePlot(*sweep), arguments.plot_file);
-    if (!written.ok()) return Report(written, "", err);
-  }
-  return PrintAnswer(sweep, arguments, PrintTable, PrintCsv, out, err);
+  return PrintAnswer(SweepRegularization(arguments), arguments, PrintTable, PrintCsv, out, err);
 }
 
 }  // namespace polyest::internal

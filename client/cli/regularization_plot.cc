@@ -6,13 +6,13 @@
 #include <limits>
 #include <utility>
 
+#include "client/plot/colors.h"
+
 namespace polyest::internal {
 namespace {
 
 using Sweep = v1::ComputeRegularizationSweepResponse;
 
-constexpr char kLineColor[] = "#1f4e9c", kLCurveColor[] = "#d95f02",
-               kDiscrepancyColor[] = "#1b9e77", kEvidenceColor[] = "#c2185b";
 constexpr char kWeight[] = "log₁₀ α²";
 constexpr double kMinLogEvidence = -20;  // points with less evidence are not drawn
 
@@ -24,9 +24,9 @@ struct Rule {
 
 std::vector<Rule> RulesThatChoose(const Sweep& sweep) {
   std::vector<Rule> rules;
-  for (const Rule& rule : {Rule{"L-curve", kLCurveColor, sweep.l_curve()},
-                           {"discrepancy", kDiscrepancyColor, sweep.discrepancy()},
-                           {"evidence", kEvidenceColor, sweep.evidence()}}) {
+  for (const Rule& rule : {Rule{"L-curve", kOrange, sweep.l_curve()},
+                           {"discrepancy", kTeal, sweep.discrepancy()},
+                           {"evidence", kMagenta, sweep.evidence()}}) {
     if (rule.choice.determined()) rules.push_back(rule);
   }
   return rules;
@@ -50,7 +50,7 @@ LinePanel LCurvePanel(const Sweep& sweep) {
   panel.title = "L-curve";
   panel.x_label = "log₁₀ mismatch";
   panel.y_label = "prior term";
-  LineSeries series{"", kLineColor, LineStyle::kMarkers, {}, {}};
+  LineSeries series{"", kBlue, LineStyle::kMarkers, {}, {}};
   for (const Sweep::Point& point : sweep.points()) {
     if (!(point.cost().mismatch() > 0)) continue;
     series.x.push_back(std::log10(point.cost().mismatch()));
@@ -62,7 +62,7 @@ LinePanel LCurvePanel(const Sweep& sweep) {
 
 LinePanel EvidencePanel(const Sweep& sweep) {
   LinePanel panel = PanelOverWeight(sweep, "Evidence", "log evidence − greatest");
-  LineSeries series{"", kLineColor, LineStyle::kSolid, {}, {}};
+  LineSeries series{"", kBlue, LineStyle::kSolid, {}, {}};
   for (const Sweep::Point& point : sweep.points()) {
     const bool seen = point.log_evidence() > kMinLogEvidence;
     series.x.push_back(std::log10(point.regularization()));
@@ -77,9 +77,9 @@ LinePanel ParameterPanel(const Sweep& sweep, int i) {
   LinePanel panel = PanelOverWeight(
       sweep, sweep.parameters(i),
       unit == "1" ? sweep.parameters(i) : absl::StrCat(sweep.parameters(i), " (", unit, ")"));
-  LineSeries map{"estimate", kLineColor, LineStyle::kSolid, {}, {}};
-  LineSeries lower{"± stdDev", kLineColor, LineStyle::kDotted, {}, {}};
-  LineSeries upper{"", kLineColor, LineStyle::kDotted, {}, {}};
+  LineSeries map{"estimate", kBlue, LineStyle::kSolid, {}, {}};
+  LineSeries lower{"± stdDev", kBlue, LineStyle::kDotted, {}, {}};
+  LineSeries upper{"", kBlue, LineStyle::kDotted, {}, {}};
   for (const Sweep::Point& point : sweep.points()) {
     const double weight = std::log10(point.regularization());
     for (const auto& [series, sign] : {std::pair{&map, 0}, {&lower, -1}, {&upper, 1}}) {

@@ -11,6 +11,7 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/study_plots.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
 
@@ -22,6 +23,7 @@ using Analysis = v1::ComputeSensitivityResponse;
 constexpr int kMaxTableRows = 21;  // per output; the other formats have all times
 
 absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeSensitivityRequest request;
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
@@ -30,7 +32,7 @@ absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& argument
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   auto response = MakeBackend(arguments.place)->ComputeSensitivity(request);
   if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
-  return response;
+  return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
 std::string Share(double share) { return absl::StrFormat("%.3f", share); }

@@ -112,6 +112,10 @@ void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char
   command.add_option("--outputs", outputs, help)->allow_extra_args(false)->delimiter(',');
 }
 
+void AddPlot(CLI::App& command, std::string& file, const char* what) {
+  command.add_option("--plot", file, absl::StrCat("Draw ", what, " into this .svg or .png file"));
+}
+
 void AddFormat(CLI::App& command, Format& format, const std::vector<std::string>& names) {
   std::map<std::string, Format> formats;
   std::string list;

@@ -30,6 +30,8 @@ void AddStudyInput(CLI::App& command, Arguments& arguments) {
 }
 // Adds --outputs, a comma-separated list.
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help);
+// Adds --plot. `what`: what it draws, as in "the fit".
+void AddPlot(CLI::App& command, std::string& file, const char* what);
 // Adds --format with these names; the first is the default.
 void AddFormat(CLI::App& command, Format& format, const std::vector<std::string>& names);
 

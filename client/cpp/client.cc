@@ -216,6 +216,10 @@ absl::StatusOr<v1::Estimate> Client::GetEstimate(const v1::GetEstimateRequest& r
   return Call(sessions_.get(), &v1::SessionService::Stub::GetEstimate, request);
 }
 
+absl::StatusOr<v1::EstimateHistory> Client::GetHistory(const v1::GetHistoryRequest& request) {
+  return Call(sessions_.get(), &v1::SessionService::Stub::GetHistory, request);
+}
+
 absl::StatusOr<v1::DaemonStatus> Client::GetStatus(const v1::GetStatusRequest& request) {
   return Call(statuses_.get(), &v1::StatusService::Stub::GetStatus, request);
 }

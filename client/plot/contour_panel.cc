@@ -38,9 +38,8 @@ class LevelTexts {
  public:
   explicit LevelTexts(const PanelFrame& frame) : frame_(frame) {}
 
-  void Add(const ContourLine& line, double level, const std::string& color) {
-    const std::string text = LevelText(level);
-    const double width = 5.8 * static_cast<double>(text.size()) + 4;
+  void Add(const ContourLine& line, const std::string& text, const std::string& color) {
+    const double width = 5.8 * VisibleLength(text) + 4;
     const size_t count = line.points.size();
     // Candidates go from the middle of the line outwards, in sixteenths of its length.
     for (const int sixteenth : {8, 5, 11, 3, 13, 2, 14}) {
@@ -100,7 +99,12 @@ void DrawContours(const ContourPanel& panel, const PanelFrame& frame, SvgWriter&
       for (const auto& [px, py] : line.points) pixels.push_back({frame.X(px), frame.Y(py)});
       svg.Polyline(pixels, line.closed, {color, 1.4, ""});
     }
-    if (longest != nullptr && l % 3 == 0) texts.Add(*longest, panel.levels[l], color);
+    if (longest == nullptr) continue;
+    if (!panel.level_texts.empty()) {
+      texts.Add(*longest, panel.level_texts[l], color);
+    } else if (l % 3 == 0) {
+      texts.Add(*longest, LevelText(panel.levels[l]), color);
+    }
   }
   texts.Draw(svg);
 }

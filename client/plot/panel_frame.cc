@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace polyest::internal {
@@ -25,15 +26,18 @@ double WidestText(const Axis& axis) {
 
 int TickCount(double length) { return std::clamp(static_cast<int>(length / kTickDistance), 2, 8); }
 
-// Returns a horizontal axis whose texts do not touch each other.
+// Returns a horizontal axis whose texts do not touch each other, if two of them have room at all.
 Axis HorizontalAxis(const Range& xs, double left, double right) {
-  Axis axis;
-  for (int count = TickCount(right - left); count >= 2; --count) {
-    axis = MakeAxis(xs.lower, xs.upper, count, left, right);
+  Axis chosen;
+  for (int count = TickCount(right - left); count >= 1; --count) {
+    Axis axis = MakeAxis(xs.lower, xs.upper, count, left, right);
+    if (axis.ticks.size() < 2 && !chosen.ticks.empty()) break;
     const auto ticks = static_cast<double>(axis.ticks.size());
-    if (ticks * (WidestText(axis) + kTickGap) <= right - left) break;
+    const bool fits = ticks * (WidestText(axis) + kTickGap) <= right - left;
+    chosen = std::move(axis);
+    if (fits) break;
   }
-  return axis;
+  return chosen;
 }
 
 }  // namespace

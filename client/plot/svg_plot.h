@@ -82,8 +82,9 @@ struct ContourPanel {
   std::string y_label;
   Vector x;
   Vector y;
-  Matrix value;                // x × y
-  std::vector<double> levels;  // increasing
+  Matrix value;                          // x × y
+  std::vector<double> levels;            // increasing
+  std::vector<std::string> level_texts;  // one for each level; empty: some levels' numbers
   std::vector<PointMark> points;
 };
 

@@ -96,6 +96,15 @@ void MemoryJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {
   found->second.snapshot = std::move(snapshot);
 }
 
+void MemoryJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end() || found->second.head.place.sequence < point.sequence) return;
+  std::vector<JournalHistoryPoint>& history = found->second.history;
+  history.push_back(std::move(point));
+  std::erase_if(history, [&](const JournalHistoryPoint& one) { return one.ordinal % stride != 0; });
+}
+
 absl::StatusOr<v1::Problem> MemoryJournal::ReadProblem(int64_t session) const {
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const Kept* const kept, Find(session));
@@ -130,6 +139,12 @@ absl::StatusOr<std::optional<JournalSnapshot>> MemoryJournal::ReadSnapshot(int64
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const Kept* const kept, Find(session));
   return kept->snapshot;
+}
+
+absl::StatusOr<std::vector<JournalHistoryPoint>> MemoryJournal::ReadHistory(int64_t session) const {
+  const std::lock_guard lock(mutex_);
+  POLYEST_ASSIGN_OR_RETURN(const Kept* const kept, Find(session));
+  return kept->history;
 }
 
 }  // namespace polyest::internal

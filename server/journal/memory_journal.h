@@ -20,12 +20,14 @@ class MemoryJournal final : public SessionJournal {
   absl::Status Delete(int64_t session) override;
   void Append(JournalEntry entry, Done done) override;
   void SaveSnapshot(int64_t session, JournalSnapshot snapshot) override;
+  void SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) override;
   absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const override;
   absl::Status ReadBatches(
       int64_t session, int64_t after,
       const std::function<absl::Status(const JournalBatch&)>& take) const override;
   absl::StatusOr<std::string> ReadDigest(int64_t session, int64_t sequence) const override;
   absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const override;
+  absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const override;
 
  private:
   struct Kept {
@@ -34,6 +36,7 @@ class MemoryJournal final : public SessionJournal {
     v1::Problem problem;
     std::vector<JournalEntry> batches;
     std::optional<JournalSnapshot> snapshot;
+    std::vector<JournalHistoryPoint> history;
   };
 
   // The following are called with the mutex held.

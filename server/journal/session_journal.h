@@ -64,6 +64,15 @@ struct JournalSnapshot {
   std::string state;
 };
 
+// Holds one estimate of a session's history.
+struct JournalHistoryPoint {
+  bool operator==(const JournalHistoryPoint&) const = default;
+
+  int64_t ordinal = 0;   // ≥ 0, increasing
+  int64_t sequence = 0;  // number of the last batch that it takes into account
+  std::string point;     // serialized
+};
+
 // Thread-safe. Errors: NOT_FOUND for a session that does not exist, RESOURCE_EXHAUSTED for a full
 // disk, UNAVAILABLE for a disk that fails, DATA_LOSS for data that was kept and cannot be read.
 class SessionJournal {
@@ -97,6 +106,10 @@ class SessionJournal {
   // snapshot's batch does not exist or the disk fails, because snapshots only save time.
   virtual void SaveSnapshot(int64_t session, JournalSnapshot snapshot) = 0;
 
+  // Saves a point of a session's history, now or later, and drops the points whose ordinal is no
+  // multiple of `stride` ≥ 1. Drops it silently under the conditions of SaveSnapshot.
+  virtual void SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) = 0;
+
   // Returns the problem of a session. Waits for the disk, as do the following.
   virtual absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const = 0;
   // Calls `take` with the batches after batch `after`, in order, until it returns an error, which
@@ -109,6 +122,9 @@ class SessionJournal {
   // Returns the latest snapshot of a session, if one was saved. A session that does not exist may
   // count as one without a snapshot.
   virtual absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const = 0;
+  // Returns the points of a session's history in the order of their ordinals. A session that does
+  // not exist may count as one without any.
+  virtual absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const = 0;
 };
 
 }  // namespace polyest::internal

@@ -53,6 +53,19 @@ absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,
   return query.Run();
 }
 
+absl::Status InsertHistoryPoint(SqliteDatabase& database, int64_t session,
+                                const JournalHistoryPoint& point, int64_t stride) {
+  SqliteQuery insert(database,
+                     "INSERT OR REPLACE INTO history SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
+                     "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?3)");
+  insert.Bind(session).Bind(point.ordinal).Bind(point.sequence).BindBlob(point.point);
+  POLYEST_RETURN_IF_ERROR(insert.Run());
+  if (stride == 1) return absl::OkStatus();
+  SqliteQuery thin(database, "DELETE FROM history WHERE session = ? AND ordinal % ? <> 0");
+  thin.Bind(session).Bind(stride);
+  return thin.Run();
+}
+
 absl::Status RunFor(SqliteDatabase& database, const char* sql, int64_t session) {
   SqliteQuery query(database, sql);
   query.Bind(session);
@@ -243,6 +256,14 @@ void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {
       [](const absl::Status&) {});
 }
 
+void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) {
+  queue_->Submit(
+      [session, point = std::move(point), stride](SqliteDatabase& database) {
+        return InsertHistoryPoint(database, session, point, stride);
+      },
+      [](const absl::Status&) {});
+}
+
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
@@ -305,6 +326,20 @@ absl::StatusOr<std::optional<JournalSnapshot>> SqliteJournal::ReadSnapshot(int64
   return JournalSnapshot{query.Integer(0), query.Integer(1), query.Bytes(2)};
 }
 
+absl::StatusOr<std::vector<JournalHistoryPoint>> SqliteJournal::ReadHistory(int64_t session) const {
+  Reader reader(*this);
+  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
+  SqliteQuery query(
+      *database, "SELECT ordinal, sequence, point FROM history WHERE session = ? ORDER BY ordinal");
+  query.Bind(session);
+  std::vector<JournalHistoryPoint> history;
+  while (true) {
+    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
+    if (!row) return history;
+    history.push_back({query.Integer(0), query.Integer(1), query.Bytes(2)});
+  }
+}
+
 void SqliteJournal::WakeMaintenance() {
   const std::lock_guard lock(maintenance_mutex_);
   maintenance_.notify_one();
@@ -354,6 +389,7 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
     POLYEST_RETURN_IF_ERROR(query.Run());
     if (database.changes() > 0) return absl::OkStatus();
     POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM snapshot WHERE session = ?", session));
+    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM history WHERE session = ?", session));
     return RunFor(database, "DELETE FROM deleted WHERE session = ?", session);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(remove));

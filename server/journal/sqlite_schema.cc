@@ -46,6 +46,12 @@ constexpr const char* kMigrations[] = {
          rows INTEGER NOT NULL,
          state BLOB NOT NULL);
        CREATE TABLE deleted (session INTEGER PRIMARY KEY);)",
+    R"(CREATE TABLE history (
+         session INTEGER NOT NULL,
+         ordinal INTEGER NOT NULL,
+         sequence INTEGER NOT NULL,
+         point BLOB NOT NULL,
+         PRIMARY KEY (session, ordinal)) WITHOUT ROWID;)",
 };
 
 absl::StatusOr<int64_t> CheckOwn(SqliteDatabase& database) {

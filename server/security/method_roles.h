@@ -35,6 +35,7 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"ImportSession", Role::kAdmin},
     {"AddMeasurements", Role::kWriter},
     {"GetEstimate", Role::kReader},
+    {"GetHistory", Role::kReader},
     {"StreamMeasurements", Role::kWriter},
     {"WatchSession", Role::kReader},
     {"ComputeEstimate", Role::kReader},

@@ -62,6 +62,13 @@ class SessionService final : public v1::SessionService::CallbackService {
                          v1::AddMeasurementsResponse* response) override;
   Unary* GetEstimate(Context* call, const v1::GetEstimateRequest* request,
                      v1::Estimate* response) override;
+  Unary* GetHistory(Context* call, const v1::GetHistoryRequest* request,
+                    v1::EstimateHistory* response) override {
+    return OnStrand(call, "GetHistory", request->session(),
+                    [=](const std::shared_ptr<Session>& session, const Stop&) {
+                      return Deliver(session->History(), response);
+                    });
+  }
   grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>*
   StreamMeasurements(Context* call) override {
     return new MeasurementStream(context_, *call);

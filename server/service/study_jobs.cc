@@ -52,10 +52,14 @@ concept RunsTheModel = std::same_as<Request, v1::ComputePropagationRequest> ||
 
 // The overloads of OnStrand answer a study of a session from its estimator, on its strand.
 
-absl::Status OnStrand(const v1::ComputeEstimateRequest&, Session& session, const ServiceContext&,
-                      const Stop& stop, v1::ComputeEstimateResponse& response) {
+absl::Status OnStrand(const v1::ComputeEstimateRequest& request, Session& session,
+                      const ServiceContext&, const Stop& stop,
+                      v1::ComputeEstimateResponse& response) {
   POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate, session.CurrentEstimate(stop));
   *response.mutable_estimate() = *estimate;
+  if (request.history_point_count() > 0) {
+    POLYEST_ASSIGN_OR_RETURN(*response.mutable_history(), session.History());
+  }
   return absl::OkStatus();
 }
 

@@ -127,6 +127,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   loaded->Attach(services_.journal, number());
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;
+  history_.reset();
   Replace({loaded, losses});
   return loaded;
 }
@@ -219,12 +220,33 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
   }
   if (latest == passed_on_) return latest;
   passed_on_ = latest;
+  // A history that cannot be read is no reason to withhold an estimate.
+  if (LoadHistory().ok()) {
+    if (auto point = history_->Add(*latest)) {
+      services_.journal.SaveHistoryPoint(number(), *std::move(point), history_->stride());
+    }
+  }
   CountEstimate(*latest, Clock::now() - begin);
   WhenKept(latest->sequence(), Present().losses,
            [self = shared_from_this(), latest](const absl::Status& kept) {
              if (kept.ok()) self->observers_.OnEstimate(latest);
            });
   return latest;
+}
+
+absl::Status Session::LoadHistory() {
+  if (history_) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(const auto kept, services_.journal.ReadHistory(number()));
+  history_.emplace(kept);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::EstimateHistory> Session::History() {
+  POLYEST_RETURN_IF_ERROR(CheckOpen());
+  POLYEST_RETURN_IF_ERROR(LoadHistory());
+  v1::EstimateHistory history = history_->Points();
+  if (!loaded()) history_.reset();
+  return history;
 }
 
 void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration duration) {
@@ -261,6 +283,7 @@ void Session::Unload() {
   if (!IdleTime()) return;
   Replace({nullptr, Present().losses});
   passed_on_ = nullptr;
+  history_.reset();
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
 }
 

@@ -19,6 +19,7 @@
 #include "server/execution/executor.h"
 #include "server/journal/session_journal.h"
 #include "server/sessions/batch_ledger.h"
+#include "server/sessions/estimate_history.h"
 #include "server/sessions/limits.h"
 #include "server/sessions/loaded_session.h"
 #include "server/sessions/memory_limit.h"
@@ -126,6 +127,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<SharedEstimate> LatestEstimate(const Stop& stop);
   // Processes everything added, then returns the estimate as LatestEstimate does.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
+  // Returns the history of the estimates. Loads nothing but the history.
+  absl::StatusOr<v1::EstimateHistory> History();
   // Calls `work` with the estimator, which has everything added and may have yet to process it, and
   // with the number of the last batch added. Returns what `work` returns.
   absl::Status WithEstimator(const LoadedSession::Work& work, const Stop& stop);
@@ -160,6 +163,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
   InMemory Present() const;
   void Replace(InMemory in_memory);
+  absl::Status LoadHistory();
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
   const SessionServices services_;
@@ -167,7 +171,9 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::shared_ptr<Strand> strand_;
   BatchLedger ledger_;
 
-  SharedEstimate passed_on_;  // the last estimate given to the observers; used on the strand only
+  // Used on the strand only.
+  SharedEstimate passed_on_;                // the last estimate given to the observers
+  std::optional<EstimateHistory> history_;  // not in memory until it is used
 
   std::atomic<bool> closed_ = false;
   WriterLease writer_;

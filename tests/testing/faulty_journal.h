@@ -70,6 +70,9 @@ class FaultyJournal final : public SessionJournal {
   void SaveSnapshot(int64_t session, JournalSnapshot snapshot) override {
     journal_.SaveSnapshot(session, std::move(snapshot));
   }
+  void SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) override {
+    journal_.SaveHistoryPoint(session, std::move(point), stride);
+  }
   absl::StatusOr<v1::Problem> ReadProblem(int64_t session) const override {
     return journal_.ReadProblem(session);
   }
@@ -83,6 +86,9 @@ class FaultyJournal final : public SessionJournal {
   }
   absl::StatusOr<std::optional<JournalSnapshot>> ReadSnapshot(int64_t session) const override {
     return journal_.ReadSnapshot(session);
+  }
+  absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const override {
+    return journal_.ReadHistory(session);
   }
 
  private:

@@ -150,6 +150,24 @@ v1::Diagnostic ToProto(const Diagnostic& diagnostic) {
   return proto;
 }
 
+v1::EstimateHistory::Point ToHistoryPoint(const v1::Estimate& estimate) {
+  v1::EstimateHistory::Point point;
+  point.set_time_s(estimate.time());
+  point.set_sample_count(estimate.samples());
+  point.set_sequence(estimate.sequence());
+  for (const v1::ParameterEstimate& parameter : estimate.parameters()) {
+    v1::EstimateHistory::Parameter& added = *point.add_parameters();
+    added.set_name(parameter.name());
+    added.set_unit(parameter.unit());
+    added.set_mean(parameter.mean());
+    added.set_std_dev(parameter.std_dev());
+    added.set_lower95(parameter.lower95());
+    added.set_upper95(parameter.upper95());
+    added.set_verdict(parameter.verdict());
+  }
+  return point;
+}
+
 v1::Estimate ToProto(const Estimate& estimate) {
   v1::Estimate proto;
   for (const auto& parameter : estimate.parameters) ToProto(parameter, *proto.add_parameters());

@@ -10,4 +10,7 @@ v1::Estimate ToProto(const Estimate& estimate);
 
 v1::Diagnostic ToProto(const Diagnostic& diagnostic);
 
+// Returns the estimate in short, for a history.
+v1::EstimateHistory::Point ToHistoryPoint(const v1::Estimate& estimate);
+
 }  // namespace polyest::internal

@@ -1,11 +1,15 @@
 #include "proto/wire/convert/posterior.h"
 
+#include <algorithm>
+
 #include "core/common/check.h"
 #include "proto/wire/convert/estimate.h"
 #include "proto/wire/convert/repeated.h"
 
 namespace polyest::internal {
 namespace {
+
+constexpr size_t kMaxPaired = 8;  // parameters of ComputePosteriorRequest.all_joints
 
 v1::ComputePosteriorResponse::Method ToProto(PosteriorMethod method) {
   switch (method) {
@@ -31,7 +35,8 @@ void ToProto(const PosteriorMarginal& marginal, v1::ComputePosteriorResponse::Ma
 
 }  // namespace
 
-PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request) {
+PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request,
+                                    const std::vector<std::string>& names) {
   PosteriorOptions options;
   if (!request.probabilities().empty()) {
     options.probabilities.assign(request.probabilities().begin(), request.probabilities().end());
@@ -39,6 +44,10 @@ PosteriorOptions ToPosteriorOptions(const v1::ComputePosteriorRequest& request) 
   if (request.density_bin_count() != 0) options.density_bins = request.density_bin_count();
   for (const auto& pair : request.joints())
     options.joints.emplace_back(pair.first(), pair.second());
+  const size_t paired = request.all_joints() ? std::min<size_t>(names.size(), kMaxPaired) : 0;
+  for (size_t i = 0; i < paired; ++i) {
+    for (size_t j = i + 1; j < paired; ++j) options.joints.emplace_back(names[i], names[j]);
+  }
   if (request.joint_bin_count() != 0) options.joint_bins = request.joint_bin_count();
   options.samples = request.sample_count();
   return options;

@@ -1,5 +1,7 @@
 #include "proto/wire/operations/operations.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -23,11 +25,14 @@
 #include "proto/wire/convert/regularization.h"
 #include "proto/wire/convert/studies.h"
 #include "proto/wire/convert/wire_fields.h"
+#include "proto/wire/operations/estimate_history.h"
 #include "proto/wire/operations/names.h"
 #include "proto/wire/operations/pages.h"
 
 namespace polyest::internal {
 namespace {
+
+constexpr int kMaxHistoryPoints = 1000;
 
 // Returns the experiment of a request. Refuses a session: only a daemon has sessions, and it
 // handles them itself.
@@ -40,20 +45,29 @@ absl::StatusOr<const v1::Experiment*> ExperimentOf(const v1::Subject& subject) {
   return InvalidField("subject", "must be given: a session, or an experiment with its problem");
 }
 
+// Returns an estimator without measurements for an experiment, and converts its measurements.
+absl::StatusOr<std::unique_ptr<Estimator>> MakeEstimator(const v1::Experiment& experiment,
+                                                         int threads, const ModelLibrary& models,
+                                                         const ProblemLimits& limits,
+                                                         std::shared_ptr<SampleStore> store,
+                                                         Samples& samples) {
+  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
+                           ToProblem(experiment.problem(), models, limits));
+  POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, experiment.measurements()));
+  POLYEST_ASSIGN_OR_RETURN(samples, ToSamples(experiment.measurements()));
+  samples.end_of_run = true;
+  return EstimatorAccess::Make(std::move(problem),
+                               {.threads = threads, .store = std::move(store), .snapshot = {}});
+}
+
 // Returns an estimator that holds all measurements of an experiment, none of them processed yet.
 absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const v1::Experiment& experiment, int threads,
                                                    const ModelLibrary& models,
                                                    const ProblemLimits& limits,
                                                    std::shared_ptr<SampleStore> store = nullptr) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
-                           ToProblem(experiment.problem(), models, limits));
-  POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, experiment.measurements()));
-  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(experiment.measurements()));
-  POLYEST_ASSIGN_OR_RETURN(
-      auto estimator,
-      EstimatorAccess::Make(std::move(problem),
-                            {.threads = threads, .store = std::move(store), .snapshot = {}}));
-  samples.end_of_run = true;
+  Samples samples;
+  POLYEST_ASSIGN_OR_RETURN(auto estimator, MakeEstimator(experiment, threads, models, limits,
+                                                         std::move(store), samples));
   POLYEST_RETURN_IF_ERROR(WireFields(estimator->Append(samples)));
   return estimator;
 }
@@ -86,11 +100,20 @@ absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
     const v1::ComputeEstimateRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
-  POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
-  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
+  const int points = request.history_point_count();
+  if (points < 0 || points > kMaxHistoryPoints) {
+    return InvalidField("historyPointCount",
+                        absl::StrFormat("%d must be from 0 to %d", points, kMaxHistoryPoints));
+  }
+  Samples samples;
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator, MakeEstimator(*experiment, threads, models, limits,
+                                                               std::move(store), samples));
   v1::ComputeEstimateResponse response;
+  v1::EstimateHistory history;
+  POLYEST_RETURN_IF_ERROR(
+      ProcessWithHistory(std::move(samples), points, *estimator, history, stop));
+  if (points > 0) *response.mutable_history() = std::move(history);
+  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
   *response.mutable_estimate() = ToProto(estimate);
   return response;
 }
@@ -188,9 +211,9 @@ absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
 
 absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
     const v1::ComputePosteriorRequest& request, Estimator& estimator, const Stop& stop) {
-  const PosteriorOptions options = ToPosteriorOptions(request);
-  POLYEST_RETURN_IF_ERROR(
-      WireFields(Validate(options, EstimatorAccess::ProblemOf(estimator).prior())));
+  const Prior& prior = EstimatorAccess::ProblemOf(estimator).prior();
+  const PosteriorOptions options = ToPosteriorOptions(request, prior.Names());
+  POLYEST_RETURN_IF_ERROR(WireFields(Validate(options, prior)));
   POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
   POLYEST_ASSIGN_OR_RETURN(const Posterior posterior, estimator.CurrentPosterior(options, stop));
   return ToProto(posterior, options);

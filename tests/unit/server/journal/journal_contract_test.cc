@@ -224,6 +224,25 @@ TEST_P(JournalContractTest, HasTheLatestSnapshotOfBatchesThatItKeeps) {
   EXPECT_EQ(snapshot->rows, 1);
 }
 
+TEST_P(JournalContractTest, HasTheHistoryOfBatchesThatItKeepsAndThinsIt) {
+  const int64_t number = Create("t", "sessions/a"), other = Create("t", "sessions/b");
+  EXPECT_TRUE(journal_->ReadHistory(number)->empty());
+  journal_->SaveHistoryPoint(number, {0, 1, "too early"}, 1);
+  ASSERT_TRUE(Append(Entry(number, 1, 1)).ok());
+  ASSERT_TRUE(Append(Entry(other, 1, 1)).ok());
+  const std::string bytes("a\0b", 3);
+  journal_->SaveHistoryPoint(number, {0, 1, bytes}, 1);
+  journal_->SaveHistoryPoint(other, {3, 1, "other"}, 1);
+  for (int64_t k = 1; k <= 3; ++k) journal_->SaveHistoryPoint(number, {k, 1, "point"}, 1);
+  journal_->SaveHistoryPoint(number, {4, 1, "last"}, 2);
+  // Writes are in order, so that the points are there.
+  ASSERT_TRUE(Append(Entry(number, 2, 2)).ok());
+  using Points = std::vector<JournalHistoryPoint>;
+  EXPECT_EQ(*journal_->ReadHistory(number),
+            (Points{{0, 1, bytes}, {2, 1, "point"}, {4, 1, "last"}}));
+  EXPECT_EQ(*journal_->ReadHistory(other), (Points{{3, 1, "other"}}));
+}
+
 INSTANTIATE_TEST_SUITE_P(, JournalContractTest, testing::Values(Kind::kMemory, Kind::kSqlite),
                          [](const auto& kind) {
                            return kind.param == Kind::kMemory ? "Memory" : "Sqlite";

@@ -108,6 +108,34 @@ TEST_F(SessionTest, EstimatesOnceForAllWhoAskUntilThereIsMore) {
   EXPECT_EQ((*second)->sequence(), 2);
 }
 
+TEST_F(SessionTest, KeepsTheHistoryOfItsEstimatesOverARestart) {
+  ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
+  ASSERT_TRUE(session_->CurrentEstimate({}).ok());
+  ASSERT_TRUE(Add(2, Batch({0.3})).ok());
+  const auto second = session_->CurrentEstimate({});
+  ASSERT_TRUE(second.ok()) << second.status();
+  ASSERT_TRUE(session_->CurrentEstimate({}).ok());  // the same again
+  const auto before = session_->History();
+  ASSERT_TRUE(before.ok()) << before.status();
+  ASSERT_EQ(before->points_size(), 2);
+  const v1::EstimateHistory::Point& last = before->points(1);
+  EXPECT_EQ(before->points(0).sequence(), 1);
+  EXPECT_EQ(last.sequence(), 2);
+  EXPECT_EQ(last.sample_count(), 3);
+  EXPECT_EQ(last.time_s(), 0.3);
+  ASSERT_EQ(last.parameters_size(), (*second)->parameters_size());
+  EXPECT_EQ(last.parameters(0).mean(), (*second)->parameters(0).mean());
+  EXPECT_EQ(last.parameters(0).lower95(), (*second)->parameters(0).lower95());
+
+  Restart();
+  const auto after = session_->History();
+  ASSERT_TRUE(after.ok()) << after.status();
+  EXPECT_EQ(after->SerializeAsString(), before->SerializeAsString());
+  ASSERT_TRUE(session_->Load({}).ok());
+  ASSERT_TRUE(session_->CurrentEstimate({}).ok());  // of the same batch: no new point
+  EXPECT_EQ(session_->History()->points_size(), 2);
+}
+
 TEST_F(SessionTest, TakesBatchesLongBeforeItProcessesThem) {
   ASSERT_TRUE(Add(1, Batch({0.1, 0.2})).ok());
   ASSERT_TRUE(Add(2, Batch({0.3})).ok());

@@ -1,0 +1,87 @@
+#include <absl/strings/str_cat.h>
+#include <absl/time/clock.h>
+#include <absl/time/time.h>
+
+#include <fstream>
+#include <utility>
+
+#include "client/cli/backend.h"
+#include "client/cli/commands.h"
+#include "client/cli/exit_status.h"
+#include "client/cli/problem_input.h"
+#include "client/cli/report_page.h"
+#include "core/common/status.h"
+#include "polyest/client.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kHistoryPoints = 50;
+constexpr int kDensityBins = 60;
+
+absl::StatusOr<v1::Problem> ProblemOfSession(const ReportArguments& arguments) {
+  Client client(arguments.place.server, ToClientOptions(arguments.place));
+  v1::GetSessionRequest get;
+  get.set_name(absl::StrCat("sessions/", arguments.session));
+  POLYEST_ASSIGN_OR_RETURN(v1::Session session, client.GetSession(get));
+  return std::move(*session.mutable_problem());
+}
+
+// Computes what the report shows.
+absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent& content) {
+  v1::ComputeEstimateRequest estimate;
+  *estimate.mutable_subject() = subject;
+  estimate.set_history_point_count(kHistoryPoints);
+  POLYEST_ASSIGN_OR_RETURN(v1::ComputeEstimateResponse estimated,
+                           backend.ComputeEstimate(estimate));
+  content.estimate = std::move(*estimated.mutable_estimate());
+  content.history = std::move(*estimated.mutable_history());
+  v1::PredictRequest predict;
+  *predict.mutable_subject() = subject;
+  POLYEST_ASSIGN_OR_RETURN(content.prediction, backend.Predict(predict));
+  v1::ComputePosteriorRequest posterior;
+  *posterior.mutable_subject() = subject;
+  posterior.set_all_joints(true);
+  posterior.set_density_bin_count(kDensityBins);
+  POLYEST_ASSIGN_OR_RETURN(content.posterior, backend.ComputePosterior(posterior));
+  return absl::OkStatus();
+}
+
+absl::Status Write(const std::string& file, const std::string& page) {
+  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+  stream << page;
+  stream.close();
+  if (stream) return absl::OkStatus();
+  return absl::UnknownError(absl::StrCat("--output: cannot write ", file));
+}
+
+absl::Status MakeReport(const ReportArguments& arguments) {
+  // Any of the requests has the subject.
+  v1::ComputeEstimateRequest input;
+  POLYEST_RETURN_IF_ERROR(FillInput(arguments, input));
+  ReportContent content;
+  if (arguments.session.empty()) {
+    content.subject = absl::StrCat(arguments.problem_file, ", ", arguments.data_file);
+    content.problem = input.subject().experiment().problem();
+  } else {
+    content.subject = absl::StrCat("session ", arguments.session);
+    POLYEST_ASSIGN_OR_RETURN(content.problem, ProblemOfSession(arguments));
+  }
+  content.date = absl::FormatTime("%Y-%m-%d %H:%M UTC", absl::Now(), absl::UTCTimeZone());
+  content.version = POLYEST_VERSION;
+  const auto backend = MakeBackend(arguments.place);
+  const absl::Status computed = Compute(input.subject(), *backend, content);
+  if (!computed.ok()) return InInput(computed, arguments);
+  return Write(arguments.output_file, ReportPage(content));
+}
+
+}  // namespace
+
+int RunCommand(const ReportArguments& arguments, std::ostream& out, std::ostream& err) {
+  const absl::Status status = MakeReport(arguments);
+  if (!status.ok()) return Report(status, arguments.place.server, err);
+  out << arguments.output_file << '\n';
+  return kExitOk;
+}
+
+}  // namespace polyest::internal
