@@ -19,6 +19,7 @@
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/model_correction.h"
 #include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/noise_marginal.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
 
@@ -75,6 +76,9 @@ class Assessment {
     findings_.minimizer_reason = minima.front().reason;
     NoteOtherMinima(cost, minima);
     Summarize(cost, eta);
+    POLYEST_ASSIGN_OR_RETURN(
+        noise_widening_, MarginalizeNoise(problem_, *request_.expansion, cost, *request_.guesses,
+                                          request_.effort, stop, posterior_));
     Correct(cost);
     findings_.shift = std::hypot(findings_.shift, findings_.integration_shift);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
@@ -167,7 +171,8 @@ class Assessment {
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
     const Vector informed = ContractionByData(cost, eta);
-    const Vector widening = shift_widening_ * findings_.windows.widening;
+    const Vector widening =
+        shift_widening_ * noise_widening_.cwiseProduct(findings_.windows.widening);
     DescribeSpread(cost, eta, informed, widening);
     estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
@@ -332,6 +337,7 @@ class Assessment {
   double spent_ = 0;   // degrees of freedom used up, see Cost::MismatchHessian
   PosteriorDraws posterior_;
   double shift_widening_ = 1;  // factor of the uncertainty for the expansion's own error
+  Vector noise_widening_;      // factors of it for the noise's correlation, by parameter
   Vector deviation_;           // standard deviations of the parameters
   Vector robust_deviation_;    // as deviation_, from the scores of windows; 0 if unknown
   Findings findings_;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <string>
@@ -94,6 +95,7 @@ struct Fit {
   Vector value;                        // a, b
   Vector deviation;                    // their standard deviations
   double negative_log_likelihood = 0;  // with a and b integrated out, up to a constant
+  double chi_squared = 0;
 };
 
 // Generalized least squares. With Q the precision of the correlated part, K = σ² (f + (1 − f) Q⁻¹)
@@ -116,9 +118,10 @@ Fit GeneralizedLeastSquares(const Samples& line, const Noise& noise) {
   Fit fit;
   fit.value = information.solve(gram.col(2).head(2));
   fit.deviation = information.solve(Matrix::Identity(2, 2)).diagonal().cwiseSqrt();
-  const double chi_squared = gram(2, 2) - fit.value.dot(gram.col(2).head(2));
-  fit.negative_log_likelihood = 0.5 * (kRows * std::log(variance) + log_determinant + chi_squared) +
-                                Matrix(information.matrixL()).diagonal().array().log().sum();
+  fit.chi_squared = gram(2, 2) - fit.value.dot(gram.col(2).head(2));
+  fit.negative_log_likelihood =
+      0.5 * (kRows * std::log(variance) + log_determinant + fit.chi_squared) +
+      Matrix(information.matrixL()).diagonal().array().log().sum();
   return fit;
 }
 
@@ -163,6 +166,49 @@ Curvature CurvatureAt(const Samples& line, const Noise& noise) {
   return curvature;
 }
 
+// Returns the 2.5 % and 97.5 % quantiles of a and b, as rows, with the noise integrated out: its
+// size with the density 1/σ, log τ and log f/(1 − f) with a uniform one, up to a τ of the length of
+// the record and 2^2.5 times that of the noise learned. The sum is over log τ and log f τ/(1 − f),
+// which the record knows almost independently of τ.
+Matrix IntegratedIntervals(const Samples& line, const Noise& learned) {
+  std::vector<Fit> fits;
+  std::vector<double> densities;
+  const double reach = std::exp2(2.5);
+  const double longest_s = std::min(kDuration, reach * learned.time_constant_s);
+  for (double tau = longest_s; tau > learned.time_constant_s / reach; tau /= 1.15) {
+    for (int i = -4; i <= 4; ++i) {
+      const double odds = learned.share / (1 - learned.share) * learned.time_constant_s / tau;
+      const double ratio = odds * std::exp(0.2 * i);
+      Fit fit = GeneralizedLeastSquares(line, {1, ratio / (1 + ratio), tau});
+      // ∫ σ^−(N−2) e^−½χ²/σ² dσ/σ is (χ²)^−½(N−2) up to a constant.
+      densities.push_back(-fit.negative_log_likelihood + 0.5 * fit.chi_squared -
+                          0.5 * (kRows - 2) * std::log(fit.chi_squared));
+      fit.deviation *= std::sqrt(fit.chi_squared / (kRows - 2));
+      fits.push_back(fit);
+    }
+  }
+  const double top = *std::ranges::max_element(densities);
+  Matrix quantiles(2, 2);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    for (const double probability : {0.025, 0.975}) {
+      double low = -10, high = 10;
+      for (int step = 0; step < 40; ++step) {
+        const double middle = 0.5 * (low + high);
+        double below = 0, all = 0;
+        for (size_t k = 0; k < fits.size(); ++k) {
+          const double density = std::exp(densities[k] - top);
+          const double z = (middle - fits[k].value[i]) / fits[k].deviation[i];
+          all += density;
+          below += density * 0.5 * std::erfc(-z / std::sqrt(2.0));
+        }
+        (below < probability * all ? low : high) = middle;
+      }
+      quantiles(i, probability < 0.5 ? 0 : 1) = low;
+    }
+  }
+  return quantiles;
+}
+
 Noise NoiseOf(const Estimate& estimate) {
   const ChannelEstimate& channel = estimate.channels[0];
   return {channel.noise_std_dev, channel.noise_white_share, channel.noise_time_constant_s};
@@ -188,11 +234,16 @@ TEST_P(WhiteShare, IsLearnedWithTheTimeConstantAndTheSize) {
   const Fit exact = GeneralizedLeastSquares(line, truth);
   const Fit with_found = GeneralizedLeastSquares(line, found);
   EXPECT_LT(exact.negative_log_likelihood - with_found.negative_log_likelihood, 0.5 * 16.3);
+  const Matrix integrated = IntegratedIntervals(line, found);
   // How well the record knows the width of an interval.
   const double unsure = std::sqrt(there.widening.dot(there.hessian.llt().solve(there.widening)));
   for (Eigen::Index i = 0; i < 2; ++i) {
     const ParameterEstimate& p = estimate.parameters[static_cast<size_t>(i)];
-    EXPECT_NEAR(p.std_dev / with_found.deviation[i], 1, 0.05) << p.name;
+    // The estimator integrates by steps of a factor 2 of the time constant.
+    const double half = 0.5 * (integrated(i, 1) - integrated(i, 0));
+    EXPECT_NEAR(p.lower95, integrated(i, 0), 0.1 * half) << p.name;
+    EXPECT_NEAR(p.upper95, integrated(i, 1), 0.1 * half) << p.name;
+    EXPECT_NEAR(1.96 * p.std_dev / half, 1, 0.1) << p.name;
     EXPECT_NEAR(std::log(p.std_dev / exact.deviation[i]), 0, 3 * unsure) << p.name;
     EXPECT_NEAR(p.mean, exact.value[i], 0.3 * exact.deviation[i]) << p.name;
   }
