@@ -103,7 +103,8 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
   bool moved = false;
   for (int i = 0; i < kMaxRevisions; ++i) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    std::optional<LearnedNoise> revised = ReviseNoise(problem_, *expansion_, summary_, stop);
+    std::optional<LearnedNoise> revised =
+        ReviseNoise(problem_, *expansion_, summary_, particles_, stop);
     if (!revised) break;
     POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(revised), stop));
     moved = true;

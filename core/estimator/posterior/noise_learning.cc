@@ -64,10 +64,11 @@ double CorrelationBehind(double r, double a) {
 class Revision {
  public:
   Revision(const ResolvedProblem& problem, const RegionalExpansion& expansion,
-           const RecordSummary& record)
+           const RecordSummary& record, const Matrix& particles)
       : problem_(problem),
         expansion_(expansion),
         record_(record),
+        particles_(particles),
         cost_(expansion.MakeCost(problem.problem().regularization)),
         noise_(expansion.noise()) {}
 
@@ -106,13 +107,29 @@ class Revision {
     Vector start = design.reference;
     const Vector& known = noise_.posterior.centre;
     if (known.size() > 0) start = design.region.ToLocal(known);
-    eta_ = FindMinima(SearchOf(cost_, design), start.transpose(), MinimizerOptions(), stop)
+    eta_ = FindMinima(SearchOf(cost_, design), WithBestParticle(start), MinimizerOptions(), stop)
                .front()
                .point;
     d_ = cost_.BasisDifference(eta_);
     to_local_ = Inverse(design.region.axes());
     fitted_ = FittedParameters(to_local_.transpose() * cost_.MismatchHessian(eta_) * to_local_,
                                problem_.prior());
+  }
+
+  // Returns the start and the particle of least cost, as rows. Where the cost has several minima,
+  // the noise at one that is not the least would be too large, and the expansion's own error would
+  // seem small beside it.
+  Matrix WithBestParticle(const Vector& start) const {
+    Matrix starts = start.transpose();
+    if (particles_.rows() == 0) return starts;
+    const Matrix etas = expansion_.design().region.ManyToLocal(particles_);
+    Vector costs;
+    cost_.EvaluateMany(etas, costs);
+    Eigen::Index best = 0;
+    if (!std::isfinite(costs.minCoeff(&best))) return starts;
+    starts.conservativeResize(2, Eigen::NoChange);
+    starts.row(1) = etas.row(best);
+    return starts;
   }
 
   void ReviseScale(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
@@ -271,6 +288,7 @@ class Revision {
   const ResolvedProblem& problem_;
   const RegionalExpansion& expansion_;
   const RecordSummary& record_;
+  const Matrix& particles_;
   const Cost cost_;
   LearnedNoise noise_;
   Vector eta_, d_;
@@ -313,8 +331,9 @@ bool LearnsNoise(const Problem& problem) {
 
 std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
                                         const RegionalExpansion& expansion,
-                                        const RecordSummary& record, const Stop& stop) {
-  return Revision(problem, expansion, record).Run(stop);
+                                        const RecordSummary& record, const Matrix& particles,
+                                        const Stop& stop) {
+  return Revision(problem, expansion, record, particles).Run(stop);
 }
 
 double FittedParameters(const ConstMatrixRef& mismatch_hessian, const Prior& prior) {

@@ -47,10 +47,13 @@ std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel
 // Whether anything of the problem's noise is learned from the record.
 bool LearnsNoise(const Problem& problem);
 
-// Returns the revised noise, or nullopt when the present noise needs no revision.
+// Returns the revised noise, or nullopt when the present noise needs no revision. The minimum is
+// searched from the expansion's reference or the posterior known, and from the best of `particles`
+// (any number × n, germ coordinates).
 std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
                                         const RegionalExpansion& expansion,
-                                        const RecordSummary& record, const Stop& stop);
+                                        const RecordSummary& record, const Matrix& particles,
+                                        const Stop& stop);
 
 // Returns the bias correction for the lag-1 correlation of N residuals of which a fit has used up
 // `share` degrees of freedom. The fit makes the correlation too small by share/N. The sums do not

@@ -14,6 +14,7 @@
 #include "tests/testing/oscillator.h"
 #include "tests/testing/records.h"
 #include "tests/unit/core/estimator/estimation.h"
+#include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal {
 namespace {
@@ -271,6 +272,38 @@ TEST(NoiseModel, WeighsAsItsLossesAsk) {
   noise.outliers = OutlierHandling::kHuber;
   EXPECT_EQ(OutlierWeight(noise.outliers, 1), 1);
   EXPECT_EQ(OutlierWeight(noise.outliers, -2.69), 0.5);
+}
+
+// A cosine at regular times is the same at a frequency and at its alias, so that only the prior
+// prefers one. The noise must be that of the better minima: with a larger one the error of an
+// expansion over both would seem small, and decide between them.
+TEST(NoiseOfUnknownSize, LeavesAnAliasItsWeight) {
+  constexpr double kStep = 0.574;  // s
+  constexpr double kTruth = 1.008, kAlias = 1 / kStep - kTruth;
+  constexpr double kMu = -0.517, kSigma = 0.2406;  // of the logarithm
+  const double mean = std::exp(kMu + 0.5 * kSigma * kSigma);
+  const auto frequency =
+      UncertainParameter::Lognormal("f", mean, mean * std::sqrt(std::expm1(kSigma * kSigma)));
+  const auto density = [](double f) {
+    const double z = (std::log(f) - kMu) / kSigma;
+    return std::exp(-0.5 * z * z) / f;
+  };
+  const double weight = density(kTruth) / (density(kTruth) + density(kAlias));
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal(0, 0.03);
+    Problem problem = TextProblem("cos(2*pi*f*t)", {*frequency}, 1);
+    problem.measured[0].noise = {.unknown = true};
+    Samples samples;
+    samples.columns = {{"y", {}, {}}};
+    for (int k = 1; k <= 32; ++k) {
+      samples.time_s.push_back(k * kStep);
+      samples.columns[0].value.push_back(std::cos(2 * M_PI * kTruth * k * kStep) + normal(random));
+    }
+    const Estimate estimate = EstimateOf(problem, samples);
+    ASSERT_EQ(estimate.components.size(), 2u) << "seed " << seed;
+    EXPECT_NEAR(estimate.components[1].weight, weight, 0.1 * weight) << "seed " << seed;
+  }
 }
 
 TEST(ProblemOfUnknownNoise, RefusesACorrelationWithoutATimeConstant) {
