@@ -56,6 +56,12 @@ TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
 }
 
+TEST_F(AnswersTest, PredictionsAgreeToTheLastDigit) {
+  const std::string data = File("data.csv", DemoRows(100)), other = File("b.csv", DemoRows(40));
+  ExpectSameAnswer({"fit", Example("oscillator.json"), data, "--format", "csv"});
+  ExpectSameAnswer({"fit", Example("oscillator.json"), data, "--validate", other});
+}
+
 TEST_F(AnswersTest, PosteriorsAgreeToTheLastDigit) {
   const std::string data = File("data.csv", DemoRows(100));
   const std::vector<std::string> command = {

@@ -34,7 +34,8 @@ TEST(EstimateHistory, StaysSmallAndEvenlySpacedHoweverManyEstimatesThereAre) {
   EstimateHistory history;
   Kept kept;
   for (int64_t batch = 1; batch <= kEstimates; ++batch) {
-    kept.Save(history.Add(EstimateOfBatch(batch)), history.stride());
+    const auto point = history.Add(EstimateOfBatch(batch));
+    kept.Save(point, history.stride());
     ASSERT_LE(std::ssize(kept.points()), EstimateHistory::kMaxPoints);
   }
   const v1::EstimateHistory points = history.Points();
@@ -51,7 +52,8 @@ TEST(EstimateHistory, StaysSmallAndEvenlySpacedHoweverManyEstimatesThereAre) {
   EstimateHistory restored(kept.points());
   EXPECT_EQ(restored.stride(), history.stride());
   EXPECT_EQ(restored.Points().points(0).sequence(), 1);
-  kept.Save(restored.Add(EstimateOfBatch(kEstimates + 1)), restored.stride());
+  const auto point = restored.Add(EstimateOfBatch(kEstimates + 1));
+  kept.Save(point, restored.stride());
   EXPECT_EQ(restored.Points().points().rbegin()->sequence(), kEstimates + 1);
   ASSERT_LE(std::ssize(kept.points()), EstimateHistory::kMaxPoints);
 }
