@@ -105,7 +105,8 @@ TEST_F(PicturesTest, FitScoresAnotherRecord) {
   EXPECT_EQ(fit.str(), validated.str());
   EXPECT_THAT(fit.str(),
               HasSubstr("run,t,x_mean,x_stdDev,x_q0.025,x_q0.5,x_q0.975,x_sampleStdDev"));
-  EXPECT_EQ(std::count(fit.str().begin(), fit.str().end(), '\n'), 4);
+  const std::string lines = fit.str();
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 4);
 }
 
 TEST_F(PicturesTest, ReportIsOnePageWithAllThatSupportsTheEstimate) {
