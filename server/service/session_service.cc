@@ -75,7 +75,7 @@ class SessionService final : public v1::SessionService::CallbackService {
   }
   grpc::ServerWriteReactor<v1::WatchSessionResponse>* WatchSession(
       Context* call, const v1::WatchSessionRequest* request) override {
-    return new SessionWatch(context_, *call, request->session());
+    return new SessionWatch(context_, *call, *request);
   }
 
  private:

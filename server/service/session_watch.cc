@@ -1,15 +1,51 @@
 #include "server/service/session_watch.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "proto/wire/operations/names.h"
+#include "proto/wire/operations/operations.h"
 #include "server/service/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest::internal {
+
+namespace {
+
+// Time from one prediction to the next ÷ time that one takes, at least.
+constexpr int kRest = 10;
+
+using PredictionPolicy = v1::WatchSessionRequest::PredictionPolicy;
+
+v1::PredictRequest ToPredictRequest(const PredictionPolicy& policy) {
+  constexpr int kDraws = 50, kRows = 200;
+  v1::PredictRequest request;
+  *request.mutable_outputs() = policy.outputs();
+  request.set_draw_count(policy.draw_count() == 0 ? kDraws : policy.draw_count());
+  request.set_max_row_count(policy.max_row_count() == 0 ? kRows : policy.max_row_count());
+  return request;
+}
+
+std::chrono::duration<double> IntervalOf(const PredictionPolicy& policy) {
+  constexpr double kInterval = 1;
+  return std::chrono::duration<double>(policy.min_interval_s() == 0 ? kInterval
+                                                                    : policy.min_interval_s());
+}
+
+absl::Status CheckPolicy(const PredictionPolicy& policy) {
+  constexpr double kLongest = 86'400;
+  const double interval_s = policy.min_interval_s();
+  if (interval_s >= 0 && interval_s <= kLongest) return absl::OkStatus();
+  return InvalidField(FieldPath{"prediction", "minIntervalS"},
+                      absl::StrFormat("%g must be from 0 to %g", interval_s, kLongest));
+}
+
+}  // namespace
 
 WatchFlow::WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call)
     : context_(context),
@@ -25,10 +61,16 @@ absl::StatusOr<Caller> WatchFlow::Authorize() const {
 }
 
 void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
-                        const std::string& session) {
+                        const v1::WatchSessionRequest& request) {
   std::lock_guard lock(mutex_);
   reactor_ = reactor;
-  const absl::Status attached = admitted.ok() ? Attach(session) : admitted;
+  if (request.has_prediction()) {
+    wanted_ = ToPredictRequest(request.prediction());
+    interval_ = IntervalOf(request.prediction());
+  }
+  absl::Status attached = admitted;
+  if (attached.ok()) attached = CheckPolicy(request.prediction());
+  if (attached.ok()) attached = Attach(request.session());
   if (!attached.ok()) End(attached);
   Advance();
 }
@@ -59,8 +101,39 @@ void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
   const absl::Status allowed = Authorize().status();
   if (allowed.ok()) {
     pending_ = last_ = estimate;
+    PredictIfDue();
   } else {
     End(allowed);
+  }
+  Advance();
+}
+
+void WatchFlow::PredictIfDue() {
+  if (!wanted_ || predicting_ || Clock::now() < due_) return;
+  // When the executor is full, a later estimate tries again.
+  predicting_ = session_->strand().Submit([flow = shared_from_this()] { flow->Predict(); }).ok();
+}
+
+void WatchFlow::Predict() {
+  const Clock::time_point begin = Clock::now();
+  v1::PredictResponse prediction;
+  const auto predict = [&](Estimator& estimator, int64_t sequence) -> absl::Status {
+    POLYEST_ASSIGN_OR_RETURN(prediction,
+                             polyest::internal::Predict(*wanted_, estimator, stop_.Begin()));
+    prediction.set_sequence(sequence);
+    return absl::OkStatus();
+  };
+  const absl::Status predicted =
+      stop_.Name(Guarded([&] { return session_->WithEstimator(predict, stop_.Begin()); }));
+  const Clock::time_point end = Clock::now();
+  std::lock_guard lock(mutex_);
+  predicting_ = false;
+  due_ = std::max(begin + std::chrono::duration_cast<Clock::duration>(interval_),
+                  begin + kRest * (end - begin));
+  if (predicted.ok()) {
+    if (!end_) prediction_ = std::move(prediction);
+  } else if (absl::IsInvalidArgument(predicted) || absl::IsResourceExhausted(predicted)) {
+    End(predicted);  // what was asked for cannot be predicted
   }
   Advance();
 }
@@ -71,6 +144,7 @@ void WatchFlow::OnWritten(bool ok) {
   if (!ok) {
     End(absl::CancelledError("the client does not read any more"));
     pending_ = nullptr;
+    prediction_.reset();
   }
   Advance();
 }
@@ -80,6 +154,7 @@ void WatchFlow::OnCancelled() {
   stop_source_.request_stop();
   End(absl::CancelledError("the call was cancelled"));
   pending_ = nullptr;
+  prediction_.reset();
   Advance();
 }
 
@@ -102,12 +177,20 @@ void WatchFlow::End(const absl::Status& status) {
 void WatchFlow::Advance() {
   if (finished_ || reactor_ == nullptr || writing_) return;
   if (pending_ != nullptr) {
+    written_.clear_prediction();
     *written_.mutable_estimate() = *std::exchange(pending_, nullptr);
     writing_ = true;
     reactor_->StartWrite(&written_);
     return;
   }
-  if (!end_ || registering_) return;
+  if (prediction_) {
+    written_.clear_estimate();
+    *written_.mutable_prediction() = *std::exchange(prediction_, std::nullopt);
+    writing_ = true;
+    reactor_->StartWrite(&written_);
+    return;
+  }
+  if (!end_ || registering_ || predicting_) return;
   finished_ = true;
   if (session_ != nullptr) session_->Unobserve(this);
   reactor_->Finish(ToGrpc(*end_));
@@ -119,7 +202,7 @@ void WatchFlow::OnDone() {
 }
 
 SessionWatch::SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
-                           const std::string& session)
+                           const v1::WatchSessionRequest& request)
     : flow_(std::make_shared<WatchFlow>(context, call)) {
   absl::Status admitted = flow_->Authorize().status();
   if (admitted.ok()) {
@@ -127,7 +210,7 @@ SessionWatch::SessionWatch(ServiceContext& context, grpc::CallbackServerContext&
     admitted = ticket.status();
     if (admitted.ok()) ticket_ = *std::move(ticket);
   }
-  flow_->OnStart(this, admitted, session);
+  flow_->OnStart(this, admitted, request);
 }
 
 void SessionWatch::OnDone() {

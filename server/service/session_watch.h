@@ -2,10 +2,13 @@
 
 // Serves WatchSession: sends every new estimate of a session to any number of observers. Between
 // the session and an observer there is room for one estimate; a newer one replaces it, so that a
-// slow observer misses those between but never the last.
+// slow observer misses those between but never the last. An observer may also ask for predictions
+// of the signals, which are computed on the session's strand, at a rate that leaves nine tenths of
+// the time to the estimates.
 
 #include <grpcpp/support/server_callback.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -30,7 +33,8 @@ class WatchFlow final : public SessionObserver,
   // token may be revoked while the watch is open.
   absl::StatusOr<Caller> Authorize() const;
 
-  void OnStart(WatchReactor* reactor, const absl::Status& admitted, const std::string& session);
+  void OnStart(WatchReactor* reactor, const absl::Status& admitted,
+               const v1::WatchSessionRequest& request);
   void OnWritten(bool ok);
   void OnCancelled();
   void OnDone();
@@ -40,11 +44,16 @@ class WatchFlow final : public SessionObserver,
   void Drain() override;
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   // The following are called with the mutex held.
   absl::Status Attach(const std::string& session);
   void End(const absl::Status& status);
   void Advance();
+  void PredictIfDue();
 
+  // Computes a prediction; runs on the strand.
+  void Predict();
   // Makes the watch an observer of the session; runs on the strand.
   void Register();
 
@@ -57,7 +66,12 @@ class WatchFlow final : public SessionObserver,
   WatchReactor* reactor_ = nullptr;
   std::shared_ptr<Session> session_;
   SharedEstimate pending_, last_;
-  v1::WatchSessionResponse written_;  // belongs to gRPC while writing_ is set
+  std::optional<v1::PredictRequest> wanted_;   // the prediction that is asked for, if any
+  std::chrono::duration<double> interval_{0};  // from one prediction to the next, at least
+  Clock::time_point due_{};                    // of the next prediction
+  bool predicting_ = false;
+  std::optional<v1::PredictResponse> prediction_;  // to be sent
+  v1::WatchSessionResponse written_;               // belongs to gRPC while writing_ is set
   bool writing_ = false;
   bool registering_ = false;
   bool finished_ = false;
@@ -67,7 +81,7 @@ class WatchFlow final : public SessionObserver,
 class SessionWatch final : public WatchReactor {
  public:
   SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
-               const std::string& session);
+               const v1::WatchSessionRequest& request);
 
   void OnWriteDone(bool ok) override { flow_->OnWritten(ok); }
   void OnCancel() override { flow_->OnCancelled(); }

@@ -32,6 +32,43 @@ class WatchTest : public DaemonTest {
   }
 };
 
+TEST_F(WatchTest, ShowsPredictionsToThoseWhoAskForThem) {
+  v1::WatchSessionRequest request;
+  request.set_session("sessions/rig");
+  request.mutable_prediction()->add_outputs("v");
+  request.mutable_prediction()->set_max_row_count(3);
+  grpc::ClientContext context;
+  const auto reader = sessions_->WatchSession(&context, request);
+  v1::WatchSessionResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  EXPECT_TRUE(response.has_estimate());
+  ASSERT_TRUE(reader->Read(&response));
+  ASSERT_TRUE(response.has_prediction());
+  EXPECT_FALSE(response.has_estimate());
+  EXPECT_EQ(response.prediction().sequence(), 1);
+  EXPECT_EQ(response.prediction().row_count(), 5);
+  EXPECT_EQ(response.prediction().draw_count(), 50);
+  ASSERT_EQ(response.prediction().outputs_size(), 1);
+  EXPECT_EQ(response.prediction().outputs(0).output(), "v");
+  EXPECT_EQ(response.prediction().outputs(0).mean_size(), 3);
+  context.TryCancel();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+
+  for (const bool bad_output : {true, false}) {
+    v1::WatchSessionRequest bad = request;
+    bad.mutable_prediction()->clear_outputs();
+    if (bad_output) {
+      bad.mutable_prediction()->add_outputs("q");
+    } else {
+      bad.mutable_prediction()->set_min_interval_s(-1);
+    }
+    grpc::ClientContext call;
+    const auto refused = sessions_->WatchSession(&call, bad);
+    while (refused->Read(&response)) EXPECT_FALSE(response.has_prediction());
+    EXPECT_EQ(refused->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  }
+}
+
 TEST_F(WatchTest, ShowsThePresentEstimateAndNewOnesToEveryObserver) {
   Watch first(*sessions_, "sessions/rig"), second(*sessions_, "sessions/rig");
   EXPECT_EQ(first.Next(), 1);
