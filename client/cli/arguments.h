@@ -10,6 +10,7 @@
 
 #include "client/cli/screen.h"
 #include "client/paper/paper_command.h"
+#include "polyest/data_file.h"
 
 namespace polyest::internal {
 
@@ -37,6 +38,7 @@ struct EstimateArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
@@ -45,6 +47,7 @@ struct ExplainArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;  // its id, in place of the files; empty: none
 };
 
@@ -52,6 +55,7 @@ struct StreamArguments {
   Place place;
   std::string problem_file;
   std::string data_file;  // "-": standard input
+  DataFileOptions data_options;
   int batch_rows = 30;
   double rate = 0;      // factor by which data are sent faster than measured; 0: at once
   std::string session;  // its id; empty: the daemon chooses
@@ -70,6 +74,7 @@ struct CostArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::vector<std::string> parameters;
   int grid_points = 0;  // 0: the default
   Format format = Format::kJson;
@@ -85,6 +90,7 @@ struct CheckArguments {
   Place place;  // always this process
   std::string problem_file;
   std::string data_file;  // empty: none
+  DataFileOptions data_options;
   Format format = Format::kTable;
 };
 
@@ -112,6 +118,7 @@ struct DesignArguments {
   Place place;
   std::string problem_file;
   std::string data_file;  // empty: none
+  DataFileOptions data_options;
   double until_s = 0;
   double step_s = 0;  // 0: the default
   int samples = 0;    // 0: the default
@@ -125,6 +132,7 @@ struct PosteriorArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;  // its id, in place of the files; empty: none
   int samples = 0;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
@@ -159,6 +167,7 @@ struct ProfileArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;  // its id, in place of the files; empty: none
   std::vector<std::string> parameters;
   int points = 0;         // 0: the default
@@ -170,6 +179,7 @@ struct RegularizationArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;  // its id, in place of the files; empty: none
   double lowest = 0;    // 0: the default
   double highest = 0;   // 0: the default

@@ -7,6 +7,7 @@
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/data_input.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/json_format.h"
 #include "client/cli/problem_input.h"
@@ -44,14 +45,14 @@ struct Findings {
 };
 
 // Reads the rows that are valid and adds the errors of the others to the findings.
-std::optional<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
+std::optional<v1::Measurements> ReadRows(const std::string& file, const DataColumns& columns,
                                          Findings& findings) {
   int refused = 0;
   const auto note = [&](const absl::Status& refusal) {
     if (++refused <= kMaxLines) findings.AddError(refusal);
     return absl::OkStatus();
   };
-  auto data = ReadDataFile(file, columns, note);
+  auto data = ReadData(file, columns, note);
   if (!data.ok()) findings.AddError(data.status());
   if (refused > kMaxLines) {
     findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMaxLines, " more"));
@@ -130,7 +131,8 @@ Findings Check(const CheckArguments& arguments, std::ostream& out) {
   }
   std::optional<v1::Measurements> data;
   if (!arguments.data_file.empty()) {
-    data = ReadData(arguments.data_file, ColumnsOf(*problem), findings);
+    data = ReadRows(arguments.data_file, DataColumnsFor(*problem, *models, arguments.data_options),
+                    findings);
   }
   if (findings.errors.empty()) AddSummary(arguments, *problem, *models, data, out, findings);
   return findings;

@@ -10,6 +10,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/data_input.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
@@ -74,9 +75,12 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
   if (!arguments.data_file.empty()) {
+    v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
     POLYEST_ASSIGN_OR_RETURN(
-        *request.mutable_subject()->mutable_experiment()->mutable_measurements(),
-        ReadDataFile(arguments.data_file, ColumnsOf(request.subject().experiment().problem())));
+        const DataColumns columns,
+        DataColumnsFor(experiment.problem(), arguments.place, arguments.data_options));
+    POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
+                             ReadData(arguments.data_file, columns));
   }
   POLYEST_RETURN_IF_ERROR(AddCandidates(arguments, request));
   request.set_until_s(arguments.until_s);

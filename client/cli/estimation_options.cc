@@ -18,6 +18,7 @@ void AddEstimate(CommandRegistry& registry) {
       arguments);
   AddProblem(command, arguments->problem_file);
   AddData(command, arguments->data_file);
+  AddDataOptions(command, arguments->data_options);
   AddPlace(command, arguments->place);
   AddPlot(command, arguments->plot_file, "how the estimate came about");
   AddFormat(command, arguments->format, {"table", "json"});
@@ -134,6 +135,7 @@ void AddCost(CommandRegistry& registry) {
                    arguments);
   AddProblem(command, arguments->problem_file);
   AddData(command, arguments->data_file);
+  AddDataOptions(command, arguments->data_options);
   command
       .add_option("--parameter", arguments->parameters,
                   "A parameter to vary, at most two (default: the first two)")

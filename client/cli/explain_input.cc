@@ -85,9 +85,9 @@ absl::StatusOr<ExplainInput> ReadExplainInput(const ExplainArguments& arguments,
   if (!arguments.session.empty()) return ReadSession(arguments);
   v1::ComputeEstimateRequest request;
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
-  POLYEST_RETURN_IF_ERROR(ReadProblemAndData(arguments.problem_file, arguments.data_file,
-                                             arguments.place, *experiment.mutable_problem(),
-                                             *experiment.mutable_measurements()));
+  POLYEST_RETURN_IF_ERROR(ReadProblemAndData(
+      arguments.problem_file, arguments.data_file, arguments.place, *experiment.mutable_problem(),
+      *experiment.mutable_measurements(), arguments.data_options));
   auto response = backend.ComputeEstimate(request);
   if (!response.ok()) return InInput(response.status(), arguments);
   ExplainInput input;

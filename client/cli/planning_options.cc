@@ -43,6 +43,7 @@ void AddCheck(CommandRegistry& registry) {
                    arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "The measurements, a CSV file");
+  AddDataOptions(command, arguments->data_options);
   AddFmuFolder(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json"});
 }
@@ -88,6 +89,7 @@ void AddDesign(CommandRegistry& registry) {
                    arguments);
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "What has been measured so far, a CSV file");
+  AddDataOptions(command, arguments->data_options);
   command.add_option("--until", arguments->until_s, "The last possible sample time, s")->required();
   command.add_option("--step", arguments->step_s,
                      "Step between possible sample times, s (default: a hundredth of --until)");

@@ -5,7 +5,6 @@
 #include "client/cli/backend.h"
 #include "client/cpp/file_kind.h"
 #include "core/common/status.h"
-#include "polyest/data_file.h"
 #include "polyest/problem_file.h"
 #include "proto/wire/convert/problem.h"
 
@@ -32,10 +31,11 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file,
 
 absl::Status ReadProblemAndData(const std::string& problem_file, const std::string& data_file,
                                 const Place& place, v1::Problem& problem,
-                                v1::Measurements& measurements) {
+                                v1::Measurements& measurements, const DataFileOptions& options) {
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(problem_file, data_file));
   POLYEST_ASSIGN_OR_RETURN(problem, ReadCheckedProblem(problem_file, place));
-  POLYEST_ASSIGN_OR_RETURN(measurements, ReadDataFile(data_file, ColumnsOf(problem)));
+  POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(problem, place, options));
+  POLYEST_ASSIGN_OR_RETURN(measurements, ReadData(data_file, columns));
   return absl::OkStatus();
 }
 

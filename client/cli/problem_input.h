@@ -10,6 +10,7 @@
 #include <string>
 
 #include "client/cli/arguments.h"
+#include "client/cli/data_input.h"
 #include "client/cli/exit_status.h"
 #include "core/common/status.h"
 #include "polyest/v1/measurements.pb.h"
@@ -29,7 +30,15 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file, const std:
 // Reads a checked problem and the data for it.
 absl::Status ReadProblemAndData(const std::string& problem_file, const std::string& data_file,
                                 const Place& place, v1::Problem& problem,
-                                v1::Measurements& measurements);
+                                v1::Measurements& measurements,
+                                const DataFileOptions& options = {});
+
+// Returns what the arguments say about the data file; the defaults if their command says nothing.
+template <typename Arguments>
+DataFileOptions DataOptionsOf(const Arguments& arguments) {
+  if constexpr (requires { arguments.data_options; }) return arguments.data_options;
+  return {};
+}
 
 // Fills in the subject of a request: the session that the arguments name, if their command takes
 // one, or else the problem and the data in their two files.
@@ -43,7 +52,8 @@ absl::Status FillInput(const Arguments& arguments, Request& request) {
   }
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
   return ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
-                            *experiment.mutable_problem(), *experiment.mutable_measurements());
+                            *experiment.mutable_problem(), *experiment.mutable_measurements(),
+                            DataOptionsOf(arguments));
 }
 
 // Returns the error with the name of the file in front, if it refuses a field of a file (InFile).

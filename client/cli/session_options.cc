@@ -23,6 +23,7 @@ void AddStream(CommandRegistry& registry) {
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "The measurements, a CSV file, or -")
       ->required();
+  AddDataOptions(command, arguments->data_options);
   AddServer(command, arguments->place)->required();
   command.add_option("--batch", arguments->batch_rows, "Rows per message")
       ->check(CLI::Range(1, 100'000))

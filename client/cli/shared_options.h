@@ -20,6 +20,9 @@ CLI::Option* AddPlace(CLI::App& command, Place& place);
 // AddProblem and AddData add the files as required arguments.
 void AddProblem(CLI::App& command, std::string& file);
 void AddData(CLI::App& command, std::string& file);
+// Adds what can be said about a data file: --delimiter, --decimal, --time-column, --time-zero and
+// --date-order.
+void AddDataOptions(CLI::App& command, DataFileOptions& options);
 // Adds problem and data files, or --session in their place, for a study of an estimate.
 void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
                    std::string& data_file, std::string& session);
@@ -27,6 +30,7 @@ template <typename Arguments>
 void AddStudyInput(CLI::App& command, Arguments& arguments) {
   AddStudyInput(command, arguments.place, arguments.problem_file, arguments.data_file,
                 arguments.session);
+  AddDataOptions(command, arguments.data_options);
 }
 // Adds --outputs, a comma-separated list.
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help);

@@ -14,6 +14,7 @@
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/data_input.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
@@ -104,13 +105,16 @@ class StreamCommand {
   LastEstimate Read(int descriptor, const std::string& name) {
     InterruptibleInput input(descriptor, interrupt_);
     std::istream in(&input);
-    auto reader = DataReader::Open(in, name, ColumnsOf(problem_));
+    POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
+                             DataColumnsFor(problem_, arguments_.place, arguments_.data_options));
+    auto reader = DataReader::Open(in, name, columns);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());
     // The first batch is read before the session is created, so that an invalid file creates none.
     auto first = reader->Read(arguments_.batch_rows);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(first.status());
+    line_->Interject([&] { TellOfDataFile(reader->Found()); });
     auto session = WaitForSession();
     if (!session.ok() && interrupted()) return std::nullopt;
     if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);

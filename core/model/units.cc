@@ -62,6 +62,16 @@ constexpr Symbol kSymbols[] = {
     {"t", {0, 1, 0, 0, 0, 0, 0}, 1e3, true},
     {"bar", {-1, 1, -2, 0, 0, 0, 0}, 1e5, true},
     {"%", {0, 0, 0, 0, 0, 0, 0}, 0.01, false},
+    {"°", {0, 0, 0, 0, 0, 0, 0}, std::numbers::pi / 180, false},
+    // Standard gravity, in which accelerometers are calibrated.
+    {"gn", {1, 0, -2, 0, 0, 0, 0}, 9.80665, true},
+    {"in", {1, 0, 0, 0, 0, 0, 0}, 0.0254, false},
+    {"ft", {1, 0, 0, 0, 0, 0, 0}, 0.3048, false},
+    {"mph", {1, 0, -1, 0, 0, 0, 0}, 0.44704, false},
+    {"lb", {0, 1, 0, 0, 0, 0, 0}, 0.45359237, false},
+    {"lbf", {1, 1, -2, 0, 0, 0, 0}, 4.4482216152605, false},
+    {"kgf", {1, 1, -2, 0, 0, 0, 0}, 9.80665, false},
+    {"psi", {-1, 1, -2, 0, 0, 0, 0}, 6894.757293168361, false},
 };
 
 struct Prefix {

@@ -12,6 +12,7 @@
 #include "core/model/equations/equation_model.h"
 #include "polyest/catalogue.h"
 #include "proto/wire/convert/annotate.h"
+#include "proto/wire/convert/problem_columns.h"
 #include "proto/wire/convert/wire_fields.h"
 
 namespace polyest::internal {
@@ -346,10 +347,18 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
                                         RegularizationMode::kFixed, refusals);
   problem.integration = ValueOr(ToIntegration(given.integration()), {}, refusals);
   problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
+  for (absl::Status& refusal : CheckColumns(given, problem.model.get())) {
+    refusals.push_back(std::move(refusal));
+  }
   return problem;
 }
 
 }  // namespace
+
+std::shared_ptr<const Model> FindModelOf(const v1::Problem& problem, const ModelLibrary& models) {
+  Refusals refusals;
+  return ToModel(problem, models, refusals);
+}
 
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {
   Refusals refusals;

@@ -6,6 +6,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <memory>
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
@@ -23,5 +24,8 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem,
 // Returns all errors that ToProblem would find, not only the first; none for a valid problem. When
 // the model is not available, returns the errors that can be found without it.
 std::vector<absl::Status> CheckProblem(const v1::Problem& problem, const ModelLibrary& models = {});
+
+// Returns the model of a problem; null if it is not available.
+std::shared_ptr<const Model> FindModelOf(const v1::Problem& problem, const ModelLibrary& models);
 
 }  // namespace polyest::internal

@@ -1,11 +1,24 @@
 #pragma once
 
-// Reads measurements from CSV text.
+// Reads measurements from CSV text as measuring systems and spreadsheets write it.
 //
-// The first line names the columns: `t` first (s), then measured outputs, streamed inputs and,
-// if there is more than one run, `run`. Cells are plain numbers; an empty cell of a measured output
-// is a missing sample. Blank lines, spaces around a cell, CR LF and a byte order mark are accepted;
-// quotes are not.
+// Found out by itself and said by DataReader::Found():
+//   encoding      UTF-8, UTF-16 (with a byte order mark or without), Windows-1252 and Latin-1
+//   line ends     LF, CR LF or CR; blank lines and lines that begin with # are left out
+//   delimiter     , ; tab or |, by the header
+//   header        the first line that names the time and a quantity; lines above it are left out.
+//                 The last line of comments may be the header
+//   units         in the header, "Disp [mm]", "Disp (mm)" or "Disp / mm", or in a row below it
+//   columns       a quantity's column has its name, or its name before a unit, or is named by
+//                 `DataColumns::sources`; the time is t, time, Zeit, timestamp, … Other columns are
+//                 left out. `run` (0, 1, 2 …) begins a new run at each change
+//   numbers       with a decimal point or a decimal comma; 1e5, +1, thousands that are grouped
+//   missing       an empty cell, NaN, NA, N/A, #N/A, #NV, null, -
+//   times         numbers in the unit of their column, hh:mm:ss.fff, or dates
+//                 (2026-01-31T13:00:00.5Z, 31.01.2026 13:00:00,5). Dates count from the first row
+//
+// Where two readings are possible, the file is refused, and the message names the option that
+// decides.
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/status.h>
@@ -14,6 +27,7 @@
 
 #include <cstdint>
 #include <istream>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,13 +37,41 @@
 
 namespace polyest {
 
-// The columns that data for a problem may have besides `t` and `run`.
+// What the user says about a file; the rest is found out.
+struct DataFileOptions {
+  enum class TimeZero {
+    kAutomatic,  // kFile for numbers and times of day, kFirst for dates
+    kFile,       // times as they stand in the file
+    kFirst,      // the first row of each run has the time 0
+  };
+  enum class DateOrder { kAutomatic, kDayFirst, kMonthFirst };
+
+  char delimiter = 0;  // 0: found out
+  char decimal = 0;    // '.' or ','; 0: found out
+  TimeZero time_zero = TimeZero::kAutomatic;
+  DateOrder date_order = DateOrder::kAutomatic;  // of dates such as 01/02/2026
+  std::string time_column;                       // header of the time; empty: found out
+};
+
+// Where a quantity is in a file, as in Problem.columns. Empty fields are found out.
+struct ColumnSource {
+  std::string from;  // the column's header, with its unit or without
+  std::string unit;  // of the column's values
+};
+
+// What data for a problem may have besides `t` and `run`, and how a file holds it.
 struct DataColumns {
   std::vector<std::string> measured;  // outputs; each may have missing cells, or no column
   std::vector<std::string> streamed;  // inputs; each must have a column and a value in every row
+  // By quantity: an output, an input, `t` or `run`.
+  std::map<std::string, ColumnSource> sources = {};
+  // The model's units by quantity. Values of a quantity without one are not converted.
+  std::map<std::string, std::string> units = {};
+  DataFileOptions options = {};
 };
 
-// Returns the columns that data for this problem may have.
+// Returns the columns that data for this problem may have, with the sources that it names. The
+// units are those of its model, which only the caller knows: they are left empty.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
 // Receives the error of a refused line. If it returns OK, the line is left out and reading goes on;
@@ -39,58 +81,43 @@ using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
 // Ends the reading at the first refused line, with that line's error.
 inline absl::Status StopAtRefusedLine(absl::Status refusal) { return refusal; }
 
-// Reads batches of rows, so a long file or an endless pipe is never in memory as a whole.
+// Reads batches of rows, so a long file or an endless pipe is never in memory as a whole. Never
+// waits for more of a pipe than the row it returns.
 class DataReader {
  public:
   // Reads the header. Messages call the file `name`. `in` must outlive the reader.
-  // INVALID_ARGUMENT: no header, or a column that is unknown, repeated or missing.
+  // INVALID_ARGUMENT: no header, no column for the time, for any measured output or for a streamed
+  // input, a column that is there twice, a unit of another dimension, or a name that is nearly that
+  // of a missing quantity.
   static absl::StatusOr<DataReader> Open(std::istream& in, std::string name,
                                          const DataColumns& columns,
                                          RefusedLine refused = StopAtRefusedLine);
+  DataReader(DataReader&& other) noexcept;
+  DataReader& operator=(DataReader&& other) noexcept;
+  ~DataReader();
 
-  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. INVALID_ARGUMENT
-  // names file, line, column, value and rule. It is the answer to a cell that is not a finite
-  // number, a time that does not increase within its run, a run that decreases, a row with too few
-  // or too many cells, a streamed input without a value, and data without any row.
+  // Returns the next rows, at most `max_rows` > 0; no rows at the end of the data. Values are in
+  // the model's units, times in s. INVALID_ARGUMENT names file, line, column, value and rule, and
+  // the option that would read the value. It is the answer to a cell that is not a finite number, a
+  // time that does not increase within its run, a run that decreases, a row with too few or too
+  // many cells, a streamed input without a value, and data without any row.
   absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
 
+  // Returns what has been found out so far, in one line: "data.csv: semicolons, decimal comma;
+  // 'Disp [mm]' → x, mm → m; 600 rows from 0 s". Empty for a file that has commas, decimal points
+  // and columns of the quantities' own names in the model's units only.
+  std::string Found() const;
+
  private:
-  enum class Role { kTime, kRun, kMeasured, kStreamed, kRefused };
-  struct Column {
-    std::string name;
-    Role role;
-    int channel;  // among the channels of a batch; −1 for the others
-  };
+  class Reader;
+  explicit DataReader(std::unique_ptr<Reader> reader);
 
-  DataReader(std::istream& in, std::string name);
-
-  absl::StatusOr<bool> NextLine(absl::string_view& line);
-  absl::Status AddColumn(absl::string_view name, const DataColumns& known);
-  absl::Status CheckStreamed(const DataColumns& known, RefusedLine refused) const;
-  absl::Status ParseRow(absl::string_view line, v1::Measurements& batch);
-  absl::Status ParseCells(absl::string_view line, v1::Measurements& batch);
-  absl::Status ParseRun(absl::string_view cell);
-  absl::Status ParseCell(const Column& column, absl::string_view cell, v1::Measurements& batch);
-  absl::Status CheckTime(int64_t previous_run) const;
-  absl::StatusOr<double> ParseNumber(const Column& column, absl::string_view cell) const;
-  absl::Status LineError(absl::string_view message) const;
-
-  std::istream* in_;
-  std::string name_;
-  std::unique_ptr<char[]> buffer_;  // the present line
-  std::vector<Column> columns_;
-  int channels_ = 0;
-  bool has_run_ = false;
-  int64_t line_ = 0;          // 1-based
-  int64_t rows_ = 0;          // accepted so far
-  bool any_refused_ = false;  // whether any row has been refused
-  double time_s_ = 0;         // of the last accepted row, or of the row being read
-  double previous_time_s_ = 0;
-  int32_t run_ = 0;
+  std::unique_ptr<Reader> reader_;
 };
 
-// Reads a whole file.
+// Reads a whole file. Writes Found() to `found` unless it is null.
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
-                                              RefusedLine refused = StopAtRefusedLine);
+                                              RefusedLine refused = StopAtRefusedLine,
+                                              std::string* found = nullptr);
 
 }  // namespace polyest

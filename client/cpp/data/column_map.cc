@@ -1,0 +1,250 @@
+#include "client/cpp/data/column_map.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/cpp/data/cells.h"
+#include "core/common/status.h"
+#include "proto/wire/transport/nearest_name.h"
+
+namespace polyest::internal {
+namespace {
+
+// Returns the headers of columns for a message.
+std::string Headers(const std::vector<DataColumn>& columns) {
+  constexpr size_t kMaxShown = 20;
+  std::vector<std::string> headers;
+  for (const DataColumn& column : columns) {
+    if (!column.name.header.empty()) headers.push_back(QuoteCell(column.name.header));
+  }
+  const size_t count = headers.size();
+  if (count > kMaxShown) headers.resize(kMaxShown);
+  return absl::StrCat(absl::StrJoin(headers, ", "),
+                      count > kMaxShown ? absl::StrCat(", … (", count, " columns)") : "");
+}
+
+// Returns the line of a problem that maps a column.
+std::string SourceLine(const std::string& quantity, const std::string& header) {
+  return absl::StrCat("\"columns\": {", QuoteCell(quantity), ": {\"from\": ", QuoteCell(header),
+                      "}}");
+}
+
+std::string WithoutDigits(absl::string_view name) {
+  std::string rest;
+  std::copy_if(name.begin(), name.end(), std::back_inserter(rest),
+               [](unsigned char c) { return !absl::ascii_isdigit(c); });
+  return rest;
+}
+
+class Mapping {
+ public:
+  Mapping(const Header& header, const DataColumns& known, const TextLines& lines,
+          RefusedLine refused)
+      : header_line_(header.line), known_(known), lines_(lines), refused_(refused) {
+    for (const ColumnName& name : header.names) columns_.push_back({.name = name});
+  }
+
+  absl::StatusOr<std::vector<DataColumn>> Run() {
+    for (const std::string& output : known_.measured) {
+      POLYEST_RETURN_IF_ERROR(Map(output, DataColumn::kMeasured));
+    }
+    for (const std::string& input : known_.streamed) {
+      POLYEST_RETURN_IF_ERROR(Map(input, DataColumn::kStreamed));
+    }
+    POLYEST_RETURN_IF_ERROR(Map("run", DataColumn::kRun));
+    POLYEST_RETURN_IF_ERROR(MapTime());
+    POLYEST_RETURN_IF_ERROR(CheckSpelling());
+    POLYEST_RETURN_IF_ERROR(CheckStreamed());
+    POLYEST_RETURN_IF_ERROR(CheckMeasured());
+    return std::move(columns_);
+  }
+
+ private:
+  absl::Status Error(const std::string& message) const {
+    return absl::InvalidArgumentError(
+        absl::StrCat(lines_.name(), ":", header_line_, ": ", message));
+  }
+
+  std::string Source(const std::string& quantity) const {
+    const auto source = known_.sources.find(quantity);
+    return source == known_.sources.end() ? "" : source->second.from;
+  }
+
+  bool HasColumn(const std::string& quantity) const {
+    return std::any_of(columns_.begin(), columns_.end(),
+                       [&](const DataColumn& column) { return column.quantity == quantity; });
+  }
+
+  // Returns the header of the first column that is not used; empty if there is none.
+  std::string Unused() const {
+    for (const DataColumn& column : columns_) {
+      if (column.role == DataColumn::kIgnored && !column.name.header.empty()) {
+        return column.name.header;
+      }
+    }
+    return "HEADER";
+  }
+
+  // Returns the columns with the whole header `wanted` or, if there is none, with that name.
+  std::vector<DataColumn*> Find(const std::string& wanted) {
+    std::vector<DataColumn*> whole, named;
+    for (DataColumn& column : columns_) {
+      if (column.name.header == wanted) whole.push_back(&column);
+      if (column.name.name == wanted) named.push_back(&column);
+    }
+    return whole.empty() ? named : whole;
+  }
+
+  absl::Status Map(const std::string& quantity, DataColumn::Role role) {
+    const std::string source = Source(quantity);
+    const std::vector<DataColumn*> found = Find(source.empty() ? quantity : source);
+    if (found.empty()) {
+      if (source.empty()) return absl::OkStatus();
+      return refused_(Error(absl::StrCat(
+          "there is no column ", QuoteCell(source), " for ", quantity, " (columns.", quantity,
+          ".from of the problem); the file's columns are ", Headers(columns_))));
+    }
+    return Claim(found, quantity, role);
+  }
+
+  absl::Status Claim(const std::vector<DataColumn*>& found, const std::string& quantity,
+                     DataColumn::Role role) {
+    DataColumn& first = *found.front();
+    const bool repeated = found.size() > 1;
+    const bool taken = first.role != DataColumn::kIgnored;
+    if (!repeated && !taken) {
+      first.role = role;
+      first.quantity = quantity;
+      return absl::OkStatus();
+    }
+    const std::string refusal =
+        repeated ? absl::StrCat("the column ", QuoteCell(first.name.header), " is named twice",
+                                found[1]->name.header == first.name.header
+                                    ? ""
+                                    : absl::StrCat(", also as ", QuoteCell(found[1]->name.header)),
+                                "; columns.", quantity, ".from of the problem takes a whole header")
+                 : absl::StrCat("the column ", QuoteCell(first.name.header), " would be both ",
+                                first.quantity, " and ", quantity);
+    for (DataColumn* const column : found) {
+      column->role = DataColumn::kRefused;
+      column->quantity = quantity;
+    }
+    return refused_(Error(refusal));
+  }
+
+  // Finds the time. Without it, no row can be read.
+  absl::Status MapTime() {
+    std::vector<DataColumn*> found;
+    for (DataColumn& column : columns_) {
+      if (column.role == DataColumn::kIgnored && MayBeTime(column.name, known_)) {
+        found.push_back(&column);
+      }
+    }
+    const std::string& option = known_.options.time_column;
+    const bool named = !option.empty() || !Source("t").empty();
+    if (found.size() > 1) KeepExact(named ? (option.empty() ? Source("t") : option) : "t", found);
+    if (found.empty()) return NoTime();
+    if (found.size() > 1) {
+      const bool same = found[0]->name.header == found[1]->name.header;
+      return Error(absl::StrCat(
+          same ? absl::StrCat("the column ", QuoteCell(found[0]->name.header), " is named twice")
+               : absl::StrCat("the time may be ", QuoteCell(found[0]->name.header), " or ",
+                              QuoteCell(found[1]->name.header), "; --time-column decides")));
+    }
+    found.front()->role = DataColumn::kTime;
+    found.front()->quantity = "t";
+    return absl::OkStatus();
+  }
+
+  // Keeps the columns with the whole header or the name `wanted`, if there are any.
+  static void KeepExact(const std::string& wanted, std::vector<DataColumn*>& found) {
+    for (const auto member : {&ColumnName::header, &ColumnName::name}) {
+      std::vector<DataColumn*> exact;
+      std::copy_if(found.begin(), found.end(), std::back_inserter(exact),
+                   [&](const DataColumn* column) { return column->name.*member == wanted; });
+      if (exact.empty()) continue;
+      found = std::move(exact);
+      return;
+    }
+  }
+
+  absl::Status NoTime() const {
+    const std::string& option = known_.options.time_column;
+    const std::string wanted = option.empty() ? Source("t") : option;
+    const std::string first = columns_.front().name.header;
+    return Error(absl::StrCat(
+        wanted.empty() ? "no column is the time t"
+                       : absl::StrCat("there is no column ", QuoteCell(wanted), " for the time"),
+        "; the first line must name the columns, and the file's columns are ", Headers(columns_),
+        "; --time-column ", QuoteCell(first), " or ", SourceLine("t", first),
+        " in the problem names it"));
+  }
+
+  // Refuses columns whose names are nearly that of a quantity without a column.
+  absl::Status CheckSpelling() {
+    std::vector<std::string> missing;
+    for (const auto* const names : {&known_.measured, &known_.streamed}) {
+      std::copy_if(names->begin(), names->end(), std::back_inserter(missing),
+                   [&](const std::string& name) { return !HasColumn(name); });
+    }
+    for (DataColumn& column : columns_) {
+      if (column.role != DataColumn::kIgnored || column.name.name.empty()) continue;
+      std::string nearest = NearestName(column.name.name, missing);
+      if (!HasColumn("run") && absl::EqualsIgnoreCase(column.name.name, "run")) nearest = "run";
+      // vel1 and vel2 are two channels, not a slip.
+      if (nearest.empty() || WithoutDigits(nearest) == WithoutDigits(column.name.name)) continue;
+      column.role = DataColumn::kRefused;
+      POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
+          "unknown column ", QuoteCell(column.name.header), "; did you mean ", QuoteCell(nearest),
+          "? Rename it, or map it in the problem: ", SourceLine(nearest, column.name.header)))));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckStreamed() {
+    for (const std::string& name : known_.streamed) {
+      if (HasColumn(name) || !Source(name).empty()) continue;
+      POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
+          "the column ", QuoteCell(name), " for the streamed input of that name is missing; ",
+          "the file's columns are ", Headers(columns_),
+          "; map one in the problem: ", SourceLine(name, Unused())))));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckMeasured() const {
+    const auto& names = known_.measured;
+    const bool any = std::any_of(names.begin(), names.end(),
+                                 [&](const std::string& name) { return HasColumn(name); });
+    if (names.empty() || any) return absl::OkStatus();
+    return Error(absl::StrCat("no column is a measured output of the problem (",
+                              absl::StrJoin(names, ", "), "); the file's columns are ",
+                              Headers(columns_),
+                              "; map one in the problem: ", SourceLine(names.front(), Unused())));
+  }
+
+  const int64_t header_line_;
+  const DataColumns& known_;
+  const TextLines& lines_;
+  const RefusedLine refused_;
+  std::vector<DataColumn> columns_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::vector<DataColumn>> MapColumns(const Header& header, const DataColumns& known,
+                                                   const TextLines& lines, RefusedLine refused) {
+  return Mapping(header, known, lines, refused).Run();
+}
+
+std::string ColumnLabel(const DataColumn& column) {
+  if (column.name.header == column.quantity) return column.quantity;
+  return absl::StrCat(QuoteCell(column.name.header), " (", column.quantity, ")");
+}
+
+}  // namespace polyest::internal

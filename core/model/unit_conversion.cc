@@ -1,0 +1,95 @@
+#include "core/model/unit_conversion.h"
+
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+#include <string>
+
+#include "core/common/status.h"
+#include "core/model/equations/text_error.h"
+#include "core/model/units.h"
+
+namespace polyest::internal {
+namespace {
+
+struct Spelling {
+  std::string_view recorded;
+  std::string_view unit;
+};
+
+// Spellings in files of measurements that are not units of their own.
+constexpr Spelling kSpellings[] = {
+    {"-", "1"},       {"sec", "s"},      {"secs", "s"},        {"second", "s"},
+    {"seconds", "s"}, {"Sekunden", "s"}, {"msec", "ms"},       {"milliseconds", "ms"},
+    {"usec", "us"},   {"degree", "deg"}, {"degrees", "deg"},   {"Grad", "deg"},
+    {"U/min", "rpm"}, {"kph", "km/h"},   {"deg/sec", "deg/s"}, {"Grad/s", "deg/s"},
+    {"Nm", "N m"},    {"kNm", "kN m"},   {"Nmm", "N mm"},      {"Ns/m", "N s/m"},
+};
+
+// Spellings of accelerations in standard gravity, which are masses otherwise.
+constexpr Spelling kGravities[] = {{"g", "gn"}, {"mg", "mgn"}, {"µg", "µgn"}, {"ug", "ugn"}};
+
+std::string_view UnitOf(std::string_view recorded) {
+  for (const Spelling& spelling : kSpellings) {
+    if (spelling.recorded == recorded) return spelling.unit;
+  }
+  return recorded;
+}
+
+// Replaces a mass by a multiple of gravity where the model has an acceleration.
+std::string_view WithGravity(std::string_view recorded, const Unit& model) {
+  for (const Spelling& gravity : kGravities) {
+    if (gravity.recorded == recorded && SameDimension(*ParseUnit("m/s^2"), model)) {
+      return gravity.unit;
+    }
+  }
+  return recorded;
+}
+
+bool HasAny(std::string_view text, std::initializer_list<std::string_view> symbols) {
+  for (const std::string_view symbol : symbols) {
+    if (text.find(symbol) != text.npos) return true;
+  }
+  return false;
+}
+
+bool CountsCycles(std::string_view unit) { return HasAny(unit, {"Hz"}); }
+bool CountsAngles(std::string_view unit) { return HasAny(unit, {"rad", "deg", "°", "rpm"}); }
+
+UnitConversion ByScale(double scale) {
+  constexpr double kRounding = 1e-12;
+  const double inverse = 1 / scale;
+  const double whole = std::round(inverse);
+  if (scale < 1 && whole < 1e15 && std::abs(inverse - whole) <= kRounding * whole) {
+    return {1, whole};
+  }
+  const bool is_whole = std::abs(scale - std::round(scale)) <= kRounding * scale;
+  return {is_whole ? std::round(scale) : scale, 1};
+}
+
+}  // namespace
+
+absl::Status CheckRecordedUnit(std::string_view recorded) {
+  return ParseUnit(UnitOf(recorded)).status();
+}
+
+absl::StatusOr<UnitConversion> ConvertUnit(std::string_view recorded, std::string_view model) {
+  if (recorded == model) return UnitConversion();
+  const std::string_view model_text = UnitOf(model);
+  POLYEST_ASSIGN_OR_RETURN(const Unit to, ParseUnit(model_text));
+  const std::string_view text = UnitOf(WithGravity(recorded, to));
+  POLYEST_ASSIGN_OR_RETURN(const Unit from, ParseUnit(text));
+  const auto differ = [&](std::string_view why) {
+    return absl::InvalidArgumentError(absl::StrFormat("values in %s cannot be converted to %s: %s",
+                                                      equations::Quoted(recorded),
+                                                      equations::Quoted(model), why));
+  };
+  if (!SameDimension(from, to)) return differ("their dimensions differ");
+  if ((CountsCycles(text) && CountsAngles(model_text)) ||
+      (CountsAngles(text) && CountsCycles(model_text))) {
+    return differ("one counts cycles, the other angles");
+  }
+  return ByScale(from.scale / to.scale);
+}
+
+}  // namespace polyest::internal
