@@ -84,12 +84,4 @@ std::vector<std::string> SplitCells(absl::string_view line, char delimiter) {
   return cells;
 }
 
-size_t CountCells(absl::string_view line, char delimiter) {
-  size_t count = 0;
-  for (size_t begin = 0; begin <= line.size(); ++count) {
-    begin = std::min(CellEnd(line, begin, delimiter), line.size()) + 1;
-  }
-  return count;
-}
-
 }  // namespace polyest::internal

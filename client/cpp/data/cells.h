@@ -29,7 +29,4 @@ std::string CellText(absl::string_view cell);
 // Returns the texts of all cells of a line. A quote without an end ends with the line.
 std::vector<std::string> SplitCells(absl::string_view line, char delimiter);
 
-// Returns the number of cells of a line.
-size_t CountCells(absl::string_view line, char delimiter);
-
 }  // namespace polyest::internal

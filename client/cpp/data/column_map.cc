@@ -80,14 +80,15 @@ class Mapping {
                        [&](const DataColumn& column) { return column.quantity == quantity; });
   }
 
-  // Returns the header of the first column that is not used; empty if there is none.
-  std::string Unused() const {
+  // Returns the end of a message: the line of a problem that maps the first column that is not
+  // used. Empty if all are.
+  std::string MapOne(const std::string& quantity) const {
     for (const DataColumn& column : columns_) {
       if (column.role == DataColumn::kIgnored && !column.name.header.empty()) {
-        return column.name.header;
+        return absl::StrCat("; map one in the problem: ", SourceLine(quantity, column.name.header));
       }
     }
-    return "HEADER";
+    return "";
   }
 
   // Returns the columns with the whole header `wanted` or, if there is none, with that name.
@@ -211,8 +212,7 @@ class Mapping {
       if (HasColumn(name) || !Source(name).empty()) continue;
       POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
           "the column ", QuoteCell(name), " for the streamed input of that name is missing; ",
-          "the file's columns are ", Headers(columns_),
-          "; map one in the problem: ", SourceLine(name, Unused())))));
+          "the file's columns are ", Headers(columns_), MapOne(name)))));
     }
     return absl::OkStatus();
   }
@@ -224,8 +224,7 @@ class Mapping {
     if (names.empty() || any) return absl::OkStatus();
     return Error(absl::StrCat("no column is a measured output of the problem (",
                               absl::StrJoin(names, ", "), "); the file's columns are ",
-                              Headers(columns_),
-                              "; map one in the problem: ", SourceLine(names.front(), Unused())));
+                              Headers(columns_), MapOne(names.front())));
   }
 
   const int64_t header_line_;

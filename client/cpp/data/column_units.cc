@@ -23,7 +23,7 @@ bool IsNumberOrTime(const std::string& cell) {
 
 bool IsUnit(const std::string& cell) {
   const std::string unit = UnitOfCell(cell);
-  return !unit.empty() && unit != "-" && CheckRecordedUnit(unit).ok();
+  return !unit.empty() && unit != "-" && !IsNumberOrTime(unit) && CheckRecordedUnit(unit).ok();
 }
 
 // Returns the rule that a unit breaks, without the list of all symbols.

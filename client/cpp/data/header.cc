@@ -219,6 +219,7 @@ class Search {
 }  // namespace
 
 bool IsLeftOut(absl::string_view line) {
+  if (!line.empty() && line[0] > ' ' && line[0] != '#') return false;  // ASCII, as most lines
   const size_t first = line.find_first_not_of(" \t\f\v");
   if (first == absl::string_view::npos) return true;
   if (line[first] == '#') return IsComment(line.substr(first));

@@ -150,7 +150,10 @@ NumberCell ReadNumberCell(absl::string_view text, const NumberStyle& style) {
 }
 
 DecimalEvidence DecimalEvidenceOf(absl::string_view text) {
-  const absl::string_view number = WithoutSign(text);
+  Digits digits;
+  if (!digits.Assign(text)) return DecimalEvidence::kNone;
+  digits.Remove(kGroup);
+  const absl::string_view number = WithoutSign(digits.text());
   if (number.empty() || number.find_first_not_of("0123456789.,eE+-") != number.npos) {
     return DecimalEvidence::kNone;
   }

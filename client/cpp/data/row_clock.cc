@@ -89,7 +89,7 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
       options_.time_zero == TimeZero::kFirst ||
       (options_.time_zero == TimeZero::kAutomatic && time.form == CellTime::kDate);
   const bool begins = rows_ == 0 || run != run_;
-  const CellTime zero = !from_first ? CellTime() : begins ? time : zero_;
+  const CellTime& zero = from_first && begins ? time : zero_;
   const double time_s = Seconds(time, zero);
   if (!std::isfinite(time_s)) return Error(cell, time_s, "finite");
   if (time_s < 0) {
@@ -107,7 +107,7 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
     first_time_s_ = time_s;
   }
   from_first_row_ = from_first;
-  zero_ = zero;
+  if (from_first && begins) zero_ = time;
   time_s_ = time_s;
   run_ = run;
   ++rows_;

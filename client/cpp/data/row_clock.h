@@ -52,7 +52,7 @@ class RowClock {
   const DataFileOptions options_;
   const DataColumn column_;
   DateOrder order_;
-  CellTime zero_;   // the time 0 of the run; unused if times are those of the file
+  CellTime zero_;   // the time 0 of the run; 0 if times are those of the file
   CellTime first_;  // the first row's
   std::string first_cell_;
   bool from_first_row_ = false;

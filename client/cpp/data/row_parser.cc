@@ -113,10 +113,11 @@ absl::Status RowParser::ParseCells(absl::string_view line) {
     if (at > line.size()) {
       // Spreadsheets leave out empty cells at the end of a row.
       if (column.name.header.empty()) continue;
-      return CellCountError(line);
+      return CheckShape(line);
     }
     if (absl::Status parsed = ParseCell(column, line, at); !parsed.ok()) {
-      return CountCells(line, delimiter_) == columns_.size() ? parsed : CellCountError(line);
+      const absl::Status shape = CheckShape(line);
+      return shape.ok() ? parsed : shape;
     }
   }
   return CheckEnd(line, at);
@@ -131,10 +132,7 @@ absl::Status RowParser::ParseCell(const DataColumn& column, absl::string_view li
     return TakeValue(column, line.substr(begin, at - 1 - begin), value);
   }
   const size_t end = CellEnd(line, begin, delimiter_);
-  if (end == absl::string_view::npos) {
-    return lines_.Error(absl::StrCat("the quote before ", QuoteCell(line.substr(begin + 1)),
-                                     " has no end in its line"));
-  }
+  if (end == absl::string_view::npos) return CheckShape(line);
   at = end + 1;
   const absl::string_view cell = line.substr(begin, end - begin);
   if (is_value) return ParseWritten(column, cell);
@@ -249,11 +247,22 @@ absl::Status RowParser::CheckEnd(absl::string_view line, size_t at) const {
   const auto is_empty = [this](char c) { return c == delimiter_ || c == ' ' || c == '\t'; };
   if (at > line.size()) return absl::OkStatus();
   const absl::string_view rest = line.substr(at);
-  return std::all_of(rest.begin(), rest.end(), is_empty) ? absl::OkStatus() : CellCountError(line);
+  return std::all_of(rest.begin(), rest.end(), is_empty) ? absl::OkStatus() : CheckShape(line);
 }
 
-absl::Status RowParser::CellCountError(absl::string_view line) const {
-  const size_t cells = CountCells(line, delimiter_);
+// Checks that a row has as many cells as the header, and that no quote is open.
+absl::Status RowParser::CheckShape(absl::string_view line) const {
+  size_t cells = 0;
+  for (size_t begin = 0; begin <= line.size(); ++cells) {
+    const size_t end = CellEnd(line, begin, delimiter_);
+    if (end == absl::string_view::npos) {
+      return lines_.Error(absl::StrCat("the quote before ",
+                                       QuoteCell(line.substr(line.find('"', begin) + 1)),
+                                       " has no end in its line"));
+    }
+    begin = end + 1;
+  }
+  if (cells == columns_.size()) return absl::OkStatus();
   std::string message =
       absl::StrCat("the row has ", cells, " cells, the header has ", columns_.size());
   if (cells < columns_.size() && lines_.cut_off()) {
