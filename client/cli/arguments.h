@@ -95,9 +95,11 @@ struct CheckArguments {
 };
 
 struct InitArguments {
-  Place place;              // always this process
-  std::string model;        // empty: list the models
-  bool equations = false;   // write a model given by its equations instead
+  Place place;             // always this process
+  std::string model;       // empty: list the models
+  bool equations = false;  // write a model given by its equations instead
+  std::string data_file;   // whose columns the problem is for; empty: none
+  DataFileOptions data_options;
   std::string output_file;  // empty: standard output
   bool force = false;       // overwrite the file
 };

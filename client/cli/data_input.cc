@@ -64,7 +64,7 @@ absl::StatusOr<v1::Measurements> ReadData(const std::string& file, const DataCol
                                           RefusedLine refused) {
   std::string found;
   auto data = ReadDataFile(file, columns, refused, &found);
-  TellOfDataFile(found);
+  if (data.ok()) TellOfDataFile(found);
   return data;
 }
 

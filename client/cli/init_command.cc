@@ -6,23 +6,52 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/proposed_columns.h"
 #include "client/cli/starting_problem.h"
+#include "client/cli/text_table.h"
 #include "core/common/status.h"
 #include "polyest/catalogue.h"
 
 namespace polyest::internal {
 namespace {
 
-absl::StatusOr<std::string> Text(const InitArguments& arguments) {
+// Returns the problem for a model; for the columns of a data file if the arguments name one.
+absl::StatusOr<std::string> Write(const ModelDescription& model, const char* source,
+                                  const InitArguments& arguments, std::ostream& err) {
+  if (arguments.data_file.empty()) return StartingProblem(model, source);
+  POLYEST_ASSIGN_OR_RETURN(const RecordedColumns recorded,
+                           ReadColumns(arguments.data_file, arguments.data_options));
+  const ProposedColumns proposed = ProposeColumns(model, recorded);
+  POLYEST_RETURN_IF_ERROR(CheckProposal(model, recorded, proposed, arguments.data_file));
+  err << arguments.data_file << ": " << Describe(recorded, proposed) << std::endl;
+  return StartingProblem(model, source, &proposed);
+}
+
+absl::StatusOr<std::string> Text(const InitArguments& arguments, std::ostream& err) {
   if (arguments.equations) return kStartingEquations;
   const auto builtin = FindBuiltinModel(arguments.model);
   if (builtin.ok() || arguments.place.fmu_dir.empty()) {
     POLYEST_RETURN_IF_ERROR(builtin.status());
-    return StartingProblem((*builtin)->description(), "builtin");
+    return Write((*builtin)->description(), "builtin", arguments, err);
   }
   POLYEST_ASSIGN_OR_RETURN(const ModelLibrary models, OpenModels(arguments.place));
   POLYEST_ASSIGN_OR_RETURN(const auto fmu, models.FindFmu(arguments.model));
-  return StartingProblem(fmu->description(), "fmu");
+  return Write(fmu->description(), "fmu", arguments, err);
+}
+
+// Lists the models with outputs that the columns of the data file may be.
+absl::Status ListModels(const InitArguments& arguments, std::ostream& out) {
+  POLYEST_ASSIGN_OR_RETURN(const RecordedColumns recorded,
+                           ReadColumns(arguments.data_file, arguments.data_options));
+  TextTable table({"model", "columns"});
+  for (const auto& model : BuiltinModels()) {
+    const ProposedColumns proposed = ProposeColumns(model->description(), recorded);
+    if (!CheckProposal(model->description(), recorded, proposed, arguments.data_file).ok())
+      continue;
+    table.AddRow({model->description().name, Describe(recorded, proposed)});
+  }
+  table.Print(out);
+  return absl::OkStatus();
 }
 
 absl::Status WriteFile(const InitArguments& arguments, const std::string& text) {
@@ -41,12 +70,16 @@ absl::Status WriteFile(const InitArguments& arguments, const std::string& text) 
 }  // namespace
 
 int RunCommand(const InitArguments& arguments, std::ostream& out, std::ostream& err) {
+  if (arguments.model.empty() && !arguments.data_file.empty()) {
+    const absl::Status listed = ListModels(arguments, out);
+    return listed.ok() ? kExitOk : Report(listed, "", err);
+  }
   if (arguments.model.empty() && !arguments.equations) {
     ModelsArguments list;
     list.place = arguments.place;
     return RunCommand(list, out, err);
   }
-  const absl::StatusOr<std::string> text = Text(arguments);
+  const absl::StatusOr<std::string> text = Text(arguments, err);
   if (!text.ok()) return Report(text.status(), "", err);
   if (arguments.output_file.empty()) {
     out << *text;

@@ -24,11 +24,19 @@ void AddInit(CommandRegistry& registry) {
   CLI::App& command = registry.Add(
       {.name = "init",
        .summary = "Write an example problem file for a model; without a model, list the models",
-       .examples = {"init quarter_car -o problem.json", "init --equations -o problem.json"}},
+       .examples = {"init quarter_car -o problem.json", "init --equations -o problem.json",
+                    "init --from data.csv mass_spring_damper -o problem.json"},
+       .notes = "With --from and without a model, the models are listed that fit the columns."},
       arguments);
   CLI::Option* const model = command.add_option("model", arguments->model, "A model's name");
-  command.add_flag("--equations", arguments->equations, "With a model given by its equations")
-      ->excludes(model);
+  CLI::Option* const equations =
+      command.add_flag("--equations", arguments->equations, "With a model given by its equations")
+          ->excludes(model);
+  command
+      .add_option("--from", arguments->data_file,
+                  "A CSV file: the problem measures its columns, with noise of unknown size")
+      ->excludes(equations);
+  AddDataOptions(command, arguments->data_options);
   command.add_option("-o,--output", arguments->output_file, "The file (default: standard output)");
   command.add_flag("--force", arguments->force, "Overwrite the file if it is there");
   AddFmuFolder(command, arguments->place);

@@ -114,6 +114,14 @@ std::string Measured(const Quantity& output) {
                       noise == noises.end() ? "0.01" : FormatNumber(noise->second), "}}");
 }
 
+std::string StreamedInput(const Quantity& input) {
+  return absl::StrCat("{\"name\": ", Quoted(input.name), ", \"streamed\": {}}");
+}
+
+std::string MeasuredWithUnknownNoise(const Quantity& output) {
+  return absl::StrCat("{\"output\": ", Quoted(output.name), ", \"noise\": {\"unknown\": true}}");
+}
+
 std::string Lines(const char* open, const std::vector<std::string>& elements, const char* close) {
   return absl::StrCat(open, "\n    ", absl::StrJoin(elements, ",\n    "), "\n  ", close);
 }
@@ -125,9 +133,30 @@ std::vector<std::string> Each(const std::vector<Quantity>& quantities, Write wri
   return texts;
 }
 
+std::vector<std::string> WithColumn(const std::vector<Quantity>& quantities,
+                                    const ProposedColumns& proposed,
+                                    std::string (*write)(const Quantity&)) {
+  std::vector<std::string> texts;
+  for (const Quantity& quantity : quantities) {
+    if (proposed.headers.contains(quantity.name)) texts.push_back(write(quantity));
+  }
+  return texts;
+}
+
+// Returns the entries of `columns`. A column with the quantity's own name needs none.
+std::vector<std::string> Sources(const ProposedColumns& proposed) {
+  std::vector<std::string> sources;
+  for (const auto& [quantity, header] : proposed.headers) {
+    if (quantity == header) continue;
+    sources.push_back(absl::StrCat(Quoted(quantity), ": {\"from\": ", Quoted(header), "}"));
+  }
+  return sources;
+}
+
 }  // namespace
 
-std::string StartingProblem(const ModelDescription& model, const char* source) {
+std::string StartingProblem(const ModelDescription& model, const char* source,
+                            const ProposedColumns* proposed) {
   const std::vector<Quantity> unknowns = ChooseUnknowns(model);
   std::vector<std::string> members = {
       absl::StrCat("\"$schema\": ", Quoted(kSchema)),
@@ -141,8 +170,14 @@ std::string StartingProblem(const ModelDescription& model, const char* source) {
   add("uncertain", "[", Each(unknowns, Uncertain), "]");
   int index = 0;
   const auto input = [&index](const Quantity& quantity) { return Input(quantity, index++); };
-  add("inputs", "[", Each(model.inputs, input), "]");
-  add("measured", "[", Each(model.outputs, Measured), "]");
+  if (proposed == nullptr) {
+    add("inputs", "[", Each(model.inputs, input), "]");
+    add("measured", "[", Each(model.outputs, Measured), "]");
+  } else {
+    add("columns", "{", Sources(*proposed), "}");
+    add("inputs", "[", WithColumn(model.inputs, *proposed, StreamedInput), "]");
+    add("measured", "[", WithColumn(model.outputs, *proposed, MeasuredWithUnknownNoise), "]");
+  }
   members.emplace_back(R"("expansion": {"order": "AUTO", "pointsPerTerm": 2})");
   return absl::StrCat("{\n  ", absl::StrJoin(members, ",\n  "), "\n}\n");
 }

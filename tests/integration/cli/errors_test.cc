@@ -94,12 +94,13 @@ TEST_F(ErrorsTest, AChannelThatTheModelLacks) {
   EXPECT_THAT(Refused(Changed("\"output\": \"x\"", "\"output\": \"y\""), "t,y\n0,1\n"),
               AllOf(HasSubstr("problem.json: measured[0]"), HasSubstr("y"), HasSubstr("x")));
   EXPECT_THAT(Refused(kProblem, "t,y\n0,1\n"),
-              HasSubstr("data.csv:1: unknown column \"y\"; the problem's columns are t, run, x"));
+              HasSubstr("data.csv:1: no column is a measured output of the problem (x); the file's "
+                        "columns are \"t\", \"y\""));
 }
 
 TEST_F(ErrorsTest, DataThatAreNoNumbers) {
-  EXPECT_THAT(Refused(kProblem, "t,x\n0.1,nan\n"),
-              HasSubstr("data.csv:2: column x: \"nan\" must be finite"));
+  EXPECT_THAT(Refused(kProblem, "t,x\n0.1,inf\n"),
+              HasSubstr("data.csv:2: column x: \"inf\" must be finite"));
   EXPECT_THAT(Refused(kProblem, "t,x\n0.1,abc\n"),
               HasSubstr("data.csv:2: column x: \"abc\" must be a number"));
 }

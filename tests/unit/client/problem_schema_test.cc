@@ -205,6 +205,10 @@ TEST(ProblemSchema, SeesMistakes) {
   EXPECT_EQ(with(R"("expansion": {"order": "auto"})"), "problem.expansion.order");
   EXPECT_EQ(with(R"("expansion": {"order": "AUTO"})"), "");
   EXPECT_EQ(with(R"("expansion": {"order": 7})"), "");
+  EXPECT_EQ(with(R"("columns": {"x": {"from": "Disp [mm]", "unit": "mm"}, "t": {"unit": "ms"}})"),
+            "");
+  EXPECT_EQ(with(R"("columns": {"x": {"form": "Disp [mm]"}})"),
+            "problem.columns.x.form: is unknown");
   EXPECT_EQ(with(R"("measured": [{"output": "x"}])"), "problem.measured[]: noise is missing");
   EXPECT_EQ(with(R"("uncertain": [{"name": "k"}])"), "problem.uncertain[]: 0 of oneOf");
   EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {"lower": 0, "upper": 1},

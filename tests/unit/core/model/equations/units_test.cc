@@ -43,6 +43,12 @@ TEST(Units, ThatMeanTheSameAreEqual) {
                                   {"T", "kg/A/s^2"},
                                   {"daN", "10 N"},
                                   {"l", "dm^3"},
+                                  {"°", "deg"},
+                                  {"mgn", "9.80665 mm/s^2"},
+                                  {"lbf", "lb gn"},
+                                  {"psi", "lbf/in^2"},
+                                  {"kgf", "kg gn"},
+                                  {"mph", "5280 ft/h"},
                                   {"(m/s)^2", "m^2/s^2"}};
   for (const auto& [a, b] : equal) EXPECT_TRUE(SameUnit(Parse(a), Parse(b))) << a << ", " << b;
 }
