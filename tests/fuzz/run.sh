@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Runs the fuzzers, each from the corpus beside this file:
 #   tests/fuzz/run.sh [SECONDS] [FUZZER]... [-- OPTION-OF-LIBFUZZER...]
-# SECONDS: the time for all fuzzers together, by default 60. FUZZER: equation or rpc, by default
-# both.
+# SECONDS: the time for all fuzzers together, by default 60. FUZZER: equation, data_file or rpc, by
+# default all.
 # Inputs that fail go to build/asan-ubsan/fuzz as FUZZER-crash-…, -timeout-…, -oom-… or -leak-….
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -14,7 +14,7 @@ while [[ $# -gt 0 && "$1" != -- ]]; do
   shift
 done
 [[ $# -eq 0 ]] || shift
-[[ ${#fuzzers[@]} -gt 0 ]] || fuzzers=(equation rpc)
+[[ ${#fuzzers[@]} -gt 0 ]] || fuzzers=(equation data_file rpc)
 
 deploy/install-packages.sh --tests --sanitizers
 cmake --preset asan-ubsan >/dev/null
@@ -23,6 +23,7 @@ results=build/asan-ubsan/fuzz
 for fuzzer in "${fuzzers[@]}"; do
   case "$fuzzer" in
     equation) options=(-max_len=4096 -rss_limit_mb=512 -timeout=5 -dict=tests/fuzz/equation.dict) ;;
+    data_file) options=(-max_len=4096 -rss_limit_mb=512 -timeout=5 -dict=tests/fuzz/data_file.dict) ;;
     # A call is cut off after 0.1 s, and an input has at most 12 calls. The entropic schedule is
     # off: it takes longer than the calls. Leaks are looked for at the end, because a working daemon
     # holds other memory after each input.

@@ -4,6 +4,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
 
 #include <algorithm>
 #include <utility>
@@ -28,9 +29,17 @@ std::string Headers(const std::vector<DataColumn>& columns) {
                       count > kMaxShown ? absl::StrCat(", … (", count, " columns)") : "");
 }
 
+// Returns a text as a JSON string, whole: users copy it.
+std::string JsonText(const std::string& text) {
+  std::string escaped = absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"\"", "\\\""}});
+  std::replace_if(
+      escaped.begin(), escaped.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  return absl::StrCat("\"", escaped, "\"");
+}
+
 // Returns the line of a problem that maps a column.
 std::string SourceLine(const std::string& quantity, const std::string& header) {
-  return absl::StrCat("\"columns\": {", QuoteCell(quantity), ": {\"from\": ", QuoteCell(header),
+  return absl::StrCat("\"columns\": {", JsonText(quantity), ": {\"from\": ", JsonText(header),
                       "}}");
 }
 

@@ -11,7 +11,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr size_t kBlockBytes = 1 << 18;
+constexpr std::streamsize kBlockBytes = 1 << 18;
 
 size_t Find(const std::string& text, size_t begin, size_t end, char wanted) {
   const void* const found = std::memchr(text.data() + begin, wanted, end - begin);
@@ -27,15 +27,22 @@ absl::Status TextLines::Error(absl::string_view message) const {
   return absl::InvalidArgumentError(absl::StrCat(name_, ":", line_, ": ", message));
 }
 
-// Reads what is there already, or waits for something; 0 at the end.
-absl::StatusOr<size_t> TextLines::ReadAvailable(char* to, size_t room) {
-  const auto size = static_cast<std::streamsize>(room);
-  std::streamsize count = in_->good() ? in_->readsome(to, size) : 0;
-  if (count == 0 && in_->good() && in_->peek() != std::istream::traits_type::eof()) {
-    count = in_->readsome(to, size);
+// Appends what is there already, or else waits for something; returns the number of bytes, 0 at the
+// end.
+absl::StatusOr<size_t> TextLines::ReadAvailable(std::string& bytes) {
+  const auto available = [this] { return in_->good() ? in_->rdbuf()->in_avail() : 0; };
+  std::streamsize room = available();
+  if (room <= 0 && in_->peek() != std::istream::traits_type::eof()) {
+    room = std::max<std::streamsize>(available(), 1);
   }
+  room = std::clamp<std::streamsize>(room, 0, kBlockBytes);
+  const size_t size = bytes.size();
+  bytes.resize(size + static_cast<size_t>(room));
+  if (room > 0 && in_->readsome(bytes.data() + size, room) == 0) in_->read(bytes.data() + size, 1);
+  const auto count = room > 0 ? static_cast<size_t>(in_->gcount()) : 0;
+  bytes.resize(size + count);
   if (in_->bad()) return absl::InvalidArgumentError(absl::StrCat(name_, ": cannot be read"));
-  return static_cast<size_t>(count);
+  return count;
 }
 
 // Appends more of the text to text_; false at its end.
@@ -44,12 +51,8 @@ absl::StatusOr<bool> TextLines::Fill() {
   searched_ -= std::min(searched_, begin_);
   begin_ = 0;
   std::string& target = found_.encoding == Encoding::kUtf8 && begun_ ? text_ : bytes_;
-  const size_t size = target.size();
-  target.resize(size + kBlockBytes);
-  const auto count = ReadAvailable(target.data() + size, kBlockBytes);
-  target.resize(size + count.value_or(0));
-  POLYEST_RETURN_IF_ERROR(count.status());
-  ended_ = *count == 0;
+  POLYEST_ASSIGN_OR_RETURN(const size_t count, ReadAvailable(target));
+  ended_ = count == 0;
   if (!begun_) Begin();
   if (begun_ && &target == &bytes_) Decode();
   if (ended_ && decoder_ && decoder_->ends_within()) text_ += "\xEF\xBF\xBD";

@@ -47,7 +47,7 @@ class TextLines {
   };
 
   absl::StatusOr<bool> Fill();
-  absl::StatusOr<size_t> ReadAvailable(char* to, size_t room);
+  absl::StatusOr<size_t> ReadAvailable(std::string& bytes);
   void Begin();
   void Decode();
   size_t FindEnd();

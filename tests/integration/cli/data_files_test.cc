@@ -139,7 +139,8 @@ TEST_F(DataFilesTest, RefusalsNameTheRemedy) {
   EXPECT_THAT(error({"--decimal", "point"}, Problem()),
               AllOf(HasSubstr("german.csv:2: column \"Disp [mm]\" (x): "),
                     HasSubstr("--decimal comma reads it")));
-  EXPECT_THAT(error({"--delimiter", "comma"}, Problem()), HasSubstr("no column is the time t"));
+  EXPECT_THAT(error({"--delimiter", "comma"}, Problem()),
+              HasSubstr("there is no column \"Disp [mm]\" for x"));
   EXPECT_THAT(error({"--time-column", "Bemerkung"}, Problem()),
               HasSubstr("german.csv:2: column \"Bemerkung\" (t): \"a; \"b\"\" must be a number"));
   EXPECT_THAT(error({"--time-zero", "last"}, Problem()), HasSubstr("must be one of file, first"));

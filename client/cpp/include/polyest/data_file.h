@@ -39,17 +39,20 @@ namespace polyest {
 
 // What the user says about a file; the rest is found out.
 struct DataFileOptions {
+  // What the time 0 is.
   enum class TimeZero {
     kAutomatic,  // kFile for numbers and times of day, kFirst for dates
     kFile,       // times as they stand in the file
     kFirst,      // the first row of each run has the time 0
   };
+  // The order of day and month in dates such as 01/02/2026; kAutomatic: as a date shows it that is
+  // possible in one order only.
   enum class DateOrder { kAutomatic, kDayFirst, kMonthFirst };
 
-  char delimiter = 0;  // 0: found out
-  char decimal = 0;    // '.' or ','; 0: found out
-  TimeZero time_zero = TimeZero::kAutomatic;
-  DateOrder date_order = DateOrder::kAutomatic;  // of dates such as 01/02/2026
+  char delimiter = 0;                            // 0: found out
+  char decimal = 0;                              // '.' or ','; 0: found out
+  TimeZero time_zero = TimeZero::kAutomatic;     // what the time 0 is
+  DateOrder date_order = DateOrder::kAutomatic;  // the order in all dates
   std::string time_column;                       // header of the time; empty: found out
 };
 
@@ -67,6 +70,7 @@ struct DataColumns {
   std::map<std::string, ColumnSource> sources = {};
   // The model's units by quantity. Values of a quantity without one are not converted.
   std::map<std::string, std::string> units = {};
+  // What the user says about the file.
   DataFileOptions options = {};
 };
 
@@ -92,7 +96,9 @@ class DataReader {
   static absl::StatusOr<DataReader> Open(std::istream& in, std::string name,
                                          const DataColumns& columns,
                                          RefusedLine refused = StopAtRefusedLine);
+  // Moving leaves a reader that may only be destroyed or assigned to.
   DataReader(DataReader&& other) noexcept;
+  // Takes over the other reader's place in its text.
   DataReader& operator=(DataReader&& other) noexcept;
   ~DataReader();
 
