@@ -1,6 +1,8 @@
 // Adds what can be said about a data file.
 
 #include <map>
+#include <string>
+#include <type_traits>
 
 #include "client/cli/shared_options.h"
 

@@ -3,6 +3,7 @@
 //
 //   data_file_benchmark [ROWS]
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cstdio>

@@ -4,6 +4,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/strip.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace polyest::internal {
