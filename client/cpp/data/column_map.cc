@@ -187,6 +187,11 @@ class Mapping {
     const std::string& option = known_.options.time_column;
     const std::string wanted = option.empty() ? Source("t") : option;
     const std::string first = columns_.front().name.header;
+    if (columns_.size() == 1 && first.find(' ') != first.npos) {
+      return Error(absl::StrCat("the first line must name the columns, but ", QuoteCell(first),
+                                " is one cell: cells are separated by commas, semicolons, tabs or "
+                                "|, not by blanks"));
+    }
     return Error(absl::StrCat(
         wanted.empty() ? "no column is the time t"
                        : absl::StrCat("there is no column ", QuoteCell(wanted), " for the time"),

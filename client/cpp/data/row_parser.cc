@@ -111,8 +111,7 @@ absl::Status RowParser::ParseCells(absl::string_view line) {
   size_t at = 0;
   for (const DataColumn& column : columns_) {
     if (at > line.size()) {
-      // Spreadsheets leave out empty cells at the end of a row.
-      if (column.name.header.empty()) continue;
+      if (MayLack(column)) continue;
       return CheckShape(line);
     }
     if (absl::Status parsed = ParseCell(column, line, at); !parsed.ok()) {
@@ -121,6 +120,13 @@ absl::Status RowParser::ParseCells(absl::string_view line) {
     }
   }
   return CheckEnd(line, at);
+}
+
+// Whether a row may end before this column: spreadsheets leave out empty cells at the end of a row.
+// In a line without an end, the cell before may be cut off, too.
+bool RowParser::MayLack(const DataColumn& column) const {
+  if (column.role != DataColumn::kIgnored) return false;
+  return column.name.header.empty() || !lines_.cut_off();
 }
 
 // Parses the cell at `at` and moves `at` behind the delimiter after it.
@@ -250,7 +256,8 @@ absl::Status RowParser::CheckEnd(absl::string_view line, size_t at) const {
   return std::all_of(rest.begin(), rest.end(), is_empty) ? absl::OkStatus() : CheckShape(line);
 }
 
-// Checks that a row has as many cells as the header, and that no quote is open.
+// Checks that a row has as many cells as the header, except those it may lack, and that no quote is
+// open.
 absl::Status RowParser::CheckShape(absl::string_view line) const {
   size_t cells = 0;
   for (size_t begin = 0; begin <= line.size(); ++cells) {
@@ -262,7 +269,10 @@ absl::Status RowParser::CheckShape(absl::string_view line) const {
     }
     begin = end + 1;
   }
-  if (cells == columns_.size()) return absl::OkStatus();
+  const auto last = std::find_if_not(columns_.rbegin(), columns_.rend(),
+                                     [this](const DataColumn& c) { return MayLack(c); });
+  const auto least = static_cast<size_t>(columns_.rend() - last);
+  if (cells >= least && cells <= columns_.size()) return absl::OkStatus();
   std::string message =
       absl::StrCat("the row has ", cells, " cells, the header has ", columns_.size());
   if (cells < columns_.size() && lines_.cut_off()) {

@@ -58,6 +58,7 @@ class RowParser {
   absl::Status TakeMissing(const DataColumn& column, absl::string_view text);
   absl::Status TakeValue(const DataColumn& column, absl::string_view cell, double value);
   absl::Status CheckEnd(absl::string_view line, size_t at) const;
+  bool MayLack(const DataColumn& column) const;
   absl::Status CheckShape(absl::string_view line) const;
   absl::Status NumberError(const DataColumn& column, absl::string_view text,
                            const NumberCell& number) const;

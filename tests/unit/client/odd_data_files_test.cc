@@ -57,6 +57,8 @@ const ReadCase kDialectCases[] = {
      "the header is a comment; 2 rows from 0 s"},
     {"LinesAboveTheHeader", "Rig;7\nDate;2026-01-31\nt;x\n0;1\n", "t=0 x=1",
      "semicolons; 2 lines above the header left out; 1 row from 0 s"},
+    {"RowsWithoutIgnoredCells", "t,x,Comment\n0,1\n1,2,b\n", "t=0,1 x=1,2",
+     "1 column ignored ('Comment'); 2 rows from 0 s"},
     {"SeparatorLine", "sep=;\nt;x\n0;1,5\n", "t=0 x=1.5",
      "semicolons, decimal comma; 1 line above the header left out; 1 row from 0 s"},
     {"BlankLines", "\n\nt,x\n\n0,1\n \n1,2\n\n", "t=0,1 x=1,2", ""},
