@@ -147,6 +147,7 @@ struct FitArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;          // its id, in place of the files; empty: none
   std::string validation_file;  // another record to predict; empty: none
   std::vector<std::string> outputs;
@@ -161,6 +162,7 @@ struct ReportArguments {
   Place place;
   std::string problem_file;
   std::string data_file;
+  DataFileOptions data_options;
   std::string session;  // its id, in place of the files; empty: none
   std::string output_file = "report.html";
 };

@@ -13,7 +13,6 @@
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
-#include "polyest/data_file.h"
 
 namespace polyest::internal {
 namespace {
@@ -38,8 +37,10 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   if (!arguments.validation_file.empty()) {
     POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ProblemOf(arguments, request));
+    POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
+                             DataColumnsFor(problem, arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
-                             ReadDataFile(arguments.validation_file, ColumnsOf(problem)));
+                             ReadData(arguments.validation_file, columns));
   }
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
