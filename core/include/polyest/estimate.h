@@ -60,7 +60,8 @@ struct TradeOff {
 // What is known of one uncertain parameter; numbers are in its unit unless said otherwise. Where
 // residuals or windows of the record contradict model or noise, std_dev is widened to
 // robust_std_dev, if that is larger, and the posterior's spread with it, but never beyond the
-// prior's.
+// prior's. Where the correlation of noise is learned, what is not known of it widens std_dev by the
+// same factor as the 95 % interval.
 struct ParameterEstimate {
   std::string name;              // "x_0[2]" for run 2's own value
   std::string unit;              // "1" for a plain number; empty: the equations give none

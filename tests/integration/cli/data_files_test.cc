@@ -101,6 +101,8 @@ TEST_F(DataFilesTest, EveryCommandSaysWhatItFound) {
                                                   {"posterior", "--format", "json"},
                                                   {"profile", "--format", "json"},
                                                   {"regularization", "--format", "json"},
+                                                  {"fit"},
+                                                  {"report", "-o", File("report.html", "")},
                                                   {"design", "--until", "1"}}) {
     std::vector<std::string> arguments = command;
     arguments.insert(arguments.end(), {problem_, german_, "--time-zero", "first"});
