@@ -99,7 +99,8 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
 int64_t Estimator::Implementation::SettledRows() const {
   const RecordPosition& last = checks_.position();
   if (last.run_ended) return last.rows;
-  return last.rows - std::min<int64_t>(problem_.knots_ahead(), last.rows_in_run);
+  return polyest::internal::SettledRows(problem_, last.knots, last.rows - last.rows_in_run,
+                                        last.rows);
 }
 
 absl::Status Estimator::Implementation::Process(const Stop& stop) {

@@ -183,6 +183,19 @@ std::optional<Interpolation> InputSignal::interpolation() const {
 
 int InputSignal::knots_ahead() const { return streamed() ? KnotsAhead(*interpolation()) : 0; }
 
+int InputSignal::knots_needed() const {
+  if (!streamed() || *interpolation() == Interpolation::kHold) return 0;
+  return 1 + knots_ahead();
+}
+
+bool InputSignal::SettledUpTo(double time_s) const {
+  if (!streamed() || finished_) return true;
+  const auto needed = static_cast<size_t>(knots_needed());
+  // Before the first knot the shape is its value.
+  if (needed == 0) return !knot_time_s_.empty();
+  return knot_time_s_.size() >= needed && knot_time_s_[knot_time_s_.size() - needed] >= time_s;
+}
+
 bool InputSignal::streamed() const { return std::holds_alternative<StreamedInput>(specification_); }
 
 void InputSignal::Append(double time_s, double value) {

@@ -42,6 +42,12 @@ class InputSignal {
   // Returns how many later knots must be known before the signal is settled up to a knot. A
   // finished signal is settled everywhere.
   int knots_ahead() const;
+  // Returns how many knots at or after a time must be known before a streamed signal is settled up
+  // to there; 0 for a held one, for which those before are enough, if there are any.
+  int knots_needed() const;
+  // Whether Shape is known up to time_s, whatever knots may follow. All knots up to there must have
+  // been appended.
+  bool SettledUpTo(double time_s) const;
 
   // Returns shape(t). A streamed signal must be settled up to time_s. Before the first knot the
   // shape is the first value, after the last knot the last value, and without knots 0. At a jump

@@ -44,7 +44,6 @@ void JournalStore::Release(int64_t sequence) {
 absl::Status JournalStore::Read(int64_t first, int64_t count, RowBlock& block) const {
   POLYEST_CHECK(first >= 0 && count > 0 && first + count <= rows());
   ClearRows(block);
-  block.ahead = 0;
   block.run_ended = position_.run_ended && first + count == rows();
   for (const int64_t end = first + count; first < end;) {
     const size_t number = SegmentWith(first);

@@ -70,7 +70,6 @@ class Rig final : public SampleStore {
     block.rows.clear();
     block.values.clear();
     block.noise.clear();
-    block.ahead = 0;
     block.run_ended = false;
     for (int64_t row = first; row < first + count; ++row) {
       block.rows.push_back({Run(row), Time(row)});

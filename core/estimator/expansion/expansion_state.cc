@@ -12,8 +12,6 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kKnotRows = 256;  // read at once
-
 bool IsVector(const Vector& vector, Eigen::Index size) {
   return vector.size() == size && vector.allFinite();
 }
@@ -171,8 +169,9 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
   if (!IsNoiseOf(problem, state.noise)) return Inconsistent("noise");
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignOf(problem, std::move(state.design)));
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
-      Make(problem, std::move(design), std::move(state.noise), threads);
+      Make(problem, &store, std::move(design), std::move(state.noise), threads);
   if (!expansion.ok()) return Inconsistent("collocation points");
+  (*expansion)->next_row_ = state.absorbed.rows;
   if (state.ensemble) POLYEST_RETURN_IF_ERROR((*expansion)->RestoreRun(state, store));
   POLYEST_RETURN_IF_ERROR((*expansion)->RestoreFit(state));
   return expansion;
@@ -194,11 +193,11 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
       last.time_s != state.ensemble->time_s) {
     return absl::FailedPreconditionError("the rows appended are not those of the snapshot");
   }
-  StartRun(state.run);
-  const bool streamed = !problem_.streamed_inputs().empty();
-  for (int64_t first = begin; streamed && first < rows; first += kKnotRows) {
-    POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kKnotRows, rows - first), block_));
-    inputs_->Append(block_, 0);
+  StartRun(state.run, begin);
+  POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last.time_s));
+  if (!inputs_->SettledUpTo(last.time_s)) {
+    return absl::FailedPreconditionError(
+        "the rows that settle the inputs at the snapshot have not been appended");
   }
   const bool controls_fit =
       controls_ == 0 ||

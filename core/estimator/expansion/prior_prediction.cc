@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/estimator/record/memory_store.h"
 #include "core/estimator/record/row_block.h"
+#include "core/estimator/record/sample_checks.h"
 
 namespace polyest::internal {
 namespace {
@@ -12,13 +14,12 @@ namespace {
 constexpr int64_t kRows = 16;
 constexpr std::chrono::seconds kPatience{1};
 
-// Returns the first rows, with those ahead that settle the streamed inputs.
+// Returns the first rows, as far as the beginning settles the streamed inputs.
 RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning) {
+  const RecordPosition after = After(SampleChecks(problem).position(), beginning);
   RowBlock block;
-  const int64_t ahead = problem.knots_ahead();
-  const int64_t rows = std::min<int64_t>(kRows + ahead, beginning.count());
-  AppendRows(beginning, 0, rows, block);
-  block.ahead = static_cast<int>(std::min(ahead, rows));
+  AppendRows(beginning, 0,
+             std::min(kRows, SettledRows(problem, after.knots, 0, beginning.count())), block);
   return block;
 }
 
@@ -47,7 +48,9 @@ void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record
   if (block.count() == 0) return;
   auto design = DesignForPrior(problem);
   if (!design.ok()) return;
-  auto expansion = RegionalExpansion::Make(problem, *std::move(design), NoiseOf(problem), 1);
+  MemoryStore store;
+  if (!store.Append(record.beginning()).ok()) return;
+  auto expansion = RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1);
   if (!expansion.ok()) return;
   const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
   if (!(*expansion)->Propagate(block, stop).ok()) return;

@@ -9,7 +9,6 @@
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
-#include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
 namespace {
@@ -155,11 +154,11 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           int threads, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(
       std::unique_ptr<RegionalExpansion> expansion,
-      RegionalExpansion::Make(problem, std::move(design), std::move(noise), threads));
+      RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads));
   RowBlock block;
   for (int64_t first = 0; first < rows; first += kReplayRows) {
     const int64_t count = std::min(kReplayRows, rows - first);
-    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store, first, count, problem.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
     POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
     if (expansion->fitted_rows() < block.count()) return expansion->shortage();
     for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);

@@ -49,16 +49,19 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::
       control_valid(static_cast<size_t>(controls), true) {}
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
-    const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise, int threads) {
+    const ResolvedProblem& problem, const SampleStore* store, ExpansionDesign design,
+    LearnedNoise noise, int threads) {
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
                            CollocationMatrix::Factor(*design.basis, design.points));
   return std::unique_ptr<RegionalExpansion>(new RegionalExpansion(
-      problem, std::move(design), std::move(noise), std::move(matrix), threads));
+      problem, store, std::move(design), std::move(noise), std::move(matrix), threads));
 }
 
-RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design,
-                                     LearnedNoise noise, CollocationMatrix matrix, int threads)
+RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const SampleStore* store,
+                                     ExpansionDesign design, LearnedNoise noise,
+                                     CollocationMatrix matrix, int threads)
     : problem_(problem),
+      store_(store),
       design_(std::move(design)),
       noise_(std::move(noise)),
       matrix_(std::move(matrix)),
@@ -109,12 +112,12 @@ void RegionalExpansion::LookFromPosterior() {
 }
 
 // Each run begins at t = 0 from the initial states, with its own inputs.
-void RegionalExpansion::StartRun(int run) {
+void RegionalExpansion::StartRun(int run, int64_t first_row) {
   run_ = run;
   whitening_.BeginRun();
   propagator_.reset();
   control_propagator_.reset();
-  inputs_ = std::make_unique<RunInputs>(problem_, run);
+  inputs_ = std::make_unique<RunInputs>(problem_, store_, run, first_row);
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), &inputs_->signals());
   StartControls(run);
@@ -139,15 +142,17 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
            block.rows[static_cast<size_t>(first + count)].run == run) {
       ++count;
     }
-    if (run != run_) StartRun(run);
+    if (run != run_) StartRun(run, next_row_);
     POLYEST_RETURN_IF_ERROR(PropagateRun(first, count, stop));
     first += count;
+    next_row_ += count;
   }
   return absl::OkStatus();
 }
 
 absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
-  inputs_->Append(block_, static_cast<size_t>(first));
+  const double last_s = block_.rows[static_cast<size_t>(first + count - 1)].time_s;
+  POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last_s));
   POLYEST_RETURN_IF_ERROR(Advance(first, count, stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);

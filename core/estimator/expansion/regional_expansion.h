@@ -78,8 +78,10 @@ struct ExpansionState;
 class RegionalExpansion {
  public:
   // Makes an expansion that has absorbed no rows. Returns FailedPrecondition when the design's
-  // collocation matrix cannot be factored. `problem` must outlive the expansion.
+  // collocation matrix cannot be factored. `problem` and `store`, which has the rows, must outlive
+  // the expansion; the store may be null if no input is streamed.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
+                                                                 const SampleStore* store,
                                                                  ExpansionDesign design,
                                                                  LearnedNoise noise, int threads);
 
@@ -92,10 +94,10 @@ class RegionalExpansion {
   // checkpoint, or anywhere if a new run begins next.
   ExpansionState State() const;
 
-  // Propagates over a block of rows that follows the rows propagated before, and fits the outputs
-  // of the first fitted_rows() rows. These are all rows, unless too few trajectories are left at
-  // the next one; shortage() then explains why. Only a stop request returns an error; the expansion
-  // is then unusable.
+  // Propagates over a block of rows of the store that follows the rows propagated before, and fits
+  // the outputs of the first fitted_rows() rows. These are all rows, unless too few trajectories
+  // are left at the next one; shortage() then explains why. Only a stop request or an error of the
+  // store returns an error; the expansion is then unusable.
   absl::Status Propagate(const RowBlock& block, const Stop& stop);
   int fitted_rows() const { return fitted_rows_; }
   const absl::Status& shortage() const { return shortage_; }
@@ -173,10 +175,11 @@ class RegionalExpansion {
   }
 
  private:
-  RegionalExpansion(const ResolvedProblem& problem, ExpansionDesign design, LearnedNoise noise,
-                    CollocationMatrix matrix, int threads);
+  RegionalExpansion(const ResolvedProblem& problem, const SampleStore* store,
+                    ExpansionDesign design, LearnedNoise noise, CollocationMatrix matrix,
+                    int threads);
 
-  void StartRun(int run);
+  void StartRun(int run, int64_t first_row);
   absl::Status PropagateRun(int first, int count, const Stop& stop);
   absl::Status RestoreFit(ExpansionState& state);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
@@ -205,6 +208,7 @@ class RegionalExpansion {
   void CompareControls(int column, double variance);
 
   const ResolvedProblem& problem_;
+  const SampleStore* store_;
   ExpansionDesign design_;
   LearnedNoise noise_;
   CollocationMatrix matrix_;
@@ -216,6 +220,7 @@ class RegionalExpansion {
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // collocation points that are still in the fit
   int run_ = -1;
+  int64_t next_row_ = 0;               // of the store: the first row not propagated
   int controls_;                       // K
   std::unique_ptr<RunInputs> inputs_;  // of the present run
   std::unique_ptr<EnsemblePropagator> propagator_;

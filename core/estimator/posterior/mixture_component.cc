@@ -13,7 +13,6 @@
 #include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/noise_learning.h"
-#include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
 namespace {
@@ -58,7 +57,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
   noise.misfit = beginning.misfit;
   component->tempered_ = beginning;
   POLYEST_ASSIGN_OR_RETURN(component->expansion_,
-                           RegionalExpansion::Make(component->problem_, std::move(design),
+                           RegionalExpansion::Make(component->problem_, store, std::move(design),
                                                    noise.ForNewExpansion(), threads));
   component->room_ = MostComponents(problem);
   return component;
@@ -84,9 +83,7 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
 // Reads the next rows, up to the first `rows` of the store, as far as the runs' parameters exist.
 absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const Stop& stop) {
   const int64_t count = std::min(kBlockRows, rows - taken_);
-  const auto read = [&](int64_t some) {
-    return ReadWithRowsAhead(*store_, taken_, some, problem_.knots_ahead(), block);
-  };
+  const auto read = [&](int64_t some) { return store_->Read(taken_, some, block); };
   POLYEST_RETURN_IF_ERROR(read(count));
   if (!problem_.per_run()) return absl::OkStatus();
   if (block.rows.front().run >= problem_.runs()) {

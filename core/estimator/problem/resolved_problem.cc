@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -131,6 +132,7 @@ class ResolvedProblem::Resolver {
 };
 
 void ResolvedProblem::Resolver::ResolveInputs() {
+  std::map<int, int> needed;  // knots, by column of a streamed input
   for (size_t i = 0; i < problem_.inputs.size(); ++i) {
     const NamedInput& input = problem_.inputs[i];
     const FieldPath field{"inputs", i};
@@ -148,9 +150,10 @@ void ResolvedProblem::Resolver::ResolveInputs() {
     resolved_.base_[settable_.Amplitude(*column)] = signal->default_amplitude();
     if (!signal->streamed()) continue;
     resolved_.streamed_inputs_.push_back(*column);
-    resolved_.knots_ahead_ = std::max(resolved_.knots_ahead_, signal->knots_ahead());
+    needed[*column] = signal->knots_needed();
   }
   std::sort(resolved_.streamed_inputs_.begin(), resolved_.streamed_inputs_.end());
+  for (const auto& [column, knots] : needed) resolved_.knots_needed_.push_back(knots);
 }
 
 void ResolvedProblem::Resolver::ResolveMeasured() {

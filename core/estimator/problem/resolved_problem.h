@@ -59,8 +59,8 @@ class ResolvedProblem {
   // Returns the columns of the streamed inputs among the model's inputs.
   const std::vector<int>& streamed_inputs() const { return streamed_inputs_; }
 
-  // Returns how many later rows must be known before the streamed inputs are settled up to a row.
-  int knots_ahead() const { return knots_ahead_; }
+  // Returns InputSignal::knots_needed of each streamed input.
+  const std::vector<int>& knots_needed() const { return knots_needed_; }
 
   // Returns an ensemble with one trajectory for each row of `thetas` (Q × n, values of the
   // uncertain parameters) that reads the model's `outputs`. If runs have their own parameters, 0 ≤
@@ -94,7 +94,7 @@ class ResolvedProblem {
   std::vector<int> outputs_;
   std::vector<std::string> units_;
   std::vector<int> streamed_inputs_;
-  int knots_ahead_ = 0;
+  std::vector<int> knots_needed_;
 };
 
 }  // namespace polyest::internal

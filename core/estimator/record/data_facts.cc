@@ -128,9 +128,34 @@ double ColumnFacts::Resolution() const {
   return step;
 }
 
-bool DataFacts::IsFor(size_t columns) const {
-  return columns_.size() == columns && intervals_.IsConsistent() &&
-         std::ranges::all_of(columns_, &ColumnFacts::IsConsistent);
+void InputFacts::Add(const SampleRow& row) {
+  intervals.Add(row);
+  last_s = row.time_s;
+  ++samples_in_run;
+}
+
+void InputFacts::EndRun(double last_row_s) {
+  if (samples_in_run == 0) ++runs_without;
+  if (samples_in_run > 0 && last_row_s - last_s > longest_end_s) {
+    longest_end_s = last_row_s - last_s;
+    end_from_s = last_s;
+  }
+  samples_in_run = 0;
+}
+
+bool InputFacts::IsConsistent() const {
+  return intervals.IsConsistent() && runs_without >= 0 && longest_end_s >= 0 && samples_in_run >= 0;
+}
+
+bool DataFacts::IsFor(size_t columns, size_t inputs) const {
+  return columns_.size() == columns && inputs_.size() == inputs && intervals_.IsConsistent() &&
+         std::ranges::all_of(columns_, &ColumnFacts::IsConsistent) &&
+         std::ranges::all_of(inputs_, &InputFacts::IsConsistent);
+}
+
+void DataFacts::EndRun() {
+  for (InputFacts& input : inputs_) input.EndRun(time_s_);
+  ended_run_ = run_;
 }
 
 void DataFacts::Add(const RowBlock& block, int row, int channels) {
@@ -138,12 +163,18 @@ void DataFacts::Add(const RowBlock& block, int row, int channels) {
   const auto m = static_cast<size_t>(channels);
   const size_t width = block.values.size() / block.rows.size();
   columns_.resize(width);
+  inputs_.resize(width - m);
+  if (run_ >= 0 && block.rows[k].run != run_ && ended_run_ != run_) EndRun();
+  run_ = block.rows[k].run;
+  time_s_ = block.rows[k].time_s;
   intervals_.Add(block.rows[k]);
   for (size_t i = 0; i < width; ++i) {
     const double value = block.values[k * width + i];
     if (std::isnan(value)) continue;
     columns_[i].Add(value, i < m ? block.noise[k * m + i] : 0);
+    if (i >= m) inputs_[i - m].Add(block.rows[k]);
   }
+  if (block.run_ended && row + 1 == block.count()) EndRun();
 }
 
 }  // namespace polyest::internal

@@ -91,6 +91,25 @@ struct ColumnFacts {
   }
 };
 
+// The times of a streamed input's samples.
+struct InputFacts {
+  IntervalFacts intervals;                  // between its samples
+  int64_t runs_without = 0;                 // runs that have ended without any sample of it
+  double longest_end_s = 0, end_from_s = 0;  // longest time from its last sample in a run to the
+                                             // run's last row, and the time of that sample
+  double last_s = 0;                         // time of the last sample, if the run has any
+  int64_t samples_in_run = 0;
+
+  void Add(const SampleRow& row);
+  void EndRun(double last_row_s);
+  bool IsConsistent() const;  // false after reading what was never written
+
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(intervals, runs_without, longest_end_s, end_from_s, last_s, samples_in_run);
+  }
+};
+
 // Returns how far a sample is from its prediction: in standard deviations of what the prior and the
 // noise leave open, after a relative error of the integrator's is taken out.
 double DistanceOf(const PriorPrediction& prediction);
@@ -110,17 +129,27 @@ class DataFacts {
   const IntervalFacts& intervals() const { return intervals_; }
   const std::vector<ColumnFacts>& columns() const { return columns_; }  // empty before any row
 
-  // Whether these may be the facts of a record of so many columns; false for corrupted ones.
-  bool IsFor(size_t columns) const;
+  // By streamed input; empty before any row.
+  const std::vector<InputFacts>& inputs() const { return inputs_; }
+
+  // Whether these may be the facts of a record of so many columns, the last `inputs` of which are
+  // streamed inputs; false for corrupted ones.
+  bool IsFor(size_t columns, size_t inputs) const;
 
   template <class Archive>
   void serialize(Archive& archive) {
-    archive(intervals_, columns_);
+    archive(intervals_, columns_, inputs_, run_, time_s_, ended_run_);
   }
 
  private:
+  void EndRun();
+
   IntervalFacts intervals_;
   std::vector<ColumnFacts> columns_;
+  std::vector<InputFacts> inputs_;
+  int run_ = -1;  // of the last row
+  double time_s_ = 0;
+  int ended_run_ = -1;  // the last run whose end has been counted
 };
 
 }  // namespace polyest::internal

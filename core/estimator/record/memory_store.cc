@@ -15,7 +15,6 @@ absl::Status MemoryStore::Read(int64_t first, int64_t count, RowBlock& block) co
   POLYEST_CHECK(count > 0);
   ClearRows(block);
   AppendRows(record_, first, count, block);
-  block.ahead = 0;
   block.run_ended = record_.run_ended && first + count == rows();
   return absl::OkStatus();
 }

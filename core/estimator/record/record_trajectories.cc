@@ -8,7 +8,6 @@
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
 namespace {
@@ -52,17 +51,16 @@ absl::Status RecordTrajectories::Run(int64_t rows, std::span<const SampleRow> ti
   next_time_ = 0;
   RowBlock block;
   for (int64_t first = 0; first < rows; first += block.count()) {
-    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store_, first, std::min(kRowsAtOnce, rows - first),
-                                              problem_.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(store_.Read(first, std::min(kRowsAtOnce, rows - first), block));
     for (int k = 0; k < block.count();) {
       const int run = block.rows[static_cast<size_t>(k)].run;
       int end = k + 1;
       while (end < block.count() && block.rows[static_cast<size_t>(end)].run == run) ++end;
       if (run != run_) {
         POLYEST_RETURN_IF_ERROR(FinishRun(visit, stop));
-        StartRun(run);
+        StartRun(run, first + k);
       }
-      inputs_->Append(block, static_cast<size_t>(k));
+      POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(block.rows[static_cast<size_t>(end - 1)].time_s));
       POLYEST_RETURN_IF_ERROR(Advance(block, k, end - k, first + k, visit, stop));
       k = end;
     }
@@ -73,10 +71,10 @@ absl::Status RecordTrajectories::Run(int64_t rows, std::span<const SampleRow> ti
                       absl::StrFormat("the record has no run %d", times_[next_time_].run));
 }
 
-void RecordTrajectories::StartRun(int run) {
+void RecordTrajectories::StartRun(int run, int64_t first_row) {
   run_ = run;
   propagator_.reset();
-  inputs_ = std::make_unique<RunInputs>(problem_, run);
+  inputs_ = std::make_unique<RunInputs>(problem_, &store_, run, first_row);
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, outputs_, threads_, run), &inputs_->signals());
 }

@@ -48,7 +48,7 @@ class RecordTrajectories {
 
  private:
   absl::Status CheckTimes(std::span<const SampleRow> times) const;
-  void StartRun(int run);
+  void StartRun(int run, int64_t first_row);
   absl::Status FinishRun(Visit visit, const Stop& stop);
   absl::Status Advance(const RowBlock& block, int first, int count, int64_t row, Visit visit,
                        const Stop& stop);

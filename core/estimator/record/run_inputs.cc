@@ -1,31 +1,85 @@
 #include "core/estimator/record/run_inputs.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <vector>
 
+#include "core/common/check.h"
+#include "core/common/status.h"
+
 namespace polyest::internal {
+namespace {
 
-RunInputs::RunInputs(const ResolvedProblem& problem, int run)
-    : problem_(problem), run_(run), signals_(problem.MakeInputs()) {}
+constexpr int64_t kKnotRowsAtOnce = 64;
 
-void RunInputs::Append(const RowBlock& block, size_t row) {
-  const std::vector<int>& streamed = problem_.streamed_inputs();
-  if (streamed.empty()) return;
-  const size_t width = block.values.size() / block.rows.size();
-  const auto channels = static_cast<size_t>(problem_.channels());
-  size_t k = row;
-  for (; k < block.rows.size() && block.rows[k].run == run_; ++k) {
-    const double time_s = block.rows[k].time_s;
-    if (time_s <= last_knot_s_) continue;
-    for (size_t i = 0; i < streamed.size(); ++i) {
-      const double value = block.values[k * width + channels + i];
-      signals_[static_cast<size_t>(streamed[i])].Append(time_s, value);
+}  // namespace
+
+RunInputs::RunInputs(const ResolvedProblem& problem, const SampleStore* store, int run,
+                     int64_t first_row)
+    : problem_(problem),
+      store_(store),
+      run_(run),
+      signals_(problem.MakeInputs()),
+      next_row_(first_row),
+      last_row_s_(-std::numeric_limits<double>::infinity()) {
+  POLYEST_CHECK(store != nullptr || problem.streamed_inputs().empty());
+}
+
+bool RunInputs::SettledUpTo(double time_s) const {
+  return std::ranges::all_of(problem_.streamed_inputs(), [&](int input) {
+    return signals_[static_cast<size_t>(input)].SettledUpTo(time_s);
+  });
+}
+
+absl::Status RunInputs::ReadUpTo(double time_s) {
+  if (problem_.streamed_inputs().empty()) return absl::OkStatus();
+  while (!finished_ && (last_row_s_ < time_s || !SettledUpTo(time_s))) {
+    if (next_in_block_ == block_.rows.size()) {
+      if (next_row_ == store_->rows()) return Finish();
+      POLYEST_RETURN_IF_ERROR(ReadNextRows());
     }
-    last_knot_s_ = time_s;
+    AppendRow(next_in_block_++);
   }
-  const bool complete = k < block.rows.size() || block.run_ended;
-  if (!complete || finished_) return;
-  for (const int input : streamed) signals_[static_cast<size_t>(input)].Finish();
+  return absl::OkStatus();
+}
+
+absl::Status RunInputs::ReadNextRows() {
+  const int64_t count = std::min(kKnotRowsAtOnce, store_->rows() - next_row_);
+  POLYEST_RETURN_IF_ERROR(store_->Read(next_row_, count, block_));
+  next_in_block_ = 0;
+  return absl::OkStatus();
+}
+
+// Appends the knots of a row of the block; a row of another run ends this one.
+void RunInputs::AppendRow(size_t row) {
+  const std::vector<int>& streamed = problem_.streamed_inputs();
+  if (block_.rows[row].run != run_) {
+    for (const int input : streamed) signals_[static_cast<size_t>(input)].Finish();
+    finished_ = true;
+    return;
+  }
+  const size_t width = block_.values.size() / block_.rows.size();
+  const size_t channels = width - streamed.size();
+  last_row_s_ = block_.rows[row].time_s;
+  for (size_t i = 0; i < streamed.size(); ++i) {
+    const double value = block_.values[row * width + channels + i];
+    if (std::isnan(value)) continue;
+    signals_[static_cast<size_t>(streamed[i])].Append(last_row_s_, value);
+  }
+  ++next_row_;
+}
+
+// Ends the run if the store says that its last row has no followers.
+absl::Status RunInputs::Finish() {
+  POLYEST_RETURN_IF_ERROR(store_->Read(next_row_ - 1, 1, block_));
+  next_in_block_ = block_.rows.size();
+  if (!block_.run_ended) return absl::OkStatus();
+  for (const int input : problem_.streamed_inputs()) {
+    signals_[static_cast<size_t>(input)].Finish();
+  }
   finished_ = true;
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

@@ -1,8 +1,15 @@
 #pragma once
 
-// The inputs of one run of a record. The knots of its streamed inputs come with the rows.
+// The inputs of one run of a record. The knots of a streamed input are its samples in the run's
+// rows, of which any may lack one.
+//
+// Up to a row an input is determined by the knots up to there and a few later ones
+// (InputSignal::SettledUpTo). They are read from the store ahead of the row, each row once and no
+// more than needed, so what is known at a row is a function of the record alone.
 
-#include <limits>
+#include <absl/status/status.h>
+
+#include <cstdint>
 
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/model/input_signal.h"
@@ -12,22 +19,33 @@ namespace polyest::internal {
 
 class RunInputs {
  public:
-  // Begins without any knots. `problem` must outlive the inputs.
-  RunInputs(const ResolvedProblem& problem, int run);
+  // Begins without any knots. The run's first row is `first_row` of the store. `problem` and
+  // `store` must outlive the inputs; the store may be null if no input is streamed.
+  RunInputs(const ResolvedProblem& problem, const SampleStore* store, int run, int64_t first_row);
 
-  // Appends the knots that the block contains, from row `row` on, rows ahead included. Rows whose
-  // knots are known already, such as those that were ahead in the block before, are skipped.
-  void Append(const RowBlock& block, size_t row);
+  // Reads on until all inputs are settled up to `time_s`, or the run or the store ends. Returns the
+  // store's errors.
+  absl::Status ReadUpTo(double time_s);
+  // Whether all inputs are settled up to `time_s`, the time of a row that has been read.
+  bool SettledUpTo(double time_s) const;
 
   // The signals, one for each of the model's inputs.
   const InputSignals& signals() const { return signals_; }
 
  private:
+  absl::Status ReadNextRows();
+  void AppendRow(size_t row);
+  absl::Status Finish();
+
   const ResolvedProblem& problem_;
+  const SampleStore* store_;
   int run_;
   InputSignals signals_;
-  double last_knot_s_ = -std::numeric_limits<double>::infinity();
+  int64_t next_row_;  // of the store: the first row whose knots have not been appended
+  double last_row_s_;
   bool finished_ = false;  // whether the run has no more knots
+  RowBlock block_;         // rows read
+  size_t next_in_block_ = 0;
 };
 
 }  // namespace polyest::internal

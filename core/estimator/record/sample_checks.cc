@@ -46,8 +46,12 @@ RecordPosition After(const RecordPosition& position, const RowBlock& block) {
     const SampleRow& row = block.rows[k];
     const bool same_run = after.rows > 0 && row.run == after.run;
     after.rows_in_run = same_run ? after.rows_in_run + 1 : 1;
+    if (!same_run) after.knots.assign(after.knots.size(), {});
     after.run = row.run;
     after.time_s = row.time_s;
+    for (size_t i = 0; i < after.knots.size(); ++i) {
+      if (!std::isnan(block.values[k * width + channels + i])) after.knots[i].Add(after.rows);
+    }
     ++after.rows;
     for (size_t i = 0; i < channels; ++i) {
       const double z = block.values[k * width + i];
@@ -75,6 +79,7 @@ SampleChecks::SampleChecks(const ResolvedProblem& problem)
         problem.problem().model->description().inputs[static_cast<size_t>(column)].name);
   }
   position_.largest = Vector::Zero(problem.channels());
+  position_.knots.resize(problem.streamed_inputs().size());
 }
 
 absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const {
@@ -152,11 +157,6 @@ absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
                      samples.rows());
     }
   }
-  for (size_t i = static_cast<size_t>(problem_.channels()); i < names_.size(); ++i) {
-    if (!seen.contains(names_[i])) {
-      return Refusal("columns", "column %s is missing: the input is streamed", names_[i]);
-    }
-  }
   return absl::OkStatus();
 }
 
@@ -199,16 +199,8 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
 
 absl::Status SampleChecks::CheckValues(const Samples& samples) const {
   for (const SampleColumn& column : samples.columns) {
-    const auto found = std::find(names_.begin(), names_.end(), column.name);
-    const bool input = found - names_.begin() >= problem_.channels();
     for (size_t k = 0; k < samples.rows(); ++k) {
-      if (Missing(column, k)) {
-        if (!input) continue;
-        return Refusal(ValueAt(samples, column, k),
-                       "row %d, column %s: a streamed input needs a value in every row", k,
-                       column.name);
-      }
-      if (!std::isfinite(column.value[k])) {
+      if (!Missing(column, k) && !std::isfinite(column.value[k])) {
         return Refusal(ValueAt(samples, column, k), "row %d, column %s: %g must be a finite number",
                        k, column.name, column.value[k]);
       }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/settled_rows.h"
 #include "polyest/samples.h"
 
 namespace polyest::internal {
@@ -20,6 +21,7 @@ struct RecordPosition {
   int64_t rows_in_run = 0;
   bool run_ended = false;  // whether no more rows of `run` follow
   Vector largest;          // per channel: max |z| so far, for NoiseModel::relative_to_max
+  std::vector<KnotRows> knots;  // of `run`, by streamed input
 };
 
 // Rows that have passed the checks, and the position after them.
@@ -37,7 +39,7 @@ class SampleChecks {
   // Checks what follows `position`.
   SampleChecks(const ResolvedProblem& problem, const RecordPosition& position);
 
-  // Returns all rows of `samples`, or InvalidArgument that names the row (counted from 0 in
+  // Returns all rows of `samples`, of which any column may be missing in any row, or InvalidArgument that names the row (counted from 0 in
   // `samples`), the column, the value and the rule. Changes nothing.
   absl::StatusOr<CheckedSamples> Check(const Samples& samples) const;
   // Records that the checked rows have been stored. The next samples must follow them.

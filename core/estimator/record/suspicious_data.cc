@@ -43,13 +43,17 @@ class Warnings {
       : problem_(problem),
         model_(problem.problem().model->description()),
         intervals_(facts.intervals()),
-        columns_(facts.columns()) {}
+        columns_(facts.columns()),
+        inputs_(facts.inputs()) {}
 
   std::vector<std::string> Run() {
     if (columns_.empty()) return {};
-    AddGaps();
-    AddLateStart();
     const auto channels = static_cast<size_t>(problem_.channels());
+    for (size_t i = 0; i < inputs_.size(); ++i) {
+      AddGaps(NameOf(channels + i), inputs_[i].intervals);
+      AddEnds(NameOf(channels + i), inputs_[i], problem_.knots_needed()[i] == 0);
+    }
+    AddLateStart();
     int64_t samples = 0;
     for (size_t i = 0; i < columns_.size(); ++i) {
       AddConstant(NameOf(i), columns_[i], i < channels);
@@ -88,14 +92,30 @@ class Warnings {
   bool StartsLate() const { return !model_.states.empty() && intervals_.StartsLate(); }
 
   // Between samples the model goes on exactly, unless an input is known at the samples only.
-  void AddGaps() {
-    const int64_t gaps = intervals_.gaps();
-    if (gaps == 0 || problem_.streamed_inputs().empty()) return;
-    Add("%d gap%s of more than %g usual steps; the longest is %g s, after t = %g s: the streamed "
-        "input is interpolated across it, and what it did there is not known; split the record "
-        "there with a column run, and make %s uncertain with perRun",
-        gaps, gaps == 1 ? "" : "s", IntervalFacts::kGapSteps, intervals_.longest_s(),
-        intervals_.longest_after_s(), InitialState());
+  void AddGaps(const std::string& name, const IntervalFacts& intervals) {
+    const int64_t gaps = intervals.gaps();
+    if (gaps == 0) return;
+    Add("%s: %d gap%s of more than %g usual steps; the longest is %g s, after t = %g s: the "
+        "streamed input is interpolated across it, and what it did there is not known; split the "
+        "record there with a column run, and make %s uncertain with perRun",
+        name, gaps, gaps == 1 ? "" : "s", IntervalFacts::kGapSteps, intervals.longest_s(),
+        intervals.longest_after_s(), InitialState());
+  }
+
+  // Without any sample in a run an input is 0, and after its last one it stays as it is, which for
+  // a held input is what it is meant to do.
+  void AddEnds(const std::string& name, const InputFacts& input, bool is_held) {
+    if (input.runs_without > 0) {
+      Add("%s: the streamed input has no sample in %d run%s and is taken as 0 there", name,
+          input.runs_without, input.runs_without == 1 ? "" : "s");
+    }
+    const double usual_s = input.intervals.usual_s();
+    if (is_held || !(usual_s > 0 && input.longest_end_s > IntervalFacts::kGapSteps * usual_s)) {
+      return;
+    }
+    Add("%s: the streamed input has no sample in the last %g s of a run, after t = %g s, and is "
+        "taken to stay at its last value there",
+        name, input.longest_end_s, input.end_from_s);
   }
 
   void AddLateStart() {
@@ -175,6 +195,7 @@ class Warnings {
   const ModelDescription& model_;
   const IntervalFacts& intervals_;
   const std::vector<ColumnFacts>& columns_;
+  const std::vector<InputFacts>& inputs_;
   std::vector<std::string> warnings_;
 };
 

@@ -70,8 +70,8 @@ class Estimator {
   absl::Status Append(const Samples& samples);
 
   // Processes all stored samples that are not processed yet, and expands the outputs again where
-  // needed. The last few rows of a run with a smooth streamed input wait until later rows settle
-  // its curve, or until the run ends (Samples::end_of_run). On a stop request returns its status;
+  // needed. The last rows of a run with a streamed input wait until later samples of it settle its
+  // curve, or until the run ends (Samples::end_of_run). On a stop request returns its status;
   // the next call goes on from there. FAILED_PRECONDITION if too few trajectories of the model can
   // be integrated, or the posterior has too few values of finite cost to draw from.
   absl::Status Process(const Stop& stop = {});

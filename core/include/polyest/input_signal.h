@@ -64,7 +64,7 @@ struct TableInput {
 // amplitude · the curve through values that come with the samples, in a column of the input's name
 // (polyest/samples.h).
 struct StreamedInput {
-  Interpolation interpolation = Interpolation::kCubic;  // between rows
+  Interpolation interpolation = Interpolation::kCubic;  // between samples
   double amplitude = 1;  // multiplies the values, which are in the input's unit
 };
 

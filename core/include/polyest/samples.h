@@ -15,11 +15,11 @@ namespace polyest {
 struct SampleColumn {
   std::string name;           // of a measured output or a streamed input
   std::vector<double> value;  // one for each row, in the quantity's unit; ignored where missing
-  std::vector<bool> missing;  // one for each row; empty: none is missing. Inputs are never missing
+  std::vector<bool> missing;  // one for each row; empty: none is missing
 };
 
-// Measurements: rows in time order, columns by name. All streamed inputs of the problem must have a
-// column; a measured output without one has no samples in these rows.
+// Measurements: rows in time order, columns by name. Any of them may miss a sample in any row, so
+// that each quantity has its own times; one without a column has no samples in these rows.
 struct Samples {
   std::vector<double> time_s;  // ≥ 0, strictly increasing within a run
   std::vector<int> run;        // one for each row, from 0, never decreasing; empty: all are run 0
@@ -46,11 +46,10 @@ struct RowBlock {
   // Row by row: the standard deviation of each measured output's sample, in its unit; 0 where
   // missing.
   std::vector<double> noise;
-  int ahead = 0;           // the last `ahead` rows only continue the curves of the inputs
   bool run_ended = false;  // whether the last row's run has no further rows
 
-  // The number of rows without those ahead.
-  int count() const { return static_cast<int>(rows.size()) - ahead; }
+  // The number of rows.
+  int count() const { return static_cast<int>(rows.size()); }
 };
 
 // Keeps the rows of a record, so that a moved expansion can be computed over them again. An
@@ -64,7 +63,7 @@ class SampleStore {
   // Appends the whole block with its run_ended, or nothing and says why. A block without rows only
   // marks the last row's run as ended.
   virtual absl::Status Append(const RowBlock& block) = 0;
-  // Reads rows [first, first + count), which must be there, into the block; none of them is ahead.
+  // Reads rows [first, first + count), which must be there, into the block.
   virtual absl::Status Read(int64_t first, int64_t count, RowBlock& block) const = 0;
 };
 

@@ -253,6 +253,19 @@ TEST(Snapshot, FindsTheStreamedInputsInTheRows) {
   }
 }
 
+TEST(Snapshot, FindsTheKnotsOfInputsBetweenWhichItWasMade) {
+  for (const Interpolation interpolation :
+       {Interpolation::kHold, Interpolation::kLinear, Interpolation::kCubic}) {
+    Samples samples = DrivenRecord(80);
+    samples.columns[1].missing.assign(samples.rows(), false);
+    for (size_t k = 0; k < samples.rows(); ++k) {
+      samples.columns[1].value[k] += 0.01 * std::sin(static_cast<double>(k * k));
+      samples.columns[1].missing[k] = k % 7 != 3;
+    }
+    ExpectSameBitsThroughRestarts(DrivenProblem(interpolation), samples, 30);
+  }
+}
+
 TEST(Snapshot, FindsTheStreamedInputsOfLongBeforeWhereTheyAreDelayed) {
   Problem problem = DrivenProblem(Interpolation::kLinear);
   problem.uncertain.push_back(UncertainParameter::Uniform("force.delay", 0, 0.4).value());

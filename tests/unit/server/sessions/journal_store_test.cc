@@ -40,7 +40,6 @@ void ExpectSameBits(const RowBlock& actual, const RowBlock& expected) {
     ASSERT_TRUE(AreSame(actual.values[i], expected.values[i])) << i;
   }
   EXPECT_EQ(actual.noise, expected.noise);
-  EXPECT_EQ(actual.ahead, expected.ahead);
   EXPECT_EQ(actual.run_ended, expected.run_ended);
 }
 

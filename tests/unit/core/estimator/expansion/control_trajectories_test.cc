@@ -62,7 +62,7 @@ class CirclingExpansion : public ::testing::Test {
     problem.expansion.order = 3;
     problem.integration.relative_tolerance = 1e-4;
     problem_ = std::make_unique<ResolvedProblem>(ResolvedProblem::Make(problem).value());
-    expansion_ = RegionalExpansion::Make(*problem_, DesignForPrior(*problem_).value(),
+    expansion_ = RegionalExpansion::Make(*problem_, nullptr, DesignForPrior(*problem_).value(),
                                          NoiseToBeginWith(problem), 1)
                      .value();
     const RowBlock block = BlockOf(CirclingRecord(kRows, kInterval_s), kNoise);
@@ -125,7 +125,7 @@ TEST_F(CirclingExpansion, SumsTheScoresOfItsControls) {
 
 int ControlsOf(const Problem& problem) {
   const ResolvedProblem resolved = ResolvedProblem::Make(problem).value();
-  return RegionalExpansion::Make(resolved, DesignForPrior(resolved).value(),
+  return RegionalExpansion::Make(resolved, nullptr, DesignForPrior(resolved).value(),
                                  NoiseToBeginWith(problem), 1)
       .value()
       ->controls();

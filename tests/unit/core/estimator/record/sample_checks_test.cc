@@ -227,13 +227,17 @@ TEST_F(SampleChecksTest, RefuseRunsThatDecrease) {
   EXPECT_EQ(Refusal(next), "row 0, column run: 0 after 1; runs start at 0 and never decrease");
 }
 
-TEST_F(SampleChecksTest, RefuseAStreamedInputThatIsNotThere) {
+TEST_F(SampleChecksTest, TakeAnyColumnMissingInAnyRow) {
   Samples samples = ThreeRows();
-  samples.columns.pop_back();
-  EXPECT_EQ(Refusal(samples), "column force is missing: the input is streamed");
-  samples = ThreeRows();
   samples.columns[1].missing = {false, false, true};
-  EXPECT_EQ(Refusal(samples), "row 2, column force: a streamed input needs a value in every row");
+  samples.columns[0].missing = {true, false, true};
+  EXPECT_TRUE(checks_.Check(samples).ok());
+  const CheckedSamples checked = checks_.Check(samples).value();
+  ASSERT_EQ(checked.after.knots.size(), 1);
+  EXPECT_EQ(checked.after.knots[0].count, 2);
+  EXPECT_EQ(checked.after.knots[0].last[0], 1);
+  samples.columns.clear();
+  EXPECT_TRUE(checks_.Check(samples).ok());
 }
 
 TEST_F(SampleChecksTest, RefuseValuesThatAreNoNumbers) {
