@@ -161,6 +161,7 @@ void CheckSpecification(const EnsembleSpecification& specification, const InputS
   POLYEST_CHECK(fits_or_empty(specification.input_offsets, description.inputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.output_gains, specification.outputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.output_offsets, specification.outputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.output_delays_s, specification.outputs.size()));
   POLYEST_CHECK(inputs.size() == description.inputs.size());
   POLYEST_CHECK(specification.integration.Validate().ok());
   for (const int output : specification.outputs) {
@@ -185,9 +186,17 @@ bool HasCheckpointsInRuns(const Model& model) {
 
 EnsemblePropagator::EnsemblePropagator(EnsembleSpecification specification,
                                        const InputSignals* inputs)
-    : output_gains_(specification.output_gains),
-      output_offsets_(specification.output_offsets),
-      ensemble_(StartEnsemble(std::move(specification), inputs)) {}
+    : output_gains_(specification.output_gains), output_offsets_(specification.output_offsets) {
+  Matrix delays_s = specification.output_delays_s;
+  const double tolerance = specification.integration.relative_tolerance;
+  ensemble_ = StartEnsemble(std::move(specification), inputs);
+  if (delays_s.size() == 0) return;
+  const bool streamed = std::ranges::any_of(*inputs, &InputSignal::streamed);
+  auto delayed = std::make_unique<DelayedOutputs>(std::move(ensemble_), std::move(delays_s),
+                                                  tolerance, streamed);
+  delayed_ = delayed.get();
+  ensemble_ = std::move(delayed);
+}
 
 absl::Status EnsemblePropagator::Advance(std::span<const double> times_s, MatrixRef outputs,
                                          const Stop& stop) {
@@ -198,6 +207,11 @@ absl::Status EnsemblePropagator::Advance(std::span<const double> times_s, Matrix
     auto y = outputs.col(column).array();
     if (output_gains_.size() > 0) y *= output_gains_.col(column % m).array();
     if (output_offsets_.size() > 0) y += output_offsets_.col(column % m).array();
+  }
+  if (delayed_ == nullptr) return absl::OkStatus();
+  delay_errors_ = delayed_->errors();
+  for (Eigen::Index column = 0; output_gains_.size() > 0 && column < outputs.cols(); ++column) {
+    delay_errors_[column] *= output_gains_.col(column % m).cwiseAbs().maxCoeff();
   }
   return absl::OkStatus();
 }

@@ -15,12 +15,13 @@
 #include <vector>
 
 #include "core/common/types.h"
+#include "core/propagation/delayed_outputs.h"
 #include "core/propagation/trajectory_ensemble.h"
 #include "polyest/stop.h"
 
 namespace polyest::internal {
 
-// Returns whether ensembles of the model have a State at a checkpoint.
+// Returns whether ensembles of the model have a State at a checkpoint, unless outputs have delays.
 bool HasCheckpointsInRuns(const Model& model);
 
 class EnsemblePropagator final : public TrajectoryEnsemble {
@@ -36,10 +37,16 @@ class EnsemblePropagator final : public TrajectoryEnsemble {
   std::optional<EnsembleState> State() const override { return ensemble_->State(); }
   bool Restore(const EnsembleState& state) override { return ensemble_->Restore(state); }
 
+  // Returns, for outputs with delays, the largest error of any point, by column of the last
+  // Advance, that is due to their interpolation (delayed_outputs.h); empty without delays.
+  const Vector& delay_errors() const { return delay_errors_; }
+
  private:
   Matrix output_gains_;    // Q × m, or empty
   Matrix output_offsets_;  // Q × m, or empty
   std::unique_ptr<TrajectoryEnsemble> ensemble_;
+  DelayedOutputs* delayed_ = nullptr;  // `ensemble_`, if outputs have delays
+  Vector delay_errors_;
 };
 
 }  // namespace polyest::internal

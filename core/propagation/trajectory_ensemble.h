@@ -47,13 +47,14 @@ struct EnsembleSpecification {
   std::shared_ptr<const Model> model;
   Matrix parameters;  // Q × parameters of the model
   // The channels of each point, u_i(t) = amplitude_i · shape_i(t − delay_i) + offset_i and
-  // y = gain · h + offset; an empty matrix stands for no delay, offset 0 and gain 1.
+  // y(t) = gain · h(t − delay) + offset; an empty matrix stands for no delay, offset 0 and gain 1.
   Matrix amplitudes;         // Q × inputs of the model
   Matrix input_delays_s;     // Q × inputs
   Matrix input_offsets;      // Q × inputs
   std::vector<int> outputs;  // columns of the model's outputs to read
   Matrix output_gains;       // Q × outputs read
   Matrix output_offsets;     // Q × outputs read
+  Matrix output_delays_s;    // Q × outputs read; not negative if an input is streamed
   IntegrationOptions integration;
   int threads = 1;
 };
@@ -87,8 +88,9 @@ class TrajectoryEnsemble {
 // A model that simulates itself, because its equations are not known.
 class SelfPropagatingModel : public Model {
  public:
-  // Starts the ensemble at t = 0; the caller applies output_gains and output_offsets. `inputs` must
-  // outlive the ensemble; knots of streamed inputs are appended between calls of its Advance.
+  // Starts the ensemble at t = 0; the caller applies the gains, offsets and delays of outputs.
+  // `inputs` must outlive the ensemble; knots of streamed inputs are appended between calls of its
+  // Advance.
   virtual std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
                                                             const InputSignals* inputs) const = 0;
 };

@@ -18,8 +18,8 @@ constexpr std::chrono::seconds kPatience{1};
 RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning) {
   const RecordPosition after = After(SampleChecks(problem).position(), beginning);
   RowBlock block;
-  AppendRows(beginning, 0,
-             std::min(kRows, SettledRows(problem, after.knots, 0, beginning.count())), block);
+  AppendRows(beginning, 0, std::min(kRows, SettledRows(problem, after.knots, 0, beginning.count())),
+             block);
   return block;
 }
 
@@ -50,7 +50,8 @@ void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record
   if (!design.ok()) return;
   MemoryStore store;
   if (!store.Append(record.beginning()).ok()) return;
-  auto expansion = RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1);
+  auto expansion =
+      RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1);
   if (!expansion.ok()) return;
   const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
   if (!(*expansion)->Propagate(block, stop).ok()) return;

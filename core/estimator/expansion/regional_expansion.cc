@@ -156,6 +156,7 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
   POLYEST_RETURN_IF_ERROR(Advance(first, count, stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
+  AddDelayErrors(first);
   PredictNoise(first);
   return absl::OkStatus();
 }
@@ -178,6 +179,15 @@ void RegionalExpansion::FitRows(int first, int count) {
     }
     fitted_rows_ = begin = end;
   }
+}
+
+// Takes the error of interpolating delayed outputs for one of the expansion's own.
+void RegionalExpansion::AddDelayErrors(int first) {
+  const Vector& errors = propagator_->delay_errors();
+  if (errors.size() == 0) return;
+  const int begin = first * channels_;
+  const int columns = std::max(0, fitted_rows_ - first) * channels_;
+  residual_variance_.segment(begin, columns) += errors.head(columns).cwiseAbs2();
 }
 
 // Whether a trajectory still in the fit has no output at this row of the block.

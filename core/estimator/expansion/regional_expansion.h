@@ -184,6 +184,7 @@ class RegionalExpansion {
   absl::Status RestoreFit(ExpansionState& state);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
   void FitRows(int first, int count);
+  void AddDelayErrors(int first);
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
   void NoteFailures(int row);

@@ -14,7 +14,8 @@ bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, 
   const auto m = static_cast<size_t>(problem.channels());
   const size_t width = m + problem.streamed_inputs().size();
   const RowBlock& beginning = summary.beginning();
-  return summary.rows() == rows && summary.channels().size() == m && summary.facts().IsFor(width, width - m) &&
+  return summary.rows() == rows && summary.channels().size() == m &&
+         summary.facts().IsFor(width, width - m) &&
          beginning.rows.size() <= RecordSummary::kBeginning &&
          beginning.values.size() == beginning.rows.size() * width &&
          beginning.noise.size() == beginning.rows.size() * m;

@@ -121,6 +121,8 @@ class ResolvedProblem::Resolver {
   bool Measured(int output) const;
   void CheckDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
                   double smallest_s);
+  void ResolveOutputDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
+                          double smallest_s, double largest_s);
 
   ResolvedProblem& resolved_;
   const Problem& problem_;
@@ -168,6 +170,7 @@ void ResolvedProblem::Resolver::ResolveMeasured() {
     if (Measured(*column)) Refuse(field, "output %s is given twice", measured.output);
     resolved_.outputs_.push_back(*column);
   }
+  resolved_.used_from_s_.assign(problem_.measured.size(), 0);
 }
 
 bool ResolvedProblem::Resolver::Measured(int output) const {
@@ -209,6 +212,32 @@ void ResolvedProblem::Resolver::CheckDelay(const FieldPath& field,
          delay.name, smallest_s);
 }
 
+// Samples before the delay has passed show what was before the run. With streamed inputs the model
+// cannot be run ahead of the samples.
+void ResolvedProblem::Resolver::ResolveOutputDelay(const FieldPath& field,
+                                                   const SettableQuantities::Settable& delay,
+                                                   double smallest_s, double largest_s) {
+  if (delay.kind != SettableQuantities::Kind::kOutputDelay) return;
+  if (!std::isfinite(smallest_s) || !std::isfinite(largest_s)) {
+    Refuse(field,
+           "the delay %s of an output needs bounds, since its samples before the largest delay are "
+           "not used; give it a prior between two bounds",
+           delay.name);
+    return;
+  }
+  if (smallest_s < 0 && !resolved_.streamed_inputs_.empty()) {
+    Refuse(field,
+           "%s may be as small as %g s; with a streamed input the delay of an output must not be "
+           "negative, since values to come would be needed; delay the inputs instead",
+           delay.name, smallest_s);
+  }
+  resolved_.delays_outputs_ = resolved_.delays_outputs_ || smallest_s != 0 || largest_s != 0;
+  for (size_t c = 0; c < resolved_.outputs_.size(); ++c) {
+    if (resolved_.outputs_[c] != delay.column) continue;
+    resolved_.used_from_s_[c] = std::max(0.0, largest_s);
+  }
+}
+
 void ResolvedProblem::Resolver::ResolveFixed() {
   for (const auto& [name, value] : problem_.fixed) {
     const FieldPath field{"fixed", FieldStep::Key(name)};
@@ -216,6 +245,7 @@ void ResolvedProblem::Resolver::ResolveFixed() {
     if (!index) continue;
     if (!std::isfinite(value)) Refuse(field, "%g must be finite", value);
     CheckDelay(field, settable_[*index], value);
+    ResolveOutputDelay(field, settable_[*index], value, value);
     resolved_.base_[*index] = value;
   }
 }
@@ -234,7 +264,12 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
     if (problem_.fixed.contains(parameter.name)) {
       Refuse(field, "%s is both fixed and uncertain", parameter.name);
     }
-    CheckDelay(field, settable_[*index], parameter.ToParameter(Germ(parameter.germ).Lower()));
+    const Germ germ(parameter.germ);
+    const double at_lower = parameter.ToParameter(germ.Lower());
+    const double at_upper = parameter.ToParameter(germ.Upper());
+    CheckDelay(field, settable_[*index], at_lower);
+    ResolveOutputDelay(field, settable_[*index], std::min(at_lower, at_upper),
+                       std::max(at_lower, at_upper));
     found[i] = *index;
   }
   for (int run = 0; run < resolved_.runs_; ++run) {
@@ -263,7 +298,7 @@ void ResolvedProblem::Resolver::ResolveDerived() {
     for (const UncertainParameter& parameter : problem_.uncertain) {
       if (parameter.name == name) Refuse(field, "%s is both uncertain and derived", name);
     }
-    if (settable_[*index].kind == SettableQuantities::Kind::kDelay) {
+    if (settable_[*index].is_delay()) {
       Refuse(field, "a delay cannot be derived; derive others from it");
     }
     resolved_.derived_targets_.push_back(*index);

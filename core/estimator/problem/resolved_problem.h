@@ -62,6 +62,12 @@ class ResolvedProblem {
   // Returns InputSignal::knots_needed of each streamed input.
   const std::vector<int>& knots_needed() const { return knots_needed_; }
 
+  // Returns, by channel, the time from which samples are used, in s: the largest delay of the
+  // output that the problem allows, and at least 0.
+  const std::vector<double>& used_from_s() const { return used_from_s_; }
+  // Whether an output may have a delay other than 0.
+  bool delays_outputs() const { return delays_outputs_; }
+
   // Returns an ensemble with one trajectory for each row of `thetas` (Q × n, values of the
   // uncertain parameters) that reads the model's `outputs`. If runs have their own parameters, 0 ≤
   // run < runs() is required.
@@ -95,6 +101,8 @@ class ResolvedProblem {
   std::vector<std::string> units_;
   std::vector<int> streamed_inputs_;
   std::vector<int> knots_needed_;
+  std::vector<double> used_from_s_;
+  bool delays_outputs_ = false;
 };
 
 }  // namespace polyest::internal

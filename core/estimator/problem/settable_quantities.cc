@@ -32,6 +32,7 @@ SettableQuantities::SettableQuantities(const ModelDescription& model)
   for (int i = 0; i < outputs_; ++i) {
     const Quantity& output = model.outputs[static_cast<size_t>(i)];
     all_.push_back({output.name + ".gain", "1", 1, true, Kind::kOutputGain, i});
+    all_.push_back({output.name + ".delay", "s", 0, true, Kind::kOutputDelay, i});
     all_.push_back({output.name + ".offset", output.unit, 0, true, Kind::kOutputOffset, i});
   }
 }
@@ -68,7 +69,7 @@ std::string SettableQuantities::Describe() const {
         absl::StrCat("{", absl::StrJoin(inputs, ", "), "}.{amplitude, gain, delay, offset}"));
   }
   if (!outputs.empty()) {
-    parts.push_back(absl::StrCat("{", absl::StrJoin(outputs, ", "), "}.{gain, offset}"));
+    parts.push_back(absl::StrCat("{", absl::StrJoin(outputs, ", "), "}.{gain, delay, offset}"));
   }
   return absl::StrJoin(parts, ", ");
 }
@@ -83,7 +84,7 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
     Matrix columns(values.rows(), std::ssize(ensemble.outputs));
     for (Eigen::Index c = 0; c < columns.cols(); ++c) {
       const int output = ensemble.outputs[static_cast<size_t>(c)];
-      columns.col(c) = values.col(Amplitude(inputs_) + 2 * output + which);
+      columns.col(c) = values.col(Amplitude(inputs_) + 3 * output + which);
     }
     return columns;
   };
@@ -92,7 +93,8 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
   ensemble.input_delays_s = UnlessNeutral(of_inputs(2), 0);
   ensemble.input_offsets = UnlessNeutral(of_inputs(3), 0);
   ensemble.output_gains = UnlessNeutral(of_outputs(0), 1);
-  ensemble.output_offsets = UnlessNeutral(of_outputs(1), 0);
+  ensemble.output_delays_s = UnlessNeutral(of_outputs(1), 0);
+  ensemble.output_offsets = UnlessNeutral(of_outputs(2), 0);
 }
 
 }  // namespace polyest::internal

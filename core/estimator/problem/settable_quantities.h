@@ -4,10 +4,10 @@
 // the initial states, and the parameters of its channels,
 //
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
-//   sample = x.gain · x + x.offset + noise                         of an output x.
+//   sample(t) = x.gain · x(t − x.delay) + x.offset + noise         of an output x.
 //
 // Their values form one vector: the parameters, then amplitude, gain, delay and offset of each
-// input, then gain and offset of each output.
+// input, then gain, delay and offset of each output.
 
 #include <optional>
 #include <string>
@@ -29,6 +29,7 @@ class SettableQuantities {
     kDelay,
     kInputOffset,
     kOutputGain,
+    kOutputDelay,
     kOutputOffset
   };
   struct Settable {
@@ -43,7 +44,10 @@ class SettableQuantities {
       return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
              kind == Kind::kInputOffset;
     }
-    bool of_output() const { return kind == Kind::kOutputGain || kind == Kind::kOutputOffset; }
+    bool of_output() const {
+      return kind == Kind::kOutputGain || kind == Kind::kOutputDelay || kind == Kind::kOutputOffset;
+    }
+    bool is_delay() const { return kind == Kind::kDelay || kind == Kind::kOutputDelay; }
   };
 
   explicit SettableQuantities(const ModelDescription& model);
@@ -57,6 +61,8 @@ class SettableQuantities {
   Vector Defaults() const;
   // Returns the index of the amplitude of the model's input `column`.
   int Amplitude(int column) const { return parameters_ + 4 * column; }
+  // Returns the index of the delay of the model's output `column`.
+  int OutputDelay(int column) const { return Amplitude(inputs_) + 3 * column + 1; }
   // Returns a list of all names, for a message.
   std::string Describe() const;
 

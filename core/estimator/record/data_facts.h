@@ -93,8 +93,8 @@ struct ColumnFacts {
 
 // The times of a streamed input's samples.
 struct InputFacts {
-  IntervalFacts intervals;                  // between its samples
-  int64_t runs_without = 0;                 // runs that have ended without any sample of it
+  IntervalFacts intervals;                   // between its samples
+  int64_t runs_without = 0;                  // runs that have ended without any sample of it
   double longest_end_s = 0, end_from_s = 0;  // longest time from its last sample in a run to the
                                              // run's last row, and the time of that sample
   double last_s = 0;                         // time of the last sample, if the run has any

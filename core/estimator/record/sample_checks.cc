@@ -100,6 +100,10 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
       const double z = column.value[k];
       checked.values[k * width + place] = z;
       if (place >= channels) continue;
+      if (samples.time_s[k] < problem_.used_from_s()[place]) {  // shows what was before the run
+        checked.values[k * width + place] = std::numeric_limits<double>::quiet_NaN();
+        continue;
+      }
       double& largest = largest_so_far[static_cast<Eigen::Index>(place)];
       largest = std::max(largest, std::abs(z));
       const NoiseModel& noise = problem_.problem().measured[place].noise;

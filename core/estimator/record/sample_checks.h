@@ -19,8 +19,8 @@ struct RecordPosition {
   int run = 0;
   double time_s = 0;
   int64_t rows_in_run = 0;
-  bool run_ended = false;  // whether no more rows of `run` follow
-  Vector largest;          // per channel: max |z| so far, for NoiseModel::relative_to_max
+  bool run_ended = false;       // whether no more rows of `run` follow
+  Vector largest;               // per channel: max |z| so far, for NoiseModel::relative_to_max
   std::vector<KnotRows> knots;  // of `run`, by streamed input
 };
 
@@ -39,8 +39,9 @@ class SampleChecks {
   // Checks what follows `position`.
   SampleChecks(const ResolvedProblem& problem, const RecordPosition& position);
 
-  // Returns all rows of `samples`, of which any column may be missing in any row, or InvalidArgument that names the row (counted from 0 in
-  // `samples`), the column, the value and the rule. Changes nothing.
+  // Returns all rows of `samples`, of which any column may be missing in any row, or
+  // InvalidArgument that names the row (counted from 0 in `samples`), the column, the value and the
+  // rule. Changes nothing.
   absl::StatusOr<CheckedSamples> Check(const Samples& samples) const;
   // Records that the checked rows have been stored. The next samples must follow them.
   void Accept(const CheckedSamples& samples) { position_ = samples.after; }

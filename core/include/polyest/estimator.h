@@ -47,8 +47,9 @@ struct EstimatorOptions {
   std::shared_ptr<SampleStore> store;
   // Called by Process, if given, once at each checkpoint of the record: after every
   // IntegrationOptions::samples_between_checkpoints rows of a run, and before a new run if as many
-  // rows have passed since the checkpoint before. A model that simulates itself (an FMU) has
-  // checkpoints before new runs only. The function does not change any answer.
+  // rows have passed since the checkpoint before. A model that simulates itself (an FMU) and
+  // a problem with delays of outputs have checkpoints before new runs only. The function does not
+  // change any answer.
   std::function<void(EstimatorSnapshot)> snapshot;
 };
 

@@ -6,9 +6,12 @@
 // its initial states among them, and the parameters of its channels,
 //
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
-//   sample = x.gain · x + x.offset + noise                         of an output x,
+//   sample(t) = x.gain · x(t − x.delay) + x.offset + noise         of an output x,
 //
-// by default gain 1, delay 0 and offset 0.
+// by default gain 1, delay 0 and offset 0. The delay of an output must be bounded by its prior.
+// Samples of an output before the largest delay that the prior allows are not used: they show what
+// was before the run. A negative delay, by which an output shows what is to come, is possible
+// without streamed inputs only; with them, delay the inputs instead.
 
 #include <map>
 #include <memory>

@@ -59,6 +59,20 @@ TEST_P(ModelExchangeOscillator, JumpsWithItsInput) {
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
 }
 
+TEST_P(ModelExchangeOscillator, IsSeenLateThroughDelays) {
+  FmuEnsemble fmu = Fmu(GetParam());
+  FmuEnsemble built_in = BuiltIn();
+  for (FmuEnsemble* ensemble : {&fmu, &built_in}) {
+    ensemble->specification.output_delays_s.setZero(kPoints, 3);
+    ensemble->specification.output_delays_s.col(0).setLinSpaced(0, 0.1);
+    ensemble->specification.output_delays_s.col(2).setConstant(-0.02);
+  }
+  const std::vector<double> times_s = TimesUntil(2, 0.05);
+  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  // The same nodes are chosen, up to rounding errors.
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-11);
+}
+
 INSTANTIATE_TEST_SUITE_P(Versions, ModelExchangeOscillator,
                          testing::Values("oscillator_me2", "oscillator_me3"));
 

@@ -76,10 +76,10 @@ TEST(ResolvedProblem, TakesAmplitudesFromFixedBeforeTheSignalsOwn) {
 TEST(ResolvedProblem, AnswersAnUnknownNameWithTheNamesThereAre) {
   EXPECT_EQ(Refusal([](Problem& p) { p.fixed["mass"] = 1; }),
             "fixed.mass: model mass_spring_damper has no parameter \"mass\"; it has m, c, k, x0, "
-            "v0, {force}.{amplitude, gain, delay, offset}, {x, v, a}.{gain, offset}");
+            "v0, {force}.{amplitude, gain, delay, offset}, {x, v, a}.{gain, delay, offset}");
   EXPECT_EQ(Refusal([](Problem& p) { p.uncertain[0].name = "stiffness"; }),
             "uncertain[0]: model mass_spring_damper has no parameter \"stiffness\"; it has m, c, "
-            "k, x0, v0, {force}.{amplitude, gain, delay, offset}, {x, v, a}.{gain, offset}");
+            "k, x0, v0, {force}.{amplitude, gain, delay, offset}, {x, v, a}.{gain, delay, offset}");
   EXPECT_EQ(Refusal([](Problem& p) { p.inputs[0].name = "torque"; }),
             "inputs[0]: model mass_spring_damper has no input \"torque\"; it has force");
   EXPECT_EQ(Refusal([](Problem& p) { p.measured[1].output = "y"; }),
