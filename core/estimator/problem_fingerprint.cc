@@ -103,6 +103,7 @@ uint32_t FingerprintOf(const Problem& problem) {
     AddEach(archive, problem.inputs);
     AddEach(archive, problem.measured);
     AddOptions(archive, problem);
+    archive(problem.use_when);
   }
   const std::string bytes = std::move(stream).str();
   return static_cast<uint32_t>(

@@ -14,6 +14,7 @@
 #include "core/common/check.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/estimator/problem/output_delay.h"
 #include "core/estimator/problem/parameters_of_runs.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/problem/validate_noise.h"
@@ -98,6 +99,7 @@ class ResolvedProblem::Resolver {
     ResolveFixed();
     ResolveUncertain();
     ResolveDerived();
+    ResolveGate();
     CheckAllHaveValues();
     return std::move(refusals_);
   }
@@ -115,14 +117,13 @@ class ResolvedProblem::Resolver {
   void ResolveFixed();
   void ResolveUncertain();
   void ResolveDerived();
+  void ResolveGate();
   void CheckAllHaveValues();
   std::optional<int> Find(const FieldPath& field, const std::string& name);
   bool Driven(int input) const { return signals_.contains(input); }
   bool Measured(int output) const;
-  void CheckDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
-                  double smallest_s);
-  void ResolveOutputDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
-                          double smallest_s, double largest_s);
+  void ResolveDelay(const FieldPath& field, const SettableQuantities::Settable& delay,
+                    double smallest_s, double largest_s);
 
   ResolvedProblem& resolved_;
   const Problem& problem_;
@@ -200,41 +201,26 @@ std::optional<int> ResolvedProblem::Resolver::Find(const FieldPath& field,
   return index;
 }
 
-void ResolvedProblem::Resolver::CheckDelay(const FieldPath& field,
-                                           const SettableQuantities::Settable& delay,
-                                           double smallest_s) {
+void ResolvedProblem::Resolver::ResolveDelay(const FieldPath& field,
+                                             const SettableQuantities::Settable& delay,
+                                             double smallest_s, double largest_s) {
+  if (!delay.is_delay()) return;
   const auto& streamed = resolved_.streamed_inputs_;
-  if (delay.kind != SettableQuantities::Kind::kDelay || smallest_s >= 0) return;
-  if (std::find(streamed.begin(), streamed.end(), delay.column) == streamed.end()) return;
-  Refuse(field,
-         "%s may be as small as %g s; the delay of a streamed input must not be negative, since "
-         "values to come would be needed",
-         delay.name, smallest_s);
-}
-
-// Samples before the delay has passed show what was before the run. With streamed inputs the model
-// cannot be run ahead of the samples.
-void ResolvedProblem::Resolver::ResolveOutputDelay(const FieldPath& field,
-                                                   const SettableQuantities::Settable& delay,
-                                                   double smallest_s, double largest_s) {
-  if (delay.kind != SettableQuantities::Kind::kOutputDelay) return;
-  if (!std::isfinite(smallest_s) || !std::isfinite(largest_s)) {
-    Refuse(field,
-           "the delay %s of an output needs bounds, since its samples before the largest delay are "
-           "not used; give it a prior between two bounds",
-           delay.name);
-    return;
+  if (delay.of_input()) {
+    if (smallest_s >= 0 || std::ranges::find(streamed, delay.column) == streamed.end()) return;
+    return Refuse(field,
+                  "%s may be as small as %g s; the delay of a streamed input must not be negative, "
+                  "since values to come would be needed",
+                  delay.name, smallest_s);
   }
-  if (smallest_s < 0 && !resolved_.streamed_inputs_.empty()) {
-    Refuse(field,
-           "%s may be as small as %g s; with a streamed input the delay of an output must not be "
-           "negative, since values to come would be needed; delay the inputs instead",
-           delay.name, smallest_s);
-  }
+  absl::Status check =
+      CheckOutputDelay(field, delay.name, smallest_s, largest_s, !streamed.empty());
+  if (!check.ok()) return Refuse(std::move(check));
   resolved_.delays_outputs_ = resolved_.delays_outputs_ || smallest_s != 0 || largest_s != 0;
   for (size_t c = 0; c < resolved_.outputs_.size(); ++c) {
-    if (resolved_.outputs_[c] != delay.column) continue;
-    resolved_.used_from_s_[c] = std::max(0.0, largest_s);
+    if (resolved_.outputs_[c] == delay.column) {
+      resolved_.used_from_s_[c] = std::max(0.0, largest_s);
+    }
   }
 }
 
@@ -244,8 +230,7 @@ void ResolvedProblem::Resolver::ResolveFixed() {
     const auto index = Find(field, name);
     if (!index) continue;
     if (!std::isfinite(value)) Refuse(field, "%g must be finite", value);
-    CheckDelay(field, settable_[*index], value);
-    ResolveOutputDelay(field, settable_[*index], value, value);
+    ResolveDelay(field, settable_[*index], value, value);
     resolved_.base_[*index] = value;
   }
 }
@@ -264,12 +249,10 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
     if (problem_.fixed.contains(parameter.name)) {
       Refuse(field, "%s is both fixed and uncertain", parameter.name);
     }
-    const Germ germ(parameter.germ);
-    const double at_lower = parameter.ToParameter(germ.Lower());
-    const double at_upper = parameter.ToParameter(germ.Upper());
-    CheckDelay(field, settable_[*index], at_lower);
-    ResolveOutputDelay(field, settable_[*index], std::min(at_lower, at_upper),
-                       std::max(at_lower, at_upper));
+    const auto [smallest, largest] =
+        std::minmax({parameter.ToParameter(Germ(parameter.germ).Lower()),
+                     parameter.ToParameter(Germ(parameter.germ).Upper())});
+    ResolveDelay(field, settable_[*index], smallest, largest);
     found[i] = *index;
   }
   for (int run = 0; run < resolved_.runs_; ++run) {
@@ -312,6 +295,13 @@ void ResolvedProblem::Resolver::ResolveDerived() {
     resolved_.derived_variables_.push_back(*settable_.Find(variable));
   }
   resolved_.derived_ = std::make_shared<const Expressions>(*std::move(derived));
+}
+
+void ResolvedProblem::Resolver::ResolveGate() {
+  if (problem_.use_when.empty()) return;
+  auto gate = RowGate::Make(problem_.use_when);
+  if (!gate.ok()) return Refuse(gate.status());
+  resolved_.gate_ = std::make_shared<const RowGate>(*std::move(gate));
 }
 
 void ResolvedProblem::Resolver::CheckAllHaveValues() {

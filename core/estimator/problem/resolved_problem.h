@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/bayes/prior.h"
+#include "core/estimator/problem/row_gate.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/model/equations/expressions.h"
 #include "core/model/input_signal.h"
@@ -65,6 +66,8 @@ class ResolvedProblem {
   // Returns, by channel, the time from which samples are used, in s: the largest delay of the
   // output that the problem allows, and at least 0.
   const std::vector<double>& used_from_s() const { return used_from_s_; }
+  // The condition under which rows are used; null if all are.
+  const RowGate* gate() const { return gate_.get(); }
   // Whether an output may have a delay other than 0.
   bool delays_outputs() const { return delays_outputs_; }
 
@@ -103,6 +106,7 @@ class ResolvedProblem {
   std::vector<int> knots_needed_;
   std::vector<double> used_from_s_;
   bool delays_outputs_ = false;
+  std::shared_ptr<const RowGate> gate_;
 };
 
 }  // namespace polyest::internal

@@ -61,6 +61,7 @@ RecordPosition After(const RecordPosition& position, const RowBlock& block) {
     }
   }
   after.run_ended = block.run_ended;
+  if (!block.gate.empty()) after.gate = block.gate;
   return after;
 }
 
@@ -78,6 +79,13 @@ SampleChecks::SampleChecks(const ResolvedProblem& problem)
     names_.push_back(
         problem.problem().model->description().inputs[static_cast<size_t>(column)].name);
   }
+  width_ = names_.size();
+  if (const RowGate* gate = problem.gate(); gate != nullptr) {
+    for (const std::string& name : gate->columns()) {
+      if (std::ranges::find(names_, name) == names_.end()) names_.push_back(name);
+    }
+    position_.gate.assign(gate->columns().size(), std::numeric_limits<double>::quiet_NaN());
+  }
   position_.largest = Vector::Zero(problem.channels());
   position_.knots.resize(problem.streamed_inputs().size());
 }
@@ -87,38 +95,21 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   POLYEST_RETURN_IF_ERROR(CheckTimes(samples));
   POLYEST_RETURN_IF_ERROR(CheckValues(samples));
   CheckedSamples checked;
+  const std::vector<bool> used = UsedRows(samples, checked.gate);
+  checked.left_out = std::ranges::count(used, false);
   Vector largest_so_far = position_.largest;
   const auto channels = static_cast<size_t>(problem_.channels());
-  const size_t width = names_.size();
-  checked.values.assign(samples.rows() * width, std::numeric_limits<double>::quiet_NaN());
+  checked.values.assign(samples.rows() * width_, std::numeric_limits<double>::quiet_NaN());
   checked.noise.assign(samples.rows() * channels, 0);
   for (const SampleColumn& column : samples.columns) {
-    const auto found = std::find(names_.begin(), names_.end(), column.name);
-    const auto place = static_cast<size_t>(found - names_.begin());
-    for (size_t k = 0; k < samples.rows(); ++k) {
-      if (Missing(column, k)) continue;
-      const double z = column.value[k];
-      checked.values[k * width + place] = z;
-      if (place >= channels) continue;
-      if (samples.time_s[k] < problem_.used_from_s()[place]) {  // shows what was before the run
-        checked.values[k * width + place] = std::numeric_limits<double>::quiet_NaN();
-        continue;
+    const auto place = static_cast<size_t>(std::ranges::find(names_, column.name) - names_.begin());
+    if (place < channels) {
+      POLYEST_RETURN_IF_ERROR(PlaceColumn(
+          samples, column, used, largest_so_far[static_cast<Eigen::Index>(place)], checked));
+    } else if (place < width_) {
+      for (size_t k = 0; k < samples.rows(); ++k) {
+        if (!Missing(column, k)) checked.values[k * width_ + place] = column.value[k];
       }
-      double& largest = largest_so_far[static_cast<Eigen::Index>(place)];
-      largest = std::max(largest, std::abs(z));
-      const NoiseModel& noise = problem_.problem().measured[place].noise;
-      const double sigma = noise.StandardDeviation(z, largest);
-      if (sigma <= 0) {  // 0 before any other value: without a size, it counts as missing
-        checked.values[k * width + place] = std::numeric_limits<double>::quiet_NaN();
-        continue;
-      }
-      if (!noise.unknown && std::abs(z) > kMaxSignalToNoise * sigma) {
-        return Refusal(ValueAt(samples, column, k),
-                       "row %d, column %s: %g is more than %g times its noise of %g; check its "
-                       "unit or the noise",
-                       k, column.name, z, kMaxSignalToNoise, sigma);
-      }
-      checked.noise[k * channels + place] = sigma;
     }
   }
   for (size_t k = 0; k < samples.rows(); ++k) {
@@ -127,6 +118,61 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   checked.run_ended = samples.end_of_run;
   checked.after = After(position_, checked);
   return checked;
+}
+
+// Returns which rows are used, and in `gate` the gate's values after the last one.
+std::vector<bool> SampleChecks::UsedRows(const Samples& samples, std::vector<double>& gate) const {
+  if (problem_.gate() == nullptr || samples.rows() == 0) {
+    return std::vector<bool>(samples.rows(), true);
+  }
+  gate = position_.gate;
+  const std::vector<std::string>& names = problem_.gate()->columns();
+  std::vector<const SampleColumn*> columns;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(samples.columns, name, &SampleColumn::name);
+    columns.push_back(found == samples.columns.end() ? nullptr : &*found);
+  }
+  Matrix values(static_cast<Eigen::Index>(samples.rows()), std::ssize(names));
+  bool any_row = position_.rows > 0;
+  int run = position_.run;
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    const int row_run = samples.run.empty() ? 0 : samples.run[k];
+    if (any_row && row_run != run) gate.assign(gate.size(), std::nan(""));
+    any_row = true;
+    run = row_run;
+    for (size_t i = 0; i < columns.size(); ++i) {
+      if (columns[i] != nullptr && !Missing(*columns[i], k)) gate[i] = columns[i]->value[k];
+      values(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i)) = gate[i];
+    }
+  }
+  return problem_.gate()->Uses(values, samples.time_s);
+}
+
+// Places the samples of a measured output, each with its noise. `largest`: max |z| so far.
+absl::Status SampleChecks::PlaceColumn(const Samples& samples, const SampleColumn& column,
+                                       const std::vector<bool>& used, double& largest,
+                                       CheckedSamples& checked) const {
+  const auto place = static_cast<size_t>(std::ranges::find(names_, column.name) - names_.begin());
+  const auto channels = static_cast<size_t>(problem_.channels());
+  const NoiseModel& noise = problem_.problem().measured[place].noise;
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    // Before the largest delay the sensor shows what was before the run.
+    const bool before_run = samples.time_s[k] < problem_.used_from_s()[place];
+    if (Missing(column, k) || !used[k] || before_run) continue;
+    const double z = column.value[k];
+    largest = std::max(largest, std::abs(z));
+    const double sigma = noise.StandardDeviation(z, largest);
+    if (sigma <= 0) continue;  // 0 before any other value: without a size, it counts as missing
+    if (!noise.unknown && std::abs(z) > kMaxSignalToNoise * sigma) {
+      return Refusal(ValueAt(samples, column, k),
+                     "row %d, column %s: %g is more than %g times its noise of %g; check its unit "
+                     "or the noise",
+                     k, column.name, z, kMaxSignalToNoise, sigma);
+    }
+    checked.values[k * width_ + place] = z;
+    checked.noise[k * channels + place] = sigma;
+  }
+  return absl::OkStatus();
 }
 
 absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
@@ -143,8 +189,9 @@ absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
     if (std::find(names_.begin(), names_.end(), column.name) == names_.end()) {
       return Refusal({"columns", &column - samples.columns.data()},
                      "column \"%s\" is neither a measured output nor a streamed input of the "
-                     "problem; it has %s",
-                     column.name, absl::StrJoin(names_, ", "));
+                     "problem%s; it has %s",
+                     column.name, problem_.gate() == nullptr ? "" : ", nor in useWhen",
+                     absl::StrJoin(names_, ", "));
     }
     if (!seen.insert(column.name).second) {
       return Refusal({"columns", &column - samples.columns.data()}, "column %s is given twice",

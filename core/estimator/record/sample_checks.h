@@ -22,11 +22,13 @@ struct RecordPosition {
   bool run_ended = false;       // whether no more rows of `run` follow
   Vector largest;               // per channel: max |z| so far, for NoiseModel::relative_to_max
   std::vector<KnotRows> knots;  // of `run`, by streamed input
+  std::vector<double> gate;     // RowBlock::gate
 };
 
 // Rows that have passed the checks, and the position after them.
 struct CheckedSamples : RowBlock {
   RecordPosition after;
+  int64_t left_out = 0;  // rows for which Problem::use_when does not hold
 };
 
 // Returns where the record stands after `block`, which follows `position`.
@@ -51,10 +53,15 @@ class SampleChecks {
   absl::Status CheckColumns(const Samples& samples) const;
   absl::Status CheckTimes(const Samples& samples) const;
   absl::Status CheckValues(const Samples& samples) const;
+  std::vector<bool> UsedRows(const Samples& samples, std::vector<double>& gate) const;
+  absl::Status PlaceColumn(const Samples& samples, const SampleColumn& column,
+                           const std::vector<bool>& used, double& largest,
+                           CheckedSamples& checked) const;
 
   const ResolvedProblem& problem_;
   int max_runs_;
-  std::vector<std::string> names_;  // the channels, then the streamed inputs
+  size_t width_ = 0;                // of the values: channels and streamed inputs
+  std::vector<std::string> names_;  // of these, then of the other columns in use_when
   RecordPosition position_;
 };
 

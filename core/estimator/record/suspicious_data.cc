@@ -128,7 +128,8 @@ class Warnings {
 
   void AddConstant(const std::string& name, const ColumnFacts& column, bool measured) {
     if (column.samples == 0 && measured) {
-      Add("%s is measured, but the data have no sample of it", name);
+      Add("%s is measured, but the data have no sample of it%s", name,
+          problem_.gate() == nullptr ? "" : " in rows for which useWhen holds");
     }
     if (column.samples >= kMinConstant && column.smallest == column.largest) {
       Add("%s never changes: it is %g in every row; is the sensor connected?", name,

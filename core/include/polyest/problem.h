@@ -69,6 +69,12 @@ struct Problem {
   // samples or the error of integration that it leaves asks for it; set it to false with a
   // tolerance of your own. Without effect on a fixed expansion.
   bool tolerance_follows_noise = true;
+  // The condition under which a row's samples are used, in the language of equation models, over t
+  // and columns of the data: "v > 5 && !reverse". Where it is 0, the row's streamed inputs still
+  // drive the model, and its measured samples count as missing. Columns that it names are allowed
+  // in the data beside measured outputs and streamed inputs; where one has no sample, it keeps its
+  // last value of the run, and before the first one no row is used. Empty: every row is used.
+  std::string use_when;
 };
 
 }  // namespace polyest

@@ -13,7 +13,7 @@ namespace polyest {
 
 // The values of one measured output or streamed input.
 struct SampleColumn {
-  std::string name;           // of a measured output or a streamed input
+  std::string name;           // of a measured output, a streamed input or in Problem::use_when
   std::vector<double> value;  // one for each row, in the quantity's unit; ignored where missing
   std::vector<bool> missing;  // one for each row; empty: none is missing
 };
@@ -46,6 +46,9 @@ struct RowBlock {
   // Row by row: the standard deviation of each measured output's sample, in its unit; 0 where
   // missing.
   std::vector<double> noise;
+  // The values that the columns in Problem::use_when have after the last row, NaN without any
+  // sample in its run; empty if nothing was checked for it.
+  std::vector<double> gate;
   bool run_ended = false;  // whether the last row's run has no further rows
 
   // The number of rows.

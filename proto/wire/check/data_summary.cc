@@ -80,6 +80,9 @@ class Summarizer {
         absl::StrCat(Counted(static_cast<int64_t>(samples_.rows.size()), "row"), ", ",
                      steps_.runs > 1 ? absl::StrCat(steps_.runs, " runs, ") : "", "t from ",
                      Number(first->time_s), " to ", Number(last->time_s), " s");
+    if (problem_.gate() != nullptr) {
+      absl::StrAppend(&summary_.rows, ", ", samples_.left_out, " of them left out by useWhen");
+    }
     if (steps_.usual_s == 0) return;
     // Times in a file are rounded: a thousandth of a step is no irregularity.
     const bool regular = steps_.longest_s - steps_.shortest_s < 1e-3 * steps_.usual_s;

@@ -187,6 +187,7 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
     Add("measured", measured.output(),
         "noise " + DescribeNoise(measured.noise(), model.outputs[column].unit), remarks);
   }
+  if (!problem.use_when().empty()) Add("useWhen", "", problem.use_when(), remarks);
   const ExpansionOptions& expansion = resolved.problem().expansion;
   const bool may_rise = expansion.adaptive && !expansion.order;
   Add("expansion", absl::StrCat("order ", design.basis->order(), may_rise ? " at first" : ""),

@@ -17,13 +17,15 @@ namespace {
 
 constexpr int64_t kSegment = JournalStore::kSegmentRows;
 
-// Makes a problem with two channels whose noise depends on the largest sample so far.
+// Makes a problem with two channels whose noise depends on the largest sample so far, and whose
+// samples are used depending on the last gear so far.
 ResolvedProblem TwoChannels() {
   Problem problem;
   problem.model = *FindBuiltinModel("mass_spring_damper");
   problem.uncertain = {UncertainParameter::Uniform("c", 0, 1).value()};
   problem.inputs = {{"force", StreamedInput{}}};
   problem.measured = {{"x", {.absolute = 0.1, .relative_to_max = 0.01}}, {"v", {.relative = 0.5}}};
+  problem.use_when = "gear > 0";
   return ResolvedProblem::Make(problem).value();
 }
 
@@ -60,6 +62,8 @@ class JournalStoreTest : public testing::Test {
     x.set_name("x");
     v1::Measurements::Channel& force = *batch.add_channels();
     force.set_name("force");
+    v1::Measurements::Channel& gear = *batch.add_channels();
+    gear.set_name("gear");
     for (int i = 0; i < rows; ++i, ++row_) {
       batch.add_time_s(0.01 * row_);
       batch.add_run(run);
@@ -67,6 +71,8 @@ class JournalStoreTest : public testing::Test {
       x.add_values((row_ + 1) * std::sin(row_));
       if (row_ % 7 == 3) x.add_missing(i);
       force.add_values(row_);
+      gear.add_values(row_ / 500 % 3);
+      if (row_ % 500 != 0) gear.add_missing(i);
     }
     batch.set_end_of_run(end_of_run);
     JournalEntry entry;

@@ -284,6 +284,17 @@ TEST(ToProblem, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(MessageWith(R"({"regularization": -2})"), StartsWith("regularization: -2"));
 }
 
+TEST(ToProblem, TakesTheConditionOfUsedRows) {
+  v1::Problem given = SmallProblem();
+  given.MergeFrom(ProblemFromJson(R"({"useWhen": "v > 5 && !reverse"})"));
+  const auto resolved = ToProblem(given);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_EQ(resolved->problem().use_when, "v > 5 && !reverse");
+  EXPECT_THAT(resolved->gate()->columns(), ::testing::ElementsAre("reverse", "v"));
+  EXPECT_THAT(MessageWith(R"({"useWhen": "v > 5 && * reverse"})"),
+              StartsWith("useWhen: column 10"));
+}
+
 TEST(ToProblem, KnowsEveryRuleOfRegularization) {
   for (const auto& [given, expected] :
        {std::pair{v1::Problem::REGULARIZATION_MODE_UNSPECIFIED, RegularizationMode::kFixed},
