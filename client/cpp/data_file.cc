@@ -1,5 +1,6 @@
 #include "polyest/data_file.h"
 
+#include <absl/algorithm/container.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -19,10 +20,29 @@
 #include "client/cpp/data/text_lines.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/model/equations/parser.h"
 
 namespace polyest {
 
 using namespace internal;
+
+namespace {
+
+// Returns the names in `useWhen` that are no other columns. One that cannot be read has none: the
+// problem is refused elsewhere.
+std::vector<std::string> ConditionColumns(const v1::Problem& problem, const DataColumns& others) {
+  if (problem.use_when().empty()) return {};
+  const auto syntax = equations::Parse(FieldPath("useWhen"), problem.use_when(), {});
+  if (!syntax.ok()) return {};
+  std::vector<std::string> names = equations::VariablesIn(*syntax);
+  std::erase_if(names, [&](const std::string& name) {
+    return name == "t" || absl::c_linear_search(others.measured, name) ||
+           absl::c_linear_search(others.streamed, name);
+  });
+  return names;
+}
+
+}  // namespace
 
 DataColumns ColumnsOf(const v1::Problem& problem) {
   DataColumns columns;
@@ -32,6 +52,7 @@ DataColumns ColumnsOf(const v1::Problem& problem) {
   for (const v1::Input& input : problem.inputs()) {
     if (input.has_streamed()) columns.streamed.push_back(input.name());
   }
+  columns.conditions = ConditionColumns(problem, columns);
   for (const auto& [quantity, column] : problem.columns()) {
     columns.sources[quantity] = {column.from(), column.unit()};
   }

@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "proto/wire/convert/annotate.h"
 #include "proto/wire/convert/measurements.h"
+#include "proto/wire/convert/problem.h"
 #include "proto/wire/operations/operations.h"
 
 namespace polyest::internal {
@@ -94,12 +95,15 @@ absl::Status OnStrand(const Request& request, Session& session, const ServiceCon
 }
 
 // Adds the session's rows to `measurements`; returns the number of the last batch.
-absl::StatusOr<int64_t> ReadRows(const Session& session, const Stop& stop,
+absl::StatusOr<int64_t> ReadRows(const Session& session, const Model& model, const Stop& stop,
                                  v1::Measurements& measurements) {
   int64_t sequence = 0;
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    AppendRows(batch.measurements, measurements);
+    // Each batch may have units of its own.
+    v1::Measurements converted = batch.measurements;
+    POLYEST_RETURN_IF_ERROR(ToModelUnits(model, converted));
+    AppendRows(converted, measurements);
     sequence = batch.sequence;
     return absl::OkStatus();
   };
@@ -117,7 +121,10 @@ absl::Status OfStoredExperiment(Request request, const Session& session,
   POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_problem(), session.ReadProblem());
   int64_t sequence = 0;
   if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
-    POLYEST_ASSIGN_OR_RETURN(sequence, ReadRows(session, stop, *experiment.mutable_measurements()));
+    POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved,
+                             ToProblem(experiment.problem(), context.models));
+    POLYEST_ASSIGN_OR_RETURN(sequence, ReadRows(session, *resolved.problem().model, stop,
+                                                *experiment.mutable_measurements()));
   }
   POLYEST_ASSIGN_OR_RETURN(response,
                            Run(request, kThreadsPerCall, stop, context.models, ProblemLimits()));

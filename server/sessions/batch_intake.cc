@@ -28,7 +28,7 @@ double BatchIntake::measured_s() const {
 
 absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits,
                                const Record& record) {
-  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch));
+  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch, *problem_.problem().model));
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, WireFields(checks_.Check(samples)));
   POLYEST_RETURN_IF_ERROR(CheckRuns(checked.after.run + 1, limits));

@@ -101,7 +101,8 @@ absl::StatusOr<JournalStore::Rows> JournalStore::ReadSegment(const Segment& segm
   const absl::Status enough = absl::OutOfRangeError("the segment has been read");
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     if (batch.sequence > segment.last_batch) return enough;
-    POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(batch.measurements));
+    POLYEST_ASSIGN_OR_RETURN(const Samples samples,
+                             ToSamples(batch.measurements, *problem_.problem().model));
     const auto checked = checks.Check(samples);
     // They have passed these checks before.
     if (!checked.ok()) return absl::DataLossError(checked.status().message());

@@ -65,10 +65,18 @@ class Mapping {
     for (const std::string& input : known_.streamed) {
       POLYEST_RETURN_IF_ERROR(Map(input, DataColumn::kStreamed));
     }
+    for (const std::string& condition : known_.conditions) {
+      POLYEST_RETURN_IF_ERROR(Map(condition, DataColumn::kStreamed));
+    }
     POLYEST_RETURN_IF_ERROR(Map("run", DataColumn::kRun));
     POLYEST_RETURN_IF_ERROR(MapTime());
     POLYEST_RETURN_IF_ERROR(CheckSpelling());
-    POLYEST_RETURN_IF_ERROR(CheckStreamed());
+    for (const std::string& input : known_.streamed) {
+      POLYEST_RETURN_IF_ERROR(CheckThere(input, " for the streamed input of that name"));
+    }
+    for (const std::string& condition : known_.conditions) {
+      POLYEST_RETURN_IF_ERROR(CheckThere(condition, ", which useWhen names,"));
+    }
     POLYEST_RETURN_IF_ERROR(CheckMeasured());
     return std::move(columns_);
   }
@@ -203,7 +211,7 @@ class Mapping {
   // Refuses columns whose names are nearly that of a quantity without a column.
   absl::Status CheckSpelling() {
     std::vector<std::string> missing;
-    for (const auto* const names : {&known_.measured, &known_.streamed}) {
+    for (const auto* const names : {&known_.measured, &known_.streamed, &known_.conditions}) {
       std::copy_if(names->begin(), names->end(), std::back_inserter(missing),
                    [&](const std::string& name) { return !HasColumn(name); });
     }
@@ -221,14 +229,11 @@ class Mapping {
     return absl::OkStatus();
   }
 
-  absl::Status CheckStreamed() {
-    for (const std::string& name : known_.streamed) {
-      if (HasColumn(name) || !Source(name).empty()) continue;
-      POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
-          "the column ", QuoteCell(name), " for the streamed input of that name is missing; ",
-          "the file's columns are ", Headers(columns_), MapOne(name)))));
-    }
-    return absl::OkStatus();
+  absl::Status CheckThere(const std::string& name, const char* purpose) {
+    if (HasColumn(name) || !Source(name).empty()) return absl::OkStatus();
+    return refused_(Error(absl::StrCat("the column ", QuoteCell(name), purpose,
+                                       " is missing; the file's columns are ", Headers(columns_),
+                                       MapOne(name))));
   }
 
   absl::Status CheckMeasured() const {

@@ -79,7 +79,7 @@ Candidate Split(absl::string_view line, char delimiter, const DataColumns& colum
   const auto& names = candidate.header.names;
   candidate.has_time = std::any_of(
       names.begin(), names.end(), [&](const ColumnName& name) { return MayBeTime(name, columns); });
-  for (const auto* const quantities : {&columns.measured, &columns.streamed}) {
+  for (const auto* const quantities : {&columns.measured, &columns.streamed, &columns.conditions}) {
     for (const std::string& quantity : *quantities) {
       candidate.quantities += std::any_of(names.begin(), names.end(), [&](const ColumnName& name) {
         return IsColumnOf(name, quantity, columns);

@@ -220,10 +220,6 @@ absl::Status RowParser::TakeMissing(const DataColumn& column, absl::string_view 
                                   text.empty() ? "" : absl::StrCat(" (", text, ")"), "; ", rule));
   };
   if (column.role == DataColumn::kTime) return missing("every row needs its time");
-  // The rule for a streamed input without a value. Nothing else depends on it.
-  if (column.role == DataColumn::kStreamed) {
-    return missing("a streamed input needs a value in every row");
-  }
   if (!text.empty() && seen_.missing_words++ == 0) seen_.missing_word = std::string(text);
   row_.any_missing = true;
   row_.missing[channel_] = 1;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "core/common/status.h"
@@ -13,17 +12,12 @@ namespace polyest::internal {
 absl::StatusOr<RowGate> RowGate::Make(const std::string& text) {
   POLYEST_ASSIGN_OR_RETURN(const equations::Syntax syntax,
                            equations::Parse(FieldPath("use_when"), text, {}));
-  std::set<std::string> names;
-  for (const equations::SyntaxNode& node : syntax.nodes) {
-    if (node.operation == equations::Operation::kVariable && node.name != "t") {
-      names.insert(node.name);
-    }
-  }
-  std::vector<std::string> columns(names.begin(), names.end());
+  std::vector<std::string> columns = equations::VariablesIn(syntax);
+  std::erase(columns, "t");
   std::vector<std::string> variables = columns;
   variables.push_back("t");
   std::string definition = "used";
-  while (names.contains(definition)) definition += '_';
+  while (std::find(columns.begin(), columns.end(), definition) != columns.end()) definition += '_';
   POLYEST_ASSIGN_OR_RETURN(Expressions expression,
                            Expressions::Make("use_when", {{definition, text}}, variables));
   return RowGate(std::move(columns), std::move(expression));

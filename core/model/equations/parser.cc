@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "core/common/field_error.h"
@@ -258,6 +259,14 @@ absl::StatusOr<Syntax> Parse(FieldPath field, std::string text,
   Syntax syntax{std::move(field), std::move(text), {}};
   POLYEST_RETURN_IF_ERROR(Parser(&syntax, tables).Run());
   return syntax;
+}
+
+std::vector<std::string> VariablesIn(const Syntax& syntax) {
+  std::set<std::string> names;
+  for (const SyntaxNode& node : syntax.nodes) {
+    if (node.operation == Operation::kVariable) names.insert(node.name);
+  }
+  return {names.begin(), names.end()};
 }
 
 }  // namespace polyest::internal::equations

@@ -43,4 +43,7 @@ struct Syntax {
 absl::StatusOr<Syntax> Parse(FieldPath field, std::string text,
                              const std::map<std::string, int>& tables);
 
+// Returns the names of variables in the expression, in alphabetical order.
+std::vector<std::string> VariablesIn(const Syntax& syntax);
+
 }  // namespace polyest::internal::equations

@@ -2,11 +2,13 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/model/unit_conversion.h"
 #include "proto/wire/convert/annotate.h"
 
 namespace polyest::internal {
@@ -46,8 +48,32 @@ absl::StatusOr<std::vector<bool>> ToMissing(const v1::Measurements::Channel& cha
   return missing;
 }
 
+// Returns the unit of an output or an input; empty if there is none.
+std::string UnitOf(const std::string& name, const ModelDescription& model) {
+  if (const auto output = model.FindOutput(name)) {
+    return model.outputs[static_cast<size_t>(*output)].unit;
+  }
+  const auto input = model.FindInput(name);
+  return input ? model.inputs[static_cast<size_t>(*input)].unit : "";
+}
+
+absl::StatusOr<UnitConversion> ConversionOf(const v1::Measurements::Channel& channel,
+                                            const Model& model, const std::string& path) {
+  if (channel.unit().empty()) return UnitConversion();
+  const std::string unit = UnitOf(channel.name(), model.description());
+  if (unit.empty()) {
+    return InvalidField(path + ".unit",
+                        absl::StrFormat("\"%s\": the model gives %s no unit to convert it to",
+                                        channel.unit(), channel.name()));
+  }
+  absl::StatusOr<UnitConversion> conversion = ConvertUnit(channel.unit(), unit);
+  if (conversion.ok()) return conversion;
+  return InvalidField(path + ".unit",
+                      absl::StrFormat("%s: %s", channel.name(), conversion.status().message()));
+}
+
 absl::StatusOr<SampleColumn> ToColumn(const v1::Measurements::Channel& channel, int rows,
-                                      const std::string& path) {
+                                      const Model& model, const std::string& path) {
   if (channel.name().empty()) return InvalidField(path + ".name", "must not be empty");
   if (channel.values_size() != rows) {
     return InvalidField(path + ".values",
@@ -57,7 +83,11 @@ absl::StatusOr<SampleColumn> ToColumn(const v1::Measurements::Channel& channel, 
   SampleColumn column;
   column.name = channel.name();
   POLYEST_ASSIGN_OR_RETURN(column.missing, ToMissing(channel, rows, path));
+  POLYEST_ASSIGN_OR_RETURN(const UnitConversion conversion, ConversionOf(channel, model, path));
   column.value.assign(channel.values().begin(), channel.values().end());
+  if (!conversion.IsIdentity()) {
+    std::transform(column.value.begin(), column.value.end(), column.value.begin(), conversion);
+  }
   for (size_t row = 0; row < column.value.size(); ++row) {
     const bool missing = !column.missing.empty() && column.missing[row];
     if (!missing && !std::isfinite(column.value[row])) {
@@ -88,7 +118,21 @@ void FillUp(int rows, v1::Measurements::Channel& channel) {
 
 }  // namespace
 
-absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements) {
+absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements) {
+  for (int i = 0; i < measurements.channels_size(); ++i) {
+    v1::Measurements::Channel& channel = *measurements.mutable_channels(i);
+    POLYEST_ASSIGN_OR_RETURN(
+        const UnitConversion conversion,
+        ConversionOf(channel, model, absl::StrFormat("measurements.channels[%d]", i)));
+    channel.clear_unit();
+    if (conversion.IsIdentity()) continue;
+    std::transform(channel.values().begin(), channel.values().end(),
+                   channel.mutable_values()->begin(), conversion);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements, const Model& model) {
   POLYEST_RETURN_IF_ERROR(CheckTime(measurements));
   Samples samples;
   samples.time_s.assign(measurements.time_s().begin(), measurements.time_s().end());
@@ -97,7 +141,7 @@ absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements) {
   samples.columns.reserve(static_cast<size_t>(measurements.channels_size()));
   for (int i = 0; i < measurements.channels_size(); ++i) {
     POLYEST_ASSIGN_OR_RETURN(SampleColumn column,
-                             ToColumn(measurements.channels(i), measurements.time_s_size(),
+                             ToColumn(measurements.channels(i), measurements.time_s_size(), model,
                                       absl::StrFormat("measurements.channels[%d]", i)));
     samples.columns.push_back(std::move(column));
   }

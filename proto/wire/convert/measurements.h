@@ -4,16 +4,21 @@
 
 #include <absl/status/statusor.h>
 
+#include "polyest/model.h"
 #include "polyest/samples.h"
 #include "polyest/v1/measurements.pb.h"
 
 namespace polyest::internal {
 
-// Converts measurements and checks what the message format leaves open: that each column has one
-// value per row, that missing rows exist and increase, and that every number is finite. The
-// estimator checks whether names and times suit the problem. INVALID_ARGUMENT names the field, the
-// channel and the row.
-absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements);
+// Converts measurements, in units of their own, and checks what the message format leaves open:
+// that each column has one value per row, that missing rows exist and increase, and that every
+// number is finite. The estimator checks whether names and times suit the problem. INVALID_ARGUMENT
+// names the field, the channel and the row.
+absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements, const Model& model);
+
+// Converts the values of all channels to the units of the model, and removes their units.
+// INVALID_ARGUMENT names the channel and the units.
+absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements);
 
 // Appends the rows of a batch to those of the batches before it. In the rows of a batch that lacks
 // a channel, the samples of that channel are missing.

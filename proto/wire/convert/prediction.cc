@@ -49,7 +49,8 @@ void ToProto(const PredictedOutput& output, Output& proto) {
 
 }  // namespace
 
-absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& request) {
+absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& request,
+                                                      const Model& model) {
   PredictionOptions options;
   options.outputs.assign(request.outputs().begin(), request.outputs().end());
   if (!request.probabilities().empty()) {
@@ -62,7 +63,7 @@ absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& 
   }
   if (request.lag_count() != 0) options.lags = request.lag_count();
   if (request.has_record()) {
-    absl::StatusOr<Samples> record = ToSamples(request.record());
+    absl::StatusOr<Samples> record = ToSamples(request.record(), model);
     if (!record.ok()) return Within({"record"}, record.status());
     options.record = *std::move(record);
     options.record->end_of_run = true;

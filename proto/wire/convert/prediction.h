@@ -11,7 +11,8 @@ namespace polyest::internal {
 
 // Converts the options. Errors are those of the other record's conversion (measurements.h), within
 // `record`.
-absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& request);
+absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& request,
+                                                      const Model& model);
 
 // Converts a prediction that was computed with `options`. `sequence` stays 0: only the session
 // knows it.

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/common/field_error.h"
+#include "core/model/equations/parser.h"
 #include "core/model/unit_conversion.h"
 
 namespace polyest::internal {
@@ -19,6 +20,11 @@ std::vector<std::string> Recorded(const v1::Problem& problem) {
   for (const v1::MeasuredOutput& measured : problem.measured()) names.push_back(measured.output());
   for (const v1::Input& input : problem.inputs()) {
     if (input.has_streamed()) names.push_back(input.name());
+  }
+  const auto syntax = equations::Parse(FieldPath("use_when"), problem.use_when(), {});
+  if (!problem.use_when().empty() && syntax.ok()) {
+    const std::vector<std::string> conditions = equations::VariablesIn(*syntax);
+    names.insert(names.end(), conditions.begin(), conditions.end());
   }
   return names;
 }
@@ -39,8 +45,10 @@ absl::Status CheckColumn(const std::string& quantity, const v1::Problem::Column&
                          const std::vector<std::string>& known, const Model* model) {
   const FieldPath field = FieldPath{"columns"}.Then({FieldStep::Key(quantity)});
   if (std::find(known.begin(), known.end(), quantity) == known.end()) {
-    return InvalidField(field, absl::StrCat("is neither a measured output nor a streamed input; ",
-                                            "known names: ", absl::StrJoin(known, ", ")));
+    return InvalidField(
+        field,
+        absl::StrCat("is neither a measured output nor a streamed input nor named by useWhen; ",
+                     "known names: ", absl::StrJoin(known, ", ")));
   }
   if (column.from().empty() && column.unit().empty()) {
     return InvalidField(field, "from or unit must be given, as in {\"from\": \"Disp [mm]\"}");

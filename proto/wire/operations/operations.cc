@@ -54,7 +54,7 @@ absl::StatusOr<std::unique_ptr<Estimator>> MakeEstimator(const v1::Experiment& e
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
                            ToProblem(experiment.problem(), models, limits));
   POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, experiment.measurements()));
-  POLYEST_ASSIGN_OR_RETURN(samples, ToSamples(experiment.measurements()));
+  POLYEST_ASSIGN_OR_RETURN(samples, ToSamples(experiment.measurements(), *problem.problem().model));
   samples.end_of_run = true;
   return EstimatorAccess::Make(std::move(problem),
                                {.threads = threads, .store = std::move(store), .snapshot = {}});
@@ -137,7 +137,8 @@ absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
                            ToProblem(experiment->problem(), models, limits));
-  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(experiment->measurements()));
+  POLYEST_ASSIGN_OR_RETURN(Samples samples,
+                           ToSamples(experiment->measurements(), *problem.problem().model));
   CostGridOptions options = ToCostGridOptions(request);
   options.threads = threads;
   if (problem.problem().regularization_mode != RegularizationMode::kFixed) {
@@ -268,7 +269,8 @@ absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSwee
 
 absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, Estimator& estimator,
                                             const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const PredictionOptions options, ToPredictionOptions(request));
+  POLYEST_ASSIGN_OR_RETURN(const PredictionOptions options,
+                           ToPredictionOptions(request, *estimator.problem().model));
   POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
   POLYEST_ASSIGN_OR_RETURN(const Prediction prediction,
                            WireFields(estimator.CurrentPrediction(options, stop)));

@@ -175,13 +175,34 @@ TEST(DataReader, RefusesRepeatedAndMisspeltColumns) {
             "the problem: \"columns\": {\"force\": {\"from\": \"Force\"}}");
 }
 
-TEST(DataReader, RefusesAStreamedInputThatIsNotThereOrHasGaps) {
+TEST(DataReader, RefusesAStreamedInputThatIsNotThere) {
   EXPECT_EQ(ErrorOf("t,x\n0,1\n", kColumns),
             "data.csv:1: the column \"force\" for the streamed input of that name is missing; the "
             "file's columns are \"t\", \"x\"");
-  EXPECT_EQ(
-      ErrorOf("t,x,force\n0,1,\n", kColumns),
-      "data.csv:2: column force: a value is missing; a streamed input needs a value in every row");
+}
+
+TEST(DataReader, ReadsChannelsWithTimesOfTheirOwnAndTheColumnsOfACondition) {
+  v1::Problem problem;
+  problem.add_measured()->set_output("x");
+  v1::Input& force = *problem.add_inputs();
+  force.set_name("force");
+  force.mutable_streamed();
+  problem.set_use_when("speed > 5 && x < t");
+  const DataColumns columns = ColumnsOf(problem);
+  EXPECT_EQ(columns.conditions, std::vector<std::string>{"speed"});
+  std::istringstream in("t,x,force,speed\n0,1,,3\n0.5,,7,\n");
+  auto reader = DataReader::Open(in, "data.csv", columns);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  const auto batch = reader->Read(10);
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  ASSERT_EQ(batch->channels_size(), 3);
+  for (const auto& channel : batch->channels()) {
+    ASSERT_EQ(channel.missing_size(), 1) << channel.name();
+    EXPECT_EQ(channel.missing(0), channel.name() == "force" ? 0 : 1) << channel.name();
+  }
+  EXPECT_EQ(ErrorOf("t,x,force\n0,1,2\n", columns),
+            "data.csv:1: the column \"speed\", which useWhen names, is missing; the file's columns "
+            "are \"t\", \"x\", \"force\"");
 }
 
 TEST(DataReader, RefusesRaggedRows) {

@@ -65,13 +65,15 @@ struct ColumnSource {
 // What data for a problem may have besides `t` and `run`, and how a file holds it.
 struct DataColumns {
   std::vector<std::string> measured;  // outputs; each may have missing cells, or no column
-  std::vector<std::string> streamed;  // inputs; each must have a column and a value in every row
+  std::vector<std::string> streamed;  // inputs; each must have a column, and may have missing cells
   // By quantity: an output, an input, `t` or `run`.
   std::map<std::string, ColumnSource> sources = {};
   // The model's units by quantity. Values of a quantity without one are not converted.
   std::map<std::string, std::string> units = {};
   // What the user says about the file.
   DataFileOptions options = {};
+  // Columns that only the problem's condition `useWhen` names, as `streamed`.
+  std::vector<std::string> conditions = {};
 };
 
 // Returns the columns that data for this problem may have, with the sources that it names. The
@@ -106,7 +108,7 @@ class DataReader {
   // the model's units, times in s. INVALID_ARGUMENT names file, line, column, value and rule, and
   // the option that would read the value. It is the answer to a cell that is not a finite number, a
   // time that does not increase within its run, a run that decreases, a row with too few or too
-  // many cells, a streamed input without a value, and data without any row.
+  // many cells, and data without any row.
   absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
 
   // Returns what has been found out so far, in one line: "data.csv: semicolons, decimal comma;

@@ -81,7 +81,7 @@ class JournalStoreTest : public testing::Test {
     entry.digest = Digest(entry.measurements);
     entry.place.sequence = ++sequence_;
     journal_.Append(std::move(entry), [](const absl::Status& kept) { ASSERT_TRUE(kept.ok()); });
-    const auto checked = checks_.Check(ToSamples(batch).value());
+    const auto checked = checks_.Check(ToSamples(batch, *problem_.problem().model).value());
     ASSERT_TRUE(checked.ok()) << checked.status();
     checks_.Accept(*checked);
     ASSERT_TRUE(memory_.Append(*checked).ok());

@@ -1,8 +1,10 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "polyest/catalogue.h"
 #include "proto/wire/convert/measurements.h"
 
 namespace polyest::internal {
@@ -23,14 +25,19 @@ v1::Measurements ThreeRows() {
   return measurements;
 }
 
+const Model& MassOnASpring() {
+  static const auto model = FindBuiltinModel("mass_spring_damper").value();
+  return *model;
+}
+
 std::string MessageOf(const v1::Measurements& measurements) {
-  const auto samples = ToSamples(measurements);
+  const auto samples = ToSamples(measurements, MassOnASpring());
   EXPECT_EQ(samples.status().code(), absl::StatusCode::kInvalidArgument);
   return std::string(samples.status().message());
 }
 
 TEST(ToSamples, KeepsRowsRunsColumnsAndGaps) {
-  const auto samples = ToSamples(ThreeRows());
+  const auto samples = ToSamples(ThreeRows(), MassOnASpring());
   ASSERT_TRUE(samples.ok()) << samples.status();
   EXPECT_EQ(samples->time_s, (std::vector<double>{0.1, 0.2, 0.1}));
   EXPECT_EQ(samples->run, (std::vector<int>{0, 0, 1}));
@@ -93,6 +100,28 @@ TEST(ToSamples, RefusesAChannelWithoutAName) {
   v1::Measurements measurements = ThreeRows();
   measurements.mutable_channels(0)->clear_name();
   EXPECT_EQ(MessageOf(measurements), "measurements.channels[0].name: must not be empty");
+}
+
+TEST(ToSamples, ConvertsToTheUnitsOfTheModel) {
+  v1::Measurements measurements = ThreeRows();
+  measurements.mutable_channels(0)->set_unit("mm");
+  measurements.mutable_channels(1)->set_unit("km/h");
+  const auto samples = ToSamples(measurements, MassOnASpring());
+  ASSERT_TRUE(samples.ok()) << samples.status();
+  EXPECT_EQ(samples->columns[0].value, (std::vector<double>{0.001, 0.002, 0.003}));
+  EXPECT_NEAR(samples->columns[1].value[0], 4 / 3.6, 1e-15);
+  ASSERT_TRUE(ToModelUnits(MassOnASpring(), measurements).ok());
+  EXPECT_EQ(measurements.channels(0).unit(), "");
+  EXPECT_EQ(measurements.channels(0).values(2), 0.003);
+
+  measurements.mutable_channels(0)->set_unit("kN");
+  EXPECT_THAT(MessageOf(measurements), ::testing::StartsWith("measurements.channels[0].unit: x: "));
+  measurements.mutable_channels(0)->set_unit("furlong");
+  EXPECT_THAT(MessageOf(measurements), ::testing::HasSubstr("furlong"));
+  measurements.mutable_channels(0)->set_name("speed");
+  EXPECT_EQ(MessageOf(measurements),
+            "measurements.channels[0].unit: \"furlong\": the model gives speed no unit to convert "
+            "it to");
 }
 
 }  // namespace

@@ -42,8 +42,8 @@ TEST(ProblemColumns, MayNameEveryRecordedQuantity) {
 
 TEST(ProblemColumns, AreOfRecordedQuantitiesOnly) {
   EXPECT_THAT(Refusals(R"({"v": {"from": "Speed"}})"),
-              ElementsAre("columns.v: is neither a measured output nor a streamed input; known "
-                          "names: t, run, x, force"));
+              ElementsAre("columns.v: is neither a measured output nor a streamed input nor named "
+                          "by useWhen; known names: t, run, x, force"));
 }
 
 TEST(ProblemColumns, SaySomething) {
