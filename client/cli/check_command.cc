@@ -74,8 +74,7 @@ void Print(const Remarks& remarks, std::ostream& out) {
 
 absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements& data,
                          Findings& findings, std::ostream& out) {
-  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(data, *problem.problem().model));
-  samples.end_of_run = true;
+  POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(data, *problem.problem().model));
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, SampleChecks(problem).Check(samples));
   DataSummary record = Summarize(problem, checked);
   out << "\ndata: " << record.rows << '\n';

@@ -36,8 +36,8 @@ void AddRemark(std::string description, v1::CheckProblemResponse& response) {
 absl::Status CheckMeasurements(const ResolvedProblem& problem, const v1::Measurements& measurements,
                                const ProblemLimits& limits, v1::CheckProblemResponse& response) {
   POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, measurements));
-  POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(measurements, *problem.problem().model));
-  samples.end_of_run = true;
+  POLYEST_ASSIGN_OR_RETURN(const Samples samples,
+                           ToSamples(measurements, *problem.problem().model));
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, SampleChecks(problem).Check(samples));
   DataSummary record = Summarize(problem, checked);
   AddRemark(std::move(record.rows), response);

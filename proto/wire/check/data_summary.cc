@@ -115,7 +115,9 @@ class Summarizer {
 }  // namespace
 
 DataSummary Summarize(const ResolvedProblem& problem, const CheckedSamples& samples) {
-  return Summarizer(problem, samples).Run();
+  CheckedSamples whole = samples;
+  whole.run_ended = true;
+  return Summarizer(problem, whole).Run();
 }
 
 }  // namespace polyest::internal

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/wire/check/check.h"
 #include "proto/wire/convert/problem.h"
 #include "tests/testing/problem_json.h"
 
@@ -10,6 +11,7 @@ namespace polyest::internal {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
@@ -86,6 +88,28 @@ TEST(CheckProblem, NamesEveryEquationThatIsWrong) {
   EXPECT_THAT(Messages(problem),
               ElementsAre(StartsWith("model.equations."), StartsWith("model.equations."),
                           StartsWith("uncertain[0].uniform: ")));
+}
+
+TEST(CheckProblem, TellsOfRowsLeftOutAndOfInputsWithoutSamples) {
+  v1::CheckProblemRequest request;
+  *request.mutable_problem() = SmallProblem();
+  request.mutable_problem()->MergeFrom(ProblemFromJson(R"({
+    "inputs": [{"name": "force", "streamed": {}}], "useWhen": "t > 0.25"})"));
+  v1::Measurements& measurements = *request.mutable_measurements();
+  v1::Measurements::Channel& x = *measurements.add_channels();
+  x.set_name("x");
+  for (int k = 0; k < 10; ++k) {
+    measurements.add_time_s(0.1 * k);
+    x.add_values(k % 3);
+  }
+  const v1::CheckProblemResponse response = CheckProblem(request);
+  ASSERT_TRUE(response.errors().empty()) << response.errors(0).description();
+  std::string said;
+  for (const auto& warning : response.warnings()) said += warning.description() + '\n';
+  EXPECT_THAT(said, HasSubstr("force: the streamed input has no sample in 1 run"));
+  for (const auto& remark : response.summary()) said += remark.description() + '\n';
+  EXPECT_THAT(said, HasSubstr("3 of them left out by useWhen"));
+  EXPECT_THAT(said, HasSubstr("t > 0.25"));
 }
 
 }  // namespace
