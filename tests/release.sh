@@ -40,8 +40,9 @@ threads() { tests/threads/run.sh; }
 
 calibration() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
-  cmake --build --preset release --parallel "$(nproc)" --target calibration
+  cmake --build --preset release --parallel "$(nproc)" --target calibration bands
   build/release/bin/calibration 1008
+  build/release/bin/bands 200
 }
 
 properties() {

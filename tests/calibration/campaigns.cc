@@ -82,7 +82,7 @@ Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform;
   std::normal_distribution<double> normal;
-  Campaign campaign{rig.problem, {}, {}};
+  Campaign campaign{rig.problem, {}, {}, {}};
   const Prior prior(rig.problem.uncertain);
   const Vector xi = Vector::NullaryExpr(prior.dimension(), [&](Eigen::Index i) {
     return prior.germs()[static_cast<size_t>(i)].Quantile(uniform(random));
@@ -90,6 +90,7 @@ Campaign MakeCampaign(const Rig& rig, int rows, Noise noise, uint64_t seed) {
   campaign.truth = prior.ToParameters(xi);
   for (int k = 1; k <= rows; ++k) campaign.record.time_s.push_back(k * rig.interval_s);
   const Matrix outputs = Simulate(rig.problem, campaign.truth, campaign.record.time_s);
+  campaign.signal = outputs;
   const double a = noise == Noise::kCorrelated ? std::exp(-1 / kCorrelationIntervals) : 0;
   for (Eigen::Index c = 0; c < outputs.cols(); ++c) {
     MeasuredOutput& measured = campaign.problem.measured[static_cast<size_t>(c)];

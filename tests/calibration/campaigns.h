@@ -29,6 +29,7 @@ struct Campaign {
   Problem problem;
   Vector truth;  // of the uncertain parameters
   Samples record;
+  Matrix signal;  // the outputs without noise, rows × channels
 };
 
 // Returns a campaign that depends on the arguments alone. Correlated noise has an unknown size and
