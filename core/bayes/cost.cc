@@ -40,13 +40,21 @@ Vector Cost::BasisDifference(const ConstVectorRef& eta) const {
   return d - reference_phi_;
 }
 
+void Cost::set_remainder(Vector coefficients) {
+  POLYEST_CHECK(coefficients.size() == basis_->size());
+  remainder_ = std::move(coefficients);
+  remainder_constant_ = remainder_.dot(reference_phi_);
+}
+
 CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   CostValue value;
-  value.mismatch = mismatch_.Evaluate(BasisDifference(eta));
+  const Vector d = BasisDifference(eta);
+  value.mismatch = mismatch_.Evaluate(d);
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
   value.total =
       Supports(xi) ? Total(power_ * value.mismatch, value.prior, regularization_) : kInfinity;
+  if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
   return value;
 }
 
@@ -62,6 +70,7 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   value.prior = prior_.NegativeLogDensity(xi);
   // ∇J = β ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
   gradient = power_ * (phi_gradient.transpose() * by_d);
+  if (has_remainder()) gradient += phi_gradient.transpose() * remainder_;
   value.total = kInfinity;
   if (Supports(xi)) {
     value.total = Total(power_ * value.mismatch, value.prior, regularization_);
@@ -69,6 +78,7 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
       gradient += regularization_ * (region_.axes().transpose() * prior_.Gradient(xi));
     }
   }
+  if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
   return value;
 }
 
@@ -93,6 +103,7 @@ Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
     hessian +=
         regularization_ * (region_.axes().transpose() * curvature.asDiagonal() * region_.axes());
   }
+  if (has_remainder()) hessian += basis_->WeightedHessian(eta, remainder_);
   return hessian;
 }
 
@@ -102,6 +113,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   thread_local Matrix difference;  // D = Φ − 1 φ_0ᵀ
   thread_local Matrix product;
   thread_local Matrix xis;
+  thread_local Vector remainders;
   thread_local Vector xi;
   totals.resize(etas.rows());
   for (Eigen::Index first = 0; first < etas.rows(); first += kBlock) {
@@ -110,6 +122,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
     basis_->EvaluateMany(block, difference);
     difference.rowwise() -= reference_phi_.transpose();
     mismatch_.EvaluateMany(difference, product, totals.segment(first, count));
+    if (has_remainder()) remainders = difference * remainder_;
     xis.resize(count, dimension());
     xis.noalias() = block * region_.axes().transpose();
     xis.rowwise() += region_.centre().transpose();
@@ -118,6 +131,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
       xi = xis.row(i).transpose();
       const double prior = prior_.NegativeLogDensity(xi);
       total = Supports(xi) ? Total(power_ * total, prior, regularization_) : kInfinity;
+      if (has_remainder()) total += remainders[i] + remainder_constant_;
     }
   }
 }

@@ -1,10 +1,10 @@
 #pragma once
 
 // The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
-//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)),   ξ = centre + axes η,
-// with the power β = 1 of the likelihood unless the posterior is tempered,
-// with exact derivatives: J_mismatch is a function of quadratic forms in φ(η) (mismatch.h), φ a
-// polynomial.
+//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)) + J_0(η),   ξ = centre + axes η,
+// with the power β = 1 of the likelihood unless the posterior is tempered, and a polynomial J_0
+// that is 0 unless parameters have been eliminated (estimator/problem/ended_runs.h), with exact
+// derivatives: J_mismatch is a function of quadratic forms in φ(η) (mismatch.h), φ a polynomial.
 
 #include <memory>
 
@@ -34,6 +34,9 @@ class Cost {
   double power() const { return power_; }
   void set_power(double power) { power_ = power; }
 
+  // Sets J_0(η) = coefficientsᵀ φ(η). It enters the total and its derivatives alone.
+  void set_remainder(Vector coefficients);
+
   CostValue Evaluate(const ConstVectorRef& eta) const;
   // `gradient` (n) is with respect to η.
   CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
@@ -49,6 +52,7 @@ class Cost {
   Vector BasisDifference(const ConstVectorRef& eta) const;
 
  private:
+  bool has_remainder() const { return remainder_.size() > 0; }
   bool Supports(const ConstVectorRef& xi) const {
     return prior_.Contains(xi) && element_.Contains(xi);
   }
@@ -61,6 +65,8 @@ class Cost {
   double regularization_;
   Element element_;
   double power_ = 1;
+  Vector remainder_;               // coefficients of J_0; empty if it is 0
+  double remainder_constant_ = 0;  // J_0 at the reference
 };
 
 }  // namespace polyest::internal

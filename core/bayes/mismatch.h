@@ -42,10 +42,12 @@ struct ChannelSums {
   bool scale_unknown = false;
   bool correlation_unknown = false;
   double degrees_factor = 1;  // NoiseModel::DegreesFactor
+  double spent = 0;           // degrees of freedom used up by parameters that are eliminated
 
   bool IsKnown() const { return !scale_unknown && !correlation_unknown; }
-  // Returns the expected χ² if the working noise is right: N, or less if outliers are handled.
-  double Degrees() const { return degrees_factor * static_cast<double>(samples.count()); }
+  // Returns the expected χ² if the working noise is right: N, or less if outliers are handled or
+  // parameters have been eliminated.
+  double Degrees() const { return degrees_factor * static_cast<double>(samples.count()) - spent; }
   // Returns r at d, in [−1, 1]; 0 without samples.
   double Lag1Correlation(const ConstVectorRef& d) const;
 };

@@ -28,6 +28,19 @@ void MismatchSums::Add(const MismatchSums& other) {
   count_ += other.count_;
 }
 
+MismatchSums MismatchSums::Substituted(const ConstMatrixRef& t, const ConstVectorRef& shift,
+                                       double variance) const {
+  POLYEST_CHECK(t.cols() == b_.size() && shift.size() == b_.size() && variance > 0);
+  const Vector moved = b_ - g_ * shift;
+  MismatchSums sums(static_cast<int>(t.rows()));
+  sums.g_ = t * g_ * t.transpose();
+  sums.g_ = (0.5 / variance * (sums.g_ + sums.g_.transpose())).eval();
+  sums.b_ = t * moved / variance;
+  sums.w_ = std::max(0.0, w_ - shift.dot(b_ + moved)) / variance;
+  sums.count_ = count_;
+  return sums;
+}
+
 double MismatchSums::ChiSquared(const ConstVectorRef& d) const {
   // The χ² is dᵀ G d − 2 bᵀ d + w; as a sum of squares it is below 0 only by rounding.
   return std::max(0.0, d.dot(g_ * d) - 2 * b_.dot(d) + w_);

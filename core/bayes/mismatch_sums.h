@@ -29,6 +29,11 @@ class MismatchSums {
   // operations and does not allocate.
   void Add(const ConstVectorRef& coefficients, double error, double variance);
   void Add(const MismatchSums& other);
+  // Returns the sums by other terms φ′ with φ ≈ Tᵀφ′, about a reference φ′_0: with d = Tᵀd′ + δ,
+  //   G′ = T G Tᵀ,   b′ = T (b − G δ),   w′ = w − 2 bᵀδ + δᵀG δ,
+  // all divided by `variance`, a factor of the noise's variance. `t` is S′ × S, `shift` = δ (S).
+  MismatchSums Substituted(const ConstMatrixRef& t, const ConstVectorRef& shift,
+                           double variance = 1) const;
   // Returns χ² = 2 J_mismatch at d.
   double ChiSquared(const ConstVectorRef& d) const;
   // Returns χ² at d; `gradient` (S) is with respect to d.

@@ -87,7 +87,7 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, checks_.Check(samples));
   std::optional<ResolvedProblem> grown;
   if (problem_.per_run() && checked.after.run >= problem_.runs()) {
-    POLYEST_ASSIGN_OR_RETURN(grown, problem_.WithRuns(checked.after.run + 1));
+    POLYEST_ASSIGN_OR_RETURN(grown, problem_.AtRun(checked.after.run));
   }
   POLYEST_RETURN_IF_ERROR(store_->Append(checked));
   if (grown) problem_ = *std::move(grown);
@@ -199,7 +199,9 @@ absl::StatusOr<Prediction> Estimator::Implementation::CurrentPrediction(
   const AssessmentRequest heaviest =
       mixture_->component(assessed.order.front()).RequestAssessment();
   PredictionSubject subject;
-  subject.problem = &problem_;
+  const ResolvedProblem& own = mixture_->component(assessed.order.front()).problem();
+  // Only the component's problem knows the parameters of runs that have been eliminated.
+  subject.problem = own.ended_runs() != nullptr ? &own : &problem_;
   subject.store = store_.get();
   subject.rows = rows_processed();
   subject.thetas = EquallyWeightedThetas(assessed.whole.posterior, problem_.prior(), options.draws);
@@ -218,6 +220,14 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
                                                                    const Stop& stop) const {
   const std::vector<int>& runs = options.record->run;
   const int last_run = runs.empty() ? 0 : *std::max_element(runs.begin(), runs.end());
+  const int most = problem_.max_joint_runs();
+  if (last_run >= most) {
+    return InvalidField(
+        "record.run",
+        absl::StrFormat("%d must be below %d: each run has parameters of its own, and more runs "
+                        "would have too many of them",
+                        last_run, most));
+  }
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem other,
                            problem_.WithRuns(problem_.per_run() ? std::max(0, last_run) + 1 : 1));
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked,

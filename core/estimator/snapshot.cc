@@ -132,9 +132,44 @@ void serialize(Archive& archive, ExpansionState& expansion) {
 }
 
 template <class Archive>
+void save(Archive& archive, const EndedRuns& ended) {
+  std::vector<double> spent;
+  for (const ChannelSums& sums : ended.sums) spent.push_back(sums.spent);
+  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
+          ended.factor, ended.region.centre(), ended.region.axes(), ended.basis->truncation().order,
+          ended.basis->truncation().exponent, ended.sums, spent, ended.discount, ended.own_error,
+          ended.log_noise, ended.log_variance, ended.outliers, ended.largest, ended.remainder,
+          ended.noise_scale);
+}
+
+template <class Archive>
+void load(Archive& archive, EndedRuns& ended) {
+  Vector centre;
+  Matrix axes;
+  Truncation truncation;
+  std::vector<double> spent;
+  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
+          ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
+          ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
+          ended.largest, ended.remainder, ended.noise_scale);
+  const Eigen::Index n = centre.size();
+  if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
+      !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||
+      truncation.order < 1 || truncation.order > kMaxTerms || !(truncation.exponent > 0) ||
+      truncation.exponent > 1 ||
+      TermCount(static_cast<int>(n), truncation, kMaxTerms) > kMaxTerms) {
+    throw cereal::Exception("ended runs that cannot be");
+  }
+  ended.region = Region(std::move(centre), std::move(axes));
+  ended.basis = std::make_shared<Basis>(std::vector<Germ>(static_cast<size_t>(n), Germ::Uniform()),
+                                        truncation);
+  for (size_t c = 0; c < spent.size(); ++c) ended.sums[c].spent = spent[c];
+}
+
+template <class Archive>
 void serialize(Archive& archive, ComponentState& component) {
-  archive(component.runs, component.relative_tolerance, component.expansion, component.particles,
-          component.weight, component.room);
+  archive(component.runs, component.ended_runs, component.relative_tolerance, component.expansion,
+          component.particles, component.weight, component.room);
   Flag(archive, component.bisected);
   archive(component.taken, component.windows_from, component.window_end, component.edges_row,
           component.patient_until, component.whole_until, component.settled_row,

@@ -47,8 +47,11 @@ absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimit
 // own.
 absl::Status BatchIntake::CheckRuns(int runs, const ProblemLimits& limits) {
   if (!problem_.per_run() || runs <= runs_) return absl::OkStatus();
-  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem_.WithRuns(runs));
-  POLYEST_RETURN_IF_ERROR(CheckLimits(limits, grown));
+  const int most = problem_.max_joint_runs();  // later runs add no parameters
+  if (runs_ < most) {
+    POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem_.WithRuns(std::min(runs, most)));
+    POLYEST_RETURN_IF_ERROR(CheckLimits(limits, grown));
+  }
   runs_ = runs;
   return absl::OkStatus();
 }

@@ -79,7 +79,7 @@ bool AreSums(const MismatchSums& sums, int terms) {
 }
 
 // Values accumulated at the check points may be infinite, since a trajectory may diverge.
-bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
+bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_windows) {
   const auto terms = static_cast<int>(fresh.previous_coefficients.rows());
   const auto channels = fresh.discount.size();
   for (const ChannelSums& sums : state.sums) {
@@ -88,7 +88,8 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh) {
   const auto same = [](const CorrelationProfile& a, const CorrelationProfile& b) {
     return a.HasSizesOf(b);
   };
-  return state.sums.size() == fresh.sums.size() && state.windows.Suits(fresh.sums, state.rows) &&
+  return state.sums.size() == fresh.sums.size() &&
+         state.windows.Suits(fresh.sums, has_windows ? state.rows : 0) &&
          std::ranges::equal(state.profiles, fresh.profiles, same) &&
          IsVector(state.discount, channels) && std::ssize(state.outliers) == channels &&
          IsMatrix(state.previous_coefficients, terms, channels) &&
@@ -209,7 +210,8 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
 
 // Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
 absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
-  if (!HasSizesOf(state.absorbed, absorbed_)) return Inconsistent("sums");
+  const bool has_windows = problem_.ended_runs() == nullptr;
+  if (!HasSizesOf(state.absorbed, absorbed_, has_windows)) return Inconsistent("sums");
   for (size_t c = 0; c < absorbed_.sums.size(); ++c) {
     // The flags of the channel's noise are kept, since they do not come from the rows.
     ChannelSums sums = absorbed_.sums[c];

@@ -6,6 +6,7 @@
 
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
+#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -95,6 +96,78 @@ PosteriorSummary SummaryForNewRuns(const ResolvedProblem& grown, const Posterior
     summary.centre[j] = grown.prior().germs()[static_cast<size_t>(j)].Mean();
     summary.factor(j, j) = deviation[j];
   }
+  return summary;
+}
+
+Particles DrawsForNewRun(const ResolvedProblem& problem, const Vector& centre, const Matrix& factor,
+                         int count) {
+  const std::vector<int> shared = problem.SharedParameters();
+  const std::vector<Germ>& germs = problem.prior().germs();
+  const Matrix cube = UnitCubePoints(PointSet::kHalton, problem.dimension(), count);
+  Particles draws{Matrix(count, problem.dimension()), Vector::Zero(count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    Vector xi(problem.dimension());
+    for (const int j : problem.OwnParameters(problem.runs() - 1)) {
+      xi[j] = germs[static_cast<size_t>(j)].Quantile(cube(i, j));
+      draws.costs[i] -= germs[static_cast<size_t>(j)].LogDensity(xi[j]);
+    }
+    const Vector deviate = cube.row(i)(shared).transpose().unaryExpr(
+        [](double u) { return Germ::Normal().Quantile(u); });
+    xi(shared) = centre + factor * deviate;
+    draws.costs[i] += 0.5 * deviate.squaredNorm();
+    draws.etas.row(i) = NearestInside(problem.prior(), xi).transpose();
+  }
+  return draws;
+}
+
+ExpansionDesign DesignAfterEndedRuns(const ResolvedProblem& problem, const Vector& centre,
+                                     const Matrix& factor, const Element& present) {
+  constexpr double kDeviations = 4.5;
+  const std::vector<int> shared = problem.SharedParameters();
+  const std::vector<Germ>& germs = problem.prior().germs();
+  const int n = problem.dimension();
+  Vector middle(n);
+  Matrix axes = Matrix::Zero(n, n);
+  middle(shared) = centre;
+  const SymmetricEigen eigen = DecomposeSymmetric(factor * factor.transpose());
+  axes(shared, shared) =
+      kDeviations * eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+  for (const int j : problem.OwnParameters(problem.runs() - 1)) {
+    const auto [lower, upper] = TrustedRange(germs[static_cast<size_t>(j)]);
+    middle[j] = 0.5 * (lower + upper);
+    axes(j, j) = 0.5 * (upper - lower);
+  }
+  const Vector inside = NearestInside(problem.prior(), middle);
+  ExpansionDesign design = DesignForRegion(problem, FirstTruncation(problem.problem().expansion, n),
+                                           Region(middle, axes), inside);
+  Particles checks = DrawsForNewRun(problem, centre, factor, CheckCount(n));
+  design.check_points = design.region.ManyToLocal(checks.etas);
+  design.check_costs = std::move(checks.costs);
+  design.checks_are_draws = true;
+  // Bounds along the own germs of earlier runs say nothing of this one's.
+  std::vector<Element::Bound> bounds;
+  for (const Element::Bound& bound : present.bounds()) {
+    Vector normal = Vector::Zero(n);
+    normal(shared) = bound.normal(shared);
+    if (normal == bound.normal.head(n)) bounds.push_back({normal, bound.offset});
+  }
+  design.element = Element(std::move(bounds));
+  return design;
+}
+
+PosteriorSummary SummaryAfterEndedRuns(const ResolvedProblem& problem, const Vector& centre,
+                                       const Matrix& factor) {
+  const std::vector<int> shared = problem.SharedParameters();
+  const Vector deviation = problem.prior().GermStandardDeviation();
+  PosteriorSummary summary;
+  summary.centre.resize(problem.dimension());
+  summary.factor = Matrix::Zero(problem.dimension(), problem.dimension());
+  for (const int j : problem.OwnParameters(problem.runs() - 1)) {
+    summary.centre[j] = problem.prior().germs()[static_cast<size_t>(j)].Mean();
+    summary.factor(j, j) = deviation[j];
+  }
+  summary.centre(shared) = centre;
+  summary.factor(shared, shared) = factor;
   return summary;
 }
 

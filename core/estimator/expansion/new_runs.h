@@ -24,4 +24,19 @@ Matrix ParticlesForNewRuns(const ResolvedProblem& grown, const Matrix& present);
 // posterior that is not known stays unknown.
 PosteriorSummary SummaryForNewRuns(const ResolvedProblem& grown, const PosteriorSummary& present);
 
+// Returns W draws of the posterior of the shared germs, a Gaussian, and of the prior of the own
+// ones of the run that `problem` is for (W × n), and −log of their density up to a constant.
+Particles DrawsForNewRun(const ResolvedProblem& problem, const Vector& centre, const Matrix& factor,
+                         int count);
+
+// Returns the design for a run that begins when all earlier ones have been eliminated. It covers 4½
+// standard deviations of the shared germs, of which `centre` and `factor` (factor factorᵀ is the
+// covariance) are the posterior, and the whole prior of the run's own.
+ExpansionDesign DesignAfterEndedRuns(const ResolvedProblem& problem, const Vector& centre,
+                                     const Matrix& factor, const Element& present);
+
+// Returns the posterior when such a run begins.
+PosteriorSummary SummaryAfterEndedRuns(const ResolvedProblem& problem, const Vector& centre,
+                                       const Matrix& factor);
+
 }  // namespace polyest::internal

@@ -156,7 +156,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
       std::unique_ptr<RegionalExpansion> expansion,
       RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads));
   RowBlock block;
-  for (int64_t first = 0; first < rows; first += kReplayRows) {
+  for (int64_t first = problem.first_row(); first < rows; first += kReplayRows) {
     const int64_t count = std::min(kReplayRows, rows - first);
     POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
     POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));

@@ -43,7 +43,8 @@ struct Settlement {
 absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
                                   const Stop& stop);
 
-// Makes an expansion of the design and lets it absorb the first `rows` rows of the store. Returns
+// Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
+// problem.first_row() on. Returns
 // FailedPrecondition when its collocation matrix cannot be factored or too few trajectories are
 // left.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,

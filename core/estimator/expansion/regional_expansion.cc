@@ -93,6 +93,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   }
   LookFromPosterior();
   Linearize();
+  TakeEndedRuns();
 }
 
 void RegionalExpansion::LookFromPosterior() {
@@ -125,8 +126,9 @@ void RegionalExpansion::StartRun(int run, int64_t first_row) {
 
 bool RegionalExpansion::StepsExactly() const {
   const InputSignals inputs = problem_.MakeInputs();
-  return internal::StepsExactly(
-      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, std::max(run_, 0)), inputs);
+  return internal::StepsExactly(problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_,
+                                                      std::max(run_, problem_.first_run())),
+                                inputs);
 }
 
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
@@ -323,7 +325,9 @@ void RegionalExpansion::Absorb(int row) {
         (outputs_.col(column).head(points()).array() - z).square() / variance;
     ++absorbed_.samples;
   }
-  absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
+  if (problem_.ended_runs() == nullptr) {
+    absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
+  }
   ++absorbed_.rows;
   absorbed_.propagated += thetas_.rows() + controls_;
 }
@@ -374,6 +378,7 @@ Cost RegionalExpansion::MakeCost(double regularization) const {
   Cost cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
             problem_.prior(), regularization, design_.element);
   cost.set_power(1 / noise_.misfit);
+  if (remainder_.size() > 0) cost.set_remainder(remainder_);
   return cost;
 }
 

@@ -50,7 +50,7 @@ struct AbsorbedRows {
   int64_t samples = 0;            // over all channels
   int64_t propagated = 0;         // trajectories × rows
   std::vector<ChannelSums> sums;  // per channel, over all runs
-  WindowSums windows;             // the sums by windows of the record
+  WindowSums windows;             // the sums by windows of the record; none after ended runs
   Vector discount;                // per channel: Σ ρ_k/R_k, with ρ divided by the misfit
   double own_error = 0;           // Σ ρ_k/R_k over all channels, with ρ as it is
   double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
@@ -114,6 +114,8 @@ class RegionalExpansion {
   double Magnitude(int row, int channel) const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
+  // Ends the run absorbed so far. No more rows are absorbed then.
+  void EndRun() { EndRunOfSums(); }
 
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }
@@ -131,6 +133,8 @@ class RegionalExpansion {
   // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
   const WindowSums& windows() const { return absorbed_.windows; }
+  // Returns all that the rows absorbed have contributed.
+  const AbsorbedRows& absorbed() const { return absorbed_; }
   // Returns the number of a channel's samples lost to the expansion's own error.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
@@ -188,6 +192,7 @@ class RegionalExpansion {
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
   void NoteFailures(int row);
+  void TakeEndedRuns();
   void LookFromPosterior();
   void Linearize();
   void PredictNoise(int first);
@@ -248,6 +253,7 @@ class RegionalExpansion {
   Matrix linearized_gradient_;  // S × n
 
   AbsorbedRows absorbed_;
+  Vector remainder_;   // coefficients of what ended runs add to the cost (S); empty without any
   Vector difference_;  // S
   Vector slope_;       // n
 };

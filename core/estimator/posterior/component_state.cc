@@ -1,6 +1,8 @@
 #include "core/estimator/posterior/component_state.h"
 
 #include <cmath>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/common/check.h"
@@ -22,11 +24,23 @@ bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, 
 }
 
 bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
-  return state.taken > 0 && state.windows_from >= 0 && state.windows_from <= state.taken &&
-         state.expansion.absorbed.rows == state.taken &&
+  return state.taken > 0 && problem.first_row() <= state.taken && state.windows_from >= 0 &&
+         state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
          state.weight >= 0 && state.weight <= 1 && state.room >= 1 &&
          IsSummaryFor(problem, state.summary, state.taken);
+}
+
+// Gives the problem what a snapshot says of ended runs.
+absl::Status SetEndedRuns(const std::optional<EndedRuns>& ended, ResolvedProblem& problem) {
+  const bool has_ended = problem.runs() > problem.max_joint_runs();
+  const auto shared = static_cast<int>(problem.SharedParameters().size());
+  if (has_ended != ended.has_value() ||
+      (ended && !IsWellFormed(*ended, shared, problem.dimension() - shared, problem.channels()))) {
+    return absl::DataLossError("the snapshot's ended runs cannot be of this problem");
+  }
+  problem.set_ended_runs(ended ? std::make_shared<const EndedRuns>(*ended) : nullptr);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<ResolvedProblem> ProblemOf(const ResolvedProblem& problem,
@@ -37,8 +51,9 @@ absl::StatusOr<ResolvedProblem> ProblemOf(const ResolvedProblem& problem,
   }
   ResolvedProblem own = problem;
   if (state.runs != problem.runs()) {
-    POLYEST_ASSIGN_OR_RETURN(own, problem.WithRuns(state.runs));
+    POLYEST_ASSIGN_OR_RETURN(own, problem.AtRun(state.runs - 1));
   }
+  POLYEST_RETURN_IF_ERROR(SetEndedRuns(state.ended_runs, own));
   IntegrationOptions integration = own.problem().integration;
   integration.relative_tolerance = state.relative_tolerance;
   if (!integration.Validate().ok()) {
@@ -54,6 +69,7 @@ ComponentState MixtureComponent::State() const {
   POLYEST_CHECK(!broken_ && !must_divide());
   ComponentState state;
   state.runs = problem_.runs();
+  if (problem_.ended_runs() != nullptr) state.ended_runs = *problem_.ended_runs();
   state.relative_tolerance = problem_.problem().integration.relative_tolerance;
   state.expansion = expansion_->State();
   state.particles = particles_;

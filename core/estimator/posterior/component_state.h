@@ -4,6 +4,7 @@
 // MixtureComponent.
 
 #include <cstdint>
+#include <optional>
 
 #include "core/estimator/expansion/expansion_state.h"
 #include "core/estimator/record/record_summary.h"
@@ -11,7 +12,8 @@
 namespace polyest::internal {
 
 struct ComponentState {
-  int runs = 1;                   // runs of the component's problem
+  int runs = 1;  // runs of the component's problem
+  std::optional<EndedRuns> ended_runs;
   double relative_tolerance = 0;  // of the problem's integrators; it follows the noise
   ExpansionState expansion;
   Matrix particles;

@@ -97,6 +97,7 @@ absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const St
 // Replays the record so far with the parameters of the new run, which are as uncertain as their
 // prior.
 absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
+  if (run >= problem_.max_joint_runs()) return BeginRunAlone(run, stop);
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
   LearnedNoise noise = expansion_->noise().ForNewExpansion();

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/run_elimination.h"
 #include "core/estimator/posterior/assessment.h"
 #include "core/estimator/posterior/posterior_pieces.h"
 #include "core/estimator/record/record_summary.h"
@@ -104,6 +105,13 @@ class MixtureComponent {
   absl::Status Recover(const Stop& stop);
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
+  absl::Status BeginRunAlone(int run, const Stop& stop);
+  absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
+  std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
+  absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
+                                        EndedRuns& ended) const;
+  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, const Stop& stop,
+                                       EndedRuns& ended) const;
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);

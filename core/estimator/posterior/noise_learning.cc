@@ -88,7 +88,9 @@ class Revision {
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());
       ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
-      const bool correlated = model.correlation == NoiseCorrelation::kUnknown;
+      // Runs that have been eliminated are whitened with the correlation learned until then.
+      const bool correlated =
+          model.correlation == NoiseCorrelation::kUnknown && problem_.ended_runs() == nullptr;
       const bool weighted = model.outliers != OutlierHandling::kNone;
       const bool together =
           correlated && !weighted && ReviseTimeConstant(c, sums, model.unknown, noise);

@@ -16,7 +16,7 @@ namespace {
 // run.
 absl::StatusOr<std::vector<Correlation>> CorrelationsOfRuns(
     const std::vector<UncertainParameter>& parameters, const std::vector<Correlation>& correlations,
-    int runs) {
+    int runs, int first_run) {
   std::vector<Correlation> all;
   const auto per_run = [&parameters](const std::string& name) {
     return std::ranges::any_of(parameters, [&name](const UncertainParameter& parameter) {
@@ -31,8 +31,8 @@ absl::StatusOr<std::vector<Correlation>> CorrelationsOfRuns(
           absl::StrFormat("only one of %s and %s is per run; a correlation needs both or neither",
                           given.first, given.second));
     }
-    const int repeats = per_run(given.first) ? runs : 1;
-    for (int run = 0; run < repeats; ++run) {
+    const int end = per_run(given.first) ? runs : first_run + 1;
+    for (int run = first_run; run < end; ++run) {
       all.push_back(given);
       if (!per_run(given.first)) continue;
       all.back().first = absl::StrFormat("%s[%d]", given.first, run);
@@ -45,11 +45,11 @@ absl::StatusOr<std::vector<Correlation>> CorrelationsOfRuns(
 }  // namespace
 
 std::vector<UncertainParameter> ParametersOfRuns(const std::vector<UncertainParameter>& given,
-                                                 int runs) {
+                                                 int runs, int first_run) {
   std::vector<UncertainParameter> all;
-  for (int run = 0; run < runs; ++run) {
+  for (int run = first_run; run < runs; ++run) {
     for (const UncertainParameter& parameter : given) {
-      if (run > 0 && !parameter.per_run) continue;
+      if (run > first_run && !parameter.per_run) continue;
       all.push_back(parameter);
       if (parameter.per_run) all.back().name = absl::StrFormat("%s[%d]", parameter.name, run);
     }
@@ -58,10 +58,11 @@ std::vector<UncertainParameter> ParametersOfRuns(const std::vector<UncertainPara
 }
 
 absl::StatusOr<Prior> PriorOfRuns(const std::vector<UncertainParameter>& given,
-                                  const std::vector<Correlation>& correlations, int runs) {
+                                  const std::vector<Correlation>& correlations, int runs,
+                                  int first_run) {
   POLYEST_ASSIGN_OR_RETURN(std::vector<Correlation> all,
-                           CorrelationsOfRuns(given, correlations, runs));
-  return Prior::Make(ParametersOfRuns(given, runs), std::move(all));
+                           CorrelationsOfRuns(given, correlations, runs, first_run));
+  return Prior::Make(ParametersOfRuns(given, runs, first_run), std::move(all));
 }
 
 }  // namespace polyest::internal

@@ -11,6 +11,7 @@
 #include <optional>
 #include <set>
 
+#include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
@@ -52,7 +53,7 @@ absl::Status ValidatePriors(const Problem& problem) {
 }
 
 // Returns the errors that can be found without examining the model.
-std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
+std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int first_run) {
   std::vector<absl::Status> refusals;
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));
@@ -65,9 +66,10 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs) {
   if (const absl::Status priors = ValidatePriors(problem); !priors.ok()) {
     add(priors);
   } else if (!problem.uncertain.empty()) {
-    const auto parameters = ParametersOfRuns(problem.uncertain, runs);
+    const auto parameters = ParametersOfRuns(problem.uncertain, runs, first_run);
     add(problem.expansion.Validate(static_cast<int>(parameters.size())));
-    const absl::StatusOr<Prior> prior = PriorOfRuns(problem.uncertain, problem.correlations, runs);
+    const absl::StatusOr<Prior> prior =
+        PriorOfRuns(problem.uncertain, problem.correlations, runs, first_run);
     add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
   }
   if (const absl::Status status = problem.integration.Validate(); !status.ok()) {
@@ -255,14 +257,15 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
     ResolveDelay(field, settable_[*index], smallest, largest);
     found[i] = *index;
   }
-  for (int run = 0; run < resolved_.runs_; ++run) {
+  const int first_run = resolved_.first_run_;
+  for (int run = first_run; run < resolved_.runs_; ++run) {
     for (size_t i = 0; i < found.size(); ++i) {
       const bool per_run = problem_.uncertain[i].per_run;
-      if (!found[i] || (run > 0 && !per_run)) continue;
+      if (!found[i] || (run > first_run && !per_run)) continue;
       resolved_.targets_.push_back(*found[i]);
       resolved_.target_run_.push_back(per_run ? run : -1);
       resolved_.units_.push_back(settable_[*found[i]].unit);
-      if (per_run && run == 0) ++resolved_.parameters_per_run_;
+      if (per_run && run == first_run) ++resolved_.parameters_per_run_;
     }
   }
 }
@@ -314,31 +317,50 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
   }
 }
 
-absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs) {
-  POLYEST_CHECK(runs >= 1);
-  std::vector<absl::Status> refusals = CheckOptions(problem, runs);
+absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs, int first_run) {
+  POLYEST_CHECK(runs > first_run && first_run >= 0);
+  std::vector<absl::Status> refusals = CheckOptions(problem, runs, first_run);
   if (!refusals.empty()) return refusals.front();
-  POLYEST_ASSIGN_OR_RETURN(Prior prior, PriorOfRuns(problem.uncertain, problem.correlations, runs));
-  ResolvedProblem resolved(std::move(problem), std::move(prior), runs);
+  POLYEST_ASSIGN_OR_RETURN(Prior prior,
+                           PriorOfRuns(problem.uncertain, problem.correlations, runs, first_run));
+  ResolvedProblem resolved(std::move(problem), std::move(prior), runs, first_run);
   refusals = Resolver(resolved).Run();
   if (!refusals.empty()) return refusals.front();
   return resolved;
 }
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
-  std::vector<absl::Status> refusals = CheckOptions(problem, 1);
+  std::vector<absl::Status> refusals = CheckOptions(problem, 1, 0);
   if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
   // The prior only provides the names, because the correlations may be invalid. It needs at least
   // one parameter; without any, a placeholder that no name refers to is used.
   Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);
-  ResolvedProblem resolved(std::move(problem), std::move(prior), 1);
+  ResolvedProblem resolved(std::move(problem), std::move(prior), 1, 0);
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
   return refusals;
 }
 
 int ResolvedProblem::max_runs() const {
+  const auto given = static_cast<int>(problem_.uncertain.size());
+  const bool eliminates = problem_.expansion.adaptive && parameters_per_run_ < given;
+  return eliminates ? std::numeric_limits<int>::max() : max_joint_runs();
+}
+
+std::vector<int> ResolvedProblem::SharedParameters() const {
+  return OwnParameters(-1);  // their target_run_
+}
+
+std::vector<int> ResolvedProblem::OwnParameters(int run) const {
+  std::vector<int> own;
+  for (size_t i = 0; i < target_run_.size(); ++i) {
+    if (target_run_[i] == run) own.push_back(static_cast<int>(i));
+  }
+  return own;
+}
+
+int ResolvedProblem::max_joint_runs() const {
   if (!per_run()) return std::numeric_limits<int>::max();
-  const int of_one_run = dimension() - (runs_ - 1) * parameters_per_run_;
+  const auto of_one_run = static_cast<int>(problem_.uncertain.size());
   int most = 1 + std::max(0, kMaxParametersOfRuns - of_one_run) / parameters_per_run_;
   const auto too_many = [&] {
     return !problem_.expansion.Validate(of_one_run + (most - 1) * parameters_per_run_).ok();
@@ -366,6 +388,9 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
                                                     std::vector<int> outputs, int threads,
                                                     int run) const {
   POLYEST_CHECK(thetas.cols() == dimension() && (run < runs_ || !per_run()));
+  if (per_run() && run < first_run_) {
+    return MakeEnsemble(ThetasOfEndedRun(thetas, run), std::move(outputs), threads, first_run_);
+  }
   Matrix values = base_.transpose().replicate(thetas.rows(), 1);
   for (size_t i = 0; i < targets_.size(); ++i) {
     if (target_run_[i] >= 0 && target_run_[i] != run) continue;
@@ -379,6 +404,33 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;
+}
+
+// Returns the values with those of the first run that has parameters replaced by draws of an ended
+// run's: their path (ended_runs.h) and quasi-random normal deviates from it.
+Matrix ResolvedProblem::ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const {
+  POLYEST_CHECK(ended_runs_ != nullptr);
+  constexpr double kGoldenRatio = 0.6180339887498949;
+  const std::vector<int>& runs = ended_runs_->run;
+  const auto found = std::ranges::lower_bound(runs, run);
+  if (found == runs.end() || *found != run) return thetas;  // a run without rows: nothing is known
+  const RunPath path = ended_runs_->Path(static_cast<size_t>(found - runs.begin()));
+  const std::vector<int> shared = SharedParameters(), own = OwnParameters(first_run_);
+  const Matrix cube = UnitCubePoints(PointSet::kHalton, static_cast<int>(own.size()),
+                                     static_cast<int>(thetas.rows()));
+  Matrix result = thetas;
+  for (Eigen::Index i = 0; i < thetas.rows(); ++i) {
+    Vector xi = prior_.ToGerm(thetas.row(i).transpose());
+    const Vector deviate = cube.row(i).transpose().unaryExpr([&](double u) {
+      const double turned = u + kGoldenRatio * run;
+      return Germ::Normal().Quantile(std::clamp(turned - std::floor(turned), 1e-9, 1 - 1e-9));
+    });
+    xi(own) = path.centre + path.slope * (xi(shared) - ended_runs_->region.centre()) +
+              path.spread * deviate;
+    for (const int j : own) xi[j] = std::clamp(xi[j], prior_.lower()[j], prior_.upper()[j]);
+    result.row(i) = prior_.ToParameters(xi).transpose();
+  }
+  return result;
 }
 
 // A derived value that is not finite makes the whole point fail.

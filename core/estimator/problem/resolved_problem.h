@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/bayes/prior.h"
+#include "core/estimator/problem/ended_runs.h"
 #include "core/estimator/problem/row_gate.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/model/equations/expressions.h"
@@ -20,30 +21,55 @@
 
 namespace polyest::internal {
 
-// Maximum number of uncertain parameters of a record whose runs have their own parameters.
+// Maximum number of uncertain parameters of an expansion over several runs with their own
+// parameters. A run that would bring more leaves all earlier runs without theirs (ended_runs.h).
 inline constexpr int kMaxParametersOfRuns = 12;
 
 // A problem whose names have all been resolved in its model, for a record of a given number of
 // runs. Its uncertain parameters are the problem's own, a per-run one named "x_0[0]" for run 0,
-// followed by the per-run ones for run 1, "x_0[1]", for run 2, …
+// followed by the per-run ones for run 1, "x_0[1]", for run 2, … While run r is the last of more
+// runs than kMaxParametersOfRuns allow, they are the problem's own, a per-run one named "x_0[r]".
 class ResolvedProblem {
  public:
   // Resolves the problem for `runs` ≥ 1 runs. Returns InvalidArgument or ResourceExhausted that
   // name the field, the value and the rule; for an unknown name the message lists the known ones.
   // `measured` may be empty (a propagation needs no measured outputs).
-  static absl::StatusOr<ResolvedProblem> Make(Problem problem, int runs = 1);
+  // The parameters of runs before `first_run` < `runs` are left out.
+  static absl::StatusOr<ResolvedProblem> Make(Problem problem, int runs = 1, int first_run = 0);
   // Returns every error of Make, not only the first.
   static std::vector<absl::Status> Check(Problem problem);
 
   const Problem& problem() const { return problem_; }
   int runs() const { return runs_; }
+  int first_run() const { return first_run_; }  // the first one with parameters in the problem
   // Whether runs have their own parameters, so that each new run adds to the dimension.
   bool per_run() const { return parameters_per_run_ > 0; }
-  // Returns the problem resolved for another number of runs. Errors are those of Make.
+  // Returns the problem resolved for another number of runs, all with their parameters, or for one
+  // run alone. Errors are those of Make.
   absl::StatusOr<ResolvedProblem> WithRuns(int runs) const { return Make(problem_, runs); }
-  // Returns the maximum number of runs: as many as kMaxParametersOfRuns and the expansion's limits
-  // allow, or any number if runs have no parameters of their own.
+  absl::StatusOr<ResolvedProblem> OfRun(int run) const { return Make(problem_, run + 1, run); }
+  // Returns the problem while `run` is the last run of the record: with the parameters of all runs
+  // up to max_joint_runs(), of this one alone beyond.
+  absl::StatusOr<ResolvedProblem> AtRun(int run) const {
+    return run < max_joint_runs() ? WithRuns(run + 1) : OfRun(run);
+  }
+  // Returns the maximum number of runs with parameters in one expansion: as many as
+  // kMaxParametersOfRuns and the expansion's limits allow, or any number if runs have no parameters
+  // of their own.
+  int max_joint_runs() const;
+  // Returns the maximum number of runs of a record: that of one expansion where ended runs cannot
+  // be eliminated, because the expansion is not adaptive or the runs share no parameter, else any.
   int max_runs() const;
+  // What is known of the runs before the first one whose parameters are in the problem; null if
+  // there are none.
+  const EndedRuns* ended_runs() const { return ended_runs_.get(); }
+  const std::shared_ptr<const EndedRuns>& shared_ended_runs() const { return ended_runs_; }
+  void set_ended_runs(std::shared_ptr<const EndedRuns> ended) { ended_runs_ = std::move(ended); }
+  // Returns the first row of the record that an expansion of this problem takes.
+  int64_t first_row() const { return ended_runs_ ? ended_runs_->rows : 0; }
+  // Returns the uncertain parameters that all runs share, and those of one run.
+  std::vector<int> SharedParameters() const;
+  std::vector<int> OwnParameters(int run) const;
   // Sets the tolerance of ensembles made from now on; it must be above 0 and within the limits of
   // IntegrationOptions.
   void set_relative_tolerance(double tolerance) {
@@ -73,26 +99,31 @@ class ResolvedProblem {
 
   // Returns an ensemble with one trajectory for each row of `thetas` (Q × n, values of the
   // uncertain parameters) that reads the model's `outputs`. If runs have their own parameters, 0 ≤
-  // run < runs() is required.
+  // run < runs() is required. Those of an ended run are draws of their posterior given the shared
+  // ones.
   EnsembleSpecification MakeEnsemble(const ConstMatrixRef& thetas, std::vector<int> outputs,
                                      int threads, int run = 0) const;
 
  private:
   class Resolver;
 
-  ResolvedProblem(Problem problem, Prior prior, int runs)
+  ResolvedProblem(Problem problem, Prior prior, int runs, int first_run)
       : problem_(std::move(problem)),
         prior_(std::move(prior)),
         runs_(runs),
+        first_run_(first_run),
         settable_(problem_.model->description()),
         base_(settable_.Defaults()) {}
 
   void Derive(Matrix& values) const;
+  Matrix ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const;
 
   Problem problem_;
   Prior prior_;
   int runs_;
+  int first_run_;  // the first one whose parameters are among the uncertain ones
   int parameters_per_run_ = 0;
+  std::shared_ptr<const EndedRuns> ended_runs_;
   SettableQuantities settable_;
   Vector base_;                  // values of the settable quantities that are not uncertain
   std::vector<int> targets_;     // settable quantity of each uncertain parameter

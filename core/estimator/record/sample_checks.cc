@@ -220,7 +220,8 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
       return Refusal(
           {"run", k},
           "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
-          "runs would have too many of them",
+          "runs would have too many of them; they are eliminated only from an adaptive expansion "
+          "and if the runs share a parameter",
           k, run, max_runs_);
     }
     if (!std::isfinite(time_s) || time_s < 0) {

@@ -268,6 +268,13 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
     return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
   }
   POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
+  if (record.after.run >= problem.max_joint_runs()) {
+    return InvalidField(
+        "measurements",
+        absl::StrFormat("%d runs are more than a grid may have, %d, since each has parameters of "
+                        "its own",
+                        record.after.run + 1, problem.max_joint_runs()));
+  }
   if (problem.per_run() && record.after.run >= problem.runs()) {
     POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem grown, problem.WithRuns(record.after.run + 1));
     return EvaluateCostGrid(grown, samples, options, stop);

@@ -63,7 +63,8 @@ absl::Status CheckRuns(const ProblemLimits& limits, const ResolvedProblem& probl
   const int last = *std::max_element(batch.run().begin(), batch.run().end());
   // The estimator reports other errors of a run more precisely: it knows the row.
   if (last < problem.runs() || last >= problem.max_runs()) return absl::OkStatus();
-  const auto with_runs = problem.WithRuns(last + 1);
+  // Beyond the runs of one expansion, more of them add no parameters.
+  const auto with_runs = problem.WithRuns(std::min(last + 1, problem.max_joint_runs()));
   return with_runs.ok() ? CheckLimits(limits, *with_runs) : absl::OkStatus();
 }
 

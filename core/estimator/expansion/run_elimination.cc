@@ -1,0 +1,370 @@
+#include "core/estimator/expansion/run_elimination.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "core/bayes/domain_cover.h"
+#include "core/chaos/collocation_points.h"
+#include "core/common/check.h"
+#include "core/common/linear_algebra.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/run_marginal.h"
+#include "core/estimator/problem/truncation.h"
+#include "core/estimator/record/rows_ahead.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kHalfWidth = 4;     // of the region of a run's own germs, standard deviations
+constexpr double kMinSpread = 1e-9;  // of a path, in units of the prior's standard deviation
+constexpr int kMaxEliminations = 5;
+constexpr int64_t kRowsAtOnce = 256;
+constexpr int kPointsPerTerm = 3;  // of the shared germs
+constexpr double kWithinDomain = 1 - 1e-9;
+
+// Returns the lower triangular factor of a covariance, at least kMinSpread of `unit`.
+Matrix SpreadOf(const Matrix& covariance, const Vector& unit) {
+  const Matrix least = (kMinSpread * unit).cwiseAbs2().asDiagonal();
+  const CholeskyFactor factor(0.5 * (covariance + covariance.transpose()) + least);
+  if (factor.positive_definite()) return factor.Lower();
+  return Matrix(covariance.diagonal().cwiseMax(least.diagonal()).cwiseSqrt().asDiagonal());
+}
+
+// One run, expanded about a path.
+class Elimination {
+ public:
+  Elimination(const ResolvedProblem& problem, const LearnedNoise& noise, const EndedRuns& ended)
+      : problem_(problem),
+        noise_(noise),
+        ended_(ended),
+        shared_(problem.SharedParameters()),
+        own_(problem.OwnParameters(problem.runs() - 1)),
+        n_shared_(std::ssize(shared_)),
+        n_own_(std::ssize(own_)) {}
+
+  absl::Status Expand(const RunPath& path, const SampleStore& store, const RunRows& rows,
+                      int threads, const Stop& stop);
+  absl::Status FindMinima();
+  bool IsWithinRegion() const;
+  RunPath PathFound() const;
+  absl::Status AddTo(EndedRuns& ended) const;
+  int64_t propagated() const { return expansion_->propagated_rows(); }
+
+ private:
+  Region JointRegion(const RunPath& path) const;
+  LearnedNoise NoiseAbout(const Vector& centre) const;
+  Matrix SharedPoints() const;
+  Cost OwnCost() const;
+  double SharedPrior(const Vector& xi) const;
+  Vector SpentDegrees() const;
+  Matrix BoxOfOwn() const;
+  Vector Remainder(const Cost& cost, const RunMarginal& marginal,
+                   const std::vector<ChannelSums>& sums, const Matrix& terms) const;
+
+  const ResolvedProblem& problem_;
+  const LearnedNoise& noise_;
+  const EndedRuns& ended_;
+  std::vector<int> shared_, own_;
+  Eigen::Index n_shared_, n_own_;
+  std::unique_ptr<RegionalExpansion> expansion_;
+  RunPath path_;
+  Matrix points_;                           // of the shared germs, local coordinates
+  std::vector<ConditionalMinimum> minima_;  // at the points, then at the centre
+};
+
+Region Elimination::JointRegion(const RunPath& path) const {
+  Vector centre(n_shared_ + n_own_);
+  centre(shared_) = ended_.region.centre();
+  centre(own_) = path.centre;
+  Matrix axes = Matrix::Zero(n_shared_ + n_own_, n_shared_ + n_own_);
+  axes(shared_, Eigen::seqN(0, n_shared_)) = ended_.region.axes();
+  axes(own_, Eigen::seqN(0, n_shared_)) = path.slope * ended_.region.axes();
+  axes(own_, Eigen::seqN(n_shared_, n_own_)) = kHalfWidth * path.spread;
+  return Region(std::move(centre), std::move(axes));
+}
+
+// Outliers are judged, and relative noise is predicted, at the centre of the path.
+LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
+  LearnedNoise noise = noise_.ForNewExpansion();
+  for (size_t c = 0; c < noise.channels.size(); ++c) {
+    noise.channels[c].scale = ended_.noise_scale[static_cast<Eigen::Index>(c)];
+    noise.channels[c].grid = {};
+  }
+  noise.centre = centre;
+  if (noise.posterior.centre.size() == 0) return noise;
+  noise.posterior.centre = centre;
+  noise.posterior.factor = Matrix::Zero(centre.size(), centre.size());
+  noise.posterior.factor(shared_, Eigen::seqN(0, n_shared_)) = ended_.factor;
+  noise.posterior.factor(own_, Eigen::seqN(0, n_shared_)) = path_.slope * ended_.factor;
+  noise.posterior.factor(own_, Eigen::seqN(n_shared_, n_own_)) = path_.spread;
+  return noise;
+}
+
+absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, const RunRows& rows,
+                                 int threads, const Stop& stop) {
+  path_ = path;
+  Region region = JointRegion(path);
+  const Vector inside = NearestInside(problem_.prior(), region.centre());
+  ExpansionDesign design =
+      DesignForRegion(problem_, FirstTruncation(problem_.problem().expansion, problem_.dimension()),
+                      std::move(region), inside);
+  POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, std::move(design),
+                                                               NoiseAbout(inside), threads));
+  RowBlock block;
+  for (int64_t first = rows.first; first < rows.end; first += kRowsAtOnce) {
+    const int64_t count = std::min(kRowsAtOnce, rows.end - first);
+    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store, first, count, problem_.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
+    if (expansion_->fitted_rows() < block.count()) return expansion_->shortage();
+    for (int row = 0; row < block.count(); ++row) expansion_->Absorb(row);
+  }
+  expansion_->EndRun();
+  return absl::OkStatus();
+}
+
+// The noise counts as known: one run alone tells little of it.
+Cost Elimination::OwnCost() const {
+  std::vector<ChannelSums> sums = expansion_->sums();
+  for (ChannelSums& channel : sums) channel.scale_unknown = channel.correlation_unknown = false;
+  const ExpansionDesign& design = expansion_->design();
+  Cost cost(design.basis, design.region, design.reference, Mismatch(std::move(sums)),
+            problem_.prior(), problem_.problem().regularization);
+  cost.set_power(1 / noise_.misfit);
+  return cost;
+}
+
+// Returns collocation points of the shared germs; those outside Ω are moved towards the centre.
+Matrix Elimination::SharedPoints() const {
+  const int count = kPointsPerTerm * ended_.basis->size();
+  Matrix points =
+      2 * UnitCubePoints(PointSet::kHalton, static_cast<int>(n_shared_), count).array() - 1;
+  Vector inside = NearestInside(problem_.prior(), expansion_->design().region.centre());
+  for (Eigen::Index q = 0; q < count; ++q) {
+    Vector xi = inside;
+    xi(shared_) = ended_.region.ToGerm(points.row(q).transpose());
+    const double fraction = FractionInDomain(problem_.prior(), xi, inside);
+    if (!(fraction < 1)) continue;
+    xi = inside + kWithinDomain * fraction * (xi - inside);
+    points.row(q) = ended_.region.ToLocal(xi(shared_)).transpose();
+  }
+  return points;
+}
+
+absl::Status Elimination::FindMinima() {
+  points_ = SharedPoints();
+  const Cost cost = OwnCost();
+  const RunMarginal marginal(cost, static_cast<int>(n_shared_), own_);
+  const Vector start = Vector::Zero(n_own_);
+  minima_.clear();
+  const ConditionalMinimum centre = marginal.Minimize(Vector::Zero(n_shared_), start);
+  for (Eigen::Index q = 0; q < points_.rows(); ++q) {
+    minima_.push_back(marginal.Minimize(points_.row(q).transpose(), centre.own));
+  }
+  minima_.push_back(centre);
+  for (const ConditionalMinimum& minimum : minima_) {
+    if (std::isfinite(minimum.value) && minimum.own.allFinite()) continue;
+    return absl::FailedPreconditionError("the parameters of a run that has ended were not found");
+  }
+  return absl::OkStatus();
+}
+
+// Whether the run was expanded where its own parameters are: the minimum within the region, at
+// which the standard deviation is a quarter of the half width, to a factor of 2.
+bool Elimination::IsWithinRegion() const {
+  for (const ConditionalMinimum& minimum : minima_) {
+    if (minimum.own.cwiseAbs().maxCoeff() > 1) return false;
+  }
+  const Vector deviation = Inverse(minima_.back().hessian).diagonal().cwiseSqrt() * kHalfWidth;
+  return deviation.maxCoeff() < 2 && deviation.minCoeff() > 0.5;
+}
+
+// Returns 4 spread, the axes of the own germs.
+Matrix Elimination::BoxOfOwn() const {
+  return expansion_->design().region.axes()(own_, Eigen::seqN(n_shared_, n_own_));
+}
+
+// dη̂_φ/dη_θ = −H_φφ⁻¹ H_φθ
+RunPath Elimination::PathFound() const {
+  const ConditionalMinimum& minimum = minima_.back();
+  const Region& region = expansion_->design().region;
+  Vector eta = Vector::Zero(n_shared_ + n_own_);
+  eta.tail(n_own_) = minimum.own;
+  const Matrix hessian = OwnCost().Hessian(eta);
+  const Matrix inverse = Inverse(minimum.hessian);
+  const Matrix follows = -(inverse * hessian.bottomLeftCorner(n_own_, n_shared_));
+  const Matrix box = BoxOfOwn();
+  RunPath path;
+  path.centre = region.ToGerm(eta)(own_);
+  path.slope = path_.slope + box * follows * Inverse(ended_.region.axes());
+  const Vector unit = problem_.prior().GermStandardDeviation()(own_);
+  Matrix covariance = box * inverse * box.transpose();
+  // Never wider than the prior: where it is, the integrand is not a Gaussian.
+  const Vector most = unit.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMin(1);
+  covariance = most.asDiagonal() * covariance * most.asDiagonal();
+  path.spread = SpreadOf(covariance, unit);
+  return path;
+}
+
+double Elimination::SharedPrior(const Vector& xi) const {
+  double prior = 0;
+  for (const int j : shared_) {
+    prior -= problem_.prior().germs()[static_cast<size_t>(j)].LogDensity(xi[j]);
+  }
+  return problem_.problem().regularization * prior;
+}
+
+// Returns E at the points: −log of the integral over the own germs without the prior of the shared
+// ones, less what the sums of the shared terms give there.
+Vector Elimination::Remainder(const Cost& cost, const RunMarginal& marginal,
+                              const std::vector<ChannelSums>& sums, const Matrix& terms) const {
+  const Vector at_centre = TermsAtCentre(ended_);
+  const double volume = LuFactors(BoxOfOwn()).LogAbsDeterminant();
+  Vector remainder(points_.rows());
+  for (Eigen::Index q = 0; q < points_.rows(); ++q) {
+    Vector eta = Vector::Zero(n_shared_ + n_own_);
+    eta.head(n_shared_) = points_.row(q).transpose();
+    const Vector d = terms.row(q).transpose() - at_centre;
+    double mismatch = 0;
+    for (const ChannelSums& channel : sums) mismatch += 0.5 * channel.samples.ChiSquared(d);
+    remainder[q] =
+        marginal.NegativeLogIntegral(eta.head(n_shared_), minima_[static_cast<size_t>(q)]) -
+        volume - SharedPrior(cost.region().ToGerm(eta)) - cost.power() * mismatch;
+  }
+  return remainder;
+}
+
+// Returns tr(H_φφ⁻¹ ∂_φᵀ G_c ∂_φ) at the centre for each channel.
+Vector Elimination::SpentDegrees() const {
+  const ExpansionDesign& design = expansion_->design();
+  Vector eta = Vector::Zero(n_shared_ + n_own_);
+  eta.tail(n_own_) = minima_.back().own;
+  Vector phi(design.basis->size());
+  Matrix gradient(design.basis->size(), eta.size());
+  design.basis->EvaluateWithGradient(eta, phi, gradient);
+  const Matrix by_own = gradient.rightCols(n_own_);
+  const Matrix inverse = Inverse(minima_.back().hessian) / noise_.misfit;
+  Vector spent(problem_.channels());
+  for (int c = 0; c < problem_.channels(); ++c) {
+    const Matrix& g = expansion_->sums()[static_cast<size_t>(c)].samples.G();
+    const double share = (inverse * (by_own.transpose() * g * by_own)).trace();
+    spent[c] = std::clamp(share, 0.0, static_cast<double>(n_own_));
+  }
+  return spent;
+}
+
+absl::Status Elimination::AddTo(EndedRuns& ended) const {
+  const ExpansionDesign& design = expansion_->design();
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
+                           CollocationMatrix::Factor(*ended.basis, points_));
+  Matrix along(points_.rows(), n_shared_ + n_own_);
+  along.leftCols(n_shared_) = points_;
+  for (Eigen::Index q = 0; q < points_.rows(); ++q) {
+    along.row(q).tail(n_own_) = minima_[static_cast<size_t>(q)].own.transpose();
+  }
+  Matrix phi;
+  design.basis->EvaluateMany(along, phi);
+  Matrix transfer(ended.basis->size(), phi.cols());
+  Vector residual(phi.cols());
+  matrix.Solve(phi, transfer, residual);
+  Vector reference(design.basis->size());
+  design.basis->Evaluate(design.reference, reference);
+  const Vector shift = transfer.transpose() * TermsAtCentre(ended) - reference;
+  const AbsorbedRows& absorbed = expansion_->absorbed();
+  std::vector<ChannelSums> sums = absorbed.sums;
+  const Vector spent = SpentDegrees();
+  for (size_t c = 0; c < sums.size(); ++c) {
+    const auto channel = static_cast<Eigen::Index>(c);
+    sums[c].samples = absorbed.sums[c].samples.Substituted(transfer, shift);
+    sums[c].differences = absorbed.sums[c].differences.Substituted(transfer, shift);
+    ended.sums[c].samples.Add(sums[c].samples);
+    ended.sums[c].differences.Add(sums[c].differences);
+    ended.sums[c].spent += spent[channel];
+    ended.outliers[c] += absorbed.outliers[c];
+  }
+  const Cost cost = OwnCost();
+  const RunMarginal marginal(cost, static_cast<int>(n_shared_), own_);
+  const Matrix values = Remainder(cost, marginal, sums, matrix.matrix());
+  if (!values.allFinite()) {
+    return absl::FailedPreconditionError("the likelihood of a run that has ended vanishes");
+  }
+  Matrix coefficients(ended.basis->size(), 1);
+  Vector ignored(1);
+  matrix.Solve(values, coefficients, ignored);
+  ended.remainder += coefficients.col(0);
+  ended.samples += absorbed.samples;
+  ended.discount += absorbed.discount;
+  ended.own_error += absorbed.own_error;
+  ended.log_noise += absorbed.log_noise;
+  ended.log_variance += absorbed.log_variance;
+  ended.largest = ended.largest.cwiseMax(absorbed.largest);
+  return absl::OkStatus();
+}
+
+void Append(const RunRows& rows, const RunPath& path, EndedRuns& ended) {
+  ended.run.push_back(rows.run);
+  ended.first_row.push_back(rows.first);
+  ended.rows = rows.end;
+  const Eigen::Index numbers = path.centre.size() + path.slope.size() + path.spread.size();
+  ended.paths.conservativeResize(numbers, std::ssize(ended.run));
+  ended.SetPath(ended.run.size() - 1, path);
+}
+
+}  // namespace
+
+EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
+                           const GermSummary& posterior, const LearnedNoise& noise) {
+  EndedRuns ended;
+  const auto shared = static_cast<size_t>(region.dimension());
+  ended.region = std::move(region);
+  ended.centre = posterior.mean;
+  ended.factor = SpreadOf(posterior.covariance, Vector::Ones(posterior.mean.size()));
+  const auto of_one_run = static_cast<int>(problem.problem().uncertain.size());
+  ended.basis = std::make_shared<Basis>(std::vector<Germ>(shared, Germ::Uniform()),
+                                        FirstTruncation(problem.problem().expansion, of_one_run));
+  const auto channels = static_cast<size_t>(problem.channels());
+  ended.sums.assign(channels, ChannelSums(ended.basis->size()));
+  ended.discount = ended.largest = Vector::Zero(problem.channels());
+  ended.outliers.assign(channels, 0);
+  ended.remainder = Vector::Zero(ended.basis->size());
+  ended.noise_scale.resize(problem.channels());
+  for (size_t c = 0; c < channels; ++c) {
+    ended.noise_scale[static_cast<Eigen::Index>(c)] = noise.channels[c].scale;
+  }
+  return ended;
+}
+
+RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
+               const Vector& centre) {
+  const std::vector<int> shared = problem.SharedParameters(), own = problem.OwnParameters(run);
+  const Matrix& covariance = posterior.covariance;
+  RunPath path;
+  const Matrix both = covariance(own, shared);
+  path.slope = both * Inverse(covariance(shared, shared));
+  path.centre = posterior.mean(own) + path.slope * (centre - posterior.mean(shared));
+  path.spread = SpreadOf(covariance(own, own) - path.slope * both.transpose(),
+                         problem.prior().GermStandardDeviation()(own));
+  return path;
+}
+
+absl::StatusOr<int64_t> EliminateRun(const EliminationRequest& request, const RunRows& rows,
+                                     const RunPath& path, const Stop& stop, EndedRuns& ended) {
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem problem, request.problem->OfRun(rows.run));
+  Elimination elimination(problem, request.noise, ended);
+  RunPath present = path;
+  int64_t propagated = 0;
+  for (int attempt = 1;; ++attempt) {
+    POLYEST_RETURN_IF_ERROR(
+        elimination.Expand(present, *request.store, rows, request.threads, stop));
+    propagated += elimination.propagated();
+    POLYEST_RETURN_IF_ERROR(elimination.FindMinima());
+    present = elimination.PathFound();
+    if (elimination.IsWithinRegion() || attempt == kMaxEliminations) break;
+  }
+  POLYEST_RETURN_IF_ERROR(elimination.AddTo(ended));
+  Append(rows, present, ended);
+  return propagated;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,78 @@
+#include "core/estimator/problem/ended_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace polyest::internal {
+namespace {
+
+bool IsFiniteMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
+  return matrix.rows() == rows && matrix.cols() == columns && matrix.allFinite();
+}
+
+bool AreSumsOf(const MismatchSums& sums, Eigen::Index terms) {
+  return IsFiniteMatrix(sums.G(), terms, terms) && IsFiniteMatrix(sums.b(), terms, 1) &&
+         std::isfinite(sums.w()) && sums.count() >= 0;
+}
+
+template <class Number>
+bool AreAscending(const std::vector<Number>& numbers) {
+  return std::ranges::adjacent_find(numbers, std::ranges::greater_equal()) == numbers.end();
+}
+
+}  // namespace
+
+// A column is centre, slope and spread one after the other: n_φ (1 + n_θ + n_φ) numbers.
+int EndedRuns::own_parameters() const {
+  const int shared = region.dimension();
+  int own = 1;
+  while (own * (1 + shared + own) < paths.rows()) ++own;
+  return own;
+}
+
+RunPath EndedRuns::Path(size_t i) const {
+  const Eigen::Index own = own_parameters(), shared = region.dimension();
+  const Vector column = paths.col(static_cast<Eigen::Index>(i));
+  RunPath path;
+  path.centre = column.head(own);
+  path.slope = column.segment(own, own * shared).reshaped(own, shared);
+  path.spread = column.tail(own * own).reshaped(own, own);
+  return path;
+}
+
+void EndedRuns::SetPath(size_t i, const RunPath& path) {
+  auto column = paths.col(static_cast<Eigen::Index>(i));
+  column << path.centre, path.slope.reshaped(), path.spread.reshaped();
+}
+
+Vector TermsAtCentre(const EndedRuns& ended) {
+  Vector terms(ended.basis->size());
+  ended.basis->Evaluate(Vector::Zero(ended.basis->dimension()), terms);
+  return terms;
+}
+
+bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
+  const auto runs = std::ssize(ended.run);
+  const Eigen::Index terms = ended.basis->size();
+  if (ended.rows < 1 || ended.samples < 0 || runs < 1 || std::ssize(ended.first_row) != runs ||
+      !AreAscending(ended.run) || ended.run.front() < 0 || !AreAscending(ended.first_row) ||
+      ended.first_row.front() != 0 || ended.first_row.back() >= ended.rows) {
+    return false;
+  }
+  for (const ChannelSums& sums : ended.sums) {
+    if (!AreSumsOf(sums.samples, terms) || !AreSumsOf(sums.differences, terms)) return false;
+    if (!std::isfinite(sums.spent)) return false;
+  }
+  return ended.region.dimension() == shared && ended.basis->dimension() == shared &&
+         IsFiniteMatrix(ended.paths, own * (1 + shared + own), runs) &&
+         IsFiniteMatrix(ended.centre, shared, 1) && IsFiniteMatrix(ended.factor, shared, shared) &&
+         std::ssize(ended.sums) == channels && std::ssize(ended.outliers) == channels &&
+         IsFiniteMatrix(ended.discount, channels, 1) &&
+         IsFiniteMatrix(ended.largest, channels, 1) && IsFiniteMatrix(ended.remainder, terms, 1) &&
+         IsFiniteMatrix(ended.noise_scale, channels, 1) && ended.noise_scale.minCoeff() > 0 &&
+         std::isfinite(ended.own_error) && std::isfinite(ended.log_noise) &&
+         std::isfinite(ended.log_variance);
+}
+
+}  // namespace polyest::internal
