@@ -139,7 +139,7 @@ void save(Archive& archive, const EndedRuns& ended) {
           ended.factor, ended.region.centre(), ended.region.axes(), ended.basis->truncation().order,
           ended.basis->truncation().exponent, ended.sums, spent, ended.discount, ended.own_error,
           ended.log_noise, ended.log_variance, ended.outliers, ended.largest, ended.remainder,
-          ended.noise_scale);
+          ended.noise_scale, ended.noise_time_constant_s);
 }
 
 template <class Archive>
@@ -151,7 +151,7 @@ void load(Archive& archive, EndedRuns& ended) {
   archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
           ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
           ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
-          ended.largest, ended.remainder, ended.noise_scale);
+          ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s);
   const Eigen::Index n = centre.size();
   if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
       !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||

@@ -58,6 +58,7 @@ class Elimination {
   Matrix SharedPoints() const;
   Cost OwnCost() const;
   double SharedPrior(const Vector& xi) const;
+  Vector StartAt(const ConstVectorRef& eta_shared) const;
   Vector SpentDegrees() const;
   Matrix BoxOfOwn() const;
   Vector Remainder(const Cost& cost, const RunMarginal& marginal,
@@ -87,9 +88,12 @@ Region Elimination::JointRegion(const RunPath& path) const {
 
 // Outliers are judged, and relative noise is predicted, at the centre of the path.
 LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
-  LearnedNoise noise = noise_.ForNewExpansion();
+  LearnedNoise noise = noise_;
+  noise.misfit = noise.misfit_of_weights = 1;
   for (size_t c = 0; c < noise.channels.size(); ++c) {
-    noise.channels[c].scale = ended_.noise_scale[static_cast<Eigen::Index>(c)];
+    const auto channel = static_cast<Eigen::Index>(c);
+    noise.channels[c].scale = ended_.noise_scale[channel];
+    noise.channels[c].time_constant_s = ended_.noise_time_constant_s[channel];
     noise.channels[c].grid = {};
   }
   noise.centre = centre;
@@ -131,7 +135,6 @@ Cost Elimination::OwnCost() const {
   const ExpansionDesign& design = expansion_->design();
   Cost cost(design.basis, design.region, design.reference, Mismatch(std::move(sums)),
             problem_.prior(), problem_.problem().regularization);
-  cost.set_power(1 / noise_.misfit);
   return cost;
 }
 
@@ -152,15 +155,24 @@ Matrix Elimination::SharedPoints() const {
   return points;
 }
 
+// Returns η_φ of the path at η_θ, in Ω.
+Vector Elimination::StartAt(const ConstVectorRef& eta_shared) const {
+  const Region& region = expansion_->design().region;
+  Vector eta = Vector::Zero(n_shared_ + n_own_);
+  eta.head(n_shared_) = eta_shared;
+  return region.ToLocal(NearestInside(problem_.prior(), region.ToGerm(eta))).tail(n_own_);
+}
+
 absl::Status Elimination::FindMinima() {
   points_ = SharedPoints();
   const Cost cost = OwnCost();
   const RunMarginal marginal(cost, static_cast<int>(n_shared_), own_);
-  const Vector start = Vector::Zero(n_own_);
   minima_.clear();
-  const ConditionalMinimum centre = marginal.Minimize(Vector::Zero(n_shared_), start);
+  const Vector middle = Vector::Zero(n_shared_);
+  const ConditionalMinimum centre = marginal.Minimize(middle, StartAt(middle));
   for (Eigen::Index q = 0; q < points_.rows(); ++q) {
-    minima_.push_back(marginal.Minimize(points_.row(q).transpose(), centre.own));
+    const Vector point = points_.row(q).transpose();
+    minima_.push_back(marginal.Minimize(point, StartAt(point)));
   }
   minima_.push_back(centre);
   for (const ConditionalMinimum& minimum : minima_) {
@@ -230,7 +242,7 @@ Vector Elimination::Remainder(const Cost& cost, const RunMarginal& marginal,
     for (const ChannelSums& channel : sums) mismatch += 0.5 * channel.samples.ChiSquared(d);
     remainder[q] =
         marginal.NegativeLogIntegral(eta.head(n_shared_), minima_[static_cast<size_t>(q)]) -
-        volume - SharedPrior(cost.region().ToGerm(eta)) - cost.power() * mismatch;
+        volume - SharedPrior(cost.region().ToGerm(eta)) - mismatch;
   }
   return remainder;
 }
@@ -244,7 +256,7 @@ Vector Elimination::SpentDegrees() const {
   Matrix gradient(design.basis->size(), eta.size());
   design.basis->EvaluateWithGradient(eta, phi, gradient);
   const Matrix by_own = gradient.rightCols(n_own_);
-  const Matrix inverse = Inverse(minima_.back().hessian) / noise_.misfit;
+  const Matrix inverse = Inverse(minima_.back().hessian);
   Vector spent(problem_.channels());
   for (int c = 0; c < problem_.channels(); ++c) {
     const Matrix& g = expansion_->sums()[static_cast<size_t>(c)].samples.G();
@@ -258,11 +270,15 @@ absl::Status Elimination::AddTo(EndedRuns& ended) const {
   const ExpansionDesign& design = expansion_->design();
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
                            CollocationMatrix::Factor(*ended.basis, points_));
-  Matrix along(points_.rows(), n_shared_ + n_own_);
-  along.leftCols(n_shared_) = points_;
+  // A polynomial path: at a bound of Ω the minima have a kink, which no terms would follow.
+  Matrix minima(points_.rows(), n_own_), path(ended.basis->size(), n_own_);
   for (Eigen::Index q = 0; q < points_.rows(); ++q) {
-    along.row(q).tail(n_own_) = minima_[static_cast<size_t>(q)].own.transpose();
+    minima.row(q) = minima_[static_cast<size_t>(q)].own.transpose();
   }
+  Vector kinks(n_own_);
+  matrix.Solve(minima, path, kinks);
+  Matrix along(points_.rows(), n_shared_ + n_own_);
+  along << points_, matrix.matrix() * path;
   Matrix phi;
   design.basis->EvaluateMany(along, phi);
   Matrix transfer(ended.basis->size(), phi.cols());
@@ -329,8 +345,11 @@ EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
   ended.outliers.assign(channels, 0);
   ended.remainder = Vector::Zero(ended.basis->size());
   ended.noise_scale.resize(problem.channels());
+  ended.noise_time_constant_s.resize(problem.channels());
   for (size_t c = 0; c < channels; ++c) {
-    ended.noise_scale[static_cast<Eigen::Index>(c)] = noise.channels[c].scale;
+    const auto channel = static_cast<Eigen::Index>(c);
+    ended.noise_scale[channel] = noise.channels[c].scale;
+    ended.noise_time_constant_s[channel] = noise.channels[c].time_constant_s;
   }
   return ended;
 }

@@ -6,10 +6,11 @@
 // deviations of its own germs:
 //   ξ_θ = centre + A η_θ,   ξ_φ = path(ξ_θ) + 4 spread η_φ.
 // At the collocation points of the shared germs the integrand's minimum and integral are found on
-// that expansion (run_marginal.h). If a minimum lies beyond the region, or the spread differs by
-// more than a factor 2, the run is expanded again about the path that was found. The expansion's
-// terms along the path, Φ_qs = φ_s(η_θq, η̂_φ(η_θq)), are fitted by the terms of the shared germs,
-// which takes the sums over to those: Φ ≈ A_θ T, T is S_θ × S.
+// that expansion (run_marginal.h). The path is the polynomial of the shared terms that fits the
+// minima best. If a minimum lies beyond the region, or the spread differs by more than a factor 2,
+// the run is expanded again about the path that was found. The expansion's terms along the path,
+// Φ_qs = φ_s(η_θq, path(η_θq)), are fitted by the terms of the shared germs, which takes the sums
+// over to those: Φ ≈ A_θ T, T is S_θ × S.
 
 #include <absl/status/statusor.h>
 

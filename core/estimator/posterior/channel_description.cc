@@ -42,7 +42,8 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
           : 1;
   channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
   channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
-  const double share = fitted * samples / static_cast<double>(request.record->samples());
+  const double share =
+      fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
   channel.lag1_correlation =
       std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
   channel.noise_time_constant_s = noise.time_constant_s;

@@ -5,10 +5,10 @@
 // From then on each run is eliminated at its end, about the region of the shared germs that the
 // ended runs have. It is valid near there only. When the posterior has contracted to less than half
 // a standard deviation in any direction, or has moved by more than 1½ of them, or the noise's scale
-// has changed by a quarter, all ended runs are eliminated again about the present posterior. As
-// standard deviations fall with 1/√R, this happens about whenever the number R of runs has grown
-// fourfold, and all eliminations together take at most 1 + ¼ + … = 4/3 as long as one of each run.
-// All of it is a function of the rows alone.
+// has changed by a quarter, or its correlation, all ended runs are eliminated again about the
+// present posterior. As standard deviations fall with 1/√R, this happens about whenever the number
+// R of runs has grown fourfold, and all eliminations together take at most 1 + ¼ + … = 4/3 as long
+// as one of each run. All of it is a function of the rows alone.
 
 #include <algorithm>
 #include <cmath>
@@ -61,6 +61,8 @@ bool HoldsWith(const EndedRuns& ended, const LearnedNoise& noise) {
   for (size_t c = 0; c < noise.channels.size(); ++c) {
     const double ratio = noise.channels[c].scale / ended.noise_scale[static_cast<Eigen::Index>(c)];
     if (ratio > kMostRescaled || ratio < 1 / kMostRescaled) return false;
+    const double before = ended.noise_time_constant_s[static_cast<Eigen::Index>(c)];
+    if (noise.channels[c].time_constant_s != before) return false;
   }
   return true;
 }

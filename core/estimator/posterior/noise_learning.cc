@@ -88,10 +88,10 @@ class Revision {
       const double share = fitted_ * static_cast<double>(sums.samples.count()) /
                            static_cast<double>(record_.samples());
       ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
-      // Runs that have been eliminated are whitened with the correlation learned until then.
-      const bool correlated =
-          model.correlation == NoiseCorrelation::kUnknown && problem_.ended_runs() == nullptr;
-      const bool weighted = model.outliers != OutlierHandling::kNone;
+      const bool correlated = model.correlation == NoiseCorrelation::kUnknown && MayRecorrelate(c);
+      // The likelihood of other time constants is not kept of runs that have been eliminated.
+      const bool weighted =
+          model.outliers != OutlierHandling::kNone || problem_.ended_runs() != nullptr;
       const bool together =
           correlated && !weighted && ReviseTimeConstant(c, sums, model.unknown, noise);
       if (model.unknown && !together) ReviseScale(c, sums, share, noise);
@@ -132,6 +132,15 @@ class Revision {
     starts.conservativeResize(2, Eigen::NoChange);
     starts.row(1) = etas.row(best);
     return starts;
+  }
+
+  // Runs that have been eliminated stay whitened as they were until they are again. Only then does
+  // the correlation left in the sums tell of the present time constant.
+  bool MayRecorrelate(int c) const {
+    const EndedRuns* ended = problem_.ended_runs();
+    if (ended == nullptr) return true;
+    const ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
+    return noise.white_share == 0 && noise.time_constant_s == ended->noise_time_constant_s[c];
   }
 
   void ReviseScale(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
@@ -211,7 +220,7 @@ class Revision {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const auto samples = static_cast<double>(sums.samples.count());
     if (channel.intervals == 0) return;
-    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share, samples);
+    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share + sums.spent, samples);
     const double present = channel.Correlation(noise);
     const double asked = CorrelationBehind(left, present);
     // The standard error of a correlation a is √((1 − a²)/N).

@@ -124,7 +124,13 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
   WindowAssessment assessment;
   assessment.widening = Vector::Ones(prior.dimension());
   assessment.doubtful.assign(static_cast<size_t>(prior.dimension()), false);
-  if (expansion.windows().count() == 0) return assessment;
+  if (expansion.windows().count() == 0) {
+    // After ended runs there are no windows, and the residuals alone tell of a wrong model.
+    assessment.contradicted =
+        problem.ended_runs() != nullptr && ResidualsContradict(problem, record, channels);
+    if (assessment.contradicted) Widen(LargestDispersion(problem, channels), assessment);
+    return assessment;
+  }
   const std::vector<WindowScore> windows = ScoresByWindow(expansion, prior, eta);
   const Matrix precision = PriorPrecision(prior);
   const double dispersion = LargestDispersion(problem, channels);

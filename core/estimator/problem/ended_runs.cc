@@ -70,6 +70,7 @@ bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
          std::ssize(ended.sums) == channels && std::ssize(ended.outliers) == channels &&
          IsFiniteMatrix(ended.discount, channels, 1) &&
          IsFiniteMatrix(ended.largest, channels, 1) && IsFiniteMatrix(ended.remainder, terms, 1) &&
+         IsFiniteMatrix(ended.noise_time_constant_s, channels, 1) &&
          IsFiniteMatrix(ended.noise_scale, channels, 1) && ended.noise_scale.minCoeff() > 0 &&
          std::isfinite(ended.own_error) && std::isfinite(ended.log_noise) &&
          std::isfinite(ended.log_variance);

@@ -5,16 +5,19 @@
 //
 // With θ the shared germs and φ_r those of run r, the posterior of θ and the present run needs of
 // every ended run only
-//   −log L_r(θ) = −log ∫ e^{−β J_r(θ, φ)} p(φ)^{α²} dφ.
+//   −log L_r(θ) = −log ∫ e^{−J_r(θ, φ)} p(φ)^{α²} dφ,
+// with the mismatch J_r of its rows and the α² that the problem gives.
 // The run's own parameters follow the shared ones along a path φ̂_r(θ), the minimum of the
 // integrand, so that its outputs become functions of θ alone, y_k(θ, φ̂_r(θ)) ≈ c_kᵀφ(η), over a
 // region of the shared germs. In these terms the run enters the mismatch sums as any other rows do,
 // channel by channel; for a linear model that is the Schur complement H_θθ − H_θφ H_φφ⁻¹ H_φθ. What
 // the path leaves out is a polynomial of θ, too,
-//   E_r(θ) = −log L_r(θ) − β J_r(θ, φ̂_r(θ)),
+//   E_r(θ) = −log L_r(θ) − J_r(θ, φ̂_r(θ)),
 // which is ½ log |H_φφ(θ)| − α² log p(φ̂_r(θ)) for a Gaussian integrand and found by quadrature
-// otherwise (expansion/run_elimination.h). The path has used up tr(H_φφ⁻¹ ∂_φᵀ G_c ∂_φ) degrees of
-// freedom of channel c, n_φ in all if the run's parameters are identified.
+// otherwise (expansion/run_elimination.h). A tempered likelihood has the power of J_r(θ, φ̂_r(θ))
+// alone: E_r is, but for a constant, that of a Gaussian integrand of any width. The path has used
+// up tr(H_φφ⁻¹ ∂_φᵀ G_c ∂_φ) degrees of freedom of channel c, n_φ in all if the run's parameters
+// are identified.
 //
 // The sums are in units of the noise with which they were taken. An expansion with a revised scale
 // rescales them; the path then is no longer the minimum, which changes the sums to second order
@@ -66,8 +69,9 @@ struct EndedRuns {
   std::vector<int64_t> outliers;
   Vector largest;
 
-  Vector remainder;    // coefficients of Σ_r E_r, S
-  Vector noise_scale;  // by channel: ChannelNoise::scale with which the sums were taken
+  Vector remainder;  // coefficients of Σ_r E_r, S
+  // By channel, the noise with which the sums were taken: ChannelNoise::scale and time_constant_s.
+  Vector noise_scale, noise_time_constant_s;
 
   int own_parameters() const;    // n_φ
   RunPath Path(size_t i) const;  // of run run[i]

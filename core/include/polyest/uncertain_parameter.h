@@ -48,7 +48,10 @@ struct UncertainParameter {
   double location = 0;                       // θ, or log θ, at ξ = 0
   double scale = 1;                          // dθ/dξ, or d log θ/dξ, > 0
   ParameterMap map = ParameterMap::kAffine;  // from ξ to θ
-  bool per_run = false;  // each run of the record has a value of its own, all with this prior
+  // Each run of the record has a value of its own, all with this prior. Those of runs that have
+  // ended are integrated out of the posterior once all would be more parameters than an expansion
+  // bears.
+  bool per_run = false;
 
   // Makes a normal prior. `std_dev` > 0, both in the parameter's unit.
   static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);

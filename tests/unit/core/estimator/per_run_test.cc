@@ -114,7 +114,9 @@ TEST(PerRun, HowARecordIsCutIntoBatchesDoesNotMatter) {
 }
 
 TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
-  const auto estimator = MakeEstimator(LineProblem());
+  Problem problem = LineProblem();
+  problem.expansion.adaptive = false;  // runs that have ended cannot be eliminated
+  const auto estimator = MakeEstimator(problem);
   EXPECT_EQ(EstimatorAccess::ProblemOf(*estimator).max_runs(),
             11);  // a and 11 values of b make 12.
   Samples samples;
@@ -128,6 +130,20 @@ TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   samples.run = {0, 10};
   EXPECT_TRUE(estimator->Append(samples).ok());
   EXPECT_EQ(EstimatorAccess::ProblemOf(*estimator).dimension(), 12);
+}
+
+TEST(PerRun, RunsThatShareNothingAreNotEliminated) {
+  Problem problem = LineProblem();
+  problem.uncertain[1].per_run = true;
+  EXPECT_EQ(ResolvedProblem::Make(problem)->max_runs(), 6);
+}
+
+TEST(PerRun, AnAdaptiveExpansionHasNoLimit) {
+  const ResolvedProblem problem = ResolvedProblem::Make(LineProblem()).value();
+  EXPECT_GT(problem.max_runs(), 1'000'000);
+  EXPECT_EQ(problem.max_joint_runs(), 11);
+  EXPECT_EQ(problem.AtRun(10)->dimension(), 12);
+  EXPECT_THAT(problem.AtRun(11)->prior().Names(), ElementsAre("b[11]", "a"));
 }
 
 TEST(PerRun, WithoutThemRunsAreUnlimited) {

@@ -178,6 +178,15 @@ TEST(Snapshot, HoldsParametersOfRuns) {
   EXPECT_THAT(outcome.estimates.back().parameters, SizeIs(5));
 }
 
+TEST(Snapshot, HoldsRunsWhoseParametersHaveBeenEliminated) {
+  Problem problem = OscillatorProblem();
+  problem.uncertain[1].per_run = true;
+  problem.measured[0].noise.unknown = true;
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord(16, 16), 37);
+  ASSERT_THAT(outcome.estimates.back().parameters, SizeIs(2));
+  EXPECT_EQ(outcome.estimates.back().parameters[1].name, "x0[15]");
+}
+
 TEST(Snapshot, HoldsWhereTheRunsAre) {
   for (const int rows : {20, 50}) {  // a run shorter than the interval, and longer
     const Outcome outcome =

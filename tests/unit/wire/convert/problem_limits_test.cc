@@ -78,10 +78,20 @@ TEST(ProblemLimits, BoundTheParametersThatComeWithRuns) {
   EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
   batch.add_run(2);
   EXPECT_EQ(RefusalOf(CheckRuns(limits, *resolved, batch))->limit, "--max-parameters");
+  // On the way to later runs the parameters of the first ones are together.
+  const ProblemLimits more{.parameters = 12};
+  for (const int run : {1'000, std::numeric_limits<int>::max() - 1}) {
+    batch.set_run(2, run);
+    EXPECT_EQ(RefusalOf(CheckRuns(limits, *resolved, batch))->limit, "--max-parameters");
+    EXPECT_TRUE(CheckRuns(more, *resolved, batch).ok());
+  }
   // The core itself refuses more runs than it can bear, and more than a number holds.
+  problem.mutable_expansion()->set_adaptive(false);
+  const auto fixed = ToProblem(problem, {}, limits);
+  ASSERT_TRUE(fixed.ok()) << fixed.status();
   for (const int run : {1'000, std::numeric_limits<int>::max()}) {
     batch.set_run(2, run);
-    EXPECT_TRUE(CheckRuns(limits, *resolved, batch).ok());
+    EXPECT_TRUE(CheckRuns(limits, *fixed, batch).ok());
   }
 }
 

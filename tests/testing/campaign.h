@@ -6,11 +6,13 @@
 // block.
 
 #include <cmath>
+#include <cstdint>
 #include <random>
+#include <utility>
 
 #include "core/common/linear_algebra.h"
 #include "core/model/equations/equation_model.h"
-#include "tests/unit/core/estimator/estimation.h"
+#include "polyest/estimator.h"
 
 namespace polyest::internal {
 
@@ -88,6 +90,7 @@ inline CampaignOracle OracleOf(const Samples& samples, double noise = Campaign::
     Matrix information = prior_information;
     Vector right = prior_information * (prior_mean - oracle.mode);
     double own = 0;
+    Vector follows(2);
     for (size_t first = 0; first < samples.rows(); first += Campaign::kRowsPerRun) {
       const Eigen::Map<const Vector> z(samples.columns[0].value.data() + first,
                                        Campaign::kRowsPerRun);
@@ -102,10 +105,13 @@ inline CampaignOracle OracleOf(const Samples& samples, double noise = Campaign::
       const double by_own =
           response.dot(residual) / noise / noise + kVelocityInformation * (1 - velocity);
       right += by_shared.transpose() * residual / noise / noise - both * by_own / own;
+      // ½ ∂ log H_vv
+      right -= slope.transpose() * response / noise / noise / own;
       oracle.last_velocity = velocity;
+      follows = both / own;
     }
     oracle.covariance = Inverse(information);
-    oracle.last_deviation = std::sqrt(1 / own);
+    oracle.last_deviation = std::sqrt(1 / own + follows.dot(oracle.covariance * follows));
     oracle.mode += oracle.covariance * right;
   }
   return oracle;
