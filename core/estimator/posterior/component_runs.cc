@@ -3,11 +3,11 @@
 // ones and those of the new run.
 //
 // From then on each run is eliminated at its end, about the region of the shared germs that the
-// ended runs have. It is valid near there only. When the posterior has contracted to less than half
-// a standard deviation in any direction, or has moved by more than 1½ of them, or the noise's scale
+// ended runs have. It is valid near there only. When the posterior has contracted to less than 0.7
+// standard deviations in any direction, or has moved by more than one of them, or the noise's scale
 // has changed by a quarter, or its correlation, all ended runs are eliminated again about the
 // present posterior. As standard deviations fall with 1/√R, this happens about whenever the number
-// R of runs has grown fourfold, and all eliminations together take at most 1 + ¼ + … = 4/3 as long
+// R of runs has doubled, and all eliminations together take about 1 + ½ + ¼ + … = 2 times as long
 // as one of each run. All of it is a function of the rows alone.
 
 #include <algorithm>
@@ -26,8 +26,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kContraction = 0.5;    // of a standard deviation
-constexpr double kMostMoved = 1.5;      // standard deviations
+constexpr double kContraction = 0.7;    // of a standard deviation
+constexpr double kMostMoved = 1;        // standard deviations
 constexpr double kMostRescaled = 1.25;  // factor of the noise's scale
 // The Gaussian at the minimum of the cost stands for the posterior where the gradient leaves no
 // more than this to be gained: the minimum is not at a bound.
