@@ -32,6 +32,15 @@ Matrix SpreadOf(const Matrix& covariance, const Vector& unit) {
   return Matrix(covariance.diagonal().cwiseMax(least.diagonal()).cwiseSqrt().asDiagonal());
 }
 
+void AddCountsTo(EndedRuns& ended, const AbsorbedRows& absorbed) {
+  ended.samples += absorbed.samples;
+  ended.discount += absorbed.discount;
+  ended.own_error += absorbed.own_error;
+  ended.log_noise += absorbed.log_noise;
+  ended.log_variance += absorbed.log_variance;
+  ended.largest = ended.largest.cwiseMax(absorbed.largest);
+}
+
 // One run, expanded about a path.
 class Elimination {
  public:
@@ -61,6 +70,7 @@ class Elimination {
   Vector StartAt(const ConstVectorRef& eta_shared) const;
   Vector SpentDegrees() const;
   Matrix BoxOfOwn() const;
+  Matrix AlongPath(CollocationMatrix& matrix) const;
   Vector Remainder(const Cost& cost, const RunMarginal& marginal,
                    const std::vector<ChannelSums>& sums, const Matrix& terms) const;
 
@@ -266,12 +276,10 @@ Vector Elimination::SpentDegrees() const {
   return spent;
 }
 
-absl::Status Elimination::AddTo(EndedRuns& ended) const {
-  const ExpansionDesign& design = expansion_->design();
-  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
-                           CollocationMatrix::Factor(*ended.basis, points_));
-  // A polynomial path: at a bound of Ω the minima have a kink, which no terms would follow.
-  Matrix minima(points_.rows(), n_own_), path(ended.basis->size(), n_own_);
+// Returns the points on the polynomial that fits the minima best: at a bound of Ω these have a
+// kink, which no terms would follow.
+Matrix Elimination::AlongPath(CollocationMatrix& matrix) const {
+  Matrix minima(points_.rows(), n_own_), path(matrix.terms(), n_own_);
   for (Eigen::Index q = 0; q < points_.rows(); ++q) {
     minima.row(q) = minima_[static_cast<size_t>(q)].own.transpose();
   }
@@ -279,8 +287,15 @@ absl::Status Elimination::AddTo(EndedRuns& ended) const {
   matrix.Solve(minima, path, kinks);
   Matrix along(points_.rows(), n_shared_ + n_own_);
   along << points_, matrix.matrix() * path;
+  return along;
+}
+
+absl::Status Elimination::AddTo(EndedRuns& ended) const {
+  const ExpansionDesign& design = expansion_->design();
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
+                           CollocationMatrix::Factor(*ended.basis, points_));
   Matrix phi;
-  design.basis->EvaluateMany(along, phi);
+  design.basis->EvaluateMany(AlongPath(matrix), phi);
   Matrix transfer(ended.basis->size(), phi.cols());
   Vector residual(phi.cols());
   matrix.Solve(phi, transfer, residual);
@@ -309,12 +324,7 @@ absl::Status Elimination::AddTo(EndedRuns& ended) const {
   Vector ignored(1);
   matrix.Solve(values, coefficients, ignored);
   ended.remainder += coefficients.col(0);
-  ended.samples += absorbed.samples;
-  ended.discount += absorbed.discount;
-  ended.own_error += absorbed.own_error;
-  ended.log_noise += absorbed.log_noise;
-  ended.log_variance += absorbed.log_variance;
-  ended.largest = ended.largest.cwiseMax(absorbed.largest);
+  AddCountsTo(ended, absorbed);
   return absl::OkStatus();
 }
 

@@ -192,7 +192,18 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(work, EliminateAll(*particles, stop, *ended));
   }
   next.set_ended_runs(std::move(ended));
-  const GermSummary shared = Shared(problem_, *posterior);
+  POLYEST_RETURN_IF_ERROR(GoOnWith(std::move(next), Shared(problem_, *posterior), stop));
+  abandoned_rows_ += work;
+  if (!holds) {
+    ++settlements_;
+    ++reexpansions_;
+  }
+  return absl::OkStatus();
+}
+
+// Goes on with a problem whose run has no rows yet; `shared` is the posterior of the shared germs.
+absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary& shared,
+                                        const Stop& stop) {
   const Matrix factor = FactorOf(shared.covariance);
   LearnedNoise noise = expansion_->noise().ForNewExpansion();
   if (noise.posterior.centre.size() > 0) {
@@ -210,11 +221,6 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
     return begun.status();
   }
   Adopt(*std::move(begun));
-  abandoned_rows_ += work;
-  if (!holds) {
-    ++settlements_;
-    ++reexpansions_;
-  }
   particles_ = std::move(draws);
   windows_from_ = patient_until_ = taken_;
   window_end_ = taken_ + 2;

@@ -106,6 +106,7 @@ class MixtureComponent {
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
   absl::Status BeginRunAlone(int run, const Stop& stop);
+  absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
   absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
   std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
   absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
