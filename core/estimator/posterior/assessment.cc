@@ -155,6 +155,9 @@ class Assessment {
     Cost stated = cost;
     stated.set_power(1);
     estimate_.cost = stated.Evaluate(eta);
+    if (problem_.ended_runs() == nullptr || !(regularization_ > 0)) return;
+    // What the parameters of ended runs add when they are integrated out counts with the prior.
+    estimate_.cost.prior = (estimate_.cost.total - estimate_.cost.mismatch) / regularization_;
   }
 
   // Reweights the draws by the model itself.
