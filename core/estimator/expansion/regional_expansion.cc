@@ -91,6 +91,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
     sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned && !found;
     sums.degrees_factor = DegreesFactor(model.outliers);
   }
+  next_row_ = problem_.first_row();
   LookFromPosterior();
   Linearize();
   TakeEndedRuns();

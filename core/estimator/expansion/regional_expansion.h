@@ -114,6 +114,8 @@ class RegionalExpansion {
   double Magnitude(int row, int channel) const;
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
+  // Sets the row of the store that is the first to be propagated; no row has been yet.
+  void BeginAt(int64_t row) { next_row_ = row; }
   // Ends the run absorbed so far. No more rows are absorbed then.
   void EndRun() { EndRunOfSums(); }
 

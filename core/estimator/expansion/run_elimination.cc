@@ -12,7 +12,6 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/run_marginal.h"
 #include "core/estimator/problem/truncation.h"
-#include "core/estimator/record/rows_ahead.h"
 
 namespace polyest::internal {
 namespace {
@@ -124,12 +123,13 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
   ExpansionDesign design =
       DesignForRegion(problem_, FirstTruncation(problem_.problem().expansion, problem_.dimension()),
                       std::move(region), inside);
-  POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, std::move(design),
+  POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, &store, std::move(design),
                                                                NoiseAbout(inside), threads));
+  expansion_->BeginAt(rows.first);
   RowBlock block;
   for (int64_t first = rows.first; first < rows.end; first += kRowsAtOnce) {
     const int64_t count = std::min(kRowsAtOnce, rows.end - first);
-    POLYEST_RETURN_IF_ERROR(ReadWithRowsAhead(store, first, count, problem_.knots_ahead(), block));
+    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     if (expansion_->fitted_rows() < block.count()) return expansion_->shortage();
     for (int row = 0; row < block.count(); ++row) expansion_->Absorb(row);
