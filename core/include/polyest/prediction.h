@@ -24,9 +24,9 @@
 namespace polyest {
 
 // Limits past which options are INVALID_ARGUMENT.
-inline constexpr int kMaxPredictionDraws = 10'000;
-inline constexpr int64_t kMaxPredictionRows = 1'000'000;
-inline constexpr int kMaxPredictionLags = 10'000;
+inline constexpr int kMaxPredictionDraws = 10'000;        // PredictionOptions::draws
+inline constexpr int64_t kMaxPredictionRows = 1'000'000;  // max_rows, and the number of times
+inline constexpr int kMaxPredictionLags = 10'000;         // PredictionOptions::lags
 // The most numbers in an answer: rows × outputs × numbers for each; past it RESOURCE_EXHAUSTED.
 inline constexpr int64_t kMaxPredictedValues = 10'000'000;
 
@@ -72,7 +72,7 @@ struct PredictedOutput {
   Vector measured;               // the samples; NaN where there is none
   Vector residual;               // measured − mean; NaN where there is no sample
   Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample
-  PredictionScore score;
+  PredictionScore score;         // over the whole record
 };
 
 // The prediction.

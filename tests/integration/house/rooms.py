@@ -27,7 +27,8 @@ PUBLIC = {
     "core/estimator/record": ["samples"],
     "core/estimator/posterior": ["posterior"],
     "core/estimator/studies": [
-        "cost_grid", "cost_profile", "experiment_design", "prior_propagation", "sensitivity"],
+        "cost_grid", "cost_profile", "experiment_design", "prediction", "prior_propagation",
+        "sensitivity"],
     "core/estimator": ["estimator"],
 }
 

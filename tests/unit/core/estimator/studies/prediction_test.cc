@@ -237,7 +237,8 @@ TEST(Prediction, DoesNotDependOnThreadsOrOnHowOftenItIsAsked) {
   const Samples record = InitialVelocityRecord({0.1, 0.2, 0.4, 0.7, 1.1}, 1.05, 0.01);
   std::vector<Vector> means;
   for (const int threads : {1, 2}) {
-    const auto estimator = MakeEstimator(problem, {.threads = threads, .store = {}, .snapshot = {}});
+    const auto estimator =
+        MakeEstimator(problem, {.threads = threads, .store = {}, .snapshot = {}});
     ASSERT_TRUE(estimator->Append(record).ok());
     ASSERT_TRUE(estimator->Process().ok());
     means.push_back(PredictionOf(*estimator, {}).outputs[0].mean);
