@@ -4,6 +4,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "polyest/model.h"
 #include "polyest/prediction.h"
 #include "polyest/v1/study_service.pb.h"
 
