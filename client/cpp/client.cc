@@ -216,7 +216,7 @@ absl::StatusOr<v1::Estimate> Client::GetEstimate(const v1::GetEstimateRequest& r
   return Call(sessions_.get(), &v1::SessionService::Stub::GetEstimate, request);
 }
 
-absl::StatusOr<v1::EstimateHistory> Client::GetHistory(const v1::GetHistoryRequest& request) {
+absl::StatusOr<v1::GetHistoryResponse> Client::GetHistory(const v1::GetHistoryRequest& request) {
   return Call(sessions_.get(), &v1::SessionService::Stub::GetHistory, request);
 }
 

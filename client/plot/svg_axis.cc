@@ -31,7 +31,7 @@ Axis MakeAxis(double lower, double upper, int count, double first_pixel, double 
   const double step = RoundStep((upper - lower) / count);
   const double largest = std::max(std::abs(lower), std::abs(upper));
   const int magnitude = static_cast<int>(std::floor(std::log10(largest)));
-  if (magnitude < -2 || magnitude > 5) axis.exponent = magnitude;
+  if (magnitude < -2 || magnitude > 4) axis.exponent = magnitude;
   const double unit = std::pow(10.0, axis.exponent);
   const int decimals =
       std::max(0, -static_cast<int>(std::floor(std::log10(step / unit * (1 + 1e-9)))));

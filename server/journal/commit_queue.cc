@@ -1,6 +1,7 @@
 #include "server/journal/commit_queue.h"
 
 #include <future>
+#include <iterator>
 #include <utility>
 
 #include "core/common/status.h"
@@ -36,6 +37,19 @@ void CommitQueue::Submit(Write write, Done done) {
   submitted_.notify_one();
 }
 
+void CommitQueue::SubmitLazily(Write write) {
+  const std::lock_guard lock(mutex_);
+  lazy_.push_back({std::move(write), [](const absl::Status&) {}});
+}
+
+void CommitQueue::Flush() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (lazy_.empty()) return;
+  }
+  Run([](SqliteDatabase&) { return absl::OkStatus(); }).IgnoreError();
+}
+
 absl::Status CommitQueue::Run(Write write) {
   std::promise<absl::Status> promise;
   auto outcome = promise.get_future();
@@ -56,6 +70,8 @@ std::vector<CommitQueue::Item> CommitQueue::Take() {
     items.push_back(std::move(queue_.front()));
     queue_.pop_front();
   }
+  std::move(lazy_.begin(), lazy_.end(), std::back_inserter(items));
+  lazy_.clear();
   return items;
 }
 

@@ -44,6 +44,11 @@ class CommitQueue {
 
   // Queues a write. Writes run in the order of the calls; any thread may call this.
   void Submit(Write write, Done done);
+  // Queues a write that nobody waits for: it goes into the next commit that there is anyway, or
+  // into one of its own at the end.
+  void SubmitLazily(Write write);
+  // Waits until lazy writes submitted so far are on disk, or could not be written.
+  void Flush();
   // Submits a write and waits for its outcome.
   absl::Status Run(Write write);
 
@@ -63,6 +68,7 @@ class CommitQueue {
   std::mutex mutex_;
   std::condition_variable submitted_;
   std::deque<Item> queue_;
+  std::vector<Item> lazy_;
   bool ending_ = false;
   std::jthread thread_;
 };

@@ -257,11 +257,9 @@ void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {
 }
 
 void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) {
-  queue_->Submit(
-      [session, point = std::move(point), stride](SqliteDatabase& database) {
-        return InsertHistoryPoint(database, session, point, stride);
-      },
-      [](const absl::Status&) {});
+  queue_->SubmitLazily([session, point = std::move(point), stride](SqliteDatabase& database) {
+    return InsertHistoryPoint(database, session, point, stride);
+  });
 }
 
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
@@ -327,6 +325,7 @@ absl::StatusOr<std::optional<JournalSnapshot>> SqliteJournal::ReadSnapshot(int64
 }
 
 absl::StatusOr<std::vector<JournalHistoryPoint>> SqliteJournal::ReadHistory(int64_t session) const {
+  queue_->Flush();
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   SqliteQuery query(

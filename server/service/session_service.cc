@@ -63,10 +63,11 @@ class SessionService final : public v1::SessionService::CallbackService {
   Unary* GetEstimate(Context* call, const v1::GetEstimateRequest* request,
                      v1::Estimate* response) override;
   Unary* GetHistory(Context* call, const v1::GetHistoryRequest* request,
-                    v1::EstimateHistory* response) override {
+                    v1::GetHistoryResponse* response) override {
     return OnStrand(call, "GetHistory", request->session(),
-                    [=](const std::shared_ptr<Session>& session, const Stop&) {
-                      return Deliver(session->History(), response);
+                    [=](const std::shared_ptr<Session>& session, const Stop&) -> absl::Status {
+                      POLYEST_ASSIGN_OR_RETURN(*response->mutable_history(), session->History());
+                      return absl::OkStatus();
                     });
   }
   grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>*

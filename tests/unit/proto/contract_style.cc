@@ -200,7 +200,8 @@ void ContractStyle::CheckMethod(const MethodDescriptor& method) {
        method.output_type()->FindFieldByName("next_page_token") == nullptr)) {
     Note(name, "has no pages");
   }
-  const bool computes = absl::StartsWith(name, "Compute");
+  // Predict computes, too; people know it by its short name.
+  const bool computes = absl::StartsWith(name, "Compute") || name == "Predict";
   if (computes != (method.service()->name() == "StudyService")) {
     Note(name, "computes, or is in StudyService, but not both");
   }

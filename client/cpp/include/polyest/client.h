@@ -70,7 +70,7 @@ class Client {
   // Computes what the posterior says of the signals, over the same record or another one.
   absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request);
   // Returns how a session's estimates came about.
-  absl::StatusOr<v1::EstimateHistory> GetHistory(const v1::GetHistoryRequest& request);
+  absl::StatusOr<v1::GetHistoryResponse> GetHistory(const v1::GetHistoryRequest& request);
   // Starts a computation that can be polled and cancelled.
   absl::StatusOr<v1::Operation> StartComputation(const v1::StartComputationRequest& request);
   // Returns the state of a computation, and its result when it is done.
