@@ -219,6 +219,7 @@ void FillDisk(Client& client, const v1::Problem& problem) {
       for (int i = 0; i < rows; ++i) {
         add.mutable_measurements()->add_time_s(0.001 * static_cast<double>(row + i));
         x.add_values(0.1);
+        x.add_missing(i);  // rows without samples are not worth computing
       }
       add.set_sequence(sequence + 1);
       added = client.AddMeasurements(add).status();
