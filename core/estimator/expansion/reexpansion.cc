@@ -7,6 +7,7 @@
 
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
+#include "core/estimator/expansion/overlooked_minima.h"
 #include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -19,6 +20,9 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 // larger error does not follow the model, and its ripples would be mistaken for pieces of the
 // posterior.
 constexpr double kMaxErrorOfRaised = 0.05;
+// Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
+// piece of the posterior to be found there.
+constexpr double kShareOfOverlooked = 0.03;
 constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
@@ -43,8 +47,9 @@ class Settler {
         continue;
       }
       if (!may_move) break;
+      if (Pays(RegionOfParticles(result_.particles))) POLYEST_RETURN_IF_ERROR(AddOverlooked());
       const Region region = RegionOfParticles(result_.particles);
-      if (region.LogVolume() >= std::log(kPays) + TrustedRegion(design).LogVolume()) {
+      if (!Pays(region)) {
         if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
         break;
       }
@@ -108,6 +113,29 @@ class Settler {
     particles_ = *std::move(particles);
     result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
     return true;
+  }
+
+  // Returns whether a contraction to the region saves enough.
+  bool Pays(const Region& region) const {
+    return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
+  }
+
+  // Puts particles at minima that a contraction to the region of the particles would lose.
+  absl::Status AddOverlooked() {
+    Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    cost.set_power(power_);
+    POLYEST_ASSIGN_OR_RETURN(
+        const ConfirmedMinima found,
+        OverlookedMinima(expansion(), cost, result_.particles, request_, stop_));
+    result_.propagated_rows += found.propagated_rows;
+    const auto each = static_cast<Eigen::Index>(
+        std::ceil(kShareOfOverlooked * static_cast<double>(result_.particles.rows())));
+    Eigen::Index row = result_.particles.rows();
+    for (Eigen::Index i = 0; i < found.points.rows() && row >= 2 * each; ++i) {
+      row -= each;
+      result_.particles.middleRows(row, each).rowwise() = found.points.row(i);
+    }
+    return absl::OkStatus();
   }
 
   // Returns false when the new expansion cannot be built; the present one then stays.

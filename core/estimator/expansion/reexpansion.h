@@ -6,11 +6,12 @@
 // A settlement samples the posterior on the present expansion and then moves the region as needed.
 // If particles lean on an edge of the region that is not an edge of Ω, that axis is widened and the
 // record is propagated again. If the region of the particles has less than half the volume of the
-// present one, the expansion moves there and the record is propagated again. This repeats until
-// neither is needed. If moving gains nothing, an expansion of automatic order stays in place and
-// tries higher orders; it takes the first one that follows the model there, if any. Each move
-// lowers the order by one. The region is derived from particles and never from a minimum and its
-// Hessian: in a direction that the data do not inform yet, the position of the minimum is
+// present one, the expansion moves there and the record is propagated again; particles are added
+// first at minima that the model confirms and the sampler overlooked (overlooked_minima.h). This
+// repeats until neither is needed. If moving gains nothing, an expansion of automatic order stays
+// in place and tries higher orders; it takes the first one that follows the model there, if any.
+// Each move lowers the order by one. The region is derived from particles and never from a minimum
+// and its Hessian: in a direction that the data do not inform yet, the position of the minimum is
 // arbitrary.
 
 #include <absl/status/statusor.h>
@@ -44,9 +45,8 @@ absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const Settle
                                   const Stop& stop);
 
 // Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
-// problem.first_row() on. Returns
-// FailedPrecondition when its collocation matrix cannot be factored or too few trajectories are
-// left.
+// problem.first_row() on. Returns FailedPrecondition when its collocation matrix cannot be factored
+// or too few trajectories are left.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
                                                           LearnedNoise noise,

@@ -18,8 +18,8 @@ namespace polyest::internal {
 // The integrand at one place of the shared germs.
 struct ConditionalMinimum {
   Vector own;  // η_φ of the minimum (n_φ)
-  Matrix
-      hessian;  // ∂²J/∂η_φ², n_φ × n_φ; positive definite, since a shift is added where it is not
+  // ∂²J/∂η_φ², n_φ × n_φ; positive definite, since a shift is added where it is not.
+  Matrix hessian;
   double value = 0;  // J there
 };
 

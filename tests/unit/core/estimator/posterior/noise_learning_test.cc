@@ -289,7 +289,8 @@ TEST(NoiseOfUnknownSize, LeavesAnAliasItsWeight) {
     return std::exp(-0.5 * z * z) / f;
   };
   const double weight = density(kTruth) / (density(kTruth) + density(kAlias));
-  for (uint64_t seed = 1; seed <= 4; ++seed) {
+  // With 219 and 253 the sampler puts hardly a particle at the alias while the noise is learned.
+  for (const uint64_t seed : {1, 2, 219, 253}) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal(0, 0.03);
     Problem problem = TextProblem("cos(2*pi*f*t)", {*frequency}, 1);

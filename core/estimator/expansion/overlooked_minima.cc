@@ -1,0 +1,123 @@
+#include "core/estimator/expansion/overlooked_minima.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "core/bayes/newton_starts.h"
+#include "core/common/status.h"
+#include "core/estimator/expansion/model_agreement.h"
+#include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/problem/truncation.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kStarts = 12;
+constexpr int kMostRuns = 6;  // of the model, at the lowest minima outside
+// How far the model's cost at such a minimum may be above its cost at the lowest one. The minimum
+// of an inaccurate expansion lies beside the model's, so that more than its weight is allowed for.
+constexpr double kMostAbove = 12;
+
+// Returns the model's cost at a point (local coordinates) from its χ² of each channel.
+double ModelCost(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta,
+                 const Vector& chi_squared) {
+  const double model = ModelMismatch(expansion, cost.BasisDifference(eta), chi_squared);
+  return cost.power() * model + cost.regularization() * cost.Evaluate(eta).prior;
+}
+
+// Returns the collocation points of least cost, by the model or by the expansion.
+Matrix StartsOf(const RegionalExpansion& expansion, const Cost& cost) {
+  const Matrix& points = expansion.design().points;
+  Vector least;
+  cost.EvaluateMany(points, least);
+  for (Eigen::Index q = 0; q < points.rows(); ++q) {
+    const Vector chi_squared = expansion.PointChiSquared().row(q).transpose();
+    const double model = chi_squared.allFinite()
+                             ? ModelCost(expansion, cost, points.row(q).transpose(), chi_squared)
+                             : kInfinity;
+    least[q] = std::fmin(std::fmin(least[q], model), kInfinity);
+  }
+  std::vector<Eigen::Index> order(static_cast<size_t>(points.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return least[a] < least[b]; });
+  order.resize(std::min<size_t>(kStarts, order.size()));
+  return points(order, Eigen::all);
+}
+
+// Returns the minima (local coordinates) that lie outside the region of the particles, the lowest
+// ones first, and before them the lowest of all.
+Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
+                        const Matrix& particles, const Stop& stop) {
+  const MinimizationProblem search = SearchOf(cost, expansion.design());
+  const MinimizerOptions options;
+  const Matrix starts = ImprovedStarts(cost, search, StartsOf(expansion, cost), options);
+  const std::vector<Minimum> minima = FindMinima(search, starts, options, stop);
+  const Region kept = RegionOfParticles(particles);
+  Matrix found(1, cost.dimension());
+  found.row(0) = minima.front().point.transpose();
+  for (const Minimum& minimum : minima) {
+    const Vector local = kept.ToLocal(expansion.design().region.ToGerm(minimum.point));
+    if (!minimum.converged || local.cwiseAbs().maxCoeff() <= 1) continue;
+    found.conservativeResize(found.rows() + 1, Eigen::NoChange);
+    found.bottomRows(1) = minimum.point.transpose();
+    if (found.rows() > kMostRuns) break;
+  }
+  return found;
+}
+
+// Runs the model at points (local coordinates of `present`, one row each) along the record. The
+// expansion that does so is of order 1, since its few collocation points serve for nothing.
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpansion& present,
+                                                            const Matrix& etas,
+                                                            const Vector& inside,
+                                                            const SettleRequest& request,
+                                                            const Stop& stop) {
+  Truncation truncation =
+      FirstTruncation(request.problem->problem().expansion, present.design().region.dimension());
+  truncation.order = 1;
+  ExpansionDesign design =
+      DesignForRegion(*request.problem, truncation, TrustedRegion(present.design()), inside);
+  design.element = present.design().element;
+  design.check_points = design.region.ManyToLocal(present.design().region.ManyToGerm(etas));
+  design.check_costs = Vector::Zero(etas.rows());
+  return Replay(*request.problem, std::move(design), present.noise().ForNewExpansion(),
+                *request.store, request.rows, request.threads, stop);
+}
+
+}  // namespace
+
+absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
+                                                 const Cost& cost, const Matrix& particles,
+                                                 const SettleRequest& request, const Stop& stop) {
+  ConfirmedMinima confirmed{.points = Matrix(0, cost.dimension())};
+  const Matrix etas = LowestAndOutside(expansion, cost, particles, stop);
+  POLYEST_RETURN_IF_ERROR(stop.Check());
+  if (etas.rows() == 1) return confirmed;
+  const Vector inside = particles.colwise().mean().transpose();
+  auto model = RunModel(expansion, etas, inside, request, stop);
+  if (absl::IsFailedPrecondition(model.status())) return confirmed;
+  if (!model.ok()) return model.status();
+  confirmed.propagated_rows = (*model)->propagated_rows();
+  const RegionalExpansion::Check checks = (*model)->Checks();
+  std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
+  for (size_t i = 0; i < costs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (!checks.valid[i]) continue;
+    costs[i] = ModelCost(expansion, cost, etas.row(row).transpose(),
+                         checks.chi_squared.row(row).transpose());
+  }
+  std::vector<Eigen::Index> rows;
+  const double limit = *std::min_element(costs.begin(), costs.end()) + kMostAbove;
+  for (size_t i = 1; i < costs.size(); ++i) {
+    if (costs[i] < kInfinity && costs[i] <= limit) rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  confirmed.points = expansion.design().region.ManyToGerm(etas(rows, Eigen::all));
+  return confirmed;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,27 @@
+#pragma once
+
+// Minima of the cost that particles of the posterior on an expansion overlook. An expansion over a
+// wide region has errors of its own, which can raise the cost at a narrow minimum until hardly a
+// particle is there. Before a region contracts, the model itself is run at such minima.
+
+#include <absl/status/statusor.h>
+
+#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/regional_expansion.h"
+
+namespace polyest::internal {
+
+struct ConfirmedMinima {
+  Matrix points;                // one row each, germ coordinates; usually none
+  int64_t propagated_rows = 0;  // by the model, to confirm them
+};
+
+// Returns the local minima of `cost`, the cost on `expansion`, that lie outside the region of the
+// particles (germ coordinates) and that the model confirms: there its own cost is at most 12 above
+// that at the lowest minimum. The model runs only if there are minima outside. Returns an error on
+// a stop request or when the store cannot be read.
+absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
+                                                 const Cost& cost, const Matrix& particles,
+                                                 const SettleRequest& request, const Stop& stop);
+
+}  // namespace polyest::internal
