@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/fit_plot.h"
+#include "client/cli/number_format.h"
 #include "client/cli/study_plots.h"
 #include "client/plot/colors.h"
 
@@ -20,7 +20,7 @@ constexpr int kMaxParameters = 8;  // of which ComputePosteriorRequest.all_joint
 LinePanel DensityPanel(const Posterior::Marginal& parameter) {
   LinePanel panel;
   panel.title = parameter.name();
-  panel.x_label = AxisLabel(parameter.name(), parameter.unit());
+  panel.x_label = NameWithUnit(parameter.name(), parameter.unit());
   BandSeries area{"", kBlue, {}, {}, {}};
   area.x.assign(parameter.value().begin(), parameter.value().end());
   area.lower.assign(area.x.size(), 0);
@@ -81,8 +81,8 @@ ContourPanel JointPanel(const Posterior& posterior, const Posterior::Joint& join
   }
   const Posterior::Marginal &first = posterior.parameters(across),
                             &second = posterior.parameters(up);
-  panel.x_label = AxisLabel(first.name(), first.unit());
-  panel.y_label = AxisLabel(second.name(), second.unit());
+  panel.x_label = NameWithUnit(first.name(), first.unit());
+  panel.y_label = NameWithUnit(second.name(), second.unit());
   panel.points = {{"mean", kOrange, first.mean(), second.mean()}};
   return panel;
 }

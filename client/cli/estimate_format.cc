@@ -13,8 +13,6 @@ namespace polyest::internal {
 namespace {
 
 // Returns the unit to print: an empty text for "1".
-std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
-
 std::string DiagnosticText(v1::Diagnostic::Code code) {
   switch (code) {
     case v1::Diagnostic::NOT_IDENTIFIED:

@@ -48,6 +48,20 @@ std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
   }
 }
 
+// Adds the channel's values in the first `rows` rows, with their times.
+void AddKnots(const v1::Measurements& measurements, const v1::Measurements::Channel& channel,
+              int rows, v1::Input::Table& table) {
+  auto missing = channel.missing().begin();
+  for (int row = 0; row < rows; ++row) {
+    if (missing != channel.missing().end() && *missing == row) {
+      ++missing;
+      continue;
+    }
+    table.add_time_s(measurements.time_s(row));
+    table.add_value(channel.values(row));
+  }
+}
+
 // Returns the problem with each streamed input replaced by a table of its values in the first run,
 // because the request for a design carries no data.
 v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& measurements) {
@@ -65,11 +79,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
     if (!streamed.hold()) {
       table.set_interpolation(preset ? v1::Input::CUBIC : streamed.interpolation());
     }
-    table.mutable_time_s()->Add(measurements.time_s().begin(),
-                                measurements.time_s().begin() + rows);
     for (const v1::Measurements::Channel& channel : measurements.channels()) {
-      if (channel.name() != input.name()) continue;
-      table.mutable_value()->Add(channel.values().begin(), channel.values().begin() + rows);
+      if (channel.name() == input.name()) AddKnots(measurements, channel, rows, table);
     }
   }
   return problem;

@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "client/cli/data_input.h"
 #include "client/cli/problem_input.h"
 #include "core/common/status.h"
+#include "core/model/unit_conversion.h"
 #include "polyest/client.h"
+#include "polyest/data_file.h"
+#include "proto/wire/convert/measurements.h"
 
 namespace polyest::internal {
 namespace {
@@ -17,35 +21,35 @@ bool StreamsInput(const v1::Problem& problem) {
                      [](const v1::Input& input) { return input.has_streamed(); });
 }
 
-v1::Measurements::Channel& ChannelOf(v1::Measurements& measurements, const std::string& name) {
-  for (v1::Measurements::Channel& channel : *measurements.mutable_channels()) {
-    if (channel.name() == name) return channel;
-  }
-  v1::Measurements::Channel& added = *measurements.add_channels();
-  added.set_name(name);
-  return added;
-}
-
-// Appends the rows of a batch that belong to run 0. Returns false if the batch has rows of a later
-// run. Batches may name their channels in any order, but each has all streamed inputs.
-bool AppendFirstRun(const v1::Problem& problem, const v1::Measurements& batch,
-                    v1::Measurements& measurements) {
-  int rows = 0;
-  while (rows < batch.time_s_size() && (batch.run().empty() || batch.run(rows) == 0)) ++rows;
-  measurements.mutable_time_s()->Add(batch.time_s().begin(), batch.time_s().begin() + rows);
+// Returns the streamed inputs in the first `rows` rows of a batch, in the model's units.
+absl::StatusOr<v1::Measurements> InputsOf(const v1::Problem& problem, const DataColumns& columns,
+                                          const v1::Measurements& batch, int rows) {
+  v1::Measurements inputs;
+  inputs.mutable_time_s()->Add(batch.time_s().begin(), batch.time_s().begin() + rows);
   for (const v1::Input& input : problem.inputs()) {
     if (!input.has_streamed()) continue;
     for (const v1::Measurements::Channel& channel : batch.channels()) {
       if (channel.name() != input.name()) continue;
-      ChannelOf(measurements, input.name())
-          .mutable_values()
-          ->Add(channel.values().begin(), channel.values().begin() + rows);
+      v1::Measurements::Channel& added = *inputs.add_channels();
+      added.set_name(input.name());
+      added.mutable_values()->Add(channel.values().begin(), channel.values().begin() + rows);
+      for (const int row : channel.missing()) {
+        if (row < rows) added.add_missing(row);
+      }
+      const auto unit = columns.units.find(input.name());
+      if (channel.unit().empty() || unit == columns.units.end()) continue;
+      POLYEST_ASSIGN_OR_RETURN(const UnitConversion conversion,
+                               ConvertUnit(channel.unit(), unit->second));
+      std::transform(added.values().begin(), added.values().end(), added.mutable_values()->begin(),
+                     conversion);
     }
   }
-  return rows == batch.time_s_size();
+  return inputs;
 }
 
-absl::StatusOr<v1::Measurements> FirstRunOf(Client& client, const v1::Session& session) {
+absl::StatusOr<v1::Measurements> FirstRunOf(Client& client, const v1::Session& session,
+                                            const Place& place) {
+  POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(session.problem(), place, {}));
   v1::Measurements measurements;
   bool ended = false;
   v1::ExportSessionRequest request;
@@ -53,7 +57,13 @@ absl::StatusOr<v1::Measurements> FirstRunOf(Client& client, const v1::Session& s
   const absl::Status exported =
       client.ExportSession(request, [&](const v1::SessionRecord& record) -> absl::Status {
         if (!record.has_batch()) return absl::OkStatus();
-        ended = !AppendFirstRun(session.problem(), record.batch().measurements(), measurements);
+        const v1::Measurements& batch = record.batch().measurements();
+        int rows = 0;
+        while (rows < batch.time_s_size() && (batch.run().empty() || batch.run(rows) == 0)) ++rows;
+        POLYEST_ASSIGN_OR_RETURN(const v1::Measurements inputs,
+                                 InputsOf(session.problem(), columns, batch, rows));
+        AppendRows(inputs, measurements);
+        ended = rows < batch.time_s_size();
         return ended ? absl::CancelledError("the first run is complete") : absl::OkStatus();
       });
   if (!exported.ok() && !ended) return exported;
@@ -74,7 +84,7 @@ absl::StatusOr<ExplainInput> ReadSession(const ExplainArguments& arguments) {
   input.rows = static_cast<int>(
       std::min<int64_t>(session.sample_count() / channels, std::numeric_limits<int>::max()));
   if (StreamsInput(session.problem())) {
-    POLYEST_ASSIGN_OR_RETURN(input.measurements, FirstRunOf(client, session));
+    POLYEST_ASSIGN_OR_RETURN(input.measurements, FirstRunOf(client, session, arguments.place));
   }
   return input;
 }

@@ -21,22 +21,12 @@ using Output = v1::PredictResponse::Output;
 
 constexpr int kShownLags = 3;
 
-absl::StatusOr<v1::Problem> ProblemOf(const FitArguments& arguments,
-                                      const v1::PredictRequest& request) {
-  if (arguments.session.empty()) return request.subject().experiment().problem();
-  Client client(arguments.place.server, ToClientOptions(arguments.place));
-  v1::GetSessionRequest get;
-  get.set_name(absl::StrCat("sessions/", arguments.session));
-  POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client.GetSession(get));
-  return session.problem();
-}
-
 absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::PredictRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   if (!arguments.validation_file.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ProblemOf(arguments, request));
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ProblemOf(request.subject(), arguments.place));
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem, arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
@@ -67,11 +57,11 @@ void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
     const v1::PredictResponse::Score& score = output.score();
     if (!output.has_score() || score.sample_count() == 0) {
       table.AddRow(
-          {output.output(), "0", "-", output.unit() == "1" ? "" : output.unit(), "-", "-", "-"});
+          {output.output(), "0", "-", UnitText(output.unit()), "-", "-", "-"});
       continue;
     }
     table.AddRow({output.output(), absl::StrCat(score.sample_count()),
-                  FormatNumber(score.root_mean_square()), output.unit() == "1" ? "" : output.unit(),
+                  FormatNumber(score.root_mean_square()), UnitText(output.unit()),
                   FormatPercent(score.coverage95()), absl::StrFormat("%.4f", score.log_score()),
                   FormatAutocorrelation(score)});
   }

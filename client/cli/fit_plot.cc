@@ -66,7 +66,7 @@ LinePanel FitPanel(const v1::PredictResponse& prediction, const Output& output) 
   LinePanel panel;
   panel.title = output.output();
   panel.x_label = "t (s)";
-  panel.y_label = AxisLabel(output.output(), output.unit());
+  panel.y_label = NameWithUnit(output.output(), output.unit());
   if (prediction.probabilities_size() >= 2) {
     if (!output.sample_quantiles().empty()) {
       panel.areas.push_back(Band(prediction, output.sample_quantiles()));
@@ -130,10 +130,6 @@ LinePanel AutocorrelationPanel(const Output& output) {
 }
 
 }  // namespace
-
-std::string AxisLabel(const std::string& name, const std::string& unit) {
-  return unit.empty() || unit == "1" ? name : absl::StrCat(name, " (", unit, ")");
-}
 
 Plot MakePlot(const v1::PredictResponse& prediction) {
   Plot plot;

@@ -10,7 +10,4 @@ namespace polyest::internal {
 // outermost of the probabilities bound the bands.
 Plot MakePlot(const v1::PredictResponse& prediction);
 
-// Returns "x (m)", or the name alone for a plain number.
-std::string AxisLabel(const std::string& name, const std::string& unit);
-
 }  // namespace polyest::internal

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/fit_plot.h"
+#include "client/cli/number_format.h"
 #include "client/plot/colors.h"
 
 namespace polyest::internal {
@@ -48,7 +48,7 @@ LinePanel ParameterPanel(const v1::EstimateHistory& history, const std::string& 
   LinePanel panel;
   panel.title = name;
   panel.x_label = over_time ? "t (s)" : "samples";
-  panel.y_label = AxisLabel(name, unit);
+  panel.y_label = NameWithUnit(name, unit);
   BandSeries band{"95 % interval", kBlue, {}, {}, {}};
   LineSeries mean{"estimate", kBlue, LineStyle::kSolid, {}, {}};
   for (const v1::EstimateHistory::Point& point : history.points()) {

@@ -56,6 +56,13 @@ std::string FormatExact(double value) {
   return std::string(text, result.ptr);
 }
 
+std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
+
+std::string NameWithUnit(const std::string& name, const std::string& unit) {
+  const std::string text = UnitText(unit);
+  return text.empty() ? name : absl::StrCat(name, " (", text, ")");
+}
+
 std::string FormatPercent(double probability) { return FormatNumber(100 * probability) + " %"; }
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Formats numbers for readers.
+// Formats numbers and their units for readers.
 
 #include <string>
 
@@ -16,6 +16,10 @@ std::string FormatUncertain(double value, double standard_deviation);
 std::string FormatNumber(double value, int digits = 4);
 // Returns a probability as "97.5 %".
 std::string FormatPercent(double probability);
+// Returns a unit as it is printed: nothing for the plain number's "1".
+std::string UnitText(const std::string& unit);
+// Returns "x (m)", or the name alone for a plain number.
+std::string NameWithUnit(const std::string& name, const std::string& unit);
 // Returns the shortest text that gives exactly the same number when read back.
 std::string FormatExact(double value);
 

@@ -81,7 +81,7 @@ void PrintTable(const v1::ComputePosteriorResponse& posterior, std::ostream& out
   for (const auto& parameter : posterior.parameters()) {
     const double sd = parameter.std_dev();
     std::vector<std::string> row = {parameter.name(), FormatUncertain(parameter.mean(), sd),
-                                    parameter.unit() == "1" ? "" : parameter.unit()};
+                                    UnitText(parameter.unit())};
     for (const double quantile : parameter.quantiles()) row.push_back(FormatValue(quantile, sd));
     row.push_back(Sketch(parameter.density()));
     row.push_back(absl::StrFormat("%.0f", parameter.effective_sample_size()));

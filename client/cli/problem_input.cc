@@ -2,9 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <utility>
+
 #include "client/cli/backend.h"
 #include "client/cpp/file_kind.h"
 #include "core/common/status.h"
+#include "polyest/client.h"
 #include "polyest/problem_file.h"
 #include "proto/wire/convert/problem.h"
 
@@ -37,6 +40,15 @@ absl::Status ReadProblemAndData(const std::string& problem_file, const std::stri
   POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(problem, place, options));
   POLYEST_ASSIGN_OR_RETURN(measurements, ReadData(data_file, columns));
   return absl::OkStatus();
+}
+
+absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place) {
+  if (subject.has_experiment()) return subject.experiment().problem();
+  Client client(place.server, ToClientOptions(place));
+  v1::GetSessionRequest get;
+  get.set_name(subject.session());
+  POLYEST_ASSIGN_OR_RETURN(v1::Session session, client.GetSession(get));
+  return std::move(*session.mutable_problem());
 }
 
 }  // namespace polyest::internal

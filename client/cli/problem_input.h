@@ -56,6 +56,9 @@ absl::Status FillInput(const Arguments& arguments, Request& request) {
                             DataOptionsOf(arguments));
 }
 
+// Returns the problem of a subject that FillInput has filled in; asks the daemon for a session's.
+absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place);
+
 // Returns the error with the name of the file in front, if it refuses a field of a file (InFile).
 // Errors about a session stay unchanged.
 template <typename Arguments>

@@ -47,8 +47,7 @@ void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& 
   for (const auto& profile : response.profiles()) {
     const int count = profile.value_size();
     const double range = count > 0 ? profile.value(count - 1) - profile.value(0) : 0;
-    const std::string unit = profile.unit() == "1" ? "" : absl::StrCat(" (", profile.unit(), ")");
-    std::vector<std::string> header = {profile.parameter() + unit, "cost above the least",
+    std::vector<std::string> header = {NameWithUnit(profile.parameter(), profile.unit()), "cost above the least",
                                        "mismatch", "prior"};
     for (const std::string& name : response.parameters()) {
       if (name != profile.parameter()) header.push_back(name);

@@ -31,8 +31,7 @@ absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArgument
 void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   const int quantiles = propagation.probabilities_size();
   for (const auto& output : propagation.outputs()) {
-    const std::string unit = output.unit() == "1" ? "" : absl::StrCat(" (", output.unit(), ")");
-    out << output.name() << unit << '\n';
+    out << NameWithUnit(output.name(), output.unit()) << '\n';
     std::vector<std::string> header = {"t (s)", "mean", "sd"};
     for (const double probability : propagation.probabilities()) {
       header.push_back(FormatPercent(probability));

@@ -36,10 +36,6 @@ absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& argumen
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 
-std::string WithUnit(const std::string& name, const std::string& unit) {
-  return unit == "1" ? name : absl::StrCat(name, " (", unit, ")");
-}
-
 // Formats the evidence relative to the greatest; a rounding error does not show as "-0.00".
 std::string FormatLogEvidence(double value) {
   return absl::StrFormat("%.2f", value > -5e-3 ? 0 : value);
@@ -57,7 +53,7 @@ void PrintChoice(const char* rule, const Sweep::Choice& choice, std::ostream& ou
 void PrintTable(const Sweep& sweep, std::ostream& out) {
   std::vector<std::string> header = {"α²", "mismatch", "prior", "fitted", "log evidence"};
   for (int i = 0; i < sweep.parameters_size(); ++i) {
-    header.push_back(WithUnit(sweep.parameters(i), sweep.units(i)));
+    header.push_back(NameWithUnit(sweep.parameters(i), sweep.units(i)));
   }
   TextTable table(std::move(header), TextTable::Align::kRight);
   for (const Sweep::Point& point : sweep.points()) {

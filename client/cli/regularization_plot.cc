@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "client/cli/number_format.h"
 #include "client/plot/colors.h"
 
 namespace polyest::internal {
@@ -73,10 +74,9 @@ LinePanel EvidencePanel(const Sweep& sweep) {
 }
 
 LinePanel ParameterPanel(const Sweep& sweep, int i) {
-  const std::string& unit = sweep.units(i);
   LinePanel panel = PanelOverWeight(
       sweep, sweep.parameters(i),
-      unit == "1" ? sweep.parameters(i) : absl::StrCat(sweep.parameters(i), " (", unit, ")"));
+      NameWithUnit(sweep.parameters(i), sweep.units(i)));
   LineSeries map{"estimate", kBlue, LineStyle::kSolid, {}, {}};
   LineSeries lower{"± stdDev", kBlue, LineStyle::kDotted, {}, {}};
   LineSeries upper{"", kBlue, LineStyle::kDotted, {}, {}};

@@ -11,21 +11,12 @@
 #include "client/cli/problem_input.h"
 #include "client/cli/report_page.h"
 #include "core/common/status.h"
-#include "polyest/client.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr int kHistoryPoints = 50;
 constexpr int kDensityBins = 60;
-
-absl::StatusOr<v1::Problem> ProblemOfSession(const ReportArguments& arguments) {
-  Client client(arguments.place.server, ToClientOptions(arguments.place));
-  v1::GetSessionRequest get;
-  get.set_name(absl::StrCat("sessions/", arguments.session));
-  POLYEST_ASSIGN_OR_RETURN(v1::Session session, client.GetSession(get));
-  return std::move(*session.mutable_problem());
-}
 
 // Computes what the report shows.
 absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent& content) {
@@ -60,13 +51,10 @@ absl::Status MakeReport(const ReportArguments& arguments) {
   v1::ComputeEstimateRequest input;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, input));
   ReportContent content;
-  if (arguments.session.empty()) {
-    content.subject = absl::StrCat(arguments.problem_file, ", ", arguments.data_file);
-    content.problem = input.subject().experiment().problem();
-  } else {
-    content.subject = absl::StrCat("session ", arguments.session);
-    POLYEST_ASSIGN_OR_RETURN(content.problem, ProblemOfSession(arguments));
-  }
+  content.subject = arguments.session.empty()
+                        ? absl::StrCat(arguments.problem_file, ", ", arguments.data_file)
+                        : absl::StrCat("session ", arguments.session);
+  POLYEST_ASSIGN_OR_RETURN(content.problem, ProblemOf(input.subject(), arguments.place));
   content.date = absl::FormatTime("%Y-%m-%d %H:%M UTC", absl::Now(), absl::UTCTimeZone());
   content.version = POLYEST_VERSION;
   const auto backend = MakeBackend(arguments.place);

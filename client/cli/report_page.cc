@@ -66,8 +66,6 @@ std::string Image(const Plot& plot) {
                       "\">\n");
 }
 
-std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
-
 std::string Parameters(const v1::Estimate& estimate) {
   std::vector<std::vector<std::string>> rows;
   std::vector<std::string> classes;

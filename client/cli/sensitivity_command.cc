@@ -55,8 +55,7 @@ std::vector<std::string> Row(const Analysis& analysis, const Analysis::Output& o
 }
 
 void PrintOutput(const Analysis& analysis, const Analysis::Output& output, std::ostream& out) {
-  const std::string unit = output.unit() == "1" ? "" : absl::StrCat(" (", output.unit(), ")");
-  out << output.name() << unit << '\n';
+  out << NameWithUnit(output.name(), output.unit()) << '\n';
   std::vector<std::string> header = {"t (s)", "mean", "sd", "residual"};
   for (const std::string& parameter : analysis.parameters()) {
     header.push_back(parameter);

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/fit_plot.h"
+#include "client/cli/number_format.h"
 #include "client/plot/colors.h"
 
 namespace polyest::internal {
@@ -23,7 +23,7 @@ LinePanel ProfilePanel(const v1::ComputeCostProfilesResponse& profiles,
                        const v1::ComputeCostProfilesResponse::Profile& profile) {
   LinePanel panel;
   panel.title = profile.parameter();
-  panel.x_label = AxisLabel(profile.parameter(), profile.unit());
+  panel.x_label = NameWithUnit(profile.parameter(), profile.unit());
   panel.y_label = "cost above its least";
   LineSeries total{"cost", kBlue, LineStyle::kSolid, {}, {}};
   for (int k = 0; k < profile.value_size(); ++k) {
@@ -41,7 +41,7 @@ LinePanel SpreadPanel(const Sensitivity& analysis, const Sensitivity::Output& ou
   LinePanel panel;
   panel.title = output.name();
   panel.x_label = "t (s)";
-  panel.y_label = AxisLabel(output.name(), output.unit());
+  panel.y_label = NameWithUnit(output.name(), output.unit());
   BandSeries band{"± standard deviation", kBlue, {}, {}, {}};
   LineSeries mean{"mean", kBlue, LineStyle::kSolid, {}, {}};
   for (int k = 0; k < analysis.time_s_size(); ++k) {
@@ -104,7 +104,7 @@ LinePanel DeviationPanel(const Design& design, int i) {
   panel.title = parameter.name();
   panel.x_label = "samples chosen";
   panel.y_label =
-      AxisLabel(absl::StrCat("standard deviation of ", parameter.name()), parameter.unit());
+      NameWithUnit(absl::StrCat("standard deviation of ", parameter.name()), parameter.unit());
   for (int c = 0; c < design.candidates_size(); ++c) {
     const Design::Candidate& candidate = design.candidates(c);
     LineSeries series{NameOf(candidate),

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/plot/svg_writer.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -25,12 +27,6 @@ const char* NameOf(Verdict verdict) {
   return "";
 }
 
-// Returns the number of code points of UTF-8 text, which is its width on a terminal.
-size_t Letters(std::string_view text) {
-  return std::count_if(text.begin(), text.end(),
-                       [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
-}
-
 // Returns "value ± deviation" with two significant digits of the deviation, but at least
 // `min_decimals` and at most 9 decimals.
 std::string WithDeviation(double value, double deviation, int min_decimals) {
@@ -45,13 +41,13 @@ using Row = std::vector<std::string>;
 void PrintTable(const std::vector<Row>& rows, std::ostream& out) {
   std::vector<size_t> widths(rows.front().size(), 0);
   for (const Row& row : rows) {
-    for (size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], Letters(row[c]));
+    for (size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], VisibleLength(row[c]));
   }
   for (const Row& row : rows) {
     std::string line = " ";
     for (size_t c = 0; c < row.size(); ++c) {
       absl::StrAppend(&line, " ", row[c]);
-      if (c + 1 < row.size()) line.append(widths[c] - Letters(row[c]) + 1, ' ');
+      if (c + 1 < row.size()) line.append(widths[c] - VisibleLength(row[c]) + 1, ' ');
     }
     out << line << "\n";
   }
@@ -65,17 +61,17 @@ std::vector<std::string> Words(const std::string& text) {
 // indented by its width.
 void PrintWrapped(const std::string& head, const std::string& text, std::ostream& out) {
   std::string line = head;
-  size_t length = Letters(head);
+  size_t length = VisibleLength(head);
   const size_t indent = length;
   for (const std::string& word : Words(text)) {
-    if (length > indent && length + Letters(word) > kLineWidth) {
+    if (length > indent && length + VisibleLength(word) > kLineWidth) {
       out << line << "\n";
       line.assign(indent, ' ');
       length = indent;
     }
     const bool first = length == indent;
     absl::StrAppend(&line, first ? "" : " ", word);
-    length += Letters(word) + (first ? 0 : 1);
+    length += VisibleLength(word) + (first ? 0 : 1);
   }
   out << line << "\n";
 }

@@ -19,9 +19,9 @@ constexpr double kBeyond = 2000;      // the farthest that a coordinate lies out
 constexpr char kGridColor[] = "#e6e6e6", kFrameColor[] = "#888888";
 
 double WidestText(const Axis& axis) {
-  double widest = 0;
+  size_t widest = 0;
   for (const AxisTick& tick : axis.ticks) widest = std::max(widest, VisibleLength(tick.text));
-  return kTickCharacter * widest;
+  return kTickCharacter * static_cast<double>(widest);
 }
 
 int TickCount(double length) { return std::clamp(static_cast<int>(length / kTickDistance), 2, 8); }

@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "core/common/status.h"
@@ -49,7 +50,10 @@ absl::Status Convert(std::string svg, std::string png) {
 }
 
 absl::Status WritePng(const std::string& text, const std::string& file) {
-  std::string svg = "/tmp/polyest_plot_XXXXXX";
+  std::error_code unknown;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(unknown);
+  if (unknown) folder = "/tmp";
+  std::string svg = folder / "polyest_plot_XXXXXX";
   const int descriptor = mkstemp(svg.data());
   if (descriptor < 0) {
     return absl::UnknownError(absl::StrCat("--plot: cannot write ", svg, ": ", strerror(errno)));

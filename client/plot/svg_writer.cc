@@ -79,10 +79,9 @@ void SvgWriter::Line(double x1, double y1, double x2, double y2, const SvgStroke
                   "\" y2=\"", Number(y2), "\"", StrokeAttributes(stroke), "/>\n");
 }
 
-double VisibleLength(std::string_view text) {
-  return static_cast<double>(std::count_if(text.begin(), text.end(), [](char c) {
-    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-  }));
+size_t VisibleLength(std::string_view text) {
+  return std::count_if(text.begin(), text.end(),
+                       [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
 }
 
 void SvgWriter::Area(const std::vector<std::array<double, 2>>& border, std::string_view fill,

@@ -49,8 +49,8 @@ class SvgWriter {
   int clips_ = 0;
 };
 
-// Returns the number of characters of a text in UTF-8.
-double VisibleLength(std::string_view text);
+// Returns the number of code points of a text in UTF-8, which is about its width.
+size_t VisibleLength(std::string_view text);
 
 // Returns the text for a node or an attribute: & < > " ' as entities, control characters as spaces.
 std::string EscapeXml(std::string_view text);

@@ -105,6 +105,11 @@ absl::Status InvalidField(const FieldPath& field, absl::string_view sentence) {
   return FieldError(absl::StatusCode::kInvalidArgument, field, sentence);
 }
 
+absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, int64_t most) {
+  if (value >= least && value <= most) return absl::OkStatus();
+  return InvalidField(field, absl::StrCat(value, " must be from ", least, " to ", most));
+}
+
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status) {
   return status.ok() ? status : WithField(status, field, /*shown=*/false);
 }

@@ -14,6 +14,7 @@
 #include <absl/strings/string_view.h>
 
 #include <concepts>
+#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <optional>
@@ -73,6 +74,8 @@ class FieldPath {
 absl::Status FieldError(absl::StatusCode code, const FieldPath& field, absl::string_view sentence);
 // Returns a FieldError with the code INVALID_ARGUMENT.
 absl::Status InvalidField(const FieldPath& field, absl::string_view sentence);
+// Returns OK for an integer from `least` to `most`, or an InvalidField that says so.
+absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, int64_t most);
 // Returns a status that refuses a field whose sentence already names the place ("row 3, column x:
 // …"): the path is in the payload only.
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status);

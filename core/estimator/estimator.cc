@@ -230,10 +230,10 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
   }
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem other,
                            problem_.WithRuns(problem_.per_run() ? std::max(0, last_run) + 1 : 1));
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked,
-                           SampleChecks(other).Check(*options.record));
+  const absl::StatusOr<CheckedSamples> checked = SampleChecks(other).Check(*options.record);
+  if (!checked.ok()) return OfRecord(checked.status());
   MemoryStore store;
-  POLYEST_RETURN_IF_ERROR(store.Append(checked));
+  POLYEST_RETURN_IF_ERROR(store.Append(*checked));
   POLYEST_RETURN_IF_ERROR(Validate(options, other, store.rows()));
   subject.thetas = ThetasOfOtherRuns(problem_, subject.thetas, other);
   subject.problem = &other;

@@ -5,47 +5,37 @@
 #include "proto/wire/convert/estimate.h"
 
 namespace polyest::internal {
+namespace {
+
+void AddPoint(const JournalHistoryPoint& point, v1::EstimateHistory& history) {
+  v1::EstimateHistory::Point parsed;
+  if (parsed.ParseFromString(point.point)) *history.add_points() = std::move(parsed);
+}
+
+}  // namespace
 
 EstimateHistory::EstimateHistory(const std::vector<JournalHistoryPoint>& kept) {
-  for (const JournalHistoryPoint& one : kept) {
-    Point point;
-    point.ordinal = one.ordinal;
-    if (point.point.ParseFromString(one.point)) points_.push_back(std::move(point));
-  }
-  Thin();
+  if (!kept.empty()) SetNewest(kept.back());
 }
 
 std::optional<JournalHistoryPoint> EstimateHistory::Add(const v1::Estimate& estimate) {
-  Point added{0, ToHistoryPoint(estimate)};
-  if (!points_.empty()) {
-    const Point& newest = points_.back();
-    if (estimate.sequence() <= newest.point.sequence()) return std::nullopt;
-    added.ordinal = newest.ordinal + 1;
-    if (newest.ordinal % stride_ != 0) points_.pop_back();
-  }
-  points_.push_back(std::move(added));
-  Thin();
-  const Point& newest = points_.back();
-  if (newest.ordinal % stride_ != 0) return std::nullopt;
-  return JournalHistoryPoint{newest.ordinal, newest.point.sequence(),
-                             newest.point.SerializeAsString()};
+  if (newest_ && estimate.sequence() <= newest_->sequence) return std::nullopt;
+  SetNewest({newest_ ? newest_->ordinal + 1 : 0, estimate.sequence(),
+             ToHistoryPoint(estimate).SerializeAsString()});
+  if (newest_->ordinal % stride_ != 0) return std::nullopt;
+  return newest_;
 }
 
-// Doubles the stride until all ordinals up to the newest have room.
-void EstimateHistory::Thin() {
-  if (points_.empty()) return;
-  const int64_t newest = points_.back().ordinal;
-  const int64_t before = stride_;
-  while (newest / stride_ >= kMaxPoints) stride_ *= 2;
-  if (stride_ == before) return;
-  std::erase_if(points_, [&](const Point& point) {
-    return point.ordinal % stride_ != 0 && point.ordinal != newest;
-  });
+void EstimateHistory::SetNewest(JournalHistoryPoint point) {
+  while (point.ordinal / stride_ >= kMaxPoints) stride_ *= 2;
+  newest_ = std::move(point);
 }
 
-v1::EstimateHistory EstimateHistory::Points() const {
+v1::EstimateHistory EstimateHistory::Points(const std::vector<JournalHistoryPoint>& kept) const {
   v1::EstimateHistory history;
-  for (const Point& point : points_) *history.add_points() = point.point;
+  for (const JournalHistoryPoint& point : kept) AddPoint(point, history);
+  const int64_t last = kept.empty() ? -1 : kept.back().ordinal;
+  if (newest_ && newest_->ordinal > last) AddPoint(*newest_, history);
   return history;
 }
 

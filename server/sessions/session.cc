@@ -243,10 +243,8 @@ absl::Status Session::LoadHistory() {
 
 absl::StatusOr<v1::EstimateHistory> Session::History() {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
-  POLYEST_RETURN_IF_ERROR(LoadHistory());
-  v1::EstimateHistory history = history_->Points();
-  if (!loaded()) history_.reset();
-  return history;
+  POLYEST_ASSIGN_OR_RETURN(const auto kept, services_.journal.ReadHistory(number()));
+  return history_.value_or(EstimateHistory()).Points(kept);
 }
 
 void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration duration) {

@@ -173,7 +173,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Used on the strand only.
   SharedEstimate passed_on_;                // the last estimate given to the observers
-  std::optional<EstimateHistory> history_;  // not in memory until it is used
+  std::optional<EstimateHistory> history_;  // none until an estimate is passed on
 
   std::atomic<bool> closed_ = false;
   WriterLease writer_;

@@ -213,18 +213,7 @@ absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary&
   ExpansionDesign design =
       DesignAfterEndedRuns(next, shared.mean, factor, expansion_->design().element);
   Matrix draws = DrawsForNewRun(next, shared.mean, factor, kDrawsToBegin).etas;
-  std::swap(problem_, next);  // the object stays in place, since expansions refer to it
-  auto begun =
-      Replay(problem_, std::move(design), std::move(noise), *store_, taken_, threads_, stop);
-  if (!begun.ok()) {
-    std::swap(problem_, next);
-    return begun.status();
-  }
-  Adopt(*std::move(begun));
-  particles_ = std::move(draws);
-  windows_from_ = patient_until_ = taken_;
-  window_end_ = taken_ + 2;
-  return absl::OkStatus();
+  return ReplayAs(std::move(next), std::move(design), std::move(noise), std::move(draws), stop);
 }
 
 }  // namespace polyest::internal

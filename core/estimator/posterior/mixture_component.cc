@@ -104,11 +104,19 @@ absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   noise.posterior = SummaryForNewRuns(grown, noise.posterior);
   noise.centre.resize(0);
   Matrix particles = ParticlesForNewRuns(grown, particles_);
-  std::swap(problem_, grown);  // the object stays in place, since expansions refer to it
+  return ReplayAs(std::move(grown), std::move(design), std::move(noise), std::move(particles),
+                  stop);
+}
+
+// Propagates the record so far again for a problem with other runs, whose particles are given.
+// Leaves everything as it is if that fails.
+absl::Status MixtureComponent::ReplayAs(ResolvedProblem problem, ExpansionDesign design,
+                                        LearnedNoise noise, Matrix particles, const Stop& stop) {
+  std::swap(problem_, problem);  // the object stays in place, since expansions refer to it
   auto replayed =
       Replay(problem_, std::move(design), std::move(noise), *store_, taken_, threads_, stop);
   if (!replayed.ok()) {
-    std::swap(problem_, grown);
+    std::swap(problem_, problem);
     return replayed.status();
   }
   Adopt(*std::move(replayed));

@@ -106,6 +106,8 @@ class MixtureComponent {
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
   absl::Status BeginRunAlone(int run, const Stop& stop);
+  absl::Status ReplayAs(ResolvedProblem problem, ExpansionDesign design, LearnedNoise noise,
+                        Matrix particles, const Stop& stop);
   absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
   absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
   std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;

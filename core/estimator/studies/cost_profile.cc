@@ -204,11 +204,7 @@ absl::Status Validate(const ProfileOptions& options, const Prior& prior) {
                         absl::StrFormat("\"%s\" is not among the uncertain parameters %s",
                                         options.parameters[i], absl::StrJoin(names, ", ")));
   }
-  if (options.points < 3 || options.points > kMaxProfilePoints) {
-    return InvalidField(
-        "points", absl::StrFormat("%d must be from 3 to %d", options.points, kMaxProfilePoints));
-  }
-  return absl::OkStatus();
+  return CheckRange("points", options.points, 3, kMaxProfilePoints);
 }
 
 absl::StatusOr<CostProfiles> ProfileCost(const Assessed& assessed, const Cost& cost,

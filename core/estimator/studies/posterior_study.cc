@@ -26,11 +26,6 @@ int Find(const Prior& prior, const std::string& name) {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
-absl::Status CheckRange(const char* field, int value, int least, int most) {
-  if (value >= least && value <= most) return absl::OkStatus();
-  return InvalidField(field, absl::StrFormat("%d must be from %d to %d", value, least, most));
-}
-
 absl::Status CheckJoint(const Prior& prior, size_t index,
                         const std::pair<std::string, std::string>& joint) {
   for (const std::string& name : {joint.first, joint.second}) {

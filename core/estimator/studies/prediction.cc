@@ -22,11 +22,6 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr Eigen::Index kLeastDraws = 2;
 
-absl::Status CheckWithin(const char* field, int64_t value, int64_t least, int64_t most) {
-  if (value >= least && value <= most) return absl::OkStatus();
-  return InvalidField(field, absl::StrFormat("%d must be from %d to %d", value, least, most));
-}
-
 // Returns the measured output that reads the model's output `column`; −1 if none does.
 int ChannelOf(const ResolvedProblem& problem, int column) {
   const auto found = std::find(problem.outputs().begin(), problem.outputs().end(), column);
@@ -113,6 +108,7 @@ class OutputPrediction {
   // Relative noise before any signal: a sample of 0 is exact and says nothing.
   void DescribeExactSample(Eigen::Index place) {
     result_.sample_std_dev[place] = result_.std_dev[place];
+    result_.standardized_residual[place] = 0;
     result_.sample_quantiles.row(place) = result_.quantiles.row(place);
   }
 
@@ -188,10 +184,10 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
     return InvalidField(FieldPath{"probabilities", i},
                         absl::StrFormat("%g must lie between 0 and 1", options.probabilities[i]));
   }
-  POLYEST_RETURN_IF_ERROR(CheckWithin("draws", options.draws, kLeastDraws, kMaxPredictionDraws));
-  POLYEST_RETURN_IF_ERROR(CheckWithin("max_rows", options.max_rows, 1, kMaxPredictionRows));
-  POLYEST_RETURN_IF_ERROR(CheckWithin("lags", options.lags, 0, kMaxPredictionLags));
-  POLYEST_RETURN_IF_ERROR(CheckWithin("times", std::ssize(options.times), 0, kMaxPredictionRows));
+  POLYEST_RETURN_IF_ERROR(CheckRange("draws", options.draws, kLeastDraws, kMaxPredictionDraws));
+  POLYEST_RETURN_IF_ERROR(CheckRange("max_rows", options.max_rows, 1, kMaxPredictionRows));
+  POLYEST_RETURN_IF_ERROR(CheckRange("lags", options.lags, 0, kMaxPredictionLags));
+  POLYEST_RETURN_IF_ERROR(CheckRange("times", std::ssize(options.times), 0, kMaxPredictionRows));
   const int64_t times =
       options.times.empty() ? std::min(rows, options.max_rows) : std::ssize(options.times);
   const int64_t numbers = times * std::ssize(columns) * NumbersPerTime(options);
@@ -220,6 +216,12 @@ Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
     if (!given[i].per_run) result.col(column) = thetas.col(column);
   }
   return result;
+}
+
+absl::Status OfRecord(const absl::Status& status) {
+  return RenameFields(status, [](const std::string& name) {
+    return name == "measurements" ? std::string("record") : name;
+  });
 }
 
 std::vector<PredictedNoise> NoiseOf(const Assessed& assessed, const RecordSummary& record,

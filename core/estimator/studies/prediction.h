@@ -22,6 +22,10 @@ namespace polyest::internal {
 absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& problem,
                       int64_t rows);
 
+// Returns a refusal of measurements as one of the record to predict: its path begins with "record"
+// in place of "measurements".
+absl::Status OfRecord(const absl::Status& status);
+
 // The noise of a new sample of one measured output, as the estimate has it.
 struct PredictedNoise {
   double scale = 1;  // σ in units of NoiseModel::StandardDeviation; 0: not known yet

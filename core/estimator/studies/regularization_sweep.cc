@@ -59,11 +59,7 @@ absl::Status RegularizationOptions::Validate() const {
   if (!(lowest < highest)) {
     return InvalidField("lowest", absl::StrFormat("%g must be below highest, %g", lowest, highest));
   }
-  if (points < 2 || points > kMaxRegularizations) {
-    return InvalidField("points",
-                        absl::StrFormat("%d must be from 2 to %d", points, kMaxRegularizations));
-  }
-  return absl::OkStatus();
+  return CheckRange("points", points, 2, kMaxRegularizations);
 }
 
 }  // namespace polyest

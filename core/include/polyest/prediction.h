@@ -71,7 +71,8 @@ struct PredictedOutput {
   Matrix sample_quantiles;       // of a new sample, times × probabilities
   Vector measured;               // the samples; NaN where there is none
   Vector residual;               // measured − mean; NaN where there is no sample
-  Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample
+  Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample, 0 where a
+                                 // sample has no noise, such as a 0 of relative noise
   PredictionScore score;         // over the whole record
 };
 

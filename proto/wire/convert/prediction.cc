@@ -5,6 +5,7 @@
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/estimator/studies/prediction.h"
 #include "proto/wire/convert/estimate.h"
 #include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/repeated.h"
@@ -22,10 +23,7 @@ void AddSamples(const PredictedOutput& output, Output& proto) {
     proto.add_measured_rows(static_cast<int32_t>(k));
     proto.add_measured(output.measured[k]);
     proto.add_residual(output.residual[k]);
-    if (!standardized) continue;
-    // A sample that has no noise, such as a 0 of relative noise, has no standardized residual.
-    const double value = output.standardized_residual[k];
-    proto.add_standardized_residual(std::isnan(value) ? 0 : value);
+    if (standardized) proto.add_standardized_residual(output.standardized_residual[k]);
   }
 }
 
@@ -64,7 +62,7 @@ absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& 
   if (request.lag_count() != 0) options.lags = request.lag_count();
   if (request.has_record()) {
     absl::StatusOr<Samples> record = ToSamples(request.record(), model);
-    if (!record.ok()) return Within({"record"}, record.status());
+    if (!record.ok()) return OfRecord(record.status());
     options.record = *std::move(record);
     options.record->end_of_run = true;
   }

@@ -28,7 +28,10 @@ const Names kNamesOfMeasurements{{"columns", "channels"}, {"value", "values"}};
 const Names kNoOtherNames;
 
 const Names& OtherNames(const FieldPath& field) {
-  if (field.steps().front() == FieldStep("measurements")) return kNamesOfMeasurements;
+  const FieldStep& first = field.steps().front();
+  if (first == FieldStep("measurements") || first == FieldStep("record")) {
+    return kNamesOfMeasurements;
+  }
   return field.steps().size() == 1 ? kNamesOfRequests : kNoOtherNames;
 }
 

@@ -121,6 +121,29 @@ TEST_F(SessionsTest, AreExplainedWithTheInputsTheyStreamed) {
   EXPECT_EQ(session.out, Run({"explain", problem, data}).out);
 }
 
+// The input's cells are empty in every other row.
+TEST_F(SessionsTest, AreExplainedWithInputsThatHaveTimesOfTheirOwn) {
+  const std::string problem = File("p.json", R"({
+    "model": {"builtin": "linear_two_state"},
+    "uncertain": [{"name": "theta", "normal": {"mean": 1, "stdDev": 0.2}}],
+    "measured": [{"output": "x1_minus_x2", "noise": {"absolute": 100}}],
+    "inputs": [{"name": "u1", "streamed": {}}]
+  })");
+  std::string every = "t,x1_minus_x2,u1\n", some = every;
+  for (int i = 1; i <= 60; ++i) {
+    const std::string begin = std::to_string(0.04 * i) + ",0,";
+    const std::string value = std::to_string(2 - 0.01 * i) + "\n";
+    every += begin + value;
+    some += begin + (i % 2 == 1 || i == 60 ? value : "\n");
+  }
+  ASSERT_EQ(Ask({"stream", problem, File("some.csv", some), "--session", "sparse"}).exit_status, 0);
+  const Finished session = Ask({"explain", "--session", "sparse"});
+  EXPECT_EQ(session.exit_status, 0) << session.err;
+  // The input is the same straight line either way.
+  EXPECT_EQ(session.out, Run({"explain", problem, File("every.csv", every)}).out);
+  EXPECT_EQ(session.out, Run({"explain", problem, File("some.csv", some)}).out);
+}
+
 TEST_F(SessionsTest, ThatAreNotThereAreNamed) {
   for (const std::vector<std::string>& command : {std::vector<std::string>{"watch", "nowhere"},
                                                   {"posterior", "--session", "nowhere"},

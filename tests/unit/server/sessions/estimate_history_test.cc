@@ -38,7 +38,7 @@ TEST(EstimateHistory, StaysSmallAndEvenlySpacedHoweverManyEstimatesThereAre) {
     kept.Save(point, history.stride());
     ASSERT_LE(std::ssize(kept.points()), EstimateHistory::kMaxPoints);
   }
-  const v1::EstimateHistory points = history.Points();
+  const v1::EstimateHistory points = history.Points(kept.points());
   EXPECT_GE(points.points_size(), EstimateHistory::kMaxPoints / 2);
   EXPECT_EQ(points.points(0).sequence(), 1);
   EXPECT_EQ(points.points(points.points_size() - 1).sequence(), kEstimates);
@@ -51,24 +51,24 @@ TEST(EstimateHistory, StaysSmallAndEvenlySpacedHoweverManyEstimatesThereAre) {
   // What is restored continues in the same way.
   EstimateHistory restored(kept.points());
   EXPECT_EQ(restored.stride(), history.stride());
-  EXPECT_EQ(restored.Points().points(0).sequence(), 1);
+  EXPECT_EQ(restored.Points(kept.points()).points(0).sequence(), 1);
   const auto point = restored.Add(EstimateOfBatch(kEstimates + 1));
   kept.Save(point, restored.stride());
-  EXPECT_EQ(restored.Points().points().rbegin()->sequence(), kEstimates + 1);
+  EXPECT_EQ(restored.Points(kept.points()).points().rbegin()->sequence(), kEstimates + 1);
   ASSERT_LE(std::ssize(kept.points()), EstimateHistory::kMaxPoints);
 }
 
 TEST(EstimateHistory, AddsNoEstimateTwice) {
   EstimateHistory history;
-  EXPECT_TRUE(history.Add(EstimateOfBatch(4)).has_value());
-  EXPECT_FALSE(history.Add(EstimateOfBatch(4)).has_value());
-  EXPECT_FALSE(history.Add(EstimateOfBatch(3)).has_value());
-  EXPECT_EQ(history.Points().points_size(), 1);
+  Kept kept;
+  for (const int64_t batch : {4, 4, 3}) kept.Save(history.Add(EstimateOfBatch(batch)), 1);
+  EXPECT_EQ(kept.saved(), 1);
+  EXPECT_EQ(history.Points(kept.points()).points_size(), 1);
 }
 
 TEST(EstimateHistory, LeavesOutWhatCannotBeRead) {
-  const EstimateHistory history({{0, 1, "\xFF\xFF"}});
-  EXPECT_EQ(history.Points().points_size(), 0);
+  const std::vector<JournalHistoryPoint> kept = {{0, 1, "\xFF\xFF"}};
+  EXPECT_EQ(EstimateHistory(kept).Points(kept).points_size(), 0);
 }
 
 }  // namespace
