@@ -139,9 +139,12 @@ TEST_F(SessionsTest, AreExplainedWithInputsThatHaveTimesOfTheirOwn) {
   ASSERT_EQ(Ask({"stream", problem, File("some.csv", some), "--session", "sparse"}).exit_status, 0);
   const Finished session = Ask({"explain", "--session", "sparse"});
   EXPECT_EQ(session.exit_status, 0) << session.err;
-  // The input is the same straight line either way.
-  EXPECT_EQ(session.out, Run({"explain", problem, File("every.csv", every)}).out);
-  EXPECT_EQ(session.out, Run({"explain", problem, File("some.csv", some)}).out);
+  // The input is the same straight line either way. The session has not taken its last rows into
+  // account, since further knots could change the input there.
+  const std::string remedy = Lines(session.out).back();
+  EXPECT_THAT(remedy, HasSubstr("would determine theta to"));
+  EXPECT_EQ(remedy, Lines(Run({"explain", problem, File("every.csv", every)}).out).back());
+  EXPECT_EQ(remedy, Lines(Run({"explain", problem, File("some.csv", some)}).out).back());
 }
 
 TEST_F(SessionsTest, ThatAreNotThereAreNamed) {
