@@ -34,8 +34,9 @@ DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRe
 JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
                                   const ConstVectorRef& weights, int bins);
 
-// Returns the rows of `count` equally weighted draws among the weighted ones, by systematic
-// resampling with evenly spaced pointers: deterministic, and each draw as often as its weight says.
+// Returns the rows, in ascending order, of `count` equally weighted draws among the weighted ones:
+// by systematic resampling with evenly spaced pointers after a shuffle, so that each draw is taken
+// as often as its weight says, whatever order the draws are in. Deterministic.
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count);
 
 }  // namespace polyest::internal
