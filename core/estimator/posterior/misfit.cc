@@ -20,6 +20,22 @@ bool IsTested(const ResolvedProblem& problem, size_t channel) {
   return !noise.unknown && noise.outliers == OutlierHandling::kNone;
 }
 
+// Returns two starts for the minimizer: the region's reference, and the collocation point of least
+// cost, since the reference may be a stationary point that is no minimum, such as v = 0 for the
+// output v².
+Matrix StartsOf(const Cost& cost, const ExpansionDesign& design) {
+  Vector costs;
+  cost.EvaluateMany(design.points, costs);
+  Eigen::Index least = 0;
+  for (Eigen::Index q = 1; q < costs.size(); ++q) {
+    if (costs[q] < costs[least]) least = q;
+  }
+  Matrix starts(2, design.reference.size());
+  starts.row(0) = design.reference.transpose();
+  starts.row(1) = design.points.row(least);
+  return starts;
+}
+
 // Returns by how much χ² would fall, to second order, if the prior let the parameters go: gᵀ H⁻¹ g
 // with the gradient g of J_prior and the Hessian H of the mismatch.
 double HeldByPrior(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta) {
@@ -51,8 +67,7 @@ MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& 
   if (!(degrees > 0)) return {};
   const ExpansionDesign& design = expansion.design();
   const Minimum minimum =
-      FindMinima(SearchOf(cost, design), design.reference.transpose(), MinimizerOptions(), stop)
-          .front();
+      FindMinima(SearchOf(cost, design), StartsOf(cost, design), MinimizerOptions(), stop).front();
   const Vector d = cost.BasisDifference(minimum.point);
   double chi_squared = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {

@@ -6,6 +6,7 @@
 
 #include "tests/testing/oscillator.h"
 #include "tests/unit/core/estimator/estimation.h"
+#include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal {
 namespace {
@@ -43,6 +44,18 @@ TEST(Misfit, WidensTheUncertaintyToTheResiduals) {
     EXPECT_GT(ratio, 0.8);
     EXPECT_LT(ratio, 2);
   }
+}
+
+// The gradient of a cost over v² vanishes at v = 0, the prior's mean, where the residuals are
+// large.
+TEST(Misfit, IsNotSeenAtAStationaryPointThatIsNoMinimum) {
+  const auto estimator =
+      Processed(TextProblem("v^2", {*UncertainParameter::Uniform("v", -3, 3)}, 0.05),
+                {1.02, 0.97, 1.01, 0.99});
+  const ParameterEstimate v = estimator->CurrentEstimate().value().parameters[0];
+  EXPECT_NEAR(std::abs(v.map), 1, 0.02);
+  EXPECT_NEAR(v.std_dev, 0.05 / std::sqrt(4) / 2, 0.001);  // σ ÷ √N ÷ |∂(v²)/∂v|
+  EXPECT_NEAR(v.mean, 0, 0.05);                            // of both signs
 }
 
 }  // namespace
