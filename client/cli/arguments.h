@@ -158,6 +158,14 @@ struct FitArguments {
   Format format = Format::kTable;
 };
 
+struct CompareArguments {
+  Place place;
+  std::vector<std::string> files;  // at least two problems, then the data
+  DataFileOptions data_options;
+  double held_out = 0.3;  // fraction of the rows, in (0, 1)
+  Format format = Format::kTable;
+};
+
 struct ReportArguments {
   Place place;
   std::string problem_file;
@@ -231,7 +239,7 @@ using Command =
     std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
                  ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
                  SensitivityArguments, DesignArguments, PosteriorArguments, FitArguments,
-                 ReportArguments, ProfileArguments, RegularizationArguments, ExplainArguments,
+                 CompareArguments, ReportArguments, ProfileArguments, RegularizationArguments, ExplainArguments,
                  ExportArguments, ImportArguments, DeleteArguments, ListArguments, WatchArguments,
                  TopArguments, PaperOptions>;
 

@@ -22,6 +22,7 @@ int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream
 int RunCommand(const ExplainArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const PosteriorArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const FitArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const CompareArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ReportArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const ProfileArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const RegularizationArguments& arguments, std::ostream& out, std::ostream& err);

@@ -91,6 +91,31 @@ void AddFit(CommandRegistry& registry) {
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
+void AddCompare(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "compare",
+       .summary = "Which of several problems explains the data best",
+       .examples = {"compare linear.json cubic.json data.csv",
+                    "compare white.json correlated.json data.csv --hold-out 0.5"},
+       .notes =
+           "The evidence is the probability that a problem gives to all samples before it has\n"
+           "seen them; a difference of 3 in its logarithm are odds of 20 to 1. The score is the\n"
+           "log probability of the last rows, predicted from the rows before. Problems must\n"
+           "measure the same samples, with noise of unknown size in the same outputs or in none."},
+      arguments);
+  command.add_option("files", arguments->files, "Problem files, then the data file")
+      ->required()
+      ->expected(3, 20);
+  AddDataOptions(command, arguments->data_options);
+  command
+      .add_option("--hold-out", arguments->held_out,
+                  "Fraction of the rows to predict, the last ones (default 0.3)")
+      ->check(CLI::Range(0.01, 0.99));
+  AddPlace(command, arguments->place);
+  AddFormat(command, arguments->format, {"table", "csv"});
+}
+
 void AddReport(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ReportArguments>();
   CLI::App& command = registry.Add(
@@ -180,6 +205,7 @@ void AddEstimationCommands(CommandRegistry& registry) {
   AddExplain(registry);
   AddPosterior(registry);
   AddFit(registry);
+  AddCompare(registry);
   AddReport(registry);
   AddProfile(registry);
   AddCost(registry);

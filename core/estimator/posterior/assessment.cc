@@ -18,6 +18,7 @@
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/model_correction.h"
+#include "core/estimator/posterior/model_evidence.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/noise_marginal.h"
 #include "core/estimator/posterior/regularization_choice.h"
@@ -68,6 +69,10 @@ class Assessment {
     if (request_.weigh) share = ShareOf(*request_.expansion, cost, posterior_);
     const std::vector<Minimum>& minima = posterior_.minima;
     const Vector eta = MinimumAsStated(cost, stop);
+    std::optional<double> log_evidence;
+    if (request_.effort.evidence) {
+      log_evidence = LogModelEvidence(problem_, *request_.expansion, cost, posterior_, eta);
+    }
     findings_.problem = &problem_;
     findings_.expansion = request_.expansion;
     findings_.record = request_.record;
@@ -90,7 +95,8 @@ class Assessment {
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
     estimate_.diagnostics = Diagnose(findings_, estimate_);
-    return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share};
+    return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share,
+                    log_evidence};
   }
 
  private:

@@ -39,6 +39,7 @@ struct Assessed {
   PosteriorDraws posterior;  // the draws that the estimate summarizes
   Findings findings;         // the basis of the diagnostics; refers to the request's objects
   MixtureShare share;        // for a component of a mixture
+  std::optional<double> log_evidence;  // if asked for and there is one (model_evidence.h)
 };
 
 // Sets mean, posterior_std_dev and limits of parameter i.

@@ -22,6 +22,7 @@ struct PosteriorEffort {
   int importance_points = 16'384;        // ≥ 100
   double chain_effective_size = 30'000;  // target for every parameter
   int max_sweeps = 300;                  // maximum for the chains
+  bool evidence = false;                 // whether the model's evidence is wanted, too
 };
 
 struct PosteriorDraws {

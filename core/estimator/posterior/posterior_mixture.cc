@@ -10,6 +10,7 @@
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/connected_elements.h"
+#include "core/estimator/posterior/model_evidence.h"
 #include "core/estimator/posterior/most_evidence.h"
 
 namespace polyest::internal {
@@ -251,6 +252,9 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
       whole.estimate.components.push_back(DescribePiece(components, weights, places, prior));
     }
   }
+  std::vector<std::optional<double>> evidences;
+  for (const Assessed& component : components) evidences.push_back(component.log_evidence);
+  whole.log_evidence = LogSumOfExponentials(evidences);
   whole.posterior = Mix(components, weights, all);
   DescribeWhole(prior, whole.posterior, whole.estimate);
   return whole;

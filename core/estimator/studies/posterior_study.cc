@@ -86,6 +86,7 @@ PosteriorEffort EffortOf(const PosteriorOptions& options) {
   effort.importance_points = std::max(kImportancePoints, kPointsPerSample * options.samples);
   effort.chain_effective_size = kChainEffectiveSize;
   effort.max_sweeps = kMaxSweeps;
+  effort.evidence = true;
   return effort;
 }
 
@@ -127,6 +128,7 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
   if (draws.r_hat.size() > 0) posterior.r_hat = draws.r_hat.maxCoeff();
   posterior.diagnostics = assessed.estimate.diagnostics;
   AddNotConverged(posterior);
+  posterior.log_evidence = assessed.log_evidence;
   posterior.time_s = assessed.estimate.time_s;
   posterior.sample_values = assessed.estimate.samples;
   return posterior;

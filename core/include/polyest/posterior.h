@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,6 +68,13 @@ struct Posterior {
   std::vector<PosteriorMarginal> marginals;  // in the problem's order
   std::vector<PosteriorJoint> joints;        // as asked for
   Matrix samples;  // draws returned × uncertain parameters, equally weighted
+  // log of the density that model, noise and prior give to the samples, ∫ p(z | θ) p(θ) dθ; the
+  // unit of a sample's density is 1/unit of its output. The difference of two problems' for the
+  // same samples is the log of the odds that the samples give to them. Noise of unknown size counts
+  // with p(s) ∝ 1/s, so that only problems with the same unknown noises can be compared. None where
+  // α² is not 1, where a component has none, and where parameters of ended runs have been
+  // integrated out.
+  std::optional<double> log_evidence;
   // Those of an estimate from the same draws, and kNotConverged if the chains have not mixed.
   std::vector<Diagnostic> diagnostics;
   double time_s = 0;          // of the last sample

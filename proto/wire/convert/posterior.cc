@@ -72,6 +72,7 @@ v1::ComputePosteriorResponse ToProto(const Posterior& posterior, const Posterior
   response.set_draw_count(posterior.draws);
   response.set_effective_sample_size(posterior.effective_size);
   response.set_r_hat(posterior.r_hat);
+  if (posterior.log_evidence) response.set_log_evidence(*posterior.log_evidence);
   for (const Diagnostic& diagnostic : posterior.diagnostics) {
     *response.add_diagnostics() = ToProto(diagnostic);
   }

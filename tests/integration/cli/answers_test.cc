@@ -56,6 +56,43 @@ TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
 }
 
+TEST_F(AnswersTest, ComparisonsAgreeAndRankTheModelOfTheDataFirst) {
+  const auto problem = [this](const std::string& name, const std::string& damping,
+                              const std::string& condition = "t > 0") {
+    return File(name, R"({
+      "model": {"equations": {"states": {"x": "v", "v": "-k*x - )" +
+                          damping + R"("},
+                              "outputs": {"position": "x"}}},
+      "fixed": {"x_0": 1},
+      "uncertain": [{"name": "k", "uniform": {"lower": 30, "upper": 50}},
+                    {"name": "c", "uniform": {"lower": 0.01, "upper": 1}}],
+      "measured": [{"output": "position", "noise": {"absolute": 0.01}}],
+      "useWhen": ")" + condition +
+                          R"("
+    })");
+  };
+  // x″ = −39.5 x − 0.2 v from x = 1, whose last digits are the noise.
+  std::string rows = "t,position\n";
+  for (int i = 1; i <= 120; ++i) {
+    const double t = 0.05 * i, w = std::sqrt(39.5 - 0.01);
+    const double x = std::exp(-0.1 * t) * (std::cos(w * t) + 0.1 / w * std::sin(w * t));
+    rows += std::to_string(t) + ',' + std::to_string(std::round(x * 30) / 30) + '\n';
+  }
+  const std::string linear = problem("linear.json", "c*v"), dry = problem("dry.json", "c*sign(v)");
+  const std::string data = File("data.csv", rows);
+  ExpectSameAnswer({"compare", dry, linear, data});
+  ExpectSameAnswer({"compare", dry, linear, data, "--hold-out", "0.5", "--format", "csv"});
+  const Finished compared = Run({"compare", dry, linear, data});
+  EXPECT_THAT(Lines(compared.out)[1], HasSubstr("linear.json"));
+  EXPECT_THAT(compared.out, HasSubstr("120 samples, 36 of them held out. Evidence and held-out "
+                                      "samples prefer"));
+
+  const std::string later = problem("later.json", "c*v", "t > 1");
+  const Finished refused = Run({"compare", linear, later, data});
+  EXPECT_EQ(refused.exit_status, 2);
+  EXPECT_THAT(refused.err, HasSubstr("problems can be compared only if they measure the same"));
+}
+
 TEST_F(AnswersTest, PredictionsAgreeToTheLastDigit) {
   const std::string data = File("data.csv", DemoRows(100)), other = File("b.csv", DemoRows(40));
   ExpectSameAnswer({"fit", Example("oscillator.json"), data, "--format", "csv"});
