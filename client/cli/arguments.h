@@ -57,8 +57,9 @@ struct StreamArguments {
   std::string data_file;  // "-": standard input
   DataFileOptions data_options;
   int batch_rows = 30;
-  double rate = 0;      // factor by which data are sent faster than measured; 0: at once
-  std::string session;  // its id; empty: the daemon chooses
+  double rate = 0;              // factor by which data are sent faster than measured; 0: at once
+  std::string session;          // its id; empty: the daemon chooses
+  double reorder_window_s = 0;  // within which rows may be out of order; 0: they may not
   Format format = Format::kTable;
 };
 

@@ -36,6 +36,12 @@ void AddStream(CommandRegistry& registry) {
       "--session", arguments->session,
       "Name of the session to create, or to resume with rows after its last one. Its run stays "
       "open, so that the last rows of a smooth streamed input wait for further rows.");
+  command
+      .add_option("--reorder-window", arguments->reorder_window_s,
+                  "How much later than rows of other channels a row may come, s in the data's own "
+                  "time. Rows are computed once no earlier ones may come; the end of the data ends "
+                  "their run. (0: rows come in time order)")
+      ->check(CLI::Range(0.0, 3600.0));
   AddFormat(command, arguments->format, {"table", "jsonl"});
 }
 

@@ -125,7 +125,7 @@ class StreamCommand {
 
   // Opens the session. Waits and tries again while the daemon has no room for it.
   absl::StatusOr<StreamSession> WaitForSession() {
-    auto session = OpenSession(client_, problem_, arguments_.session);
+    auto session = OpenSession(client_, problem_, arguments_.session, arguments_.reorder_window_s);
     for (std::chrono::milliseconds pause = kFirstPause; !session.ok();
          pause = std::min(2 * pause, kMaxPause)) {
       const auto refusal = RefusalOf(session.status());
@@ -135,7 +135,7 @@ class StreamCommand {
                            session.status().message(), static_cast<double>(pause.count()) / 1000));
       interrupt_.WaitUntil(std::chrono::steady_clock::now() + pause);
       if (interrupted()) break;
-      session = OpenSession(client_, problem_, arguments_.session);
+      session = OpenSession(client_, problem_, arguments_.session, arguments_.reorder_window_s);
     }
     return session;
   }
@@ -186,9 +186,10 @@ class StreamCommand {
   }
 
   // Returns whether the stream must end the run, because the last rows of a streamed input would
-  // wait for rows that do not come. A session that the user has named may be resumed with further
-  // rows of the run.
+  // wait for rows that do not come, and so would those of the last reorder window. A session that
+  // the user has named may be resumed with further rows of the run, unless it has a window.
   bool EndsRun() const {
+    if (arguments_.reorder_window_s > 0) return true;
     if (!arguments_.session.empty()) return false;
     return std::any_of(problem_.inputs().begin(), problem_.inputs().end(),
                        [](const v1::Input& input) { return input.has_streamed(); });

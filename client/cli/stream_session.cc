@@ -1,16 +1,37 @@
 #include "client/cli/stream_session.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <google/protobuf/util/message_differencer.h>
 
 #include "core/common/status.h"
 
 namespace polyest::internal {
 
+namespace {
+
+// Checks that a session can be resumed with this window.
+absl::Status CheckWindow(const v1::Session& session, const std::string& id, double window_s) {
+  if (session.reorder_window_s() != window_s) {
+    return absl::AlreadyExistsError(
+        absl::StrFormat("session %s already exists with a reorderWindowS of %g s, not %g s; resume "
+                        "it with its own --reorder-window or choose another name",
+                        id, session.reorder_window_s(), window_s));
+  }
+  if (window_s == 0 || session.sample_count() == 0) return absl::OkStatus();
+  return absl::AlreadyExistsError(
+      absl::StrFormat("session %s already has rows; with --reorder-window they may be out of "
+                      "order, so that its last row does not tell which ones; choose another name",
+                      id));
+}
+
+}  // namespace
+
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
-                                          const std::string& id) {
+                                          const std::string& id, double reorder_window_s) {
   v1::CreateSessionRequest create;
   *create.mutable_session()->mutable_problem() = problem;
+  create.mutable_session()->set_reorder_window_s(reorder_window_s);
   create.set_session_id(id);
   const auto created = client.CreateSession(create);
   if (created.ok()) return StreamSession{created->name(), std::nullopt};
@@ -24,6 +45,7 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
                                                  " already exists with a different problem; resume "
                                                  "it with its own problem or choose another name"));
   }
+  POLYEST_RETURN_IF_ERROR(CheckWindow(session, id, reorder_window_s));
   StreamSession resumed{session.name(), std::nullopt};
   if (session.sample_count() > 0) {
     resumed.resumed_after = RowPlace{session.last_run(), session.last_time_s()};

@@ -22,10 +22,12 @@ struct StreamSession {
   std::optional<RowPlace> resumed_after;
 };
 
-// Creates the session `id`, or resumes it if it exists with the same problem. If `id` is empty, the
-// daemon chooses the name. ALREADY_EXISTS if the session has another problem.
+// Creates the session `id`, whose rows may be out of order within `reorder_window_s`, or resumes it
+// if it exists with the same problem. If `id` is empty, the daemon chooses the name. ALREADY_EXISTS
+// if the session has another problem or another window, or if it has rows and a window: its last
+// row does not tell then which rows it has.
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
-                                          const std::string& id);
+                                          const std::string& id, double reorder_window_s);
 
 // Removes the leading rows up to and including `place` and returns their number.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);

@@ -28,8 +28,8 @@ namespace polyest::internal {
 struct SessionPlace {
   int64_t sequence = 0;  // number of the last batch; 0: none yet
   int64_t samples = 0;   // values of measured outputs
-  int64_t rows = 0;
-  SampleRow last_row;
+  int64_t rows = 0;      // as they arrived
+  SampleRow last_row;    // the latest in time
 };
 
 // Describes a session without its problem and its batches.
@@ -39,6 +39,7 @@ struct SessionHead {
   std::string name;  // `sessions/{id}`; unique among the tenant's visible sessions
   google::protobuf::Timestamp create_time;
   SessionPlace place;
+  double reorder_window_s = 0;  // within which rows may arrive out of order; 0: they may not
 };
 
 struct JournalBatch {

@@ -178,9 +178,9 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
       *database,
       "SELECT number, tenant, name, created_s, created_ns, coalesce(sequence, 0), "
       "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "
-      "coalesce(place_time_s, 0) FROM session LEFT JOIN batch ON batch.session = number AND "
-      "sequence = (SELECT max(sequence) FROM batch WHERE session = number) WHERE hidden = 0 "
-      "ORDER BY tenant, name");
+      "coalesce(place_time_s, 0), reorder_window_s FROM session LEFT JOIN batch ON batch.session "
+      "= number AND sequence = (SELECT max(sequence) FROM batch WHERE session = number) "
+      "WHERE hidden = 0 ORDER BY tenant, name");
   std::vector<SessionHead> heads;
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -195,6 +195,7 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
     head.place.samples = query.Integer(6);
     head.place.rows = query.Integer(7);
     head.place.last_row = {static_cast<int>(query.Integer(8)), query.Real(9)};
+    head.reorder_window_s = query.Real(10);
   }
 }
 
@@ -204,14 +205,15 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
   const std::string bytes = DeterministicBytes(problem);
   const auto insert = [&](SqliteDatabase& database) -> absl::Status {
     SqliteQuery query(database,
-                      "INSERT INTO session (tenant, name, hidden, created_s, created_ns, problem) "
-                      "VALUES (?, ?, ?, ?, ?, ?)");
+                      "INSERT INTO session (tenant, name, hidden, created_s, created_ns, problem, "
+                      "reorder_window_s) VALUES (?, ?, ?, ?, ?, ?, ?)");
     query.BindText(head.tenant)
         .BindText(head.name)
         .Bind(static_cast<int64_t>(hidden))
         .Bind(head.create_time.seconds())
         .Bind(static_cast<int64_t>(head.create_time.nanos()))
-        .BindBlob(bytes);
+        .BindBlob(bytes)
+        .Bind(head.reorder_window_s);
     POLYEST_RETURN_IF_ERROR(query.Run());
     number = database.last_insert_rowid();
     return absl::OkStatus();

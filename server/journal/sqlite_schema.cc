@@ -52,6 +52,7 @@ constexpr const char* kMigrations[] = {
          sequence INTEGER NOT NULL,
          point BLOB NOT NULL,
          PRIMARY KEY (session, ordinal)) WITHOUT ROWID;)",
+    "ALTER TABLE session ADD COLUMN reorder_window_s REAL NOT NULL DEFAULT 0;",
 };
 
 absl::StatusOr<int64_t> CheckOwn(SqliteDatabase& database) {

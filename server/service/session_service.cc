@@ -104,7 +104,8 @@ SessionService::Unary* SessionService::CreateSession(Context* call,
                      const v1::Problem& problem = request->session().problem();
                      POLYEST_ASSIGN_OR_RETURN(
                          const auto session,
-                         context_.sessions.Create(caller.tenant, request->session_id(), problem));
+                         context_.sessions.Create(caller.tenant, request->session_id(), problem,
+                                                  request->session().reorder_window_s()));
                      *response = session->Describe();
                      *response->mutable_problem() = problem;
                      return absl::OkStatus();

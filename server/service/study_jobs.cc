@@ -6,9 +6,9 @@
 
 #include "core/common/status.h"
 #include "proto/wire/convert/annotate.h"
-#include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/problem.h"
 #include "proto/wire/operations/operations.h"
+#include "server/service/session_rows.h"
 
 namespace polyest::internal {
 namespace {
@@ -94,23 +94,6 @@ absl::Status OnStrand(const Request& request, Session& session, const ServiceCon
   return session.WithEstimator(answer, stop);
 }
 
-// Adds the session's rows to `measurements`; returns the number of the last batch.
-absl::StatusOr<int64_t> ReadRows(const Session& session, const Model& model, const Stop& stop,
-                                 v1::Measurements& measurements) {
-  int64_t sequence = 0;
-  const auto append = [&](const JournalBatch& batch) -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    // Each batch may have units of its own.
-    v1::Measurements converted = batch.measurements;
-    POLYEST_RETURN_IF_ERROR(ToModelUnits(model, converted));
-    AppendRows(converted, measurements);
-    sequence = batch.sequence;
-    return absl::OkStatus();
-  };
-  POLYEST_RETURN_IF_ERROR(session.ReadBatches(0, append));
-  return sequence;
-}
-
 // Runs a study on the problem and the rows of a session. The limits of a problem do not apply,
 // because a session that exists stays, whatever the limits are now.
 template <RunsTheModel Request, typename Response>
@@ -123,8 +106,8 @@ absl::Status OfStoredExperiment(Request request, const Session& session,
   if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
     POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved,
                              ToProblem(experiment.problem(), context.models));
-    POLYEST_ASSIGN_OR_RETURN(sequence, ReadRows(session, *resolved.problem().model, stop,
-                                                *experiment.mutable_measurements()));
+    POLYEST_ASSIGN_OR_RETURN(sequence,
+                             ReadRows(session, resolved, stop, *experiment.mutable_measurements()));
   }
   POLYEST_ASSIGN_OR_RETURN(response,
                            Run(request, kThreadsPerCall, stop, context.models, ProblemLimits()));

@@ -11,8 +11,9 @@
 
 namespace polyest::internal {
 
-BatchIntake::BatchIntake(ResolvedProblem problem)
+BatchIntake::BatchIntake(ResolvedProblem problem, double reorder_window_s)
     : problem_(std::move(problem)), checks_(problem_), runs_(problem_.runs()) {
+  if (reorder_window_s > 0) reorder_.emplace(checks_.names(), reorder_window_s);
   for (const MeasuredOutput& output : problem_.problem().measured) measured_.insert(output.output);
 }
 
@@ -30,17 +31,39 @@ absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimit
                                const Record& record) {
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch, *problem_.problem().model));
   const std::lock_guard lock(mutex_);
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, WireFields(checks_.Check(samples)));
-  POLYEST_RETURN_IF_ERROR(CheckRuns(checked.after.run + 1, limits));
-  waiting_.push_back(Following(std::move(samples)));
+  RowReorder::Step step;
+  if (reorder_) {
+    POLYEST_ASSIGN_OR_RETURN(step, WireFields(PutInOrder(samples)));
+  }
+  const Samples& released = reorder_ ? step.released : samples;
+  CheckedSamples checked;
+  const bool any_released = !reorder_ || !RowReorder::IsNothing(released);
+  if (any_released) {
+    POLYEST_ASSIGN_OR_RETURN(checked, WireFields(checks_.Check(released)));
+  }
+  TakenBatch following = Following(samples);
+  POLYEST_RETURN_IF_ERROR(CheckRuns(following.place.last_row.run + 1, limits));
+  following.samples = reorder_ ? std::move(step.released) : std::move(samples);
+  waiting_.push_back(std::move(following));
   absl::Cleanup undo = [this] { waiting_.pop_back(); };
   if (record) POLYEST_RETURN_IF_ERROR(record(waiting_.back().place));
   std::move(undo).Cancel();
   // What follows needs no memory, so that a lack of memory leaves everything as it was.
-  checks_.Accept(checked);
+  if (any_released) checks_.Accept(checked);
+  if (reorder_) {
+    reorder_->Accept(std::move(step));
+    waiting_.back().held_from = reorder_->held_from();
+  }
   place_ = waiting_.back().place;
   measured_s_ = waiting_.back().measured_s;
   return absl::OkStatus();
+}
+
+// Checks everything about the rows that their order could not mend later on, because a batch that
+// is taken cannot be refused any more when its rows are released.
+absl::StatusOr<RowReorder::Step> BatchIntake::PutInOrder(const Samples& samples) const {
+  if (samples.rows() > 0) POLYEST_RETURN_IF_ERROR(checks_.CheckInAnyOrder(samples));
+  return reorder_->Next(samples);
 }
 
 // Checks that the problem stays valid and within the limits when new runs add parameters of their
@@ -64,8 +87,8 @@ std::optional<TakenBatch> BatchIntake::Next(int64_t sequence) {
   return next;
 }
 
-// Returns the next batch, which has these samples.
-TakenBatch BatchIntake::Following(Samples samples) const {
+// Returns the next batch, in which these samples arrive, without its samples.
+TakenBatch BatchIntake::Following(const Samples& samples) const {
   SessionPlace place = place_;
   double measured_s = measured_s_;
   ++place.sequence;
@@ -74,10 +97,11 @@ TakenBatch BatchIntake::Following(Samples samples) const {
   for (size_t row = 0; row < samples.rows(); ++row) {
     const SampleRow next{samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]};
     const bool same_run = next.run == place.last_row.run;
+    if (same_run && next.time_s < place.last_row.time_s) continue;  // out of order
     measured_s += next.time_s - (same_run ? place.last_row.time_s : 0);
     place.last_row = next;
   }
-  return {std::move(samples), place, measured_s};
+  return {.samples = {}, .place = place, .measured_s = measured_s};
 }
 
 // Counts the values of measured outputs that are not missing, as an estimate counts its samples.

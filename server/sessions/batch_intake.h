@@ -19,20 +19,23 @@
 #include "polyest/v1/measurements.pb.h"
 #include "proto/wire/convert/problem_limits.h"
 #include "server/journal/session_journal.h"
+#include "server/sessions/row_reorder.h"
 
 namespace polyest::internal {
 
 // A batch that has been checked and waits for the estimator.
 struct TakenBatch {
-  Samples samples;
+  Samples samples;        // what it gives the estimator; may be nothing if rows are held back
   SessionPlace place;     // of the session after this batch
   double measured_s = 0;  // seconds of measurements up to its end, over all runs
+  int64_t held_from = 0;  // RowReorder::held_from after it; 0: rows come in time order
 };
 
 // Thread-safe.
 class BatchIntake {
  public:
-  explicit BatchIntake(ResolvedProblem problem);
+  // `reorder_window_s`: rows may be out of order within so much time; 0: they may not.
+  explicit BatchIntake(ResolvedProblem problem, double reorder_window_s = 0);
 
   // Returns the problem without parameters for runs other than the first.
   const ResolvedProblem& problem() const { return problem_; }
@@ -57,14 +60,16 @@ class BatchIntake {
  private:
   absl::Status CheckRuns(int runs, const ProblemLimits& limits);
   int64_t CountValues(const Samples& samples) const;
-  TakenBatch Following(Samples samples) const;
+  absl::StatusOr<RowReorder::Step> PutInOrder(const Samples& samples) const;
+  TakenBatch Following(const Samples& samples) const;
 
   const ResolvedProblem problem_;
   std::set<std::string> measured_;
 
   mutable std::mutex mutex_;
   SampleChecks checks_;
-  int runs_;  // number of runs for which the problem is known to be valid
+  std::optional<RowReorder> reorder_;  // none: rows come in time order
+  int runs_;                           // number of runs for which the problem is known to be valid
   SessionPlace place_;
   double measured_s_ = 0;
   std::deque<TakenBatch> waiting_;

@@ -10,8 +10,10 @@
 
 namespace polyest::internal {
 
-JournalStore::JournalStore(const ResolvedProblem& problem)
-    : problem_(problem), position_(SampleChecks(problem).position()) {
+JournalStore::JournalStore(const ResolvedProblem& problem, double reorder_window_s)
+    : problem_(problem),
+      reorder_window_s_(reorder_window_s),
+      position_(SampleChecks(problem).position()) {
   open_.before = position_;
 }
 
@@ -27,10 +29,15 @@ absl::Status JournalStore::Append(const RowBlock& batch) {
   if (static_cast<int64_t>(tail_.rows.size()) < kSegmentRows) return absl::OkStatus();
   open_.rows = std::make_shared<const RowBlock>(std::exchange(tail_, {}));
   segments_.push_back(std::move(open_));
-  open_ = {
-      .before = position_, .first_batch = batches_ + 1, .last_batch = batches_, .rows = nullptr};
+  open_ = {.before = position_,
+           .first_batch = batches_ + 1,
+           .last_batch = batches_,
+           .read_from = held_from_ > 0 ? held_from_ : batches_ + 1,
+           .rows = nullptr};
   return absl::OkStatus();
 }
+
+void JournalStore::PassOver() { open_.last_batch = ++batches_; }
 
 void JournalStore::Release(int64_t sequence) {
   POLYEST_CHECK(journal_ != nullptr);
@@ -98,24 +105,43 @@ absl::StatusOr<JournalStore::Rows> JournalStore::ReadSegment(const Segment& segm
                                                              int64_t rows) const {
   RowBlock read;
   SampleChecks checks(problem_, segment.before);
+  std::optional<RowReorder> reorder;
+  if (reorder_window_s_ > 0) {
+    RowReorder::Resumption from{.first_batch = segment.read_from, .released = std::nullopt};
+    const RecordPosition& before = segment.before;
+    if (before.rows > 0) from.released = SampleRow{before.run, before.time_s};
+    reorder.emplace(checks.names(), reorder_window_s_, from);
+  }
   const absl::Status enough = absl::OutOfRangeError("the segment has been read");
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     if (batch.sequence > segment.last_batch) return enough;
-    POLYEST_ASSIGN_OR_RETURN(const Samples samples,
-                             ToSamples(batch.measurements, *problem_.problem().model));
-    const auto checked = checks.Check(samples);
-    // They have passed these checks before.
-    if (!checked.ok()) return absl::DataLossError(checked.status().message());
-    AppendRows(*checked, 0, static_cast<int64_t>(checked->rows.size()), read);
-    checks.Accept(*checked);
-    return absl::OkStatus();
+    return ReadBatch(batch, reorder, checks, read);
   };
-  const absl::Status status = journal_->ReadBatches(number_, segment.first_batch - 1, append);
+  const absl::Status status = journal_->ReadBatches(number_, segment.read_from - 1, append);
   if (!status.ok() && status != enough) return status;
   if (static_cast<int64_t>(read.rows.size()) != rows) {
     return absl::DataLossError("rows of the session are missing in the journal");
   }
   return std::make_shared<const RowBlock>(std::move(read));
+}
+
+// Appends the rows that a batch gives the segment to `read`. They have passed all checks before.
+absl::Status JournalStore::ReadBatch(const JournalBatch& batch, std::optional<RowReorder>& reorder,
+                                     SampleChecks& checks, RowBlock& read) const {
+  POLYEST_ASSIGN_OR_RETURN(Samples samples,
+                           ToSamples(batch.measurements, *problem_.problem().model));
+  if (reorder) {
+    auto step = reorder->Next(samples);
+    if (!step.ok()) return absl::DataLossError(step.status().message());
+    samples = std::move(step->released);
+    reorder->Accept(*std::move(step));
+    if (RowReorder::IsNothing(samples)) return absl::OkStatus();
+  }
+  const auto checked = checks.Check(samples);
+  if (!checked.ok()) return absl::DataLossError(checked.status().message());
+  AppendRows(*checked, 0, static_cast<int64_t>(checked->rows.size()), read);
+  checks.Accept(*checked);
+  return absl::OkStatus();
 }
 
 void JournalStore::Remember(size_t segment, Rows rows) const {

@@ -6,19 +6,22 @@
 // The record is divided into segments of whole batches. In memory are the segments that the journal
 // does not keep yet, the last one, and the two that were used last; of each other segment only
 // where the record stood before it, which is all that its rows need to pass the checks once more
-// and to get the same noise.
+// and to get the same noise. If rows may arrive out of order, batches before those of a segment may
+// have rows in it: the segment then knows from which batch on to read.
 
 #include <absl/status/status.h>
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/sample_checks.h"
 #include "polyest/samples.h"
 #include "server/journal/session_journal.h"
+#include "server/sessions/row_reorder.h"
 
 namespace polyest::internal {
 
@@ -28,8 +31,8 @@ class JournalStore final : public SampleStore {
   // A segment ends with the batch that brings it to this many rows.
   static constexpr int64_t kSegmentRows = 4096;
 
-  // `problem` must outlive the store.
-  explicit JournalStore(const ResolvedProblem& problem);
+  // `problem` must outlive the store. `reorder_window_s` is the session's, as of BatchIntake.
+  explicit JournalStore(const ResolvedProblem& problem, double reorder_window_s = 0);
 
   // Says where the batches are kept: those of session `number` of `journal`, which must outlive the
   // store.
@@ -41,6 +44,11 @@ class JournalStore final : public SampleStore {
   int64_t rows() const override { return position_.rows; }
   // Each call is one batch: the first is batch 1, the next one batch 2, and so on.
   absl::Status Append(const RowBlock& batch) override;
+  // Goes on to the next batch without appending rows: all of its rows are held back.
+  void PassOver();
+  // Says, before the next batch is appended or passed over, what RowReorder::held_from is after it.
+  // Not needed if rows come in time order.
+  void SetHeldFrom(int64_t batch) { held_from_ = batch; }
   // Fails as SessionJournal::ReadBatches; DATA_LOSS if the journal has other rows than those
   // appended.
   absl::Status Read(int64_t first, int64_t count, RowBlock& block) const override;
@@ -55,7 +63,8 @@ class JournalStore final : public SampleStore {
     RecordPosition before;  // where the record stood before its first row
     int64_t first_batch = 1;
     int64_t last_batch = 0;
-    Rows rows;  // null: only in the journal
+    int64_t read_from = 1;  // the earliest batch with rows in it, ≤ first_batch
+    Rows rows;              // null: only in the journal
   };
   struct Used {
     size_t segment = 0;
@@ -66,14 +75,18 @@ class JournalStore final : public SampleStore {
   size_t SegmentWith(int64_t row) const;
   absl::StatusOr<Rows> RowsOf(size_t segment) const;
   absl::StatusOr<Rows> ReadSegment(const Segment& segment, int64_t rows) const;
+  absl::Status ReadBatch(const JournalBatch& batch, std::optional<RowReorder>& reorder,
+                         SampleChecks& checks, RowBlock& read) const;
   void Remember(size_t segment, Rows rows) const;
 
   const ResolvedProblem& problem_;
+  const double reorder_window_s_;
   const SessionJournal* journal_ = nullptr;
   int64_t number_ = 0;
 
   RecordPosition position_;        // after the last row
-  int64_t batches_ = 0;            // appended
+  int64_t batches_ = 0;            // appended or passed over
+  int64_t held_from_ = 0;          // as of SetHeldFrom
   std::vector<Segment> segments_;  // the complete ones
   size_t released_ = 0;            // the first so many of them are only in the journal
   Segment open_;                   // batches are added to it; its rows are in `tail_`

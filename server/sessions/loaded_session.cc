@@ -12,9 +12,11 @@ namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
                                                                    const ModelLibrary& models,
-                                                                   const ProblemLimits& limits) {
+                                                                   const ProblemLimits& limits,
+                                                                   double reorder_window_s) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models, limits));
-  std::unique_ptr<LoadedSession> loaded(new LoadedSession(std::move(problem), resolved));
+  std::unique_ptr<LoadedSession> loaded(
+      new LoadedSession(std::move(problem), resolved, reorder_window_s));
   EstimatorOptions options;
   options.store = loaded->store_;
   options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {
@@ -41,12 +43,14 @@ void LoadedSession::Restore(const SessionJournal& journal, int64_t session) {
 }
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const SessionJournal& journal,
-                                                                   int64_t session,
+                                                                   const SessionHead& head,
                                                                    const SessionPlace& place,
                                                                    const ModelLibrary& models,
                                                                    const Stop& stop) {
+  const int64_t session = head.number;
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(session));
-  POLYEST_ASSIGN_OR_RETURN(auto loaded, Make(std::move(problem), models));
+  POLYEST_ASSIGN_OR_RETURN(auto loaded,
+                           Make(std::move(problem), models, {}, head.reorder_window_s));
   loaded->store_->ReadFrom(journal, session);
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
@@ -64,10 +68,11 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
   return loaded;
 }
 
-LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved)
+LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved,
+                             double reorder_window_s)
     : problem_(std::move(problem)),
-      intake_(resolved),
-      store_(std::make_shared<JournalStore>(intake_.problem())) {}
+      intake_(resolved, reorder_window_s),
+      store_(std::make_shared<JournalStore>(intake_.problem(), reorder_window_s)) {}
 
 absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
@@ -81,7 +86,12 @@ absl::Status LoadedSession::WithEstimator(const Work& work) {
 
 absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
   while (const std::optional<TakenBatch> batch = intake_.Next(sequence)) {
-    POLYEST_RETURN_IF_ERROR(estimator_->Append(batch->samples));
+    store_->SetHeldFrom(batch->held_from);
+    if (RowReorder::IsNothing(batch->samples)) {
+      store_->PassOver();
+    } else {
+      POLYEST_RETURN_IF_ERROR(estimator_->Append(batch->samples));
+    }
     sequence_ = batch->place.sequence;
     measured_s_ = batch->measured_s;
   }

@@ -26,15 +26,17 @@ namespace polyest::internal {
 // Any thread may give it batches; the estimator is for one thread at a time.
 class LoadedSession {
  public:
-  // Makes a session without batches. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one
-  // beyond the limits; other errors are those of Estimator::Make.
+  // Makes a session without batches, whose rows may arrive out of order within
+  // `reorder_window_s`. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one beyond the
+  // limits; other errors are those of Estimator::Make.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
                                                              const ModelLibrary& models,
-                                                             const ProblemLimits& limits = {});
+                                                             const ProblemLimits& limits = {},
+                                                             double reorder_window_s = 0);
   // Rebuilds a session from the batches that the journal keeps. The latest snapshot in the journal,
   // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
-                                                             int64_t session,
+                                                             const SessionHead& head,
                                                              const SessionPlace& place,
                                                              const ModelLibrary& models,
                                                              const Stop& stop);
@@ -67,7 +69,7 @@ class LoadedSession {
   absl::Status WithEstimator(const Work& work);
 
  private:
-  LoadedSession(v1::Problem problem, const ResolvedProblem& resolved);
+  LoadedSession(v1::Problem problem, const ResolvedProblem& resolved, double reorder_window_s);
   void Restore(const SessionJournal& journal, int64_t session);
   absl::Status GiveUpTo(int64_t sequence);
 

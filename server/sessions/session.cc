@@ -51,6 +51,7 @@ v1::Session Session::Describe() const {
   v1::Session session;
   session.set_name(name());
   *session.mutable_create_time() = head_.create_time;
+  session.set_reorder_window_s(head_.reorder_window_s);
   const SessionPlace place = ledger_.kept();
   session.set_last_sequence(place.sequence);
   session.set_sample_count(place.samples);
@@ -123,7 +124,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   // No batch is taken until the session is loaded again below.
   POLYEST_ASSIGN_OR_RETURN(
       std::shared_ptr<LoadedSession> loaded,
-      LoadedSession::Load(services_.journal, number(), ledger_.kept(), services_.models, stop));
+      LoadedSession::Load(services_.journal, head_, ledger_.kept(), services_.models, stop));
   loaded->Attach(services_.journal, number());
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;

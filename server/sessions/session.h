@@ -56,6 +56,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const std::string& tenant() const { return head_.tenant; }
   const std::string& name() const { return head_.name; }
+  double reorder_window_s() const { return head_.reorder_window_s; }
   int64_t number() const { return head_.number; }
   Strand& strand() { return *strand_; }
 

@@ -24,6 +24,7 @@ v1::SessionRecord SessionExport::Head(const v1::Problem& problem) const {
   head.set_problem(DeterministicBytes(problem));
   *head.mutable_create_time() = described_.create_time();
   head.set_batch_count(described_.last_sequence());
+  head.set_reorder_window_s(described_.reorder_window_s());
   return record;
 }
 

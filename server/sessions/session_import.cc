@@ -50,6 +50,9 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
     return InvalidField("record.head.batchCount",
                         absl::StrFormat("%d must not be negative", head.batch_count()));
   }
+  POLYEST_RETURN_IF_ERROR(
+      CheckReorderWindow({"record", "head", "reorderWindowS"}, head.reorder_window_s()));
+  head_.reorder_window_s = head.reorder_window_s();
   POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
   head_.create_time = head.create_time();
   promised_ = head.batch_count();
@@ -59,7 +62,8 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   }
   const SessionServices& services = registry_.services();
   POLYEST_ASSIGN_OR_RETURN(auto loaded,
-                           LoadedSession::Make(problem, services.models, services.limits.problem));
+                           LoadedSession::Make(problem, services.models, services.limits.problem,
+                                               head_.reorder_window_s));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
   loaded_ = std::move(loaded);
   return absl::OkStatus();

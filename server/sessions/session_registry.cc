@@ -55,9 +55,12 @@ absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::string& tenant,
                                                                  const std::string& id,
-                                                                 const v1::Problem& problem) {
+                                                                 const v1::Problem& problem,
+                                                                 double reorder_window_s) {
   if (!id.empty()) POLYEST_RETURN_IF_ERROR(CheckSessionId(id));
+  POLYEST_RETURN_IF_ERROR(CheckReorderWindow({"session", "reorderWindowS"}, reorder_window_s));
   SessionHead head;
+  head.reorder_window_s = reorder_window_s;
   head.tenant = tenant;
   {
     const std::lock_guard lock(mutex_);
@@ -67,7 +70,8 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   // The mutex is not held here, because a large problem takes its time, and so does the journal.
   // The journal checks again whether the name is free.
   POLYEST_ASSIGN_OR_RETURN(
-      auto loaded, LoadedSession::Make(problem, services_.models, services_.limits.problem));
+      auto loaded,
+      LoadedSession::Make(problem, services_.models, services_.limits.problem, reorder_window_s));
   head.create_time = clock_();
   const auto number = services_.journal.Create(head, problem, /*hidden=*/false);
   if (absl::IsAlreadyExists(number.status())) {

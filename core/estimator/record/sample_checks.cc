@@ -36,6 +36,17 @@ bool Missing(const SampleColumn& column, size_t row) {
   return !column.missing.empty() && column.missing[row];
 }
 
+// Refuses a sample that is too large for its noise, unless the noise is to be estimated.
+absl::Status CheckSize(const Samples& samples, const SampleColumn& column, size_t row,
+                       const NoiseModel& noise, double sigma) {
+  const double z = column.value[row];
+  if (noise.unknown || std::abs(z) <= kMaxSignalToNoise * sigma) return absl::OkStatus();
+  return Refusal(ValueAt(samples, column, row),
+                 "row %d, column %s: %g is more than %g times its noise of %g; check its unit "
+                 "or the noise",
+                 row, column.name, z, kMaxSignalToNoise, sigma);
+}
+
 }  // namespace
 
 RecordPosition After(const RecordPosition& position, const RowBlock& block) {
@@ -120,6 +131,34 @@ absl::StatusOr<CheckedSamples> SampleChecks::Check(const Samples& samples) const
   return checked;
 }
 
+absl::Status SampleChecks::CheckInAnyOrder(const Samples& samples) const {
+  POLYEST_RETURN_IF_ERROR(CheckColumns(samples));
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    POLYEST_RETURN_IF_ERROR(CheckPlace(samples, k));
+  }
+  POLYEST_RETURN_IF_ERROR(CheckValues(samples));
+  for (const SampleColumn& column : samples.columns) {
+    POLYEST_RETURN_IF_ERROR(CheckSizes(samples, column));
+  }
+  return absl::OkStatus();
+}
+
+// Checks the samples of a column against the least noise that they may have: their noise grows with
+// the largest sample before them, which may still arrive.
+absl::Status SampleChecks::CheckSizes(const Samples& samples, const SampleColumn& column) const {
+  const auto place = static_cast<size_t>(std::ranges::find(names_, column.name) - names_.begin());
+  if (place >= static_cast<size_t>(problem_.channels())) return absl::OkStatus();
+  const NoiseModel& noise = problem_.problem().measured[place].noise;
+  const double largest_so_far = position_.largest[static_cast<Eigen::Index>(place)];
+  for (size_t k = 0; k < samples.rows(); ++k) {
+    if (Missing(column, k) || samples.time_s[k] < problem_.used_from_s()[place]) continue;
+    const double z = column.value[k];
+    const double sigma = noise.StandardDeviation(z, std::max(largest_so_far, std::abs(z)));
+    if (sigma > 0) POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
+  }
+  return absl::OkStatus();
+}
+
 // Returns which rows are used, and in `gate` the gate's values after the last one.
 std::vector<bool> SampleChecks::UsedRows(const Samples& samples, std::vector<double>& gate) const {
   if (problem_.gate() == nullptr || samples.rows() == 0) {
@@ -163,12 +202,7 @@ absl::Status SampleChecks::PlaceColumn(const Samples& samples, const SampleColum
     largest = std::max(largest, std::abs(z));
     const double sigma = noise.StandardDeviation(z, largest);
     if (sigma <= 0) continue;  // 0 before any other value: without a size, it counts as missing
-    if (!noise.unknown && std::abs(z) > kMaxSignalToNoise * sigma) {
-      return Refusal(ValueAt(samples, column, k),
-                     "row %d, column %s: %g is more than %g times its noise of %g; check its unit "
-                     "or the noise",
-                     k, column.name, z, kMaxSignalToNoise, sigma);
-    }
+    POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
     checked.values[k * width_ + place] = z;
     checked.noise[k * channels + place] = sigma;
   }
@@ -216,17 +250,7 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
   for (size_t k = 0; k < samples.rows(); ++k) {
     const double time_s = samples.time_s[k];
     const int run = samples.run.empty() ? 0 : samples.run[k];
-    if (run >= max_runs_) {
-      return Refusal(
-          {"run", k},
-          "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
-          "runs would have too many of them; they are eliminated only from an adaptive expansion "
-          "and if the runs share a parameter",
-          k, run, max_runs_);
-    }
-    if (!std::isfinite(time_s) || time_s < 0) {
-      return Refusal({"time_s", k}, "row %d, column t: %g must be a finite time ≥ 0", k, time_s);
-    }
+    POLYEST_RETURN_IF_ERROR(CheckPlace(samples, k));
     if (before.rows == 0 ? run != 0 : run < before.run) {
       return Refusal({"run", k},
                      "row %d, column run: %d after %d; runs start at 0 and never decrease", k, run,
@@ -245,6 +269,23 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
     before.run_ended = false;
     before.time_s = time_s;
     ++before.rows;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const {
+  const double time_s = samples.time_s[row];
+  const int run = samples.run.empty() ? 0 : samples.run[row];
+  if (run >= max_runs_) {
+    return Refusal(
+        {"run", row},
+        "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
+        "runs would have too many of them; they are eliminated only from an adaptive expansion "
+        "and if the runs share a parameter",
+        row, run, max_runs_);
+  }
+  if (!std::isfinite(time_s) || time_s < 0) {
+    return Refusal({"time_s", row}, "row %d, column t: %g must be a finite time ≥ 0", row, time_s);
   }
   return absl::OkStatus();
 }

@@ -45,14 +45,23 @@ class SampleChecks {
   // InvalidArgument that names the row (counted from 0 in `samples`), the column, the value and the
   // rule. Changes nothing.
   absl::StatusOr<CheckedSamples> Check(const Samples& samples) const;
+  // Checks what does not depend on the rows around: rows that pass, in any order, also pass Check
+  // once they are in time order, between whatever others. Judges a sample by the least noise that
+  // it may have there, and as if Problem::use_when used it. Errors are those of Check.
+  absl::Status CheckInAnyOrder(const Samples& samples) const;
   // Records that the checked rows have been stored. The next samples must follow them.
   void Accept(const CheckedSamples& samples) { position_ = samples.after; }
   const RecordPosition& position() const { return position_; }
+  // Returns the columns that samples may have: measured outputs, streamed inputs, then what only
+  // Problem::use_when names.
+  const std::vector<std::string>& names() const { return names_; }
 
  private:
   absl::Status CheckColumns(const Samples& samples) const;
   absl::Status CheckTimes(const Samples& samples) const;
+  absl::Status CheckPlace(const Samples& samples, size_t row) const;
   absl::Status CheckValues(const Samples& samples) const;
+  absl::Status CheckSizes(const Samples& samples, const SampleColumn& column) const;
   std::vector<bool> UsedRows(const Samples& samples, std::vector<double>& gate) const;
   absl::Status PlaceColumn(const Samples& samples, const SampleColumn& column,
                            const std::vector<bool>& used, double& largest,

@@ -168,4 +168,20 @@ void AppendRows(const v1::Measurements& batch, v1::Measurements& all) {
   }
 }
 
+void AppendRows(const Samples& rows, v1::Measurements& all) {
+  v1::Measurements batch;
+  batch.mutable_time_s()->Add(rows.time_s.begin(), rows.time_s.end());
+  batch.mutable_run()->Add(rows.run.begin(), rows.run.end());
+  batch.set_end_of_run(rows.end_of_run);
+  for (const SampleColumn& column : rows.columns) {
+    v1::Measurements::Channel& channel = *batch.add_channels();
+    channel.set_name(column.name);
+    channel.mutable_values()->Add(column.value.begin(), column.value.end());
+    for (size_t row = 0; row < column.missing.size(); ++row) {
+      if (column.missing[row]) channel.add_missing(static_cast<int32_t>(row));
+    }
+  }
+  AppendRows(batch, all);
+}
+
 }  // namespace polyest::internal

@@ -24,4 +24,7 @@ absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements);
 // a channel, the samples of that channel are missing.
 void AppendRows(const v1::Measurements& batch, v1::Measurements& all);
 
+// Appends rows in units of the model, as above.
+void AppendRows(const Samples& rows, v1::Measurements& all);
+
 }  // namespace polyest::internal

@@ -136,6 +136,34 @@ TEST_F(StreamTest, SaysThatAllRowsWereThereAlready) {
               HasSubstr("; 45 rows were already there"));
 }
 
+// Exchanges each row with its neighbour, which is 0.05 s from it.
+std::string WithNeighboursExchanged(const std::string& rows) {
+  std::istringstream in(rows);
+  std::string header, first, second;
+  std::getline(in, header);
+  std::string text = header + "\n";
+  while (std::getline(in, first) && std::getline(in, second)) text += second + "\n" + first + "\n";
+  return text;
+}
+
+TEST_F(StreamTest, PutsRowsInOrderWithinAWindow) {
+  const std::string data = File("d.csv", WithNeighboursExchanged(DemoRows(100)));
+  const Finished run = Run(Command(
+      data, {"--format", "jsonl", "--batch", "7", "--reorder-window", "0.1", "--session", "rig"}));
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  ExpectSame(LastEstimate(run.out), EstimateOf(100));
+  const Finished none = Run(Command(data, {}));
+  EXPECT_EQ(none.exit_status, 2);
+  EXPECT_THAT(none.err, HasSubstr("times must increase"));
+  const Finished narrow = Run(Command(data, {"--reorder-window", "0.01"}));
+  EXPECT_EQ(narrow.exit_status, 2);
+  EXPECT_THAT(narrow.err, HasSubstr("comes too late"));
+  EXPECT_THAT(Run(Command(data, {"--session", "rig", "--reorder-window", "0.1"})).err,
+              HasSubstr("session rig already has rows"));
+  EXPECT_THAT(Run(Command(data, {"--session", "rig"})).err,
+              HasSubstr("already exists with a reorderWindowS of 0.1 s, not 0 s"));
+}
+
 TEST_F(StreamTest, DoesNotMixProblemsInASession) {
   const std::string data = File("d.csv", DemoRows(30));
   ASSERT_EQ(Run(Command(data, {"--session", "rig-1"})).exit_status, 0);

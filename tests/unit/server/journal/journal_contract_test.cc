@@ -23,6 +23,7 @@ SessionHead Head(const std::string& tenant, const std::string& name) {
   head.name = name;
   head.create_time.set_seconds(7);
   head.create_time.set_nanos(9);
+  head.reorder_window_s = 0.25;
   return head;
 }
 
@@ -90,6 +91,7 @@ TEST_P(JournalContractTest, KeepsAHeadAndItsProblem) {
   EXPECT_EQ(heads->front().create_time.seconds(), 7);
   EXPECT_EQ(heads->front().create_time.nanos(), 9);
   EXPECT_EQ(heads->front().place.sequence, 0);
+  EXPECT_EQ(heads->front().reorder_window_s, 0.25);
   EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(*journal_->ReadProblem(number),
                                                                  SmallProblem()));
 }

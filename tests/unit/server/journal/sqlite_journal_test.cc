@@ -162,6 +162,7 @@ TEST_F(SqliteJournalTest, BringsAFileOfTheFirstFormatUpToDate) {
   const SessionHead head = journal_->Heads()->front();
   EXPECT_EQ(head.name, "sessions/old");
   EXPECT_EQ(head.place.rows, 4);
+  EXPECT_EQ(head.reorder_window_s, 0);
   journal_->SaveSnapshot(5, {1, 4, "state"});
   ASSERT_TRUE(Append(5, 2).ok());
   EXPECT_EQ((*journal_->ReadSnapshot(5))->state, "state");
