@@ -105,8 +105,10 @@ class StreamCommand {
   LastEstimate Read(int descriptor, const std::string& name) {
     InterruptibleInput input(descriptor, interrupt_);
     std::istream in(&input);
+    DataFileOptions options = arguments_.data_options;
+    options.any_order = arguments_.reorder_window_s > 0;
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
-                             DataColumnsFor(problem_, arguments_.place, arguments_.data_options));
+                             DataColumnsFor(problem_, arguments_.place, options));
     auto reader = DataReader::Open(in, name, columns);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());

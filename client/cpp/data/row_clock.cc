@@ -95,7 +95,7 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
   if (time_s < 0) {
     return Error(cell, time_s, "≥ 0; --time-zero first lets the time begin at the first row");
   }
-  if (!begins && time_s <= time_s_) {
+  if (!begins && time_s <= time_s_ && !options_.any_order) {
     return Error(
         cell, time_s,
         absl::StrCat("later than ", time_s_, " of the row before",

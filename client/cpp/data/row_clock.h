@@ -23,8 +23,8 @@ struct CellTime {
   bool has_zone = false;
 };
 
-// Turns the times of rows into seconds and checks that they increase. Errors are sentences without
-// file and line.
+// Turns the times of rows into seconds and checks that they increase, unless any order is allowed.
+// Errors are sentences without file and line.
 class RowClock {
  public:
   RowClock(const DataFileOptions& options, const DataColumn& column);

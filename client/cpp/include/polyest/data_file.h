@@ -54,6 +54,7 @@ struct DataFileOptions {
   TimeZero time_zero = TimeZero::kAutomatic;     // what the time 0 is
   DateOrder date_order = DateOrder::kAutomatic;  // the order in all dates
   std::string time_column;                       // header of the time; empty: found out
+  bool any_order = false;                        // whether a run's rows may be in any order of time
 };
 
 // Where a quantity is in a file, as in Problem.columns. Empty fields are found out.

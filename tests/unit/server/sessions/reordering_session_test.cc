@@ -162,14 +162,30 @@ TEST_F(ReorderingSessionTest, GoesOnAfterARestartInTheMiddleOfTheWindow) {
   EXPECT_EQ(Bits(*reordering), Bits(*ordered));
 }
 
+TEST_F(ReorderingSessionTest, GoesOnFromASnapshotToTheSameBits) {
+  const auto ordered = Create("sessions/ordered", 0);
+  AddAll(*ordered, InOrder(4'300, 0));
+  const auto reordering = Create("sessions/reordering", kReorderWindow_s);
+  for (const v1::Measurements& batch : OutOfOrder(4'300, 0)) {
+    AddAll(*reordering, {batch});
+    ASSERT_TRUE(reordering->Process({}).ok());
+  }
+  const auto snapshot = journal_.ReadSnapshot(reordering->number());
+  ASSERT_TRUE(snapshot.ok() && snapshot->has_value());
+  EXPECT_GT((*snapshot)->rows, 0);
+  const auto restarted = Restart("sessions/reordering");
+  EXPECT_EQ(Bits(*restarted), Bits(*ordered));
+  EXPECT_EQ(Bits(*reordering), Bits(*ordered));
+}
+
 TEST_F(ReorderingSessionTest, CountsOnlyReleasedSamplesInItsEstimate) {
   const auto session = Create("sessions/a", kReorderWindow_s);
   AddAll(*session, {Steps({"x", "force"}, 0, 101)});
   auto estimate = session->CurrentEstimate({});
   ASSERT_TRUE(estimate.ok()) << estimate.status();
-  // The rows from 0 s to 0.49 s are more than 0.5 s before the one at 1 s; the force has samples up
-  // to 0.48 s, so that the row at 0.49 s still waits for its curve.
-  EXPECT_EQ((*estimate)->samples(), 49);
+  // The rows from 0 s to 0.49 s are more than 0.5 s before the one at 1 s. Of these, the curve of
+  // the force has four samples at or after those up to 0.39 s: at 0.39, 0.42, 0.45 and 0.48 s.
+  EXPECT_EQ((*estimate)->samples(), 40);
   EXPECT_EQ((*estimate)->sequence(), 1);
   EXPECT_EQ(session->Describe().sample_count(), 101);
   EXPECT_EQ(session->Describe().last_time_s(), 1);
