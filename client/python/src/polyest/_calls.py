@@ -1,0 +1,197 @@
+"""Calls of the daemon as data: method, request, and how the answer is read.
+
+Synchronous and asynchronous clients run the same calls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from google.protobuf import json_format
+
+from polyest import _methods, check, estimates, results
+from polyest._proto.v1 import (
+    measurements_pb2,
+    problem_pb2,
+    problem_service_pb2,
+    session_service_pb2,
+    study_service_pb2,
+)
+from polyest.results import cost, design, history, posterior, prediction, prior
+from polyest.signals import Signal
+
+if TYPE_CHECKING:
+    from polyest.studies import Studies
+
+Result = TypeVar("Result")
+Subject = study_service_pb2.Subject
+
+#: Ways to drive the model in a next experiment: a name for each, and its inputs by name.
+Candidates = Mapping[str, Mapping[str, Signal]]
+
+
+@dataclass(frozen=True)
+class Call(Generic[Result]):
+    """A call that is not made yet."""
+
+    method: _methods.Method[Any, Any]
+    request: Any
+    read: Callable[[Any], Result]
+
+
+def subject_of_experiment(problem: problem_pb2.Problem,
+                          measurements: Optional[measurements_pb2.Measurements]) -> Subject:
+    """Returns a problem with its measurements as the subject of a study."""
+    return Subject(experiment=study_service_pb2.Experiment(problem=problem,
+                                                           measurements=measurements))
+
+
+def subject_of_session(name: str) -> Subject:
+    """Returns a session, `sessions/{id}`, as the subject of a study."""
+    return Subject(session=name)
+
+
+def compute_estimate(subject: Subject, source: Optional[Studies]) -> Call[estimates.Estimate]:
+    """The estimate of a subject; `source` is what its plots ask for more."""
+    return Call(_methods.COMPUTE_ESTIMATE,
+                study_service_pb2.ComputeEstimateRequest(subject=subject),
+                lambda answer: estimates.of_message(answer.estimate, source))
+
+
+def compute_history(subject: Subject, points: int) -> Call[results.History]:
+    """How the estimate of an experiment comes about."""
+    return Call(_methods.COMPUTE_ESTIMATE,
+                study_service_pb2.ComputeEstimateRequest(subject=subject,
+                                                         history_point_count=points),
+                lambda answer: history.of_message(answer.history))
+
+
+def get_estimate(session: str, source: Optional[Studies]) -> Call[estimates.Estimate]:
+    """The present estimate of a session."""
+    return Call(_methods.GET_ESTIMATE, session_service_pb2.GetEstimateRequest(session=session),
+                lambda answer: estimates.of_message(answer, source))
+
+
+def get_history(session: str) -> Call[results.History]:
+    """The history that the daemon keeps of a session."""
+    return Call(_methods.GET_HISTORY, session_service_pb2.GetHistoryRequest(session=session),
+                lambda answer: history.of_message(answer.history))
+
+
+def check_problem(problem: problem_pb2.Problem,
+                  measurements: Optional[measurements_pb2.Measurements]) -> Call[check.Check]:
+    """What is wrong with a problem and its measurements."""
+    return Call(_methods.CHECK_PROBLEM,
+                problem_service_pb2.CheckProblemRequest(problem=problem,
+                                                        measurements=measurements),
+                check.of_message)
+
+
+def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence[float],
+            draws: int, max_rows: int, times: Optional[npt.ArrayLike], run: int, lags: int,
+            record: Optional[measurements_pb2.Measurements]) -> Call[results.Prediction]:
+    """The outputs over time as the posterior predicts them."""
+    request = study_service_pb2.PredictRequest(
+        subject=subject, outputs=outputs, probabilities=probabilities, draw_count=draws,
+        max_row_count=max_rows, lag_count=lags, record=record)
+    if times is not None:
+        for time_s in np.asarray(times, dtype=float).ravel():
+            request.times.add(run=run, time_s=time_s)
+    return Call(_methods.PREDICT, request, prediction.of_message)
+
+
+def watch_predictions(session: str, outputs: Sequence[str], draws: int, max_rows: int,
+                      min_interval_s: float) -> session_service_pb2.WatchSessionRequest:
+    """The request for estimates of a session with predictions of its record."""
+    request = session_service_pb2.WatchSessionRequest(session=session)
+    policy = request.prediction
+    policy.SetInParent()
+    policy.outputs.extend(outputs)
+    policy.draw_count, policy.max_row_count = draws, max_rows
+    policy.min_interval_s = min_interval_s
+    return request
+
+
+def compute_posterior(subject: Subject, *, probabilities: Sequence[float], density_bins: int,
+                      joints: Sequence[tuple[str, str]], all_joints: bool, joint_bins: int,
+                      samples: int) -> Call[results.Posterior]:
+    """The posterior in detail."""
+    request = study_service_pb2.ComputePosteriorRequest(
+        subject=subject, probabilities=probabilities, density_bin_count=density_bins,
+        joint_bin_count=joint_bins, sample_count=samples, all_joints=all_joints)
+    for first, second in joints:
+        request.joints.add(first=first, second=second)
+    return Call(_methods.COMPUTE_POSTERIOR, request, posterior.of_message)
+
+
+def compute_profiles(subject: Subject, *, parameters: Sequence[str],
+                     points: int) -> Call[results.CostProfiles]:
+    """The cost over each parameter."""
+    return Call(_methods.COMPUTE_COST_PROFILES,
+                study_service_pb2.ComputeCostProfilesRequest(
+                    subject=subject, parameters=parameters, point_count=points),
+                cost.profiles_of)
+
+
+def compute_cost_grid(subject: Subject, *, parameters: Sequence[str], points: int,
+                      held: Mapping[str, float]) -> Call[results.CostGrid]:
+    """The cost on a grid."""
+    return Call(_methods.COMPUTE_COST_GRID,
+                study_service_pb2.ComputeCostGridRequest(
+                    subject=subject, parameters=parameters, point_count=points, held=dict(held)),
+                cost.grid_of)
+
+
+def compute_sweep(subject: Subject, *, lowest: float, highest: float,
+                  points: int) -> Call[results.RegularizationSweep]:
+    """The estimates over the weight of the prior."""
+    return Call(_methods.COMPUTE_REGULARIZATION_SWEEP,
+                study_service_pb2.ComputeRegularizationSweepRequest(
+                    subject=subject, lowest=lowest, highest=highest, point_count=points),
+                cost.sweep_of)
+
+
+def compute_propagation(subject: Subject, *, until_s: float, step_s: float,
+                        outputs: Sequence[str], probabilities: Sequence[float],
+                        density_bins: int) -> Call[results.Propagation]:
+    """What the prior predicts."""
+    return Call(_methods.COMPUTE_PROPAGATION,
+                study_service_pb2.ComputePropagationRequest(
+                    subject=subject, until_s=until_s, step_s=step_s, outputs=outputs,
+                    probabilities=probabilities, density_bin_count=density_bins),
+                prior.propagation_of)
+
+
+def compute_sensitivity(subject: Subject, *, until_s: float, step_s: float,
+                        outputs: Sequence[str]) -> Call[results.Sensitivity]:
+    """Which parameters the outputs depend on."""
+    return Call(_methods.COMPUTE_SENSITIVITY,
+                study_service_pb2.ComputeSensitivityRequest(
+                    subject=subject, until_s=until_s, step_s=step_s, outputs=outputs),
+                prior.sensitivity_of)
+
+
+def compute_design(subject: Subject, *, until_s: float, step_s: float, samples: int,
+                   candidates: Candidates,
+                   outputs: Mapping[str, float]) -> Call[results.ExperimentDesign]:
+    """What a next experiment would tell."""
+    request = study_service_pb2.ComputeExperimentDesignRequest(
+        subject=subject, until_s=until_s, step_s=step_s, sample_count=samples)
+    for name, inputs in candidates.items():
+        candidate = request.candidates.add(name=name)
+        for signal_name, signal in inputs.items():
+            candidate.inputs.append(input_of(signal_name, signal))
+    for output, noise in outputs.items():
+        request.possible.add(output=output).noise.absolute = noise
+    return Call(_methods.COMPUTE_EXPERIMENT_DESIGN, request, design.of_message)
+
+
+def input_of(name: str, signal: Signal) -> problem_pb2.Input:
+    """Returns an input with its signal as a message."""
+    message = problem_pb2.Input()
+    json_format.ParseDict({"name": name, **signal.as_json()}, message)
+    return message

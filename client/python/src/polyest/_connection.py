@@ -1,0 +1,137 @@
+"""The channel to a daemon: its security, the token that goes with each call, its limits."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Optional, Union
+
+import grpc
+
+from polyest.errors import InvalidInput, PolyestError, Unavailable, of_rpc
+
+File = Union[str, "os.PathLike[str]"]
+
+# The largest message taken from the daemon, bytes; gRPC's default of 4 MB is too little.
+_MAX_RESPONSE_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class ConnectionOptions:
+    """How to reach a daemon; see `polyest.connect`."""
+
+    server: str
+    token: Optional[str] = None
+    token_file: Optional[File] = None
+    ca: Optional[File] = None
+    certificate: Optional[File] = None
+    key: Optional[File] = None
+    server_name: Optional[str] = None
+    timeout_s: Optional[float] = None
+
+    @property
+    def uses_tls(self) -> bool:
+        """Whether the connection is encrypted."""
+        return any(value is not None for value in (self.ca, self.certificate, self.server_name))
+
+    def authorization(self) -> Optional[str]:
+        """Returns the header by which the daemon knows the caller.
+
+        A token's file is read for each call, so that a new token takes effect at once.
+        """
+        token = self.token
+        if self.token_file is not None:
+            token = _text("token_file", self.token_file).decode().strip()
+        if token is None:
+            return None
+        if not token or not all("!" <= letter <= "~" for letter in token):
+            raise _invalid("token", "must be one word of printable ASCII characters")
+        return f"Bearer {token}"
+
+    def metadata(self) -> tuple[tuple[str, str], ...]:
+        """Returns the metadata of a call."""
+        authorization = self.authorization()
+        return () if authorization is None else (("authorization", authorization),)
+
+    def channel_arguments(self) -> list[tuple[str, Any]]:
+        """Returns gRPC's options of the channel."""
+        arguments: list[tuple[str, Any]] = [
+            ("grpc.max_receive_message_length", _MAX_RESPONSE_BYTES),
+            ("grpc.max_send_message_length", -1),
+            ("grpc.keepalive_time_ms", 20_000),
+            ("grpc.keepalive_timeout_ms", 20_000),
+            ("grpc.keepalive_permit_without_calls", 0),
+            ("grpc.http2.max_pings_without_data", 0),
+            # The channel has a connection of its own, which other channels cannot block.
+            ("grpc.use_local_subchannel_pool", 1),
+            # A stream that reconnects has its own delays; those of the channel must not be longer.
+            ("grpc.initial_reconnect_backoff_ms", 100),
+            ("grpc.min_reconnect_backoff_ms", 5_000),
+            ("grpc.max_reconnect_backoff_ms", 1_000),
+        ]
+        if self.server_name is not None:
+            arguments.append(("grpc.ssl_target_name_override", self.server_name))
+        if self.authorization() is not None and not self.uses_tls:
+            # An HTTP proxy would see the token.
+            arguments.append(("grpc.enable_http_proxy", 0))
+        return arguments
+
+    def credentials(self) -> Optional[grpc.ChannelCredentials]:
+        """Returns the credentials of TLS; None without TLS. Raises InvalidInput."""
+        authorization = self.authorization()
+        if (self.certificate is None) != (self.key is None):
+            raise _invalid("certificate", "a certificate and its key must be given together")
+        if not self.uses_tls:
+            if authorization is not None and not _is_loopback(self.server):
+                raise _invalid("token", f"{self.server} is not a loopback address; tokens are sent "
+                               "only over TLS (ca=…)")
+            return None
+        return grpc.ssl_channel_credentials(
+            *(None if file is None else _pem(what, file) for what, file in
+              (("ca", self.ca), ("key", self.key), ("certificate", self.certificate))))
+
+    def error_of(self, error: grpc.RpcError) -> PolyestError:
+        """Returns the exception of a failed call, with the server's name if there is none."""
+        found = of_rpc(error)
+        if isinstance(found, Unavailable) and self.server not in found.message:
+            return Unavailable(f"{self.server}: {found.message}", reason=found.reason,
+                               retry_after_s=found.retry_after_s)
+        return found
+
+
+def _invalid(field: str, rule: str) -> InvalidInput:
+    return InvalidInput(f"{field}: {rule}", field=field, rule=rule)
+
+
+def _text(what: str, file: File) -> bytes:
+    try:
+        return Path(file).read_bytes()
+    except OSError as error:
+        raise _invalid(what, f"{file} cannot be read: {error.strerror}") from error
+
+
+def _pem(what: str, file: File) -> bytes:
+    text = _text(what, file)
+    if b"-----BEGIN " not in text:
+        raise _invalid(what, f"{file} is not in PEM form")
+    return text
+
+
+def _is_loopback(server: str) -> bool:
+    host = server.rpartition(":")[0].strip("[]")
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def open_channel(options: ConnectionOptions) -> grpc.Channel:
+    """Returns a synchronous channel, which connects at the first call."""
+    credentials, arguments = options.credentials(), options.channel_arguments()
+    if credentials is None:
+        return grpc.insecure_channel(options.server, options=arguments)
+    return grpc.secure_channel(options.server, credentials, options=arguments)

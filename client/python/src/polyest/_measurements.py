@@ -1,0 +1,160 @@
+"""Makes measurements for a problem from a DataFrame, a dict of columns or a structured array."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping
+from typing import Optional
+
+import numpy as np
+
+from polyest._proto.v1 import measurements_pb2, problem_pb2
+from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse
+
+Measurements = measurements_pb2.Measurements
+
+# A header with its unit: "Disp [mm]", "Disp (mm)" or "Disp / mm".
+_HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|/\s(?P<c>\S+))$")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def _split_header(header: str) -> tuple[str, str]:
+    """Returns a header's name and unit; an empty unit if it has none."""
+    match = _HEADER.match(header)
+    if match is None:
+        return header, ""
+    return match["name"], match["a"] or match["b"] or match["c"] or ""
+
+
+class MeasurementConverter:
+    """Converts data to measurements of one problem.
+
+    Columns are found by the problem's names, by its `columns`, and with or without a unit in their
+    header. Batches of one record share a converter, so that dates count from the first of all rows.
+    """
+
+    def __init__(self, problem: problem_pb2.Problem,
+                 units: Optional[Mapping[str, str]] = None) -> None:
+        """`units` names the unit of columns by quantity, as in {"x": "mm", "t": "ms"}."""
+        # The field's name is a word of Python.
+        self._sources = {name: (getattr(column, "from"), column.unit)
+                         for name, column in problem.columns.items()}
+        self._units = dict(units or {})
+        self._measured = [measured.output for measured in problem.measured]
+        self._streamed = [signal.name for signal in problem.inputs if signal.HasField("streamed")]
+        known = {"t", *self._measured, *self._streamed}
+        self._conditions = [name for name in dict.fromkeys(_NAME.findall(problem.use_when))
+                            if name not in known]
+        self._clock = Clock()
+        self._noted: set[str] = set()
+
+    def convert(self, data: Data, *, end_of_run: bool = False) -> Measurements:
+        """Returns all rows as one message; NaN is a missing sample. Raises InvalidInput."""
+        if isinstance(data, Measurements):
+            return data
+        table = Table(data)
+        used: list[str] = []
+        message = Measurements(end_of_run=end_of_run)
+        message.time_s.extend(self._times(table, used))
+        self._add_run(table, message, used)
+        quantities = dict.fromkeys((*self._measured, *self._streamed, *self._conditions))
+        for quantity in quantities:
+            self._add_channel(table, quantity, message, used)
+        self._check_channels(table, message)
+        self._note_unused(table, used)
+        return message
+
+    def _times(self, table: Table, used: list[str]) -> Floats:
+        found = self._find(table, "t")
+        column: Optional[Array]
+        header, unit, column = found or ("t", self._units.get("t", ""), table.time("t"))
+        if column is None:
+            for header in ("time", "Time"):
+                column = table.time(header)
+                if column is not None:
+                    break
+        if column is None:
+            raise refuse("t", f"no column of the time; the columns are {self._listed(table)}")
+        used.append(header)
+        return self._clock.seconds(header, column, unit)
+
+    def _add_run(self, table: Table, message: Measurements, used: list[str]) -> None:
+        found = self._find(table, "run")
+        if found is None:
+            return
+        header, _, column = found
+        numbers = floats(header, column)
+        if not np.array_equal(numbers, np.floor(numbers)):
+            raise refuse(header, "a run must be a whole number in every row")
+        message.run.extend(int(number) for number in numbers)
+        used.append(header)
+
+    def _add_channel(self, table: Table, quantity: str, message: Measurements,
+                     used: list[str]) -> None:
+        found = self._find(table, quantity)
+        if found is None:
+            if quantity in self._sources and self._sources[quantity][0]:
+                raise refuse(f"columns.{quantity}", f"there is no column "
+                             f"'{self._sources[quantity][0]}'; the columns are "
+                             f"{self._listed(table)}")
+            return
+        header, unit, column = found
+        values = floats(header, column)
+        missing = np.flatnonzero(np.isnan(values))
+        channel = message.channels.add(name=quantity, unit=unit)
+        channel.values.extend(np.nan_to_num(values, nan=0.0))
+        channel.missing.extend(int(row) for row in missing)
+        used.append(header)
+
+    def _find(self, table: Table, quantity: str) -> Optional[tuple[str, str, Array]]:
+        """Returns header, unit and values of a quantity's column; None if there is none."""
+        source, unit = self._sources.get(quantity, ("", ""))
+        wanted = source or quantity
+        unit = self._units.get(quantity, self._units.get(wanted, unit))
+        if wanted in table.columns:
+            in_header = _split_header(wanted)[1] if source else ""
+            return wanted, unit or in_header, table.columns[wanted]
+        for header, values in table.columns.items():
+            name, in_header = _split_header(header)
+            if name == wanted and in_header:
+                return header, unit or in_header, values
+        return None
+
+    def _check_channels(self, table: Table, message: Measurements) -> None:
+        present = {channel.name for channel in message.channels}
+        if self._measured and table.rows and not present.intersection(self._measured):
+            raise refuse("measurements", "no column of a measured output "
+                         f"({', '.join(self._measured)}); the columns are {self._listed(table)}")
+
+    def _note_unused(self, table: Table, used: list[str]) -> None:
+        unused = [name for name in table.columns if name not in used and name not in self._noted]
+        self._noted.update(unused)
+        if unused:
+            warnings.warn(f"columns that the problem does not name are not used: "
+                          f"{', '.join(unused)}", stacklevel=6)
+
+    @staticmethod
+    def _listed(table: Table) -> str:
+        return ", ".join(f"'{name}'" for name in table.columns) or "none"
+
+
+def split(measurements: Measurements, max_rows: int) -> Iterator[Measurements]:
+    """Yields the rows in batches of at most `max_rows`, the end of a run in the last one."""
+    rows = len(measurements.time_s)
+    if rows <= max_rows:
+        yield measurements
+        return
+    missing = [list(channel.missing) for channel in measurements.channels]
+    for first in range(0, rows, max_rows):
+        last = min(first + max_rows, rows)
+        batch = Measurements(time_s=measurements.time_s[first:last],
+                             run=measurements.run[first:last] if measurements.run else (),
+                             end_of_run=measurements.end_of_run and last == rows)
+        for channel, without in zip(measurements.channels, missing):
+            here = without[bisect_left(without, first):bisect_left(without, last)]
+            batch.channels.add(name=channel.name, unit=channel.unit,
+                               values=channel.values[first:last],
+                               missing=[row - first for row in here])
+        yield batch

@@ -1,0 +1,137 @@
+"""Looks at data of several kinds as columns by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from polyest.errors import InvalidInput
+
+Array = npt.NDArray[Any]
+Floats = npt.NDArray[np.float64]
+
+#: Data as the package takes them: a pandas DataFrame, a mapping from names to columns, or a
+#: structured numpy array.
+Data = Union[Mapping[str, npt.ArrayLike], Array, Any]
+
+# Seconds in each unit of time.
+_SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9,
+            "min": 60.0, "h": 3600.0}
+
+
+def refuse(field: str, rule: str) -> InvalidInput:
+    """Returns the exception for data that break a rule."""
+    return InvalidInput(f"{field}: {rule}", field=field, rule=rule)
+
+
+class Table:
+    """Columns by name, of equal length."""
+
+    def __init__(self, data: Data) -> None:
+        self._index: Optional[Array] = None
+        self._index_name = ""
+        self.columns: dict[str, Array] = {}
+        names = getattr(getattr(data, "dtype", None), "names", None)
+        if isinstance(data, Mapping):
+            self.columns = {str(name): np.asarray(values) for name, values in data.items()}
+        elif names:
+            self.columns = {name: np.asarray(data[name]) for name in names}
+        elif hasattr(data, "columns") and hasattr(data, "__getitem__"):
+            self._take_frame(data)
+        else:
+            raise refuse("measurements", f"a {type(data).__name__} has no columns; give a pandas "
+                         "DataFrame, a dict of columns or a structured numpy array")
+        self.rows = self._common_length()
+
+    def _take_frame(self, frame: Any) -> None:
+        for name in frame.columns:
+            if str(name) in self.columns:
+                raise refuse(str(name), "is the name of two columns")
+            self.columns[str(name)] = _values_of(frame[name])
+        index = getattr(frame, "index", None)
+        if index is not None and hasattr(index, "name"):
+            self._index, self._index_name = np.asarray(index), str(index.name or "")
+
+    def _common_length(self) -> int:
+        lengths = {}
+        for name, values in self.columns.items():
+            if values.ndim != 1:
+                raise refuse(name, f"has the shape {values.shape}; a column has one dimension")
+            lengths[name] = len(values)
+        if len(set(lengths.values())) > 1:
+            said = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise refuse("measurements", f"columns differ in length: {said}")
+        return next(iter(lengths.values()), 0)
+
+    def time(self, name: str) -> Optional[Array]:
+        """Returns the column of the time: `name`, or the index if that is one of times."""
+        if name in self.columns:
+            return self.columns[name]
+        if self._index is None:
+            return None
+        dates = self._index.dtype.kind in "mM" or _has_zone(self._index)
+        if dates or self._index_name in (name, "t", "time"):
+            return self._index
+        return None
+
+
+def _values_of(series: Any) -> Array:
+    """Returns the values of a pandas column; missing ones of nullable types become NaN."""
+    values = np.asarray(series)
+    nullable = values.dtype == object and str(getattr(series, "dtype", "object")) != "object"
+    if nullable and not _has_zone(values):
+        values = series.to_numpy(dtype=float, na_value=np.nan)
+    return values
+
+
+def _has_zone(values: Array) -> bool:
+    """Returns whether values are dates as objects, which those with a time zone are."""
+    return values.dtype == object and len(values) > 0 and hasattr(values[0], "tzinfo")
+
+
+def _nanoseconds(date: Any) -> np.datetime64:
+    value = getattr(date, "value", None)  # what pandas has in nanoseconds
+    return np.datetime64(value if value is not None else round(date.timestamp() * 1e9), "ns")
+
+
+def floats(name: str, values: Array) -> Floats:
+    """Returns a column as numbers; NaN is a missing sample. Raises InvalidInput for others."""
+    if values.dtype.kind == "O":
+        values = np.array([np.nan if value is None else value for value in values])
+    if values.dtype.kind not in "fiub":
+        raise refuse(name, f"has values of type {values.dtype}; it must have numbers")
+    numbers: Floats = values.astype(np.float64)
+    infinite = np.flatnonzero(np.isinf(numbers))
+    if infinite.size:
+        raise refuse(name, f"row {infinite[0]}: {numbers[infinite[0]]} is not finite")
+    return numbers
+
+
+class Clock:
+    """Turns times into seconds. Dates count from the first one that is seen."""
+
+    def __init__(self) -> None:
+        self._origin: Optional[np.datetime64] = None
+
+    def seconds(self, name: str, values: Array, unit: str) -> Floats:
+        """Returns times in s. `values` are numbers in `unit`, time differences or dates."""
+        if _has_zone(values):
+            values = np.array([_nanoseconds(value) for value in values])
+        if values.dtype.kind == "M":
+            if self._origin is None and len(values):
+                self._origin = values[0]
+            values = values - self._origin
+        if values.dtype.kind == "m":
+            result: Floats = values / np.timedelta64(1, "ns") * 1e-9
+        elif unit in _SECONDS:
+            result = floats(name, values) * _SECONDS[unit]
+        else:
+            raise refuse(name, f"'{unit}' is no unit of time; known are "
+                         f"{', '.join(unit for unit in _SECONDS if unit)}")
+        missing = np.flatnonzero(np.isnan(result))
+        if missing.size:
+            raise refuse(name, f"row {missing[0]} has no time")
+        return result

@@ -1,0 +1,97 @@
+"""Makes synchronous calls over a channel, and turns their failures into exceptions."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any, Optional
+
+import grpc
+
+from polyest._calls import Call, Result
+from polyest._connection import ConnectionOptions, open_channel
+from polyest._methods import Method, Request, Response
+
+
+class Transport:
+    """A channel to one daemon. Any thread may use it."""
+
+    def __init__(self, options: ConnectionOptions) -> None:
+        self.options = options
+        #: The last writers of sessions whose streams were cancelled, by session.
+        self.left_writers: dict[str, str] = {}
+        self._channel = open_channel(options)
+
+    def close(self) -> None:
+        """Ends all calls."""
+        self._channel.close()
+
+    def wait_until_connected(self, timeout_s: float) -> None:
+        """Waits for a connection, for a while: without a call gRPC seldom looks after its own."""
+        connected = grpc.channel_ready_future(self._channel)
+        with contextlib.suppress(grpc.FutureTimeoutError):
+            connected.result(timeout=timeout_s)
+        connected.cancel()
+
+    def unary(self, method: Method[Request, Response], request: Request,
+              timeout_s: Optional[float] = None) -> Response:
+        """Makes a call. Raises PolyestError."""
+        encode: Any = method.request
+        decode: Any = method.response
+        call = self._channel.unary_unary(method.path, encode.SerializeToString, decode.FromString)
+        try:
+            response: Response = call(request, metadata=self.options.metadata(),
+                                      timeout=timeout_s or self.options.timeout_s)
+        except grpc.RpcError as error:
+            raise self.options.error_of(error) from None
+        return response
+
+    def run(self, call: Call[Result]) -> Result:
+        """Makes a call and reads its answer. Raises PolyestError."""
+        return call.read(self.unary(call.method, call.request))
+
+    def server_stream(self, method: Method[Request, Response],
+                      request: Request) -> Iterator[Response]:
+        """Yields the answers of a call, which ends when the iterator is closed."""
+        encode: Any = method.request
+        decode: Any = method.response
+        call = self._channel.unary_stream(method.path, encode.SerializeToString, decode.FromString)(
+            request, metadata=self.options.metadata())
+        try:
+            yield from call
+        except grpc.RpcError as error:
+            raise self.options.error_of(error) from None
+        finally:
+            call.cancel()
+
+    def client_stream(self, method: Method[Request, Response],
+                      requests: Iterator[Request]) -> Response:
+        """Sends requests and returns the one answer.
+
+        Raises PolyestError. If the iterator of the requests fails, they end early, which the method
+        must refuse, and its exception is raised.
+        """
+        failures: list[Exception] = []
+
+        def until_failure() -> Iterator[Request]:
+            try:
+                yield from requests
+            except Exception as failure:
+                failures.append(failure)
+
+        encode: Any = method.request
+        decode: Any = method.response
+        call = self._channel.stream_unary(method.path, encode.SerializeToString, decode.FromString)
+        try:
+            response: Response = call(until_failure(), metadata=self.options.metadata())
+        except grpc.RpcError as error:
+            raise (failures[0] if failures else self.options.error_of(error)) from None
+        return response
+
+    def open_stream(self, method: Method[Request, Response], requests: Iterator[Request]) -> Any:
+        """Begins a call in both directions and returns it, an iterator over the answers."""
+        encode: Any = method.request
+        decode: Any = method.response
+        return self._channel.stream_stream(method.path, encode.SerializeToString,
+                                           decode.FromString)(
+            requests, metadata=self.options.metadata())

@@ -1,0 +1,249 @@
+"""Problems: what is estimated, from what, with which prior."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Optional, Union
+
+from google.protobuf import json_format
+
+from polyest._proto.v1 import problem_pb2
+from polyest.errors import InvalidInput
+from polyest.noise import Noise
+from polyest.priors import Prior
+from polyest.signals import Signal, Streamed
+
+if TYPE_CHECKING:
+    from polyest._table import Data
+    from polyest.check import Check
+    from polyest.client import Client
+
+
+class Problem:
+    """A problem, built step by step.
+
+    Every method that adds something returns the problem, so that calls can be chained:
+
+        problem = (polyest.Problem.builtin("mass_spring_damper")
+                   .fix(m=1.0, x0=1.0)
+                   .uncertain("k", polyest.Uniform(31.6, 47.4))
+                   .measure("x", noise=0.01))
+
+    Values are in the model's units. Names are checked by the daemon (`check`, and every call that
+    takes a problem), whose messages are those of the command line.
+    """
+
+    def __init__(self, document: Optional[Mapping[str, Any]] = None) -> None:
+        """`document` is a problem file's JSON object; by default an empty problem."""
+        self._document: dict[str, Any] = copy.deepcopy(dict(document or {}))
+
+    @classmethod
+    def builtin(cls, name: str) -> Problem:
+        """Returns a problem of a built-in model; `Client.models` lists them."""
+        return cls({"model": {"builtin": name}})
+
+    @classmethod
+    def fmu(cls, name: str) -> Problem:
+        """Returns a problem of an FMU in the daemon's folder, without ".fmu"."""
+        return cls({"model": {"fmu": name}})
+
+    @classmethod
+    def equations(cls, *, states: Mapping[str, str], outputs: Mapping[str, str],
+                  parameters: Optional[Mapping[str, float]] = None, inputs: Sequence[str] = (),
+                  units: Optional[Mapping[str, str]] = None,
+                  intermediates: Optional[Mapping[str, str]] = None) -> Problem:
+        """Returns a problem of a model given by its equations.
+
+        `states` has the time derivative of each state, `outputs` the expression of each output,
+        `parameters` defaults, `units` units by name. A state's initial value is `<state>_0`.
+        """
+        equations: dict[str, Any] = {"states": dict(states), "outputs": dict(outputs)}
+        for name, value in (("parameters", parameters), ("units", units),
+                            ("intermediates", intermediates)):
+            if value:
+                equations[name] = dict(value)
+        if inputs:
+            equations["inputs"] = list(inputs)
+        return cls({"model": {"equations": equations}})
+
+    @classmethod
+    def read(cls, path: Union[str, os.PathLike[str]]) -> Problem:
+        """Reads a problem file. Raises InvalidInput if it is no problem."""
+        return cls(_read(path))
+
+    def fix(self, values: Optional[Mapping[str, float]] = None, **named: float) -> Problem:
+        """Gives parameters, initial states, … known values, in the model's units."""
+        self._document.setdefault("fixed", {}).update({**(values or {}), **named})
+        return self
+
+    def uncertain(self, name: str, prior: Prior, *, per_run: bool = False) -> Problem:
+        """Makes a quantity uncertain; with `per_run` each run of the record has its own value."""
+        entry: dict[str, Any] = {"name": name, **prior.as_json()}
+        if per_run:
+            entry["perRun"] = True
+        self._document.setdefault("uncertain", []).append(entry)
+        return self
+
+    def correlate(self, first: str, second: str, coefficient: float) -> Problem:
+        """Correlates the priors of two uncertain parameters (Gaussian copula), in (−1, 1)."""
+        self._document.setdefault("correlations", []).append(
+            {"first": first, "second": second, "coefficient": coefficient})
+        return self
+
+    def derive(self, name: str, expression: str) -> Problem:
+        """Ties a parameter to others by an expression, such as "2*k1"."""
+        self._document.setdefault("derived", {})[name] = expression
+        return self
+
+    def drive(self, name: str, signal: Signal) -> Problem:
+        """Says how an input of the model runs over time."""
+        self._document.setdefault("inputs", []).append({"name": name, **signal.as_json()})
+        return self
+
+    def stream(self, name: str, *, hold: bool = False) -> Problem:
+        """Takes an input of the model from the measurements, in a column of its name."""
+        return self.drive(name, Streamed(hold=hold))
+
+    def measure(self, output: str, noise: Union[float, Noise], *, column: str = "",
+                unit: str = "") -> Problem:
+        """Adds a measured output.
+
+        `noise` is the standard deviation of its samples in the output's unit, or a `Noise`.
+        `column` and `unit` name the column of the data that has it, and that column's unit.
+        """
+        sizes = noise if isinstance(noise, Noise) else Noise(absolute=float(noise))
+        self._document.setdefault("measured", []).append(
+            {"output": output, "noise": sizes.as_json()})
+        return self.column(output, column, unit) if column or unit else self
+
+    def column(self, quantity: str, header: str = "", unit: str = "") -> Problem:
+        """Says which column of the data has a quantity (or `t`, or `run`), and in which unit."""
+        entry = {key: value for key, value in (("from", header), ("unit", unit)) if value}
+        self._document.setdefault("columns", {})[quantity] = entry
+        return self
+
+    def use_when(self, condition: str) -> Problem:
+        """Uses the samples of a row only where a condition holds, as in "v > 5 && !reverse"."""
+        self._document["useWhen"] = condition
+        return self
+
+    def expand(self, *, order: Optional[int] = None, points_per_term: Optional[float] = None,
+               points: Optional[Literal["HALTON", "HAMMERSLEY", "GAUSS_TENSOR"]] = None,
+               adaptive: Optional[bool] = None,
+               hyperbolic_exponent: Optional[float] = None) -> Problem:
+        """Says how the outputs are expanded in polynomials; None leaves the daemon's default."""
+        self._merge("expansion", order=order, pointsPerTerm=points_per_term, points=points,
+                    adaptive=adaptive, hyperbolicExponent=hyperbolic_exponent)
+        return self
+
+    def integrate(self, *, method: Optional[Literal["AUTO", "EXPLICIT", "STIFF"]] = None,
+                  relative_tolerance: Optional[float] = None,
+                  max_steps: Optional[int] = None) -> Problem:
+        """Says how trajectories are integrated; None leaves the daemon's default."""
+        self._merge("integration", method=method, relativeTolerance=relative_tolerance,
+                    maxSteps=max_steps)
+        return self
+
+    def regularize(self, weight: Union[float, Literal["L_CURVE", "DISCREPANCY", "EVIDENCE"]]
+                   ) -> Problem:
+        """Sets α², the weight of the prior's term (1 is Bayes' rule), or the rule for it."""
+        if isinstance(weight, str):
+            self._document["regularizationMode"] = weight
+        else:
+            self._document["regularization"] = float(weight)
+        return self
+
+    def _merge(self, member: str, **values: Any) -> None:
+        given = {name: value for name, value in values.items() if value is not None}
+        self._document.setdefault(member, {}).update(given)
+
+    def check(self, data: Optional[Data] = None, *, units: Optional[Mapping[str, str]] = None,
+              client: Optional[Client] = None) -> Check:
+        """Returns all errors and warnings of the problem, and of `data` up to the first error.
+
+        The daemon checks it: `client`, or else a daemon on this machine (see `polyest.local`).
+        """
+        from polyest._default import default_client
+
+        return (client or default_client()).check(self, data, units=units)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the JSON object of the problem file."""
+        return copy.deepcopy(self._document)
+
+    def as_json(self) -> str:
+        """Returns the text of the problem file."""
+        return json.dumps(self._document, indent=2)
+
+    def save(self, path: Union[str, os.PathLike[str]]) -> None:
+        """Writes the problem file, which the command `polyest` also reads."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.as_json() + "\n")
+
+    def copy(self) -> Problem:
+        """Returns an independent copy."""
+        return Problem(self._document)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether two problems mean the same file."""
+        return isinstance(other, Problem) and to_message(self) == to_message(other)
+
+    def __repr__(self) -> str:
+        names = [str(entry.get("name")) for entry in self._document.get("uncertain", [])]
+        measured = [str(entry.get("output")) for entry in self._document.get("measured", [])]
+        return (f"<polyest.Problem: {json.dumps(self._document.get('model', {}))[:60]}, "
+                f"uncertain {', '.join(names) or 'none'}, "
+                f"measured {', '.join(measured) or 'none'}>")
+
+
+#: A problem: built, as a problem file's JSON object, or the path of a problem file.
+ProblemLike = Union[Problem, Mapping[str, Any], str, "os.PathLike[str]", problem_pb2.Problem]
+
+
+# Where protobuf says that a field is wrong.
+_PLACE = re.compile(r'at "Problem\.([^"]+)"')
+
+
+def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            document = json.load(file)
+    except OSError as error:
+        raise InvalidInput(f"{os.fspath(path)}: cannot be opened: {error.strerror}") from error
+    except ValueError as error:
+        raise InvalidInput(f"{os.fspath(path)}: {error}") from error
+    if not isinstance(document, dict):
+        raise InvalidInput(f"{os.fspath(path)}: the file must hold one JSON object")
+    return document
+
+
+def from_message(message: problem_pb2.Problem) -> Problem:
+    """Returns the problem that a message holds."""
+    return Problem(json_format.MessageToDict(message))
+
+
+def to_message(problem: ProblemLike) -> problem_pb2.Problem:
+    """Returns a problem as the daemon takes it. Raises InvalidInput for a field it lacks."""
+    if isinstance(problem, problem_pb2.Problem):
+        return problem
+    place = ""
+    if isinstance(problem, Problem):
+        document = problem.as_dict()
+    elif isinstance(problem, Mapping):
+        document = copy.deepcopy(dict(problem))
+    else:
+        document, place = _read(problem), f"{os.fspath(problem)}: "
+    expansion = document.get("expansion")
+    if isinstance(expansion, dict) and expansion.get("order") == "AUTO":
+        del expansion["order"]  # what the word means in a problem file
+    message = problem_pb2.Problem()
+    try:
+        json_format.ParseDict(document, message)
+    except json_format.ParseError as error:
+        at = _PLACE.search(str(error))
+        raise InvalidInput(f"{place}{error}", field=at[1] if at else "") from error
+    return message

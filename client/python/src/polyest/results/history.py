@@ -1,0 +1,84 @@
+"""How the estimates of a record came about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from polyest._messages import enum_name
+from polyest._proto.v1 import estimate_pb2
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class ParameterThen:
+    """A parameter as it was estimated then; values are in `unit`."""
+
+    #: The name.
+    name: str
+    #: The unit; "1" for a pure number, empty where the equations give none.
+    unit: str
+    #: The posterior's mean.
+    mean: float
+    #: The standard deviation.
+    std_dev: float
+    #: The posterior's 2.5 % quantile.
+    lower95: float
+    #: The posterior's 97.5 % quantile.
+    upper95: float
+    #: "IDENTIFIED", "WEAK" or "NOT_IDENTIFIED".
+    verdict: str
+
+
+@dataclass(frozen=True)
+class HistoryPoint:
+    """One estimate, in short."""
+
+    #: Time of the last sample, s since its run began.
+    time_s: float
+    #: Values taken into account.
+    sample_count: int
+    #: The session's last batch taken into account; 0 where there are no batches.
+    sequence: int
+    #: The parameters by name.
+    parameters: dict[str, ParameterThen]
+
+
+@dataclass(frozen=True)
+class History:
+    """Earlier estimates, the first one first."""
+
+    #: The estimates.
+    points: list[HistoryPoint]
+
+    def __len__(self) -> int:
+        """Returns the number of estimates."""
+        return len(self.points)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Returns a DataFrame with a row for each estimate and parameter."""
+        import pandas as pd
+
+        return pd.DataFrame([
+            {"t": point.time_s, "samples": point.sample_count, "sequence": point.sequence,
+             **vars(parameter)}
+            for point in self.points for parameter in point.parameters.values()])
+
+    def plot(self) -> Figure:
+        """Draws means and 95 % intervals over time. Returns a matplotlib figure."""
+        from polyest import plot
+
+        return plot.history(self)
+
+
+def of_message(message: estimate_pb2.EstimateHistory) -> History:
+    """Returns a history as the daemon has sent it."""
+    return History([
+        HistoryPoint(point.time_s, point.sample_count, point.sequence,
+                     {one.name: ParameterThen(one.name, one.unit, one.mean, one.std_dev,
+                                              one.lower95, one.upper95, enum_name(one, "verdict"))
+                      for one in point.parameters})
+        for point in message.points])

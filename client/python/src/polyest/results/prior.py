@@ -1,0 +1,161 @@
+"""What the prior predicts, and which parameters the outputs depend on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from polyest._messages import array
+from polyest._proto.v1 import study_service_pb2
+from polyest._table import Floats
+from polyest.estimate_parts import Diagnostic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class ExpansionUsed:
+    """The expansion that an answer rests on."""
+
+    #: The order of the truncation.
+    order: int
+    #: Terms of the expansion.
+    term_count: int
+    #: Collocation points.
+    point_count: int
+
+    @classmethod
+    def of_message(cls, message: study_service_pb2.ExpansionUsed) -> ExpansionUsed:
+        """Returns the expansion as the daemon has sent it."""
+        return cls(message.order, message.term_count, message.point_count)
+
+
+@dataclass(frozen=True)
+class PropagationOutput:
+    """One output over T times, with P quantiles; values are in `unit`."""
+
+    #: The output's name.
+    name: str
+    #: Its unit; "1" for a pure number, empty where the equations give none.
+    unit: str
+    #: (T,), the mean.
+    mean: Floats
+    #: (T,), the standard deviation.
+    std_dev: Floats
+    #: (T, P), the quantiles.
+    quantiles: Floats
+    #: (T,), root mean square of model − expansion at the collocation points.
+    residual: Floats
+    #: For each time the pair of (B,) centres of bins and (B,) densities; empty if not asked for.
+    densities: list[tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """What the prior predicts for the outputs over time."""
+
+    #: (T,), s.
+    time_s: Floats
+    #: The outputs by name.
+    outputs: dict[str, PropagationOutput]
+    #: (P,), the probabilities of the quantiles.
+    probabilities: Floats
+    #: The expansion used.
+    expansion: ExpansionUsed
+    #: POINTS_FAILED where it applies.
+    diagnostics: list[Diagnostic]
+
+    def __getitem__(self, output: str) -> PropagationOutput:
+        """Returns one output. Raises KeyError."""
+        return self.outputs[output]
+
+    def plot(self) -> Figure:
+        """Draws mean and outer quantiles over time. Returns a matplotlib figure."""
+        from polyest import plot
+
+        return plot.propagation(self)
+
+
+def propagation_of(message: study_service_pb2.ComputePropagationResponse) -> Propagation:
+    """Returns a propagation as the daemon has sent it."""
+    shape = (len(message.time_s), len(message.probabilities))
+
+    def output_of(one: Any) -> PropagationOutput:
+        return PropagationOutput(
+            one.name, one.unit, array(one.mean), array(one.std_dev), array(one.quantiles, *shape),
+            array(one.residual),
+            [(array(density.value), array(density.density)) for density in one.densities])
+
+    return Propagation(array(message.time_s),
+                       {one.name: output_of(one) for one in message.outputs},
+                       array(message.probabilities), ExpansionUsed.of_message(message.expansion),
+                       [Diagnostic.of_message(one) for one in message.diagnostics])
+
+
+@dataclass(frozen=True)
+class SensitivityOutput:
+    """How one output depends on n parameters over T times; values are in `unit`."""
+
+    #: The output's name.
+    name: str
+    #: Its unit; "1" for a pure number, empty where the equations give none.
+    unit: str
+    #: (T,), the mean.
+    mean: Floats
+    #: (T,), the standard deviation.
+    std_dev: Floats
+    #: (T, n), share of the variance that each parameter causes alone, in [0, 1].
+    first_order: Floats
+    #: (T, n), share of the variance that involves each parameter, in [0, 1].
+    total: Floats
+    #: (T,), root mean square of model − expansion; shares hold where it is small beside std_dev.
+    residual: Floats
+    #: (T,), standard deviation of the noise of a sample.
+    noise_std_dev: Floats
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Which parameters the outputs depend on (Sobol' indices)."""
+
+    #: (T,), s.
+    time_s: Floats
+    #: The uncertain parameters, in the problem's order.
+    parameters: list[str]
+    #: The outputs by name.
+    outputs: dict[str, SensitivityOutput]
+    #: (share of the variance, most change of one sample in noise) of each, the most active first.
+    activity: dict[str, tuple[float, float]]
+    #: The expansion used.
+    expansion: ExpansionUsed
+    #: Warnings, as of an estimate.
+    diagnostics: list[Diagnostic]
+
+    def __getitem__(self, output: str) -> SensitivityOutput:
+        """Returns one output. Raises KeyError."""
+        return self.outputs[output]
+
+    def plot(self) -> Figure:
+        """Draws the total shares over time. Returns a matplotlib figure."""
+        from polyest import plot
+
+        return plot.sensitivity(self)
+
+
+def sensitivity_of(message: study_service_pb2.ComputeSensitivityResponse) -> Sensitivity:
+    """Returns a sensitivity as the daemon has sent it."""
+    shape = (len(message.time_s), len(message.parameters))
+
+    def output_of(one: Any) -> SensitivityOutput:
+        return SensitivityOutput(
+            one.name, one.unit, array(one.mean), array(one.std_dev),
+            array(one.first_order, *shape), array(one.total, *shape), array(one.residual),
+            array(one.noise_std_dev))
+
+    return Sensitivity(array(message.time_s), list(message.parameters),
+                       {one.name: output_of(one) for one in message.outputs},
+                       {one.parameter: (one.share, one.peak_to_noise)
+                        for one in message.activity},
+                       ExpansionUsed.of_message(message.expansion),
+                       [Diagnostic.of_message(one) for one in message.diagnostics])

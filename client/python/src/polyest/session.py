@@ -1,0 +1,196 @@
+"""A session of the daemon: a problem whose measurements arrive batch by batch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Optional, TypeVar, Union
+
+from polyest import _calls, _methods, estimates, info, results
+from polyest._calls import Call, Subject
+from polyest._measurements import MeasurementConverter, Measurements, split
+from polyest._proto.v1 import estimate_pb2, problem_pb2, session_service_pb2
+from polyest._resume import StreamOptions
+from polyest._session_file import SessionFileWriter
+from polyest._stream import MeasurementStream
+from polyest._table import Data
+from polyest.estimates import Estimate
+from polyest.problem import Problem, from_message
+from polyest.results import prediction
+from polyest.studies import Studies
+
+if TYPE_CHECKING:
+    from polyest._transport import Transport
+
+Result = TypeVar("Result")
+
+
+class Session(Studies):
+    """A session, and the stream that this program writes to it.
+
+    As a context manager it ends the stream, not the session: the daemon keeps a session until it is
+    deleted, and `Client.session` goes on with it. One program writes to a session at a time. Use it
+    from one thread.
+    """
+
+    def __init__(self, transport: Transport, created: session_service_pb2.Session,
+                 units: Optional[Mapping[str, str]], options: StreamOptions,
+                 on_estimate: Optional[Callable[[Estimate], None]]) -> None:
+        """Use `Client.session`."""
+        self._transport = transport
+        self._resource = created.name
+        self._problem_message = created.problem
+        self._units = units or {}
+        self._options = options
+        self._on_estimate = on_estimate
+        self._converter = MeasurementConverter(created.problem, units)
+        self._stream: Optional[MeasurementStream] = None
+
+    @property
+    def name(self) -> str:
+        """The session's name."""
+        return self._resource.rpartition("/")[2]
+
+    @property
+    def problem(self) -> Problem:
+        """The session's problem, as a copy: a session's problem never changes."""
+        return from_message(self._problem_message)
+
+    def info(self) -> info.SessionInfo:
+        """Returns what the daemon says of the session: its batches, its load."""
+        return info.session_of(self._transport.unary(
+            _methods.GET_SESSION, session_service_pb2.GetSessionRequest(name=self._resource)))
+
+    def append(self, data: Data, *, end_of_run: bool = False, wait: bool = True) -> int:
+        """Adds rows, later than those before, and returns the number of the last batch.
+
+        data: columns as in `Client.estimate`. end_of_run: these are the last rows of their run.
+        wait: return when the daemon keeps the rows. Otherwise return as soon as they are on their
+            way, and wait for room only; then `flush`, `estimate` or the end of the `with` block
+            reports what goes wrong.
+
+        A lost connection is made again, and rows without acknowledgement are sent again: none is
+        lost or counted twice. Raises Unavailable if all attempts fail; the rows are still pending
+        then, and `flush` tries again. Any other exception means that the rows were refused, and
+        that those before them are kept.
+        """
+        return self._send(self._converter.convert(data, end_of_run=end_of_run), wait)
+
+    def end_run(self) -> None:
+        """Says that the last row's run has no further rows.
+
+        Until then, an estimate leaves out the last rows of a problem with interpolated streamed
+        inputs: later samples shape the input there.
+        """
+        self._send(Measurements(end_of_run=True), True)
+
+    def _send(self, measurements: Measurements, wait: bool) -> int:
+        if self._stream is None:
+            self._stream = MeasurementStream(self._transport, self._resource, self._options,
+                                             self._take)
+        self._stream.send(split(measurements, self._options.batch_rows))
+        if wait:
+            self._stream.flush()
+        return self._stream.queue.last_sequence
+
+    def _take(self, message: estimate_pb2.Estimate) -> None:
+        if self._on_estimate is not None:
+            self._on_estimate(estimates.of_message(message, self))
+
+    def flush(self) -> None:
+        """Waits until the daemon keeps all rows. Raises as `append`."""
+        if self._stream is not None:
+            self._stream.flush()
+
+    def close(self) -> None:
+        """Ends the stream once all rows are kept. The session stays. Raises as `append`."""
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.finish()
+
+    def __enter__(self) -> Session:
+        """Returns the session."""
+        return self
+
+    def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
+                 traceback: Optional[TracebackType]) -> None:
+        """Ends the stream; after an exception without waiting for what is not kept yet."""
+        if kind is None:
+            self.close()
+        elif self._stream is not None:
+            stream, self._stream = self._stream, None
+            stream.cancel()
+
+    def estimate(self) -> Estimate:
+        """Returns the estimate from all rows so far."""
+        self.flush()
+        return self._transport.run(_calls.get_estimate(self._resource, self))
+
+    def estimates(self, *, follow: bool = False) -> Iterator[Estimate]:
+        """Yields the present estimate and then new ones, of which a slow loop gets the newest.
+
+        Ends with the estimate that takes in the last batch of this moment; `follow` goes on until
+        the loop is left or the session is deleted (NotFound).
+        """
+        self.flush()
+        last = self.info().last_sequence
+        if last == 0 and not follow:
+            return
+        request = session_service_pb2.WatchSessionRequest(session=self._resource)
+        for response in self._transport.server_stream(_methods.WATCH_SESSION, request):
+            if not response.HasField("estimate"):
+                continue
+            yield estimates.of_message(response.estimate, self)
+            if not follow and response.estimate.sequence >= last:
+                return
+
+    def predictions(self, outputs: Sequence[str] = (), *, draws: int = 0, max_rows: int = 0,
+                    min_interval_s: float = 0) -> Iterator[results.Prediction]:
+        """Yields predictions of the session's own record as estimates come, for a live picture.
+
+        outputs: names of outputs; by default the measured ones. draws: trajectories, 2 … 10000
+        (50). max_rows: evenly spaced ones of a longer record (200). min_interval_s: the least time
+        from one to the next, s (1). The daemon spends at most a tenth of its time on them. Goes on
+        until the loop is left or the session is deleted (NotFound).
+        """
+        self.flush()
+        request = _calls.watch_predictions(self._resource, outputs, draws, max_rows,
+                                           min_interval_s)
+        for response in self._transport.server_stream(_methods.WATCH_SESSION, request):
+            if response.HasField("prediction"):
+                yield prediction.of_message(response.prediction)
+
+    def history(self) -> results.History:
+        """Returns how the session's estimates came about: at most 512 of them and the newest."""
+        self.flush()
+        return self._transport.run(_calls.get_history(self._resource))
+
+    def export(self, file: Union[str, os.PathLike[str]]) -> None:
+        """Writes the session to a file, as `polyest export`; `Client.import_session` reads it."""
+        self.flush()
+        request = session_service_pb2.ExportSessionRequest(name=self._resource)
+        with SessionFileWriter(file) as writer:
+            for record in self._transport.server_stream(_methods.EXPORT_SESSION, request):
+                writer.write(record)
+
+    def delete(self) -> None:
+        """Deletes the session with its measurements."""
+        if self._stream is not None:
+            self._stream.cancel()
+            self._stream = None
+        self._transport.unary(_methods.DELETE_SESSION,
+                              session_service_pb2.DeleteSessionRequest(name=self._resource))
+
+    def _subject(self) -> Subject:
+        return _calls.subject_of_session(self._resource)
+
+    def _problem(self) -> problem_pb2.Problem:
+        return self._problem_message
+
+    def _run(self, call: Call[Result]) -> Result:
+        self.flush()
+        return self._transport.run(call)
+
+    def __repr__(self) -> str:
+        return f"<polyest.Session '{self.name}' of {self._transport.options.server}>"
