@@ -17,6 +17,8 @@ packages=(
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format openssl sqlite3 libfaketime
   python3-yaml python3-grpcio python3-protobuf python3-numpy python3-scipy
+  python3-pytest python3-pandas python3-matplotlib python3-xarray python3-emcee
+  mypy python3-pip python3-setuptools python3-wheel
 )
 # SUNDIALS' CMake configuration needs OpenMP of every compiler.
 sanitizer_packages=(

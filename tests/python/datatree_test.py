@@ -1,0 +1,77 @@
+"""Groups for ArviZ, and draws of priors against their moments."""
+
+import numpy as np
+import pytest
+
+import polyest
+from polyest import datatree
+from polyest._draws import prior_draws
+
+xarray = pytest.importorskip("xarray")
+
+DRAWS = 20_000
+
+
+@pytest.fixture(scope="module")
+def experiment(client, record):
+    """The oscillator with its record."""
+    wanted = (polyest.Problem.builtin("mass_spring_damper").fix(m=1.0, x0=1.0)
+              .uncertain("k", polyest.Uniform(31.584, 47.376))
+              .uncertain("c", polyest.Uniform(0.1, 0.3)).measure("x", noise=0.01))
+    return client.experiment(wanted, record)
+
+
+def test_groups_have_draws_data_and_predictions(experiment, record):
+    groups = datatree.groups(experiment, samples=500)
+    assert dict(groups["posterior"].sizes) == {"chain": 1, "draw": 500}
+    assert groups["posterior"]["k"].attrs["units"] == "N/m"
+    assert dict(groups["prior"].sizes) == {"chain": 1, "draw": 500}
+    np.testing.assert_allclose(groups["observed_data"]["x"], record["x"])
+    np.testing.assert_array_equal(groups["observed_data"]["time"], record["t"])
+    assert groups["prediction"]["x_quantiles"].dims == ("row", "probability")
+    estimate = experiment.estimate()
+    # The mean of 500 draws scatters by 0.045 standard deviations.
+    assert abs(float(groups["posterior"]["k"].mean()) - estimate["k"].mean) < (
+        0.2 * estimate["k"].std_dev)
+
+
+@pytest.mark.skipif(not hasattr(xarray, "DataTree"), reason="xarray is older than 2024.10")
+def test_arviz_reads_the_tree(experiment):
+    arviz = pytest.importorskip("arviz")
+    tree = experiment.estimate().to_datatree(samples=500)
+    assert set(tree.children) == {"posterior", "prior", "observed_data", "prediction"}
+    # ArviZ 1 reads trees, earlier ones their groups.
+    newer = int(arviz.__version__.split(".")[0]) >= 1
+    summary = arviz.summary(tree if newer else tree["posterior"].to_dataset())
+    assert set(summary.index) == {"k", "c"}
+
+
+@pytest.mark.skipif(hasattr(xarray, "DataTree"), reason="xarray has DataTree")
+def test_an_old_xarray_is_told(experiment):
+    with pytest.raises(ImportError, match=r"xarray 2024.10 or later; polyest.datatree.groups"):
+        experiment.estimate().to_datatree()
+
+
+@pytest.mark.parametrize(("prior", "mean", "std_dev"), [
+    (polyest.Uniform(1, 3), 2, 2 / np.sqrt(12)),
+    (polyest.Normal(5, 2), 5, 2),
+    (polyest.Beta(2, 3, 10, 20), 10 + 10 * 2 / 5, 10 * np.sqrt(6 / (25 * 6))),
+    (polyest.Gamma(4, 0.5, 1), 3, 1),
+    (polyest.Lognormal(40, 5), 40, 5),
+    (polyest.TruncatedNormal(0, 1, lower=0), np.sqrt(2 / np.pi), np.sqrt(1 - 2 / np.pi)),
+], ids=lambda value: type(value).__name__)
+def test_draws_have_the_moments_of_their_prior(client, prior, mean, std_dev):
+    problem = polyest.Problem.builtin("mass_spring_damper").uncertain("k", prior)
+    drawn = prior_draws(problem.as_dict(), DRAWS, 1)["k"]
+    error = std_dev / np.sqrt(DRAWS)
+    assert abs(drawn.mean() - mean) < 4 * error
+    # The kurtosis of none of them is above 10.
+    assert abs(drawn.std() - std_dev) < 4 * 1.5 * error
+
+
+def test_correlated_draws_have_the_copulas_ranks():
+    problem = (polyest.Problem.builtin("mass_spring_damper").uncertain("k", polyest.Normal(0, 1))
+               .uncertain("c", polyest.Normal(0, 1)).correlate("k", "c", 0.8))
+    drawn = prior_draws(problem.as_dict(), DRAWS, 1)
+    found = np.corrcoef(drawn["k"], drawn["c"])[0, 1]
+    assert abs(found - 0.8) < 4 * (1 - 0.8**2) / np.sqrt(DRAWS)

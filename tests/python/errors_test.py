@@ -1,0 +1,244 @@
+"""Every exception, with what it tells: by the daemon where it can be brought to it."""
+
+import threading
+from concurrent import futures
+
+import grpc
+import pytest
+from google.protobuf import any_pb2
+
+import polyest
+from polyest import _daemon
+from polyest._proto.rpc import error_details_pb2
+from polyest._proto.v1 import problem_service_pb2
+
+CODES = [code for code in grpc.StatusCode if code is not grpc.StatusCode.OK]
+
+
+def test_a_wrong_field_is_named_with_its_rule(client, problem, record):
+    wrong = problem.copy().uncertain("x0", polyest.Uniform(2.0, 1.0))
+    with pytest.raises(polyest.InvalidInput) as raised:
+        client.estimate(wrong, record)
+    error = raised.value
+    assert error.field.startswith("uncertain[2].uniform")
+    assert error.rule and error.rule in error.message
+    assert not error.retry and isinstance(error, ValueError)
+
+
+def test_a_name_that_the_model_lacks_is_refused_with_those_it_has(client, record):
+    wrong = polyest.Problem.builtin("mass_spring_damper").uncertain(
+        "stiffness", polyest.Uniform(1, 2)).measure("x", 0.01)
+    with pytest.raises(polyest.InvalidInput, match="stiffness.*k"):
+        client.estimate(wrong, record)
+
+
+def test_a_field_that_no_problem_has_is_refused_before_it_is_sent(client, record):
+    with pytest.raises(polyest.InvalidInput, match="uncertian") as raised:
+        client.estimate({"model": {"builtin": "duffing"}, "uncertian": []}, record)
+    assert raised.value.code == "INVALID_ARGUMENT"
+
+
+def test_a_problem_file_that_cannot_be_read_is_named(client, record, tmp_path):
+    with pytest.raises(polyest.InvalidInput, match="none.json: cannot be opened"):
+        client.estimate(tmp_path / "none.json", record)
+    (tmp_path / "list.json").write_text("[]")
+    with pytest.raises(polyest.InvalidInput, match="must hold one JSON object"):
+        client.estimate(tmp_path / "list.json", record)
+
+
+def test_a_session_that_does_not_exist(client):
+    with pytest.raises(polyest.NotFound, match="nowhere"):
+        client.session("nowhere")
+
+
+def test_a_session_that_has_another_problem(client, problem):
+    client.session("taken", problem)
+    with pytest.raises(polyest.AlreadyExists, match="'taken' exists with another problem"):
+        client.session("taken", problem.copy().fix(m=2.0))
+
+
+def test_a_model_that_cannot_be_integrated(client):
+    # dx/dt = k x² from 1 is infinite at 1/k, long before the last sample.
+    escaping = (polyest.Problem.equations(states={"x": "k*x^2"}, outputs={"x": "x"})
+                .fix(x_0=1.0).uncertain("k", polyest.Uniform(5, 6)).measure("x", 0.1))
+    with pytest.raises(polyest.FailedPrecondition):
+        client.estimate(escaping, {"t": [10.0, 20.0], "x": [1.0, 1.0]})
+
+
+def test_a_limit_that_is_passed_is_named(problem):
+    with polyest.local(arguments=["--max-sessions", "1"]) as client:
+        client.session("first", problem)
+        with pytest.raises(polyest.ResourceExhausted) as raised:
+            client.session("second", problem)
+    assert raised.value.limit == "--max-sessions"
+    assert raised.value.reason == "LIMIT_EXCEEDED"
+    assert not raised.value.retry
+
+
+def test_a_call_that_takes_too_long(client, problem, record):
+    with polyest.connect(client.server, timeout_s=1e-6) as hasty:
+        with pytest.raises(polyest.DeadlineExceeded) as raised:
+            hasty.estimate(problem, record)
+    assert isinstance(raised.value, TimeoutError)
+
+
+def test_a_watch_that_is_closed_with_its_client(client, problem, rows):
+    with client.session("closed", problem) as session:
+        session.append(rows(0, 100))
+    observer = polyest.connect(client.server)
+    following = observer.session("closed").estimates(follow=True)
+    next(following)
+    observer.close()
+    with pytest.raises(polyest.Cancelled):
+        next(following)
+
+
+def test_a_session_that_is_deleted_ends_its_watches(client, problem, rows):
+    with client.session("deleted", problem) as session:
+        session.append(rows(0, 100))
+        following = session.estimates(follow=True)
+        next(following)
+        client.delete_session("deleted")
+        with pytest.raises(polyest.NotFound):
+            next(following)
+        session._stream.cancel()
+        session._stream = None
+
+
+def test_a_daemon_that_is_not_there():
+    daemon = _daemon.start()
+    daemon.stop()
+    with polyest.connect(daemon.address) as client:
+        with pytest.raises(polyest.Unavailable, match=daemon.address.rpartition(":")[2]) as raised:
+            client.status()
+    assert raised.value.retry and isinstance(raised.value, ConnectionError)
+
+
+def test_a_program_that_is_no_daemon():
+    with pytest.raises(polyest.Unavailable, match="is no program"):
+        polyest.local("/nowhere/polyestd")
+    with pytest.raises(polyest.Unavailable, match="did not start: .*--max-sessions"):
+        polyest.local(arguments=["--max-sessions", "0"])
+
+
+@pytest.fixture
+def guarded(tmp_path):
+    """A daemon with tokens, and the token of a reader."""
+    import subprocess
+
+    made = subprocess.run([_daemon.find_program(None), "--new-token", "eye:lab:reader"],
+                          capture_output=True, text=True, check=True)
+    (tmp_path / "tokens").write_text(made.stderr)
+    (tmp_path / "reader.token").write_text(made.stdout)
+    with polyest.local(arguments=["--tokens", str(tmp_path / "tokens")]) as client:
+        yield client.server, tmp_path / "reader.token"
+
+
+def test_a_caller_without_a_token_or_with_a_wrong_one(guarded):
+    server, _ = guarded
+    for token in (None, "wrong"):
+        with polyest.connect(server, token=token) as client:
+            with pytest.raises(polyest.Unauthenticated):
+                client.status()
+
+
+def test_a_role_that_does_not_allow_the_call(guarded, problem):
+    server, token_file = guarded
+    with polyest.connect(server, token_file=token_file) as client:
+        assert client.sessions() == []
+        with pytest.raises(polyest.PermissionDenied) as raised:
+            client.session("written", problem)
+    assert isinstance(raised.value, PermissionError)
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    ({"token": "secret"}, "is not a loopback address; tokens are sent only over TLS"),
+    ({"token": "two words", "ca": "x"}, "must be one word"),
+    ({"token_file": "/nowhere"}, "token_file: /nowhere cannot be read"),
+    ({"ca": "/nowhere"}, "ca: /nowhere cannot be read"),
+    ({"ca": "/dev/null"}, "/dev/null is not in PEM form"),
+    ({"certificate": "x"}, "a certificate and its key must be given together"),
+])
+def test_a_connection_that_cannot_be_safe(options, said):
+    with pytest.raises(polyest.InvalidInput, match=said):
+        polyest.connect("rig.example.org:50051", **options)
+
+
+class Answering(grpc.GenericRpcHandler):
+    """Answers every call with one message, or one status and its details."""
+
+    def __init__(self):
+        self.code, self.details, self.answer = grpc.StatusCode.UNKNOWN, [], None
+
+    def service(self, call):
+        def answer(request, context):
+            if self.answer is not None:
+                return self.answer.SerializeToString()
+            status = error_details_pb2.Status(code=self.code.value[0], message="because")
+            for detail in self.details:
+                status.details.append(any_pb2.Any(
+                    type_url=f"type.googleapis.com/google.rpc.{detail.DESCRIPTOR.name}",
+                    value=detail.SerializeToString()))
+            context.set_trailing_metadata((("grpc-status-details-bin",
+                                            status.SerializeToString()),))
+            context.abort(self.code, "because")
+
+        return grpc.unary_unary_rpc_method_handler(answer)
+
+
+@pytest.fixture(scope="module")
+def answering():
+    """A server that answers as it is told, and a client of it."""
+    handler = Answering()
+    server = grpc.server(futures.ThreadPoolExecutor(2), handlers=[handler])
+    port = server.add_insecure_port("127.0.0.1:0")
+    server.start()
+    with polyest.connect(f"127.0.0.1:{port}") as client:
+        yield handler, client
+    server.stop(None).wait()
+
+
+@pytest.mark.parametrize("code", CODES, ids=lambda code: code.name)
+def test_every_status_has_its_exception(answering, code):
+    handler, client = answering
+    handler.code, handler.details = code, []
+    with pytest.raises(polyest.PolyestError, match="because") as raised:
+        client.status()
+    assert raised.value.code == code.name
+    named = {kind.code: kind for kind in vars(polyest).values()
+             if isinstance(kind, type) and issubclass(kind, polyest.PolyestError)}
+    assert type(raised.value) is named.get(code.name, polyest.PolyestError)
+
+
+def test_details_are_read_under_their_standard_names(answering):
+    handler, client = answering
+    bad = error_details_pb2.BadRequest()
+    bad.field_violations.add(field="measured[0].noise", description="must be positive")
+    info = error_details_pb2.ErrorInfo(reason="DISK_FULL", domain="polyest")
+    info.metadata["limit"] = "--max-disk-mb"
+    retry = error_details_pb2.RetryInfo()
+    retry.retry_delay.FromMilliseconds(2500)
+    handler.code, handler.details = grpc.StatusCode.RESOURCE_EXHAUSTED, [bad, info, retry]
+    with pytest.raises(polyest.ResourceExhausted) as raised:
+        client.status()
+    error = raised.value
+    assert (error.field, error.rule) == ("measured[0].noise", "must be positive")
+    assert (error.reason, error.limit) == ("DISK_FULL", "--max-disk-mb")
+    assert error.retry and error.retry_after_s == 2.5
+
+
+def test_answers_may_be_larger_than_four_megabytes(answering):
+    handler, client = answering
+    handler.answer = problem_service_pb2.GetProblemSchemaResponse(json_schema="x" * (5 << 20))
+    assert len(client.problem_schema()) == 5 << 20
+
+
+def test_threads_share_a_client(client, problem, record):
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(client.estimate(problem, record)))
+               for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({str(one.to_dict()) for one in found}) == 1 and len(found) == 4

@@ -1,0 +1,133 @@
+"""How data become measurements, without a daemon: columns, units, times, runs, missing samples."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import polyest
+from polyest._measurements import MeasurementConverter, split
+from polyest.problem import to_message
+
+
+def converter(problem=None, units=None):
+    problem = problem or polyest.Problem.builtin("quarter_car").measure("x", 0.1).stream("u")
+    return MeasurementConverter(to_message(problem), units)
+
+
+def values_of(measurements):
+    return {channel.name: list(channel.values) for channel in measurements.channels}
+
+
+def test_columns_of_the_problem_are_taken_and_others_are_named():
+    with pytest.warns(UserWarning, match="are not used: note"):
+        found = converter().convert({"t": [0.0, 1.0], "u": [1, 2], "x": [3, 4], "note": [5, 6]})
+    assert list(found.time_s) == [0.0, 1.0]
+    assert values_of(found) == {"x": [3, 4], "u": [1, 2]}
+
+
+def test_missing_samples_are_rows_counted_from_zero():
+    found = converter().convert({"t": [0.0, 1.0, 2.0], "x": [np.nan, 2.0, np.nan]})
+    assert list(found.channels[0].missing) == [0, 2]
+    assert np.isfinite(found.channels[0].values).all()
+
+
+def test_nullable_columns_of_pandas_have_missing_samples():
+    frame = pd.DataFrame({"t": [0.0, 1.0], "x": pd.array([1, None], dtype="Int64")})
+    assert list(converter().convert(frame).channels[0].missing) == [1]
+
+
+def test_objects_with_none_have_missing_samples():
+    found = converter().convert({"t": [0.0, 1.0], "x": [None, 2.0]})
+    assert list(found.channels[0].missing) == [0]
+
+
+@pytest.mark.parametrize("header", ["x [mm]", "x (mm)", "x / mm"])
+def test_a_header_may_have_the_unit(header):
+    channel = converter().convert({"t": [0.0], header: [1.0]}).channels[0]
+    assert (channel.name, channel.unit) == ("x", "mm")
+
+
+def test_a_given_unit_goes_before_that_of_the_header_and_of_the_problem():
+    problem = polyest.Problem.builtin("quarter_car").measure("x", 0.1, column="Disp", unit="cm")
+    data = {"t": [0.0], "Disp [mm]": [1.0]}
+    assert converter(problem).convert(data).channels[0].unit == "cm"
+    assert converter(problem, {"x": "m"}).convert(data).channels[0].unit == "m"
+
+
+def test_a_column_that_the_problem_names_must_exist():
+    problem = polyest.Problem.builtin("quarter_car").measure("x", 0.1, column="Disp")
+    with pytest.raises(polyest.InvalidInput, match="no column 'Disp'; the columns are 't', 'x'"):
+        converter(problem).convert({"t": [0.0], "x": [1.0]})
+
+
+def test_columns_of_the_condition_are_sent():
+    problem = polyest.Problem.builtin("quarter_car").measure("x", 0.1).use_when("v > 5 && !rev")
+    found = converter(problem).convert({"t": [0.0], "x": [1.0], "v": [6.0], "rev": [False]})
+    assert values_of(found) == {"x": [1.0], "v": [6.0], "rev": [0.0]}
+
+
+def test_runs_are_whole_numbers():
+    found = converter().convert({"t": [0.0, 0.0], "run": [0, 1], "x": [1.0, 2.0]})
+    assert list(found.run) == [0, 1]
+    with pytest.raises(polyest.InvalidInput, match="run: a run must be a whole number"):
+        converter().convert({"t": [0.0], "run": [0.5], "x": [1.0]})
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e-3), ("min", 60.0), ("s", 1.0)])
+def test_times_are_converted(unit, factor):
+    found = converter(units={"t": unit}).convert({"t": [0.0, 2.0], "x": [1.0, 2.0]})
+    np.testing.assert_allclose(found.time_s, [0.0, 2 * factor])
+
+
+def test_dates_count_from_the_first_row_of_all_batches():
+    times = pd.date_range("2026-01-31T13:00:00", periods=4, freq="250ms")
+    frame = pd.DataFrame({"x": np.arange(4.0)}, index=times)
+    one = converter()
+    assert list(one.convert(frame[:2]).time_s) == [0.0, 0.25]
+    assert list(one.convert(frame[2:]).time_s) == [0.5, 0.75]
+
+
+def test_dates_with_a_time_zone_count_as_others():
+    times = pd.date_range("2026-01-31T13:00:00", periods=2, freq="250ms", tz="Europe/Berlin")
+    found = converter().convert(pd.DataFrame({"t": times, "x": [1.0, 2.0]}))
+    assert list(found.time_s) == [0.0, 0.25]
+
+
+def test_time_differences_are_times():
+    index = pd.to_timedelta([0.0, 0.5], unit="s")
+    found = converter().convert(pd.DataFrame({"x": [1.0, 2.0]}, index=index))
+    assert list(found.time_s) == [0, 0.5]
+
+
+@pytest.mark.parametrize(("data", "said"), [
+    ({"x": [1.0]}, "t: no column of the time; the columns are 'x'"),
+    ({"t": [0.0], "y": [1.0]}, r"no column of a measured output \(x\); the columns are 't', 'y'"),
+    ({"t": [0.0, 1.0], "x": [1.0]}, "columns differ in length: t 2, x 1"),
+    ({"t": [0.0], "x": [np.inf]}, "x: row 0: inf is not finite"),
+    ({"t": [np.nan], "x": [1.0]}, "t: row 0 has no time"),
+    ({"t": [0.0], "x": ["fast"]}, "x: has values of type"),
+    ({"t": [0.0], "x": [[1.0]]}, r"x: has the shape \(1, 1\)"),
+    ([1.0, 2.0], "a list has no columns"),
+])
+def test_what_cannot_be_meant_is_refused_with_the_rule(data, said):
+    with pytest.raises(polyest.InvalidInput, match=said):
+        converter().convert(data)
+
+
+def test_an_unknown_unit_of_time_names_those_that_are_known():
+    with pytest.raises(polyest.InvalidInput, match="'mm' is no unit of time; known are s, ms"):
+        converter(units={"t": "mm"}).convert({"t": [0.0], "x": [1.0]})
+
+
+def test_a_split_record_has_the_same_rows():
+    times = np.arange(10.0)
+    signal = np.where(times % 3 == 0, np.nan, times)
+    whole = converter().convert({"t": times, "x": signal, "run": times // 5}, end_of_run=True)
+    parts = list(split(whole, 4))
+    assert [len(part.time_s) for part in parts] == [4, 4, 2]
+    assert [part.end_of_run for part in parts] == [False, False, True]
+    assert [time for part in parts for time in part.time_s] == list(whole.time_s)
+    assert [run for part in parts for run in part.run] == list(whole.run)
+    missing = [first + row for first, part in zip((0, 4, 8), parts)
+               for row in part.channels[0].missing]
+    assert missing == list(whole.channels[0].missing)

@@ -1,0 +1,111 @@
+"""The builder of problems: the same file as by hand, the daemon's own checks."""
+
+import json
+
+import pytest
+
+import polyest
+from conftest import EXAMPLES
+from polyest.problem import to_message
+
+
+def test_a_built_problem_is_the_file_of_the_example(problem):
+    assert problem == polyest.Problem.read(EXAMPLES / "oscillator.json")
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.json")), ids=lambda file: file.stem)
+def test_every_example_is_read_and_saved_without_a_change(file, tmp_path):
+    problem = polyest.Problem.read(file)
+    problem.save(tmp_path / "saved.json")
+    assert polyest.Problem.read(tmp_path / "saved.json").as_dict() == json.loads(file.read_text())
+
+
+def test_everything_that_a_problem_may_say(client):
+    problem = (
+        polyest.Problem.equations(
+            states={"x": "v", "v": "(f(t) + u - k*x - c*v)/m"}, outputs={"x": "x", "v": "v"},
+            parameters={"m": 1.0}, inputs=["u"], units={"k": "N/m", "x": "m"},
+            intermediates={"f(t)": "0"})
+        if False else
+        polyest.Problem.equations(
+            states={"x": "v", "v": "(u - force)/m"}, outputs={"x": "x", "v": "v"},
+            parameters={"m": 1.0}, inputs=["u"], intermediates={"force": "k*x + c*v"}))
+    (problem.fix({"x_0": 0.1}, m=2.0)
+     .uncertain("k", polyest.Lognormal(40, 5))
+     .uncertain("v_0", polyest.TruncatedNormal(0, 1, lower=-2, upper=2), per_run=True)
+     .uncertain("u.gain", polyest.Beta(2, 2, 0.5, 1.5))
+     .uncertain("x.offset", polyest.Gamma(4, 0.1))
+     .uncertain("d", polyest.Normal(0.2, 0.03))
+     .correlate("k", "d", 0.3)
+     .derive("c", "2*d")
+     .drive("u", polyest.Chirp(1.0, 0.1, 5.0, duration_s=10.0))
+     .measure("x", polyest.Noise(unknown=True, correlation="auto", outliers="HUBER"),
+              column="Disp", unit="mm")
+     .measure("v", polyest.Noise(absolute=0.1, relative=0.01, correlation=0.2, white_share=0.1))
+     .expand(order=2, points_per_term=3.0, points="HAMMERSLEY")
+     .integrate(method="EXPLICIT", relative_tolerance=1e-6)
+     .regularize(2.0).use_when("t > 0.5"))
+    message = to_message(problem)
+    assert message.measured[1].noise.correlation.time_constant_s == 0.2
+    assert message.columns["x"].unit == "mm"
+    check = problem.check(client=client)
+    fields = {finding.field.split("[")[0].split(".")[0] for finding in check.errors}
+    # What is refused is a combination that the daemon does not allow, never a field's name or form.
+    assert fields <= {"uncertain", "measured", "derived", "correlations", "fixed"}, str(check)
+
+
+@pytest.mark.parametrize("signal", [
+    polyest.Constant(1.0), polyest.Step(1.0, 0.5), polyest.Sinusoid(1.0, 2.0, 0.1),
+    polyest.Chirp(1.0, 0.1, 5.0, 10.0), polyest.HalfSineBump(1.0, 0.5, 0.2),
+    polyest.Samples([0.0, 1.0], [0.0, 1.0], interpolation="LINEAR"),
+    polyest.Samples([0.0, 1.0], [0.0, 1.0], hold=True, amplitude=2.0), polyest.Streamed(),
+    polyest.Streamed(hold=True), polyest.Streamed(interpolation="SHAPE_PRESERVING"),
+], ids=lambda signal: type(signal).__name__)
+def test_every_signal_is_accepted(client, problem, signal):
+    check = client.check(problem.copy().drive("force", signal))
+    assert check.ok, str(check)
+
+
+@pytest.mark.parametrize("prior", [
+    polyest.Uniform(30, 50), polyest.Normal(40, 2), polyest.Beta(2, 3, 30, 50),
+    polyest.Gamma(4, 2, 30), polyest.Lognormal(40, 5), polyest.TruncatedNormal(40, 5, lower=30),
+], ids=lambda prior: type(prior).__name__)
+def test_every_prior_is_accepted(client, prior):
+    check = client.check(polyest.Problem.builtin("mass_spring_damper").uncertain("k", prior)
+                         .measure("x", 0.01))
+    assert check.ok, str(check)
+
+
+def test_all_faults_are_found_at_once_in_the_daemons_words(client, problem):
+    wrong = problem.copy().uncertain("x0", polyest.Uniform(2, 1)).measure("nothing", 0.01)
+    check = wrong.check(client=client)
+    assert not check.ok and len(check.errors) == 3
+    assert any(finding.field.startswith("uncertain[2]") for finding in check.errors)
+    with pytest.raises(polyest.InvalidInput) as raised:
+        check.raise_for_errors()
+    assert raised.value.field == check.errors[0].field
+    assert "error" in check._repr_html_() and str(check).startswith("error: ")
+
+
+def test_a_check_looks_at_the_data(client, problem, record):
+    good = problem.check(record, client=client)
+    assert good.ok and any(remark.topic == "data" for remark in good.summary)
+    good.raise_for_errors()
+    late = {"t": record["t"] + 1000.0, "x": record["x"]}
+    assert problem.check(late, client=client).warnings
+
+
+def test_the_word_auto_is_the_default_order(problem):
+    document = problem.as_dict()
+    document["expansion"] = {"order": "AUTO"}
+    assert to_message(document) == to_message({**document, "expansion": {}})
+
+
+def test_a_copy_is_independent(problem):
+    copy = problem.copy().fix(m=2.0)
+    assert problem.as_dict()["fixed"]["m"] == 1.0 and copy != problem
+    assert "uncertain k, c" in repr(problem)
+
+
+def test_the_schema_of_problem_files_is_json(client):
+    assert "uncertain" in json.loads(client.problem_schema())["properties"]

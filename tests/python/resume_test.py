@@ -1,0 +1,157 @@
+"""Connections that break: the daemon is killed and restarted while rows are appended."""
+
+from concurrent import futures
+
+import pytest
+
+import polyest
+from polyest._proto.v1 import measurements_pb2
+from polyest._resume import BatchQueue, StreamOptions
+
+FAST = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.1, max_attempts=1000)
+
+
+def test_a_daemon_killed_under_append_loses_nothing_and_counts_nothing_twice(
+        restartable, client, problem, record, rows):
+    daemon = restartable()
+    session = polyest.connect(daemon.address).session("run7", problem, options=FAST)
+    with session, futures.ThreadPoolExecutor(1) as executor:
+        for kill in range(4):
+            for first in range(200 * kill, 200 * kill + 200, 4):
+                if first == 200 * kill + 100:
+                    daemon.kill()
+                    starting = executor.submit(restartable)
+                session.append(rows(first, first + 4), wait=False)
+            daemon = starting.result()
+        session.append(rows(800, 1000))
+        assert session.info().last_sequence == 201
+        assert session.info().sample_count == 1000
+        found = session.estimate()
+    expected = client.estimate(problem, record)
+    assert found.to_dict()["parameters"] == expected.to_dict()["parameters"]
+
+
+def test_append_itself_survives_a_restart(restartable, problem, rows):
+    daemon = restartable()
+    with polyest.connect(daemon.address).session("kept", problem, options=FAST) as session:
+        for batch in range(5):
+            assert session.append(rows(10 * batch, 10 * batch + 10)) == batch + 1
+            daemon.kill()
+            daemon = restartable()
+        assert session.estimate().samples == 50
+
+
+def test_the_end_of_the_stream_survives_a_restart(restartable, problem, rows):
+    daemon = restartable()
+    with polyest.connect(daemon.address).session("ended", problem, options=FAST) as session:
+        session.append(rows(0, 100), wait=False)
+        daemon.kill()
+        restartable()
+    assert session.info().sample_count == 100
+
+
+def test_rows_stay_pending_while_the_daemon_is_away(restartable, problem, rows):
+    daemon = restartable()
+    options = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.01, max_attempts=2)
+    session = polyest.connect(daemon.address).session("away", problem, options=options)
+    session.append(rows(0, 10))
+    daemon.kill()
+    with pytest.raises(polyest.Unavailable) as raised:
+        session.append(rows(10, 20))
+    assert raised.value.retry
+    restartable()
+    session.flush()
+    assert session.append(rows(20, 30)) == 3
+    session.close()
+    assert session.info().sample_count == 30
+
+
+def test_a_daemon_that_forgets_is_a_loss_of_data(restartable, problem, rows):
+    daemon = restartable(durable=False)
+    session = polyest.connect(daemon.address).session("lost", problem, options=FAST)
+    session.append(rows(0, 10))
+    daemon.kill()
+    restartable(durable=False)
+    with pytest.raises(polyest.DataLoss, match="has lost sessions/lost and the batches it had "
+                       "acknowledged, up to number 1"):
+        session.append(rows(10, 20))
+
+
+def test_a_second_writer_is_aborted(client, problem, rows):
+    with client.session("twice", problem) as first:
+        first.append(rows(0, 10))
+        second = client.session("twice")
+        with pytest.raises(polyest.Aborted, match="writer"):
+            second.append(rows(10, 20))
+        assert first.append(rows(10, 20)) == 2
+
+
+def queue_with(batches, **options):
+    queue = BatchQueue("sessions/any", StreamOptions(**options))
+    queue.connected(10)
+    for _ in range(batches):
+        queue.add(measurements_pb2.Measurements())
+    return queue
+
+
+def written(queue):
+    return [request.sequence for request in iter(queue.next_to_write, None)]
+
+
+def test_batches_are_numbered_from_the_sessions_last_one():
+    queue = queue_with(3)
+    assert written(queue) == [11, 12, 13]
+    queue.acknowledge(12)
+    assert len(queue) == 1 and written(queue) == []
+
+
+def test_a_new_connection_sends_what_the_session_lacks():
+    queue = queue_with(4)
+    assert written(queue) == [11, 12, 13, 14]
+    queue.acknowledge(11)
+    queue.connected(13)  # 12 and 13 had arrived, but their acknowledgement had not
+    assert written(queue) == [14]
+
+
+def test_a_session_with_other_batches_has_another_writer():
+    with pytest.raises(polyest.Aborted, match="has batch 13, the last one sent is 12"):
+        queue_with(2).connected(13)
+
+
+def test_a_session_that_lacks_acknowledged_batches_has_lost_them():
+    queue = queue_with(2)
+    queue.acknowledge(12)
+    with pytest.raises(polyest.DataLoss, match="up to 11, but acknowledged them up to 12"):
+        queue.connected(11)
+
+
+def test_delays_double_up_to_the_longest_and_end_with_the_attempts():
+    queue = queue_with(0, first_delay_s=1.0, max_delay_s=5.0, max_attempts=4)
+    broken = polyest.Unavailable("gone")
+    delays = [queue.delay_s(broken, new_token=False) for _ in range(5)]
+    assert delays == [1.0, 2.0, 4.0, 5.0, None]
+    queue.acknowledge(10)
+    assert queue.delay_s(broken, new_token=False) == 1.0
+
+
+def test_a_full_disk_is_waited_for_without_end():
+    queue = queue_with(0, first_delay_s=1.0, max_delay_s=2.0, max_attempts=0)
+    full = polyest.ResourceExhausted("full", reason="DISK_FULL", retry_after_s=3.0)
+    assert [queue.delay_s(full, new_token=False) for _ in range(3)] == [3.0, 3.0, 3.0]
+    too_large = polyest.ResourceExhausted("too large", limit="--max-batch-rows")
+    assert queue.delay_s(too_large, new_token=False) is None
+
+
+def test_a_new_token_is_tried_and_a_wrong_one_is_not():
+    queue = queue_with(0)
+    refused = polyest.Unauthenticated("unknown token")
+    assert queue.delay_s(refused, new_token=False) is None
+    assert queue.delay_s(refused, new_token=True) is not None
+
+
+def test_another_writer_is_waited_for_only_after_a_break():
+    queue = queue_with(0)
+    aborted = polyest.Aborted("another writer")
+    assert queue.delay_s(aborted, new_token=False) is None
+    assert queue.delay_s(polyest.Unavailable("gone"), new_token=False) is not None
+    assert queue.delay_s(aborted, new_token=False) is not None

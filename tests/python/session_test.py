@@ -1,0 +1,192 @@
+"""Sessions: rows that come batch by batch, estimates as they come, a session found again."""
+
+import os
+import select
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import polyest
+from conftest import TRUTH
+
+
+def test_batches_give_the_estimate_of_the_whole_record(client, problem, record, rows):
+    with client.session("batches", problem) as session:
+        for first in range(0, 1000, 125):
+            assert session.append(rows(first, first + 125)) == first // 125 + 1
+        found = session.estimate()
+    assert found.sequence == 8 and found.samples == 1000
+    assert found.to_dict()["parameters"] == client.estimate(problem, record).to_dict()["parameters"]
+
+
+def test_batches_that_are_not_waited_for_are_kept_at_the_end(client, problem, rows):
+    with client.session("pipelined", problem) as session:
+        for first in range(0, 200, 5):
+            session.append(rows(first, first + 5), wait=False)
+    info = client.session("pipelined").info()
+    assert (info.last_sequence, info.sample_count, info.has_writer) == (40, 200, False)
+
+
+def test_long_data_are_cut_into_batches(client, problem, record):
+    options = polyest.StreamOptions(batch_rows=300)
+    with client.session("cut", problem, options=options) as session:
+        assert session.append(record) == 4
+        assert session.info().sample_count == 1000
+
+
+def test_estimates_end_with_the_last_batch(client, problem, rows):
+    with client.session("loop", problem) as session:
+        session.append(rows(0, 200))
+        session.append(rows(200, 400))
+        found = list(session.estimates())
+    assert found[-1].sequence == 2
+    assert found[-1]["k"].lower95 < TRUTH["k"] < found[-1]["k"].upper95
+
+
+def test_a_session_without_rows_has_no_estimates(client, problem):
+    with client.session("empty", problem) as session:
+        assert list(session.estimates()) == []
+
+
+def test_an_observer_follows_a_writer(client, problem, rows):
+    with client.session("followed", problem) as session:
+        session.append(rows(0, 100))
+        following = client.session("followed").estimates(follow=True)
+        assert next(following).sequence == 1
+        session.append(rows(100, 200))
+        assert next(following).sequence == 2
+        following.close()
+
+
+def test_predictions_come_as_the_rows_do(client, problem, rows):
+    with client.session("predicted", problem) as session:
+        session.append(rows(0, 100))
+        following = session.predictions(["x", "v"], draws=20, max_rows=50)
+        found = next(following)
+        following.close()
+    assert list(found.outputs) == ["x", "v"] and found.sequence == 1
+    assert found.draw_count == 20 and len(found.time_s) <= 50 and found.row_count == 100
+
+
+def test_each_estimate_of_the_stream_is_told(client, problem, rows):
+    told = []
+    with client.session("told", problem, on_estimate=told.append) as session:
+        for first in range(0, 300, 100):
+            session.append(rows(first, first + 100))
+    # A last one comes before the stream ends; a slow estimator may pass over others.
+    numbers = [one.sequence for one in told]
+    assert numbers[-1] == 3 and numbers == sorted(numbers)
+
+
+def test_a_session_goes_on_where_it_was_left(client, problem, rows):
+    with client.session("again", problem) as session:
+        session.append(rows(0, 100))
+    with client.session("again", problem) as session:
+        assert session.append(rows(100, 200)) == 2
+    with client.session("again") as session:
+        assert session.append(rows(200, 300)) == 3
+        assert session.estimate().samples == 300
+        assert session.problem == problem
+
+
+def test_a_history_shows_how_the_estimate_came_about(client, problem, rows):
+    with client.session("history", problem) as session:
+        for first in range(0, 400, 100):
+            session.append(rows(first, first + 100))
+            session.estimate()
+        history = session.history()
+    assert [point.sequence for point in history.points] == [1, 2, 3, 4]
+    widths = [point.parameters["k"].std_dev for point in history.points]
+    assert widths[-1] < widths[0]
+    frame = history.to_dataframe()
+    assert list(frame.columns)[:4] == ["t", "samples", "sequence", "name"] and len(frame) == 8
+
+
+def test_an_exception_leaves_the_session_to_the_next_writer(client, problem, rows):
+    with pytest.raises(RuntimeError), client.session("broken-off", problem) as session:
+        session.append(rows(0, 100))
+        raise RuntimeError("the rig stopped")
+    with client.session("broken-off") as session:
+        assert session.append(rows(100, 200)) == 2
+
+
+def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem, rows):
+    with client.session("refused", problem) as session:
+        session.append(rows(0, 100))
+        with pytest.raises(polyest.InvalidInput, match="time"):
+            session.append(rows(0, 100))
+        assert session.append(rows(100, 200)) == 2
+        assert session.estimate().samples == 200
+
+
+def test_streamed_inputs_need_the_end_of_the_run(client):
+    wanted = (polyest.Problem.builtin("mass_spring_damper").fix(m=1.0)
+              .uncertain("k", polyest.Uniform(30, 50)).stream("force").measure("x", 0.01))
+    times = np.arange(0.0, 4.0, 0.05)
+    # From rest at 0 the force 0 holds it there.
+    data = {"t": times, "x": 0 * times, "force": 0 * times}
+    with client.session("streamed", wanted) as session:
+        session.append(data)
+        before = session.estimate().samples
+        session.end_run()
+        assert before < session.estimate().samples == len(times)
+
+
+def test_sessions_are_listed_and_deleted(client, problem):
+    for name in ("listed-b", "listed-a"):
+        client.session(name, problem)
+    names = [one.name for one in client.sessions()]
+    assert names == sorted(names) and {"listed-a", "listed-b"} <= set(names)
+    client.delete_session("listed-a")
+    client.session("listed-b").delete()
+    assert not {"listed-a", "listed-b"} & {one.name for one in client.sessions()}
+
+
+def test_an_exported_session_has_the_same_estimate(client, problem, rows, tmp_path):
+    file = tmp_path / "run.polyest"
+    with client.session("exported", problem) as session:
+        session.append(rows(0, 200))
+        session.append(rows(200, 400))
+        session.export(file)
+        expected = session.estimate().to_dict()
+    restored = client.import_session(file, "imported")
+    assert restored.name == "imported"
+    assert restored.estimate().to_dict() == expected
+    file.write_bytes(file.read_bytes()[:-3])
+    with pytest.raises(polyest.InvalidInput, match="ends in the middle of a record"):
+        client.import_session(file, "cut-off")
+
+
+def lives(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_a_local_daemon_ends_with_its_client():
+    with polyest.local() as client:
+        pid = client.daemon.pid
+        assert client.status().durable is False and lives(pid)
+    assert not lives(pid)
+    with pytest.raises((polyest.PolyestError, ValueError)):
+        client.status()
+
+
+@pytest.mark.parametrize("end", ["sys.exit(3)", "os.kill(os.getpid(), signal.SIGKILL)"])
+def test_a_local_daemon_ends_with_its_program(end, tmp_path):
+    program = ("import os, signal, sys, polyest\n"
+               f"client = polyest.local(data_dir={str(tmp_path)!r})\n"
+               f"session = client.status()\nprint(client.daemon.pid, flush=True)\n{end}")
+    done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, check=False)
+    pid = int(done.stdout)
+    try:
+        descriptor = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    ended, _, _ = select.select([descriptor], [], [], 30)
+    os.close(descriptor)
+    assert ended
