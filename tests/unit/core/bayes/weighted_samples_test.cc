@@ -76,9 +76,9 @@ TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
 
 // Without a shuffle each pointer would fall on the same place of the pattern.
 TEST(EquallyWeighted, DoesNotDependOnARegularOrderOfTheDraws) {
-  constexpr int kDraws = 1 << 14, kChosen = 1 << 12;
-  Vector weights(kDraws);
-  for (int i = 0; i < kDraws; ++i) weights[i] = i % 2 == 0 ? 1.5 : 0.5;
+  constexpr int kCount = 1 << 14, kChosen = 1 << 12;
+  Vector weights(kCount);
+  for (int i = 0; i < kCount; ++i) weights[i] = i % 2 == 0 ? 1.5 : 0.5;
   int odd = 0;
   for (const Eigen::Index row : EquallyWeighted(weights, kChosen)) odd += row % 2;
   // A quarter of the weight, and six binomial standard deviations.
