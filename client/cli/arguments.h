@@ -240,9 +240,9 @@ using Command =
     std::variant<EstimateArguments, StreamArguments, PropagateArguments, CostArguments,
                  ModelsArguments, CheckArguments, InitArguments, SchemaArguments,
                  SensitivityArguments, DesignArguments, PosteriorArguments, FitArguments,
-                 CompareArguments, ReportArguments, ProfileArguments, RegularizationArguments, ExplainArguments,
-                 ExportArguments, ImportArguments, DeleteArguments, ListArguments, WatchArguments,
-                 TopArguments, PaperOptions>;
+                 CompareArguments, ReportArguments, ProfileArguments, RegularizationArguments,
+                 ExplainArguments, ExportArguments, ImportArguments, DeleteArguments, ListArguments,
+                 WatchArguments, TopArguments, PaperOptions>;
 
 struct CommandLine {
   Command command;

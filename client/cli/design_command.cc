@@ -120,10 +120,9 @@ void PrintCandidates(const Design& design, std::ostream& out) {
 void PrintOutputs(const Design& design, const Design::Candidate& candidate, std::ostream& out) {
   TextTable table(Header(design, {"output", "unit", "noise sd", "measured", "bits alone"}));
   for (const auto& output : candidate.outputs()) {
-    std::vector<std::string> row = {output.name(), UnitText(output.unit()),
-                                    FormatNumber(output.noise_std_dev(), 3),
-                                    output.measured() ? "yes" : "no",
-                                    FormatNumber(output.alone().bits(), 3)};
+    std::vector<std::string> row = {
+        output.name(), UnitText(output.unit()), FormatNumber(output.noise_std_dev(), 3),
+        output.measured() ? "yes" : "no", FormatNumber(output.alone().bits(), 3)};
     AddGain(output.together(), row);
     table.AddRow(std::move(row));
   }

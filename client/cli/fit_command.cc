@@ -26,7 +26,8 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   v1::PredictRequest request;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
   if (!arguments.validation_file.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ProblemOf(request.subject(), arguments.place));
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem,
+                             ProblemOf(request.subject(), arguments.place));
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem, arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
@@ -56,8 +57,7 @@ void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
   for (const Output& output : prediction.outputs()) {
     const v1::PredictResponse::Score& score = output.score();
     if (!output.has_score() || score.sample_count() == 0) {
-      table.AddRow(
-          {output.output(), "0", "-", UnitText(output.unit()), "-", "-", "-"});
+      table.AddRow({output.output(), "0", "-", UnitText(output.unit()), "-", "-", "-"});
       continue;
     }
     table.AddRow({output.output(), absl::StrCat(score.sample_count()),

@@ -47,8 +47,8 @@ void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& 
   for (const auto& profile : response.profiles()) {
     const int count = profile.value_size();
     const double range = count > 0 ? profile.value(count - 1) - profile.value(0) : 0;
-    std::vector<std::string> header = {NameWithUnit(profile.parameter(), profile.unit()), "cost above the least",
-                                       "mismatch", "prior"};
+    std::vector<std::string> header = {NameWithUnit(profile.parameter(), profile.unit()),
+                                       "cost above the least", "mismatch", "prior"};
     for (const std::string& name : response.parameters()) {
       if (name != profile.parameter()) header.push_back(name);
     }

@@ -74,9 +74,8 @@ LinePanel EvidencePanel(const Sweep& sweep) {
 }
 
 LinePanel ParameterPanel(const Sweep& sweep, int i) {
-  LinePanel panel = PanelOverWeight(
-      sweep, sweep.parameters(i),
-      NameWithUnit(sweep.parameters(i), sweep.units(i)));
+  LinePanel panel = PanelOverWeight(sweep, sweep.parameters(i),
+                                    NameWithUnit(sweep.parameters(i), sweep.units(i)));
   LineSeries map{"estimate", kBlue, LineStyle::kSolid, {}, {}};
   LineSeries lower{"± stdDev", kBlue, LineStyle::kDotted, {}, {}};
   LineSeries upper{"", kBlue, LineStyle::kDotted, {}, {}};
