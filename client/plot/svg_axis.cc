@@ -10,6 +10,8 @@
 namespace polyest::internal {
 namespace {
 
+constexpr double kLeastRange = 1e-9;  // of the largest value
+
 // Returns the least of 1, 2, 5 · 10^n that is at least `step`.
 double RoundStep(double step) {
   const double power = std::pow(10.0, std::floor(std::log10(step)));
@@ -22,10 +24,12 @@ double RoundStep(double step) {
 }  // namespace
 
 Axis MakeAxis(double lower, double upper, int count, double first_pixel, double last_pixel) {
-  if (!(upper > lower)) {
-    const double half = std::max(1.0, std::abs(lower)) / 2;
-    lower -= half;
-    upper += half;
+  // Rounding errors of a constant are no range; ticks so close could not be told apart.
+  if (!(upper - lower > kLeastRange * std::max(std::abs(lower), std::abs(upper)))) {
+    const double middle = 0.5 * (lower + upper);
+    const double half = std::max(1.0, std::abs(middle)) / 2;
+    lower = middle - half;
+    upper = middle + half;
   }
   Axis axis{lower, upper, first_pixel, last_pixel, {}, 0};
   const double step = RoundStep((upper - lower) / count);

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
-#include <random>
-#include <utility>
 
 #include "core/common/check.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr uint64_t kSeed = 1;      // of the shuffle before resampling
 constexpr double kLeftOut = 5e-4;  // probability left out of a density at each side
 
 // The bins of equal width over the central part of the draws.
@@ -117,27 +115,19 @@ JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVector
 
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count) {
   POLYEST_CHECK(weights.size() > 0 && count >= 0);
-  // The draws may come in a regular order, as quasi-random points do: of evenly weighted ones every
-  // fourth is in one quarter of the range.
-  std::vector<Eigen::Index> order(static_cast<size_t>(weights.size()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::mt19937_64 generator(kSeed);
-  for (size_t i = order.size() - 1; i > 0; --i) {
-    std::swap(order[i], order[static_cast<size_t>(generator() % (i + 1))]);
-  }
   std::vector<Eigen::Index> chosen;
   chosen.reserve(static_cast<size_t>(count));
-  size_t source = 0;
-  double cumulative = weights[order[0]];
+  Eigen::Index source = 0;
+  double cumulative = weights[0];
   const double all = weights.sum();
   for (int i = 0; i < count; ++i) {
-    const double pointer = all * (i + 0.5) / count;
-    while (cumulative < pointer && source + 1 < order.size()) {
-      cumulative += weights[order[++source]];
-    }
-    chosen.push_back(order[source]);
+    // The draws may come in a regular order, as quasi-random points do: of evenly weighted ones
+    // every fourth is in one quarter of the range. So the pointers are not evenly spaced.
+    const double within = std::fmod((i + 0.5) * std::numbers::phi, 1.0);
+    const double pointer = all * (i + within) / count;
+    while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
+    chosen.push_back(source);
   }
-  std::sort(chosen.begin(), chosen.end());
   return chosen;
 }
 

@@ -95,7 +95,7 @@ def test_profiles_begin_at_the_least_cost(experiment):
     figure = experiment.profiles(points=15).plot()
     for axis in figure.axes:
         # The points are about half a standard deviation apart: the nearest one costs little.
-        assert 0 <= lines_of(axis)[0][:, 1].min() < 0.2
+        assert -1e-9 < lines_of(axis)[0][:, 1].min() < 0.2
 
 
 def test_costs_are_contours_or_a_curve(experiment):

@@ -74,7 +74,7 @@ TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
   EXPECT_TRUE(EquallyWeighted(kWeights, 0).empty());
 }
 
-// Without a shuffle each pointer would fall on the same place of the pattern.
+// Pointers in the middle of each part would all fall on the same place of the pattern.
 TEST(EquallyWeighted, DoesNotDependOnARegularOrderOfTheDraws) {
   constexpr int kCount = 1 << 14, kChosen = 1 << 12;
   Vector weights(kCount);
