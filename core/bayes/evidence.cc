@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <random>
+#include <utility>
 #include <vector>
 
 #include "core/bayes/weighted_samples.h"
@@ -56,10 +59,25 @@ double Bridge(const Vector& at_draws, const Vector& at_points) {
   return log_z;
 }
 
+// Returns kPoints equally weighted rows of the draws. These may come in a regular order, as
+// quasi-random points do: of evenly weighted ones every fourth is in one quarter of the range. So
+// they are resampled in a shuffled order.
+Matrix Chosen(const Matrix& draws, const Vector& weights) {
+  std::vector<Eigen::Index> order(static_cast<size_t>(weights.size()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::mt19937_64 generator;  // with its default seed
+  for (size_t i = order.size() - 1; i > 0; --i) {
+    std::swap(order[i], order[static_cast<size_t>(generator() % (i + 1))]);
+  }
+  std::vector<Eigen::Index> rows = EquallyWeighted(weights(order), kPoints);
+  for (Eigen::Index& row : rows) row = order[static_cast<size_t>(row)];
+  return draws(rows, Eigen::all);
+}
+
 }  // namespace
 
 double LogEvidence(const LogDensity& density, const Matrix& draws, const Vector& weights) {
-  const Matrix chosen = draws(EquallyWeighted(weights, kPoints), Eigen::all);
+  const Matrix chosen = Chosen(draws, weights);
   Gaussian gaussian;
   gaussian.mean = chosen.colwise().mean().transpose();
   const Matrix centred = chosen.rowwise() - gaussian.mean.transpose();

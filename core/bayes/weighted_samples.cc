@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "core/common/check.h"
@@ -121,10 +120,7 @@ std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int cou
   double cumulative = weights[0];
   const double all = weights.sum();
   for (int i = 0; i < count; ++i) {
-    // The draws may come in a regular order, as quasi-random points do: of evenly weighted ones
-    // every fourth is in one quarter of the range. So the pointers are not evenly spaced.
-    const double within = std::fmod((i + 0.5) * std::numbers::phi, 1.0);
-    const double pointer = all * (i + within) / count;
+    const double pointer = all * (i + 0.5) / count;
     while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
     chosen.push_back(source);
   }

@@ -34,9 +34,8 @@ DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRe
 JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
                                   const ConstVectorRef& weights, int bins);
 
-// Returns the rows, in ascending order, of `count` equally weighted draws among the weighted ones
-// by stratified resampling: one pointer in each of `count` equal parts of the weight, at places
-// that follow the golden ratio. Deterministic, and each draw as often as its weight says.
+// Returns the rows of `count` equally weighted draws among the weighted ones, by systematic
+// resampling with evenly spaced pointers: deterministic, and each draw as often as its weight says.
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count);
 
 }  // namespace polyest::internal

@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 namespace polyest::internal {
 namespace {
 
@@ -72,17 +70,6 @@ TEST(WeightedJointDensity, OfIndependentDrawsIsTheProductOfTheMarginals) {
 TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
   EXPECT_THAT(EquallyWeighted(kWeights, 10), ElementsAre(0, 1, 1, 1, 1, 2, 2, 3, 3, 3));
   EXPECT_TRUE(EquallyWeighted(kWeights, 0).empty());
-}
-
-// Pointers in the middle of each part would all fall on the same place of the pattern.
-TEST(EquallyWeighted, DoesNotDependOnARegularOrderOfTheDraws) {
-  constexpr int kCount = 1 << 14, kChosen = 1 << 12;
-  Vector weights(kCount);
-  for (int i = 0; i < kCount; ++i) weights[i] = i % 2 == 0 ? 1.5 : 0.5;
-  int odd = 0;
-  for (const Eigen::Index row : EquallyWeighted(weights, kChosen)) odd += row % 2;
-  // A quarter of the weight, and six binomial standard deviations.
-  EXPECT_NEAR(odd, 0.25 * kChosen, 6 * std::sqrt(kChosen * 0.25 * 0.75));
 }
 
 }  // namespace
