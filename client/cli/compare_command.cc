@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "client/cli/backend.h"
@@ -21,21 +21,27 @@
 namespace polyest::internal {
 namespace {
 
-// What is known of one problem.
+// One of the problems, and what speaks for it.
 struct Contestant {
   std::string file;
-  int64_t values = 0;                  // measured, over all channels
-  std::optional<double> log_evidence;  // of all samples
-  int64_t held_out = 0;                // samples
-  double log_score = 0;                // Σ log p over them
-  double covered = 0;                  // of them by 95 % intervals
+  int64_t values = 0;                   // measured, over all channels
+  std::optional<double> log_evidence;   // of all samples
+  std::set<std::string> unknown_noise;  // outputs whose noise has an unknown size
+  int64_t held_out = 0;                 // samples
+  double log_score = 0;                 // Σ log p over them
+  double covered = 0;                   // of them by 95 % intervals
   v1::ComputePosteriorResponse posterior;
 };
 
 absl::Status Score(const v1::Experiment& whole, double held_out, Backend& backend,
                    Contestant& contestant) {
   const int rows = whole.measurements().time_s_size();
-  const int64_t first = std::clamp<int64_t>(std::llround((1 - held_out) * rows), 1, rows);
+  const int64_t first = std::llround((1 - held_out) * rows);
+  if (first < 1 || first == rows) {
+    return absl::InvalidArgumentError(absl::StrFormat("--hold-out: %g of %d rows leaves none to %s",
+                                                      held_out, rows,
+                                                      first < 1 ? "estimate from" : "predict"));
+  }
   v1::PredictRequest request;
   v1::Experiment& seen = *request.mutable_subject()->mutable_experiment();
   *seen.mutable_problem() = whole.problem();
@@ -68,6 +74,9 @@ absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArgument
   if (contestant.posterior.has_log_evidence()) {
     contestant.log_evidence = contestant.posterior.log_evidence();
   }
+  for (const v1::MeasuredOutput& output : experiment.problem().measured()) {
+    if (output.noise().unknown()) contestant.unknown_noise.insert(output.output());
+  }
   const absl::Status scored = Score(experiment, arguments.held_out, backend, contestant);
   if (!scored.ok()) return InFile(scored, file, data);
   return contestant;
@@ -87,8 +96,15 @@ absl::StatusOr<std::vector<Contestant>> Compare(const CompareArguments& argument
         "compared only if they measure the same samples",
         first.file, first.values, first.held_out, last.file, last.values, last.held_out));
   }
+  // An integral over noise of unknown size has no unit in common with a density.
+  const bool comparable = std::ranges::all_of(all, [&](const Contestant& one) {
+    return one.log_evidence && one.unknown_noise == all.front().unknown_noise;
+  });
+  if (!comparable) {
+    for (Contestant& one : all) one.log_evidence.reset();
+  }
   std::ranges::stable_sort(all, std::greater(), [](const Contestant& one) {
-    return one.log_evidence.value_or(-std::numeric_limits<double>::infinity());
+    return one.log_evidence.value_or(one.log_score);
   });
   return all;
 }
@@ -108,11 +124,11 @@ void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {
   TextTable table({"problem", "log evidence", "below best", "log score", "below best",
                    "within 95 %", "warnings"});
   const Contestant& scored = BestScore(all);
+  const bool weighed = all.front().log_evidence.has_value();
   for (const Contestant& one : all) {
-    const bool comparable = one.log_evidence && all.front().log_evidence;
     table.AddRow(
-        {one.file, one.log_evidence ? absl::StrFormat("%.2f", *one.log_evidence) : "-",
-         comparable ? absl::StrFormat("%.2f", *all.front().log_evidence - *one.log_evidence) : "-",
+        {one.file, weighed ? absl::StrFormat("%.2f", *one.log_evidence) : "-",
+         weighed ? absl::StrFormat("%.2f", *all.front().log_evidence - *one.log_evidence) : "-",
          absl::StrFormat("%.2f", one.log_score),
          absl::StrFormat("%.2f", scored.log_score - one.log_score),
          FormatPercent(one.covered / static_cast<double>(std::max<int64_t>(1, one.held_out))),
@@ -121,8 +137,11 @@ void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {
   table.Print(out);
   const std::string judged =
       absl::StrFormat("%d samples, %d of them held out", all.front().values, all.front().held_out);
-  if (!all.front().log_evidence) {
-    out << absl::StrFormat("\n%s. The held-out samples prefer %s.\n", judged, scored.file);
+  if (!weighed) {
+    out << absl::StrFormat(
+        "\n%s. The held-out samples prefer %s. Evidence is compared only where each problem has "
+        "one (α² = 1) and noise of unknown size is in the same outputs.\n",
+        judged, scored.file);
   } else if (&scored == &all.front()) {
     out << absl::StrFormat("\n%s. Evidence and held-out samples prefer %s.\n", judged, scored.file);
   } else {

@@ -12,7 +12,6 @@
 namespace polyest::internal {
 namespace {
 
-// Returns the unit to print: an empty text for "1".
 std::string DiagnosticText(v1::Diagnostic::Code code) {
   switch (code) {
     case v1::Diagnostic::NOT_IDENTIFIED:

@@ -27,7 +27,7 @@ Axis MakeAxis(double lower, double upper, int count, double first_pixel, double 
   // Rounding errors of a constant are no range; ticks so close could not be told apart.
   if (!(upper - lower > kLeastRange * std::max(std::abs(lower), std::abs(upper)))) {
     const double middle = 0.5 * (lower + upper);
-    const double half = std::max(1.0, std::abs(middle)) / 2;
+    const double half = middle == 0 ? 0.5 : std::abs(middle) / 2;
     lower = middle - half;
     upper = middle + half;
   }
