@@ -44,24 +44,8 @@ class Assessment {
         design_(request.expansion->design()) {}
 
   absl::StatusOr<Assessed> Run(const Stop& stop) {
-    regularization_ = problem_.problem().regularization;
-    if (request_.regularization) {
-      regularization_ = *request_.regularization;
-    } else if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
-      POLYEST_ASSIGN_OR_RETURN(const RegularizationChoice choice,
-                               ChooseRegularization(problem_, *request_.expansion, stop));
-      regularization_ = choice.regularization;
-      findings_.regularization_not_determined = choice.reason;
-    }
-    Cost cost = request_.expansion->MakeCost(regularization_);
-    if (problem_.problem().expansion.adaptive) {
-      const MisfitFound misfit = FindMisfit(problem_, *request_.expansion, stop);
-      findings_.leans = misfit.at_edge;
-      cost.set_power(request_.power ? *request_.power : 1 / misfit.ratio);
-      const double power = LikelihoodPower(*request_.expansion, cost);
-      findings_.power = power / cost.power();
-      cost.set_power(power);
-    }
+    POLYEST_RETURN_IF_ERROR(SetRegularization(stop));
+    const Cost cost = TemperedCost(stop);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
     MixtureShare share;
@@ -100,6 +84,32 @@ class Assessment {
   }
 
  private:
+  absl::Status SetRegularization(const Stop& stop) {
+    regularization_ = problem_.problem().regularization;
+    if (request_.regularization) {
+      regularization_ = *request_.regularization;
+    } else if (problem_.problem().regularization_mode != RegularizationMode::kFixed) {
+      POLYEST_ASSIGN_OR_RETURN(const RegularizationChoice choice,
+                               ChooseRegularization(problem_, *request_.expansion, stop));
+      regularization_ = choice.regularization;
+      findings_.regularization_not_determined = choice.reason;
+    }
+    return absl::OkStatus();
+  }
+
+  // Returns the cost, with the power of the likelihood that misfit and expansion allow.
+  Cost TemperedCost(const Stop& stop) {
+    Cost cost = request_.expansion->MakeCost(regularization_);
+    if (!problem_.problem().expansion.adaptive) return cost;
+    const MisfitFound misfit = FindMisfit(problem_, *request_.expansion, stop);
+    findings_.leans = misfit.at_edge;
+    cost.set_power(request_.power ? *request_.power : 1 / misfit.ratio);
+    const double power = LikelihoodPower(*request_.expansion, cost);
+    findings_.power = power / cost.power();
+    cost.set_power(power);
+    return cost;
+  }
+
   // Returns J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
   Matrix ToGermHessian(const Matrix& hessian) const {
     const Matrix inverse = Inverse(design_.region.axes());

@@ -279,16 +279,21 @@ absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& 
   return components;
 }
 
+// Returns whether all have taken the same rows, which a stop may have prevented.
+bool AreLevel(const std::vector<AssessmentRequest>& requests) {
+  return std::ranges::all_of(requests, [&](const AssessmentRequest& one) {
+    return one.record->rows() == requests.front().record->rows();
+  });
+}
+
 std::vector<double> WeightsNow(const std::vector<AssessmentRequest>& requests,
                                const std::vector<Assessed>& components) {
   std::vector<double> evidences, last;
-  bool level = true;
   for (size_t k = 0; k < requests.size(); ++k) {
-    level = level && requests[k].record->rows() == requests.front().record->rows();
     evidences.push_back(components[k].share.log_evidence);
     last.push_back(requests[k].last_weight);
   }
-  return level ? WeightsOf(evidences) : last;
+  return AreLevel(requests) ? WeightsOf(evidences) : last;
 }
 
 // A stop may have left some components before a run with its own parameters and others in it. Then
@@ -345,6 +350,7 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
   mixture.whole = Combine(mixture.components, in_order,
                           PiecesOf(requests_in_order, mixture.components, in_order),
                           requests.front().problem->prior());
+  if (!AreLevel(requests)) mixture.whole.log_evidence.reset();
   mixture.whole.estimate.expansion.reexpansions = reexpansions;
   mixture.whole.estimate.expansion.trajectories = trajectories;
   mixture.whole.findings.left_out = left_out;
