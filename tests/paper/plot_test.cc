@@ -87,6 +87,19 @@ TEST(Axis, TicksAreRoundAndInside) {
   EXPECT_EQ(PowerOfTenText(-12), "×10⁻¹²");
 }
 
+// A constant whose values differ by rounding errors gets the axis of a constant, not a tick every
+// 1e-16; a small constant is not drawn on an axis a million times as long.
+TEST(Axis, OfAConstantHasFewTicks) {
+  for (const double constant : {2.7, -4e-12, 0.0}) {
+    const Axis axis = MakeAxis(constant - 4e-16 * std::abs(constant), constant, 5, 0, 100);
+    EXPECT_GE(axis.ticks.size(), 2u) << constant;
+    EXPECT_LE(axis.ticks.size(), 10u) << constant;
+    EXPECT_NEAR(axis.Pixel(constant), 50, 1e-9) << constant;
+    const double length = constant == 0 ? 1 : std::abs(constant);
+    EXPECT_NEAR(axis.upper - axis.lower, length, 1e-12 * length) << constant;
+  }
+}
+
 class EveryFigure : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryFigure, PlotsAsWellFormedSvgWithoutOutsideResources) {

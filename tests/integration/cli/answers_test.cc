@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "polyest/v1/study_service.pb.h"
@@ -91,6 +93,18 @@ TEST_F(AnswersTest, ComparisonsAgreeAndRankTheModelOfTheDataFirst) {
   const Finished refused = Run({"compare", linear, later, data});
   EXPECT_EQ(refused.exit_status, 2);
   EXPECT_THAT(refused.err, HasSubstr("problems can be compared only if they measure the same"));
+
+  std::ifstream stated(linear);
+  std::string text((std::istreambuf_iterator<char>(stated)), {});
+  text.replace(text.find("\"absolute\": 0.01"), 16, "\"unknown\": true");
+  const Finished mixed = Run({"compare", linear, File("unknown.json", text), data});
+  EXPECT_EQ(mixed.exit_status, 0) << mixed.err;
+  EXPECT_THAT(mixed.out, HasSubstr("Evidence is compared only where"));
+
+  const Finished short_of_rows = Run(
+      {"compare", linear, linear, File("one.csv", "t,position\n0.5,0.1\n"), "--hold-out", "0.3"});
+  EXPECT_EQ(short_of_rows.exit_status, 2);
+  EXPECT_THAT(short_of_rows.err, HasSubstr("--hold-out: 0.3 of 1 rows leaves none to predict"));
 }
 
 TEST_F(AnswersTest, PredictionsAgreeToTheLastDigit) {
