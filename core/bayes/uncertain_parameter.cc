@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -57,6 +58,11 @@ absl::Status CheckBounds(const char* family, double lower, double upper) {
     return InvalidField(family, absl::StrCat("lower ", lower, " must be below upper ", upper));
   }
   return CheckScale(family, "upper - lower", upper - lower);
+}
+
+bool IsLogUniform(const UncertainParameter& parameter) {
+  return parameter.map == ParameterMap::kExponential &&
+         parameter.germ.family == GermFamily::kUniform;
 }
 
 }  // namespace
@@ -114,6 +120,16 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Lognormal(std::string nam
                             std::sqrt(variance), ParameterMap::kExponential};
 }
 
+absl::StatusOr<UncertainParameter> UncertainParameter::LogUniform(std::string name, double lower,
+                                                                  double upper) {
+  POLYEST_RETURN_IF_ERROR(CheckName(name));
+  POLYEST_RETURN_IF_ERROR(CheckScale("log_uniform", "lower", lower));
+  POLYEST_RETURN_IF_ERROR(CheckBounds("log_uniform", lower, upper));
+  return UncertainParameter{std::move(name), Germ::Uniform(),
+                            0.5 * (std::log(lower) + std::log(upper)),
+                            0.5 * (std::log(upper) - std::log(lower)), ParameterMap::kExponential};
+}
+
 absl::StatusOr<UncertainParameter> UncertainParameter::TruncatedNormal(std::string name,
                                                                        double mean, double std_dev,
                                                                        double lower, double upper) {
@@ -139,10 +155,13 @@ absl::Status UncertainParameter::Validate() const {
   const auto is_shape = [](double shape) { return shape >= 1 && shape <= kGreatestShape; };
   bool valid = !name.empty() && std::abs(location) <= kGreatestMagnitude && scale >= kMinScale &&
                scale <= kGreatestMagnitude;
-  // A lognormal must be the exponential of a normal, of a ratio of at most kGreatestRatio.
-  if (map == ParameterMap::kExponential) {
+  // A lognormal must be the exponential of a normal, of a ratio of at most kGreatestRatio; a
+  // log-uniform one must lie within the limits of magnitude.
+  if (map == ParameterMap::kExponential && germ.family != GermFamily::kUniform) {
     valid = valid && germ.family == GermFamily::kNormal &&
             std::expm1(scale * scale) <= 1.0001 * kGreatestRatio * kGreatestRatio;
+  } else if (map == ParameterMap::kExponential) {
+    valid = valid && std::abs(location) + scale <= 1.0001 * std::log(kGreatestMagnitude);
   }
   if (germ.family == GermFamily::kBeta) valid = valid && is_shape(germ.second);
   if (germ.family == GermFamily::kBeta || germ.family == GermFamily::kGamma) {
@@ -171,12 +190,20 @@ double UncertainParameter::Slope(double xi) const {
 }
 
 double UncertainParameter::Mean() const {
+  // The mean is E[e^(μ + σξ)] = e^μ sinh(σ)/σ for a uniform ξ.
+  if (IsLogUniform(*this)) return std::exp(location) * std::sinh(scale) / scale;
   // The mean is E[e^(μ + σξ)] = e^(μ + σ²/2).
   if (map == ParameterMap::kExponential) return std::exp(location + 0.5 * scale * scale);
   return location + scale * Germ(germ).Mean();
 }
 
 double UncertainParameter::StandardDeviation() const {
+  // The mean square is e^(2μ) sinh(2σ)/(2σ).
+  if (IsLogUniform(*this)) {
+    const double mean = std::sinh(scale) / scale;
+    const double variance = std::sinh(2 * scale) / (2 * scale) - mean * mean;
+    return std::exp(location) * std::sqrt(std::max(0.0, variance));
+  }
   // The standard deviation is mean √(e^(σ²) − 1).
   if (map == ParameterMap::kExponential) return Mean() * std::sqrt(std::expm1(scale * scale));
   return scale * Germ(germ).StandardDeviation();

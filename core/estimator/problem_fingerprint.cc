@@ -68,6 +68,10 @@ void Add(Archive& archive, const MeasuredOutput& measured) {
           Number(noise.outliers), noise.full_scale, noise.least);
 }
 
+void Add(Archive& archive, const ProcessNoise& noise) {
+  archive(noise.state, noise.spectral_density, noise.unknown, noise.lower, noise.upper);
+}
+
 void AddOptions(Archive& archive, const Problem& problem) {
   const ExpansionOptions& expansion = problem.expansion;
   const IntegrationOptions& integration = problem.integration;
@@ -104,6 +108,8 @@ uint32_t FingerprintOf(const Problem& problem) {
     AddEach(archive, problem.measured);
     AddOptions(archive, problem);
     archive(problem.use_when);
+    archive(problem.likelihood ? Number(*problem.likelihood) : -1);
+    AddEach(archive, problem.process_noise);
   }
   const std::string bytes = std::move(stream).str();
   return static_cast<uint32_t>(

@@ -48,6 +48,10 @@ class BlockIntegrator {
   // time, which must be a stop time that was reached.
   virtual void Restart() = 0;
 
+  // Continues from other states at the present time, which must be a stop time that was reached;
+  // returns false and does nothing if a new integrator must be made for that.
+  virtual bool RestartFrom(const ConstBlock& /*states*/) { return false; }
+
   // Returns whether stability and not accuracy has limited the recent steps, so that a method for
   // stiff systems would do better.
   virtual bool LooksStiff() { return false; }

@@ -162,6 +162,7 @@ void CheckSpecification(const EnsembleSpecification& specification, const InputS
   POLYEST_CHECK(fits_or_empty(specification.output_gains, specification.outputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.output_offsets, specification.outputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.output_delays_s, specification.outputs.size()));
+  POLYEST_CHECK(fits_or_empty(specification.process_noise, description.states.size()));
   POLYEST_CHECK(inputs.size() == description.inputs.size());
   POLYEST_CHECK(specification.integration.Validate().ok());
   for (const int output : specification.outputs) {

@@ -26,6 +26,10 @@ class LinearIntegrator final : public BlockIntegrator {
   IntegratorOutcome AdvanceTo(double time_s, double stop_time_s, int max_steps,
                               Block states) override;
   void Restart() override {}
+  bool RestartFrom(const ConstBlock& states) override {
+    states_ = states;
+    return true;
+  }
 
  private:
   static constexpr size_t kMostKept = 8;

@@ -147,6 +147,16 @@ IntegratorOutcome SundialsIntegrator::AdvanceTo(double time_s, double stop_time_
   return Outcome(flag, covered_s_ - before_s, span_s);
 }
 
+// The right-hand side is the same as before, and so are the floors.
+bool SundialsIntegrator::RestartFrom(const ConstBlock& states) {
+  BlockValues(vector()) = states;
+  scale_.Grow(BlockValues(vector()));
+  const int flag = Reset(time_s_, vector());
+  POLYEST_CHECK(flag == 0);
+  covered_s_ = time_s_;
+  return true;
+}
+
 void SundialsIntegrator::Restart() {
   const int flag = Reset(time_s_, vector());
   POLYEST_CHECK(flag == 0);

@@ -31,6 +31,7 @@ class SundialsIntegrator : public BlockIntegrator {
   IntegratorOutcome AdvanceTo(double time_s, double stop_time_s, int max_steps,
                               Block states) override;
   void Restart() override;
+  bool RestartFrom(const ConstBlock& states) override;
 
  protected:
   // Callbacks with this object as user data.

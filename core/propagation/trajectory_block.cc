@@ -83,6 +83,7 @@ TrajectoryBlock::TrajectoryBlock(const EnsembleSpecification* specification,
 
 void TrajectoryBlock::StartIntegrator(double time_s) {
   integrator_.reset();
+  integrated_points_ = alive_points_;
   if (!alive()) return;
   if (exact_) {
     integrator_ = MakeLinearIntegrator(LinearSystemOf(*model_, parameters_, *signals_, inputs_),
@@ -183,15 +184,12 @@ absl::Status TrajectoryBlock::Reach(double time_s, double stop_time_s, const Sto
 }
 
 void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) {
-  const std::vector<int>& selected = specification_->outputs;
   const Eigen::Index columns = selected_outputs_.cols();
   if (alive()) {
     if (!integrator_ || !integrator_->Outputs(time_s, states_, model_outputs_)) {
       model_->Outputs(time_s, states_, parameters_, inputs_.At(time_s), model_outputs_);
     }
-    for (Eigen::Index j = 0; j < columns; ++j) {
-      selected_outputs_.col(j) = model_outputs_.col(selected[j]);
-    }
+    SelectOutputs();
     const int alive_before = alive_points_;
     FailRowsBeyond(selected_outputs_, time_s_, "an output");
     if (alive_points_ < alive_before && states_.cols() > 0) StartIntegrator(time_s);
@@ -203,6 +201,49 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
     } else {
       row.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
+  }
+}
+
+void TrajectoryBlock::SelectOutputs() {
+  const std::vector<int>& selected = specification_->outputs;
+  for (Eigen::Index j = 0; j < selected_outputs_.cols(); ++j) {
+    selected_outputs_.col(j) = model_outputs_.col(selected[j]);
+  }
+}
+
+void TrajectoryBlock::SetStates(const Eigen::ArrayXXd& states) {
+  for (Eigen::Index row = 0; row < states_.rows(); ++row) {
+    states_.row(row) = states.row(source_[row]);
+  }
+  FailRowsBeyond(states_, time_s_, "a state");
+}
+
+const Eigen::ArrayXXd& TrajectoryBlock::OutputsOfStates() {
+  model_->Outputs(time_s_, states_, parameters_, inputs_.At(time_s_), model_outputs_);
+  SelectOutputs();
+  FailRowsBeyond(selected_outputs_, time_s_, "an output");
+  return selected_outputs_;
+}
+
+absl::StatusOr<const Eigen::ArrayXXd*> TrajectoryBlock::Move(double time_s, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(stop.Check());
+  POLYEST_CHECK(time_s >= time_s_);
+  // The states are set anew at the end, to where the steps must not go on.
+  stops_at_samples_ = true;
+  if (alive()) {
+    // The matrices of linear models are those of the points that have not failed.
+    const bool same = alive_points_ == integrated_points_ && integrator_ != nullptr;
+    if (!same || !integrator_->RestartFrom(states_)) StartIntegrator(time_s_);
+    POLYEST_RETURN_IF_ERROR(AdvanceStates(time_s, stop));
+    FailRowsBeyond(states_, time_s, "a state");
+  }
+  time_s_ = time_s;
+  return &states_;
+}
+
+void TrajectoryBlock::LeaveOut(std::span<const int> points, const char* reason) {
+  for (const int point : points) {
+    if (IsAlive(point)) Fail(point, time_s_, 0, reason);
   }
 }
 

@@ -6,6 +6,7 @@
 // copy of a good point replaces a point that fails, so the shape does not change.
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <Eigen/Core>
 #include <limits>
@@ -41,6 +42,20 @@ class TrajectoryBlock final : public BlockSystem {
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
 
   const std::vector<PointFailure>& failures() const { return failures_; }
+  bool IsAlive(int point) const { return point_alive_[static_cast<size_t>(point)]; }
+
+  const Eigen::ArrayXXd& state_values() const { return states_; }  // rows × states
+
+  // For a filter (filter_block.h), which changes the states itself. Replaces the states of all rows
+  // at the present time (rows × states); a row that carries another point takes that point's.
+  void SetStates(const Eigen::ArrayXXd& states);
+  // Returns the outputs that are read (rows × outputs), of the states set last. A point without
+  // finite outputs fails.
+  const Eigen::ArrayXXd& OutputsOfStates();
+  // Advances the states set last to `time_s` ≥ the present time and returns them (rows × states).
+  absl::StatusOr<const Eigen::ArrayXXd*> Move(double time_s, const Stop& stop);
+  // Leaves out those of the points that have not failed yet.
+  void LeaveOut(std::span<const int> points, const char* reason);
 
   // Restarts the integration from the present states as if they were initial states.
   void Restart();
@@ -71,6 +86,7 @@ class TrajectoryBlock final : public BlockSystem {
   // Leaves out the point in that row from now on.
   void Fail(Eigen::Index row, double time_s, int flag, std::string reason);
   void CarryPoint(Eigen::Index row, Eigen::Index point);
+  void SelectOutputs();
   bool alive() const { return alive_points_ > 0; }
 
   const EnsembleSpecification* specification_;
@@ -92,6 +108,7 @@ class TrajectoryBlock final : public BlockSystem {
 
   std::vector<bool> point_alive_;
   int alive_points_;
+  int integrated_points_ = 0;  // how many were alive when the integrator was started
   bool stiff_ = false;
   double time_s_ = 0;
   double last_break_s_ = 0;

@@ -55,6 +55,9 @@ struct EnsembleSpecification {
   Matrix output_gains;       // Q × outputs read
   Matrix output_offsets;     // Q × outputs read
   Matrix output_delays_s;    // Q × outputs read; not negative if an input is streamed
+  // Q × states: spectral densities of white process noise, in (unit of the state)²/s. Filters alone
+  // use it (filter_bank.h); a trajectory has none. Empty: none.
+  Matrix process_noise;
   IntegrationOptions integration;
   int threads = 1;
 };

@@ -16,6 +16,7 @@
 #include "core/common/status.h"
 #include "core/estimator/problem/output_delay.h"
 #include "core/estimator/problem/parameters_of_runs.h"
+#include "core/estimator/problem/process_noise.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/problem/validate_noise.h"
 #include "core/estimator/problem/validate_regularization.h"
@@ -57,7 +58,11 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int fir
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));
   };
-  if (problem.model == nullptr) add(InvalidField("model", "a model must be given"));
+  if (problem.model == nullptr) {
+    add(InvalidField("model", "a model must be given"));
+  } else {
+    for (absl::Status& status : CheckFilters(problem)) add(std::move(status));
+  }
   if (problem.uncertain.empty()) {
     add(InvalidField("uncertain", "at least one parameter must be uncertain"));
   }
@@ -102,6 +107,9 @@ class ResolvedProblem::Resolver {
     ResolveDerived();
     ResolveGate();
     CheckAllHaveValues();
+    if (resolved_.uses_filters() && resolved_.delays_outputs_) {
+      Refuse("likelihood", "PREDICTION_ERROR is not available with a delay of an output");
+    }
     return std::move(refusals_);
   }
 
@@ -318,6 +326,7 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
 
 absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs, int first_run) {
   POLYEST_CHECK(runs > first_run && first_run >= 0);
+  problem = WithSpectralDensities(std::move(problem));
   std::vector<absl::Status> refusals = CheckOptions(problem, runs, first_run);
   if (!refusals.empty()) return refusals.front();
   POLYEST_ASSIGN_OR_RETURN(Prior prior,
@@ -329,6 +338,7 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs,
 }
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
+  problem = WithSpectralDensities(std::move(problem));
   std::vector<absl::Status> refusals = CheckOptions(problem, 1, 0);
   if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
   // The prior only provides the names, because the correlations may be invalid. It needs at least
@@ -371,6 +381,10 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.model = problem_.model;
   specification.outputs = std::move(outputs);
   settable_.Fill(values, specification);
+  if (uses_filters() && specification.process_noise.size() == 0) {
+    specification.process_noise.setZero(thetas.rows(),
+                                        std::ssize(problem_.model->description().states));
+  }
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;

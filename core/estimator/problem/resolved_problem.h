@@ -12,6 +12,7 @@
 
 #include "core/bayes/prior.h"
 #include "core/estimator/problem/ended_runs.h"
+#include "core/estimator/problem/process_noise.h"
 #include "core/estimator/problem/row_gate.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/model/equations/expressions.h"
@@ -94,6 +95,9 @@ class ResolvedProblem {
   const std::vector<double>& used_from_s() const { return used_from_s_; }
   // The condition under which rows are used; null if all are.
   const RowGate* gate() const { return gate_.get(); }
+  // Whether the likelihood is that of the prediction errors of filters (process_noise.h), which
+  // MakeEnsemble then specifies.
+  bool uses_filters() const { return UsesFilters(problem_); }
   // Whether an output may have a delay other than 0.
   bool delays_outputs() const { return delays_outputs_; }
 
@@ -112,7 +116,7 @@ class ResolvedProblem {
         prior_(std::move(prior)),
         runs_(runs),
         first_run_(first_run),
-        settable_(problem_.model->description()),
+        settable_(problem_.model->description(), problem_.process_noise),
         base_(settable_.Defaults()) {}
 
   void Derive(Matrix& values) const;

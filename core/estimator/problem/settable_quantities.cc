@@ -3,6 +3,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "core/estimator/problem/process_noise.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -13,10 +15,12 @@ Matrix UnlessNeutral(const Matrix& block, double neutral) {
 
 }  // namespace
 
-SettableQuantities::SettableQuantities(const ModelDescription& model)
+SettableQuantities::SettableQuantities(const ModelDescription& model,
+                                       const std::vector<ProcessNoise>& process_noise)
     : parameters_(static_cast<int>(model.parameters.size())),
       inputs_(static_cast<int>(model.inputs.size())),
-      outputs_(static_cast<int>(model.outputs.size())) {
+      outputs_(static_cast<int>(model.outputs.size())),
+      states_(static_cast<int>(model.states.size())) {
   for (int i = 0; i < parameters_; ++i) {
     const Quantity& parameter = model.parameters[static_cast<size_t>(i)];
     all_.push_back({parameter.name, parameter.unit, parameter.default_value, parameter.has_default,
@@ -34,6 +38,15 @@ SettableQuantities::SettableQuantities(const ModelDescription& model)
     all_.push_back({output.name + ".gain", "1", 1, true, Kind::kOutputGain, i});
     all_.push_back({output.name + ".delay", "s", 0, true, Kind::kOutputDelay, i});
     all_.push_back({output.name + ".offset", output.unit, 0, true, Kind::kOutputOffset, i});
+  }
+  for (const ProcessNoise& noise : process_noise) {
+    for (int i = 0; i < states_; ++i) {
+      const Quantity& state = model.states[static_cast<size_t>(i)];
+      if (state.name != noise.state) continue;
+      const std::string unit = state.unit.empty() ? "" : absl::StrCat("(", state.unit, ")^2/s");
+      all_.push_back({SpectralDensityName(state.name), unit, noise.spectral_density, true,
+                      Kind::kSpectralDensity, i});
+    }
   }
 }
 
@@ -60,7 +73,9 @@ std::string SettableQuantities::Describe() const {
   std::vector<std::string> parts, inputs, outputs;
   for (const Settable& settable : all_) {
     const std::string channel = settable.name.substr(0, settable.name.rfind('.'));
-    if (settable.kind == Kind::kParameter) parts.push_back(settable.name);
+    if (settable.kind == Kind::kParameter || settable.kind == Kind::kSpectralDensity) {
+      parts.push_back(settable.name);
+    }
     if (settable.kind == Kind::kAmplitude) inputs.push_back(channel);
     if (settable.kind == Kind::kOutputGain) outputs.push_back(channel);
   }
@@ -95,6 +110,10 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
   ensemble.output_gains = UnlessNeutral(of_outputs(0), 1);
   ensemble.output_delays_s = UnlessNeutral(of_outputs(1), 0);
   ensemble.output_offsets = UnlessNeutral(of_outputs(2), 0);
+  for (int i = OutputDelay(outputs_) - 1; i < size(); ++i) {
+    if (ensemble.process_noise.size() == 0) ensemble.process_noise.setZero(values.rows(), states_);
+    ensemble.process_noise.col((*this)[i].column) = values.col(i);
+  }
 }
 
 }  // namespace polyest::internal

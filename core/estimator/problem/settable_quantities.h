@@ -6,8 +6,9 @@
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
 //   sample(t) = x.gain · x(t − x.delay) + x.offset + noise         of an output x.
 //
-// Their values form one vector: the parameters, then amplitude, gain, delay and offset of each
-// input, then gain, delay and offset of each output.
+// and the spectral densities of process noise. Their values form one vector: the parameters, then
+// amplitude, gain, delay and offset of each input, then gain, delay and offset of each output, then
+// the spectral density of each process noise.
 
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "core/common/types.h"
 #include "core/propagation/trajectory_ensemble.h"
 #include "polyest/model.h"
+#include "polyest/problem.h"
 
 namespace polyest::internal {
 
@@ -30,7 +32,8 @@ class SettableQuantities {
     kInputOffset,
     kOutputGain,
     kOutputDelay,
-    kOutputOffset
+    kOutputOffset,
+    kSpectralDensity
   };
   struct Settable {
     std::string name;
@@ -38,7 +41,7 @@ class SettableQuantities {
     double default_value;  // 0 for an amplitude, until the input has a signal
     bool has_default;
     Kind kind;
-    int column;  // column of the model's parameters, inputs or outputs
+    int column;  // column of the model's parameters, inputs, outputs or states
 
     bool of_input() const {
       return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
@@ -50,7 +53,8 @@ class SettableQuantities {
     bool is_delay() const { return kind == Kind::kDelay || kind == Kind::kOutputDelay; }
   };
 
-  explicit SettableQuantities(const ModelDescription& model);
+  explicit SettableQuantities(const ModelDescription& model,
+                              const std::vector<ProcessNoise>& process_noise = {});
 
   int size() const { return static_cast<int>(all_.size()); }
   const Settable& operator[](int index) const { return all_[static_cast<size_t>(index)]; }
@@ -66,8 +70,8 @@ class SettableQuantities {
   // Returns a list of all names, for a message.
   std::string Describe() const;
 
-  // Sets the ensemble's parameters and channels from `values` (Q × size). The outputs to read must
-  // already be set.
+  // Sets the ensemble's parameters and channels from `values` (Q × size), and its process noise if
+  // there is any. The outputs to read must already be set.
   void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
 
  private:
@@ -75,6 +79,7 @@ class SettableQuantities {
   int parameters_;
   int inputs_;
   int outputs_;
+  int states_;
 };
 
 }  // namespace polyest::internal

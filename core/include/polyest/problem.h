@@ -15,6 +15,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,24 @@ struct MeasuredOutput {
   NoiseModel noise;    // of its samples
 };
 
+// White noise w of spectral density q that drives a state, dx/dt = f + w: what a model that is not
+// perfect leaves out, disturbing forces above all (on the state that is a velocity). In Itô's terms,
+// dx = f dt + √q dβ: without f, the state would wander by √(q t) in the time t.
+struct ProcessNoise {
+  std::string state;            // one of the model's states; each at most once
+  double spectral_density = 0;  // q ≥ 0, in (unit of the state)²/s; 0 if unknown
+  // Whether q is estimated, as the uncertain parameter "processNoise.<state>" with a constant prior
+  // density of log q between the bounds.
+  bool unknown = false;
+  double lower = 0, upper = 0;  // bounds of an unknown q, 0 < lower < upper; else 0
+};
+
+// What the samples are compared with.
+enum class LikelihoodForm {
+  kOutputError,      // the outputs of the model from its initial states: the model is perfect
+  kPredictionError,  // the predictions of a Kalman filter from the samples before
+};
+
 // How the regularization weight α² is chosen. Where a rule has no answer, α² is 1, and a diagnostic
 // says so.
 enum class RegularizationMode {
@@ -61,6 +80,12 @@ struct Problem {
   std::map<std::string, std::string> derived;
   std::vector<NamedInput> inputs;        // an input not listed is 0
   std::vector<MeasuredOutput> measured;  // at least one for an estimator; studies may have none
+  std::vector<ProcessNoise> process_noise;  // what drives the states beside the inputs
+  // Default: kPredictionError if there is process noise, else kOutputError. With kPredictionError
+  // the model must have from 1 to 32 states, must be a StateSpaceModel whose equations do not
+  // switch, and outputs have no delays; noise of the samples is known, white and not relative;
+  // uncertain parameters are shared by all runs; regularization_mode is kFixed.
+  std::optional<LikelihoodForm> likelihood;
   ExpansionOptions expansion;            // how the outputs are expanded
   double regularization = 1;             // α² ≥ 0 of the cost J_mismatch + α² J_prior
   RegularizationMode regularization_mode = RegularizationMode::kFixed;  // how α² is chosen

@@ -3,6 +3,7 @@
 // The prior of an uncertain parameter θ, as a map of a standard random variable ξ, its germ:
 //   normal, uniform, beta, gamma, truncated normal   θ = location + scale ξ
 //   lognormal                                        θ = exp(location + scale ξ), ξ ~ N(0, 1)
+//   log-uniform                                      θ = exp(location + scale ξ), ξ on [−1, 1]
 //
 // Lognormal, from its own mean m and standard deviation s:
 //   scale² = log(1 + s²/m²),  location = log m − scale²/2.
@@ -69,6 +70,9 @@ struct UncertainParameter {
   // 0 < std_dev ≤ 100 mean.
   static absl::StatusOr<UncertainParameter> Lognormal(std::string name, double mean,
                                                       double std_dev);
+  // Makes a prior with a constant density of log θ on [lower, upper], 0 < lower < upper.
+  static absl::StatusOr<UncertainParameter> LogUniform(std::string name, double lower,
+                                                       double upper);
   // Makes a normal prior cut to [lower, upper]. `mean` and `std_dev` are those before the cut;
   // either bound may be infinite. At least 10⁻⁶ of the normal's probability must lie between them.
   static absl::StatusOr<UncertainParameter> TruncatedNormal(
@@ -81,7 +85,7 @@ struct UncertainParameter {
 
   // Returns the θ of a germ's value.
   double ToParameter(double xi) const;
-  // Returns the germ's value of a θ; not a number for a θ ≤ 0 of a lognormal.
+  // Returns the germ's value of a θ; not a number for a θ ≤ 0 of a lognormal or log-uniform one.
   double ToGerm(double theta) const;
   // Returns dθ/dξ at a germ's value.
   double Slope(double xi) const;

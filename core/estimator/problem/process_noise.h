@@ -1,0 +1,40 @@
+#pragma once
+
+// Models that are not perfect: process noise (polyest/problem.h), and the rules for problems whose
+// likelihood is that of prediction errors.
+
+#include <absl/status/status.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "polyest/problem.h"
+
+namespace polyest::internal {
+
+// The maximum number of states of a model whose states are filtered: 2n trajectories run for each
+// collocation point.
+inline constexpr int kMaxFilteredStates = 32;
+
+// Whether the likelihood is that of the prediction errors of Kalman filters: if it is asked for, or
+// if there is process noise and no likelihood is given.
+bool UsesFilters(const Problem& problem);
+
+// Returns the name of the settable quantity (and uncertain parameter) that is the spectral density
+// of a state's process noise: "processNoise.v".
+std::string SpectralDensityName(std::string_view state);
+
+// Returns the problem with an uncertain parameter for each unknown spectral density that is valid
+// and has none yet, log-uniform between its bounds.
+Problem WithSpectralDensities(Problem problem);
+
+// Returns what is wrong with the problem's process noise, and what cannot be combined with filters.
+// The problem's model must not be null.
+std::vector<absl::Status> CheckFilters(const Problem& problem);
+
+// Returns OK for a likelihood of output errors; else INVALID_ARGUMENT, because `what` (such as "a
+// cost grid") propagates trajectories without filters and would be wrong.
+absl::Status RefuseFilters(const Problem& problem, std::string_view what);
+
+}  // namespace polyest::internal

@@ -1,0 +1,59 @@
+#pragma once
+
+// A bank of filters: one Kalman filter (filter_block.h) for each point of an ensemble, all given
+// the same samples. With the parameters of a point, the likelihood of the samples is that of the
+// whitened innovations,
+//
+//   −log p(z) = ½ Σ_k (w_k² + log 2πS_k),   w_k = ν_k/√S_k,
+//
+// which is exact for models that are linear in their states.
+//
+// Members are dealt into blocks of fixed size. Blocks are independent, so results have the same
+// bits for any number of threads and for any division of the samples into calls of Advance. At
+// checkpoints the integrators restart, as those of EnsemblePropagator do.
+
+#include <absl/status/status.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/propagation/filter_block.h"
+
+namespace polyest::internal {
+
+class FilterBank {
+ public:
+  // Starts the filters at t = 0. The specification must have process noise (zeros, if there is
+  // none), no output delays, and a StateSpaceModel with states. `inputs` as for EnsemblePropagator.
+  FilterBank(EnsembleSpecification specification, const InputSignals* inputs);
+
+  int members() const { return static_cast<int>(specification_.parameters.rows()); }
+
+  // As FilterBlock::Advance, for all members: innovations and log variances are members × (m ·
+  // times).
+  absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
+                       const Stop& stop);
+
+  // The failures so far, ordered by member.
+  const std::vector<PointFailure>& failures() const { return failures_; }
+
+  // As those of TrajectoryEnsemble.
+  std::optional<EnsembleState> State() const;
+  bool Restore(const EnsembleState& state);
+
+ private:
+  bool AtCheckpoint() const;
+  absl::Status AdvanceBlocks(const FilterSamples& samples, MatrixRef innovations,
+                             MatrixRef log_variances, const Stop& stop);
+  void CollectFailures();
+
+  EnsembleSpecification specification_;
+  int64_t samples_ = 0;
+  double time_s_ = 0;
+  std::vector<std::unique_ptr<FilterBlock>> blocks_;
+  std::vector<absl::Status> statuses_;  // one per block
+  std::vector<PointFailure> failures_;
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,243 @@
+#include "core/propagation/filter_block.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/common/check.h"
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+// Returns rows first … first + count − 1, `copies` times one below the other; an empty matrix of an
+// empty one.
+Matrix Repeated(const Matrix& matrix, int first, int count, Eigen::Index copies) {
+  if (matrix.size() == 0) return matrix;
+  return matrix.middleRows(first, count).replicate(copies, 1);
+}
+
+// Returns the specification of the points of some members: point s · count + i is the s-th of
+// member first + i.
+EnsembleSpecification OfPointsOf(const EnsembleSpecification& members, int first, int count) {
+  const auto copies = 2 * std::ssize(members.model->description().states);
+  EnsembleSpecification points = members;
+  points.process_noise = Matrix();
+  for (Matrix EnsembleSpecification::*part :
+       {&EnsembleSpecification::parameters, &EnsembleSpecification::amplitudes,
+        &EnsembleSpecification::input_delays_s, &EnsembleSpecification::input_offsets,
+        &EnsembleSpecification::output_gains, &EnsembleSpecification::output_offsets}) {
+    points.*part = Repeated(members.*part, first, count, copies);
+  }
+  return points;
+}
+
+}  // namespace
+
+int FilterBlock::Members(Eigen::Index states) {
+  return std::max(1, TrajectoryBlock::kPoints / static_cast<int>(2 * states));
+}
+
+FilterBlock::FilterBlock(const EnsembleSpecification& specification, const InputSignals* inputs,
+                         int first_member, int members, bool exact)
+    : first_member_(first_member),
+      specification_(OfPointsOf(specification, first_member, members)),
+      spectral_densities_(specification.process_noise.middleRows(first_member, members).array()),
+      noisy_((spectral_densities_ != 0).any()),
+      block_(&specification_, inputs, 0, static_cast<int>(specification_.parameters.rows()), exact),
+      gaussians_(members, spectral_densities_.cols()),
+      points_(block_.state_values()),
+      rates_(points_),
+      moved_rates_(points_),
+      jacobian_(points_.cols(), points_.cols()),
+      square_(points_.cols(), points_.cols()),
+      outputs_(specification_.parameters.rows()),
+      innovation_(members),
+      variance_(members),
+      alive_(static_cast<size_t>(members), true) {
+  gaussians_.mean() = points_.topRows(members);
+  for (int i = 0; i < members; ++i) {
+    if ((spectral_densities_.row(i) >= 0).all() && spectral_densities_.row(i).isFinite().all()) {
+      continue;
+    }
+    // Its trajectories begin as those of the others do, so that they end here.
+    block_.LeaveOut(PointsOf(i), "a spectral density of process noise is negative or not finite");
+    spectral_densities_.row(i).setZero();
+  }
+  NoteFailures();
+}
+
+std::vector<int> FilterBlock::PointsOf(int member) const {
+  std::vector<int> points;
+  const int count = member_count();
+  const int all = static_cast<int>(specification_.parameters.rows());
+  for (int point = member; point < all; point += count) points.push_back(point);
+  return points;
+}
+
+// A member fails with the first of its points; the others are left out then.
+void FilterBlock::NoteFailures() {
+  while (failures_seen_ < block_.failures().size()) {
+    const PointFailure failure = block_.failures()[failures_seen_++];
+    const int member = failure.point % member_count();
+    if (!alive_[static_cast<size_t>(member)]) continue;
+    alive_[static_cast<size_t>(member)] = false;
+    failures_.push_back({first_member_ + member, failure.time_s, failure.flag, failure.reason});
+    block_.LeaveOut(PointsOf(member), failure.reason.c_str());
+  }
+}
+
+absl::Status FilterBlock::Advance(const FilterSamples& samples, MatrixRef innovations,
+                                  MatrixRef log_variances, const Stop& stop) {
+  const auto channels = static_cast<int>(samples.values.rows());
+  for (Eigen::Index k = 0; k < std::ssize(samples.times_s); ++k) {
+    POLYEST_RETURN_IF_ERROR(Predict(samples.times_s[static_cast<size_t>(k)], stop));
+    for (int c = 0; c < channels; ++c) Update(samples, k, c, innovations, log_variances);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FilterBlock::Predict(double time_s, const Stop& stop) {
+  const double start_s = time_s_, interval_s = time_s - start_s;
+  if (!(interval_s > 0)) return absl::OkStatus();
+  if (!noisy_) return MoveTo(time_s, stop);
+  const int parts = Parts(interval_s);
+  for (int part = 0; part < parts; ++part) {
+    const double from_s = time_s_;
+    const double to_s = part + 1 == parts ? time_s : start_s + interval_s * (part + 1) / parts;
+    const double step_s = to_s - from_s;
+    gaussians_.Diffuse(spectral_densities_, step_s / 6);
+    POLYEST_RETURN_IF_ERROR(MoveTo(from_s + step_s / 2, stop));
+    gaussians_.Diffuse(spectral_densities_, 4 * step_s / 6);
+    POLYEST_RETURN_IF_ERROR(MoveTo(to_s, stop));
+    gaussians_.Diffuse(spectral_densities_, step_s / 6);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FilterBlock::MoveTo(double time_s, const Stop& stop) {
+  gaussians_.Draw(points_);
+  block_.SetStates(points_);
+  POLYEST_ASSIGN_OR_RETURN(const Eigen::ArrayXXd* const states, block_.Move(time_s, stop));
+  NoteFailures();
+  gaussians_.Collect(*states);
+  time_s_ = time_s;
+  return absl::OkStatus();
+}
+
+int FilterBlock::Parts(double interval_s) {
+  const double parts = std::ceil(interval_s * FastestRate(interval_s));
+  return std::isfinite(parts) ? static_cast<int>(std::clamp(parts, 1.0, double{kMaxParts}))
+                              : kMaxParts;
+}
+
+// Returns the spectral radius of ∂f/∂x at the mean of the first member, in 1/s, by differences and
+// Gelfand's formula, ‖A^k‖^{1/k} with k = 32, in which the units of the states hardly matter.
+double FilterBlock::FastestRate(double interval_s) {
+  const Eigen::Index n = gaussians_.states(), members = gaussians_.members();
+  for (Eigen::Index s = 0; s < 2 * n; ++s)
+    points_.middleRows(s * members, members) = gaussians_.mean();
+  block_.SetStates(points_);
+  const Eigen::ArrayXXd& states = block_.state_values();
+  block_.Derivatives(time_s_, states, rates_);
+  const double root_epsilon = std::sqrt(std::numeric_limits<double>::epsilon());
+  for (Eigen::Index j = 0; j < n; ++j) {
+    // A state that is still 0 is as large as it becomes in the interval.
+    double size = states.col(j).abs().maxCoeff();
+    if (size == 0) size = interval_s * rates_.col(j).abs().maxCoeff();
+    const double step = root_epsilon * size;
+    points_ = states;
+    points_.col(j) += step;
+    block_.Derivatives(time_s_, points_, moved_rates_);
+    jacobian_.col(j).setZero();
+    if (step > 0) {
+      jacobian_.col(j) = ((moved_rates_.row(0) - rates_.row(0)) / step).matrix().transpose();
+    }
+  }
+  double log_rate = 0, weight = 1;
+  for (int doubling = 0; doubling < 5; ++doubling) {
+    const double norm = jacobian_.norm();
+    if (!(norm > 0)) return 0;
+    log_rate += weight * std::log(norm);
+    jacobian_ /= norm;
+    square_.noalias() = jacobian_ * jacobian_;
+    jacobian_.swap(square_);
+    weight /= 2;
+  }
+  return jacobian_.norm() > 0 ? std::exp(log_rate + weight * std::log(jacobian_.norm())) : 0;
+}
+
+void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int channel,
+                         MatrixRef innovations, MatrixRef log_variances) {
+  const int members = member_count();
+  const double sigma = samples.noise(channel, sample);
+  auto innovation = innovations.col(sample * samples.values.rows() + channel);
+  auto log_variance = log_variances.col(sample * samples.values.rows() + channel);
+  innovation.segment(first_member_, members).setZero();
+  log_variance.segment(first_member_, members).setZero();
+  if (sigma > 0) {
+    gaussians_.Draw(points_);
+    block_.SetStates(points_);
+    outputs_ = block_.OutputsOfStates().col(channel).head(outputs_.size());
+    NoteFailures();
+    // y = gain · h + offset
+    if (specification_.output_gains.size() > 0) {
+      outputs_ *= specification_.output_gains.col(channel).array();
+    }
+    if (specification_.output_offsets.size() > 0) {
+      outputs_ += specification_.output_offsets.col(channel).array();
+    }
+    gaussians_.Update(outputs_, samples.values(channel, sample), sigma * sigma, innovation_,
+                      variance_);
+    // Roots and logarithms of a vector may differ in the last bit from those of a number, so they
+    // are taken in memory of one alignment.
+    innovation_ /= variance_.sqrt();
+    variance_ = (variance_ / (sigma * sigma)).log();
+    innovation.segment(first_member_, members) = innovation_;
+    log_variance.segment(first_member_, members) = variance_;
+  }
+  for (int i = 0; i < members; ++i) {
+    if (alive_[static_cast<size_t>(i)]) continue;
+    innovation[first_member_ + i] = std::numeric_limits<double>::quiet_NaN();
+    log_variance[first_member_ + i] = std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
+// The columns are the states, the means and the factors.
+EnsembleState::OfBlock FilterBlock::State() const {
+  EnsembleState::OfBlock state = block_.State();
+  const Eigen::Index n = gaussians_.states(), rows = state.states.rows();
+  const Eigen::Index members = gaussians_.members();
+  Eigen::ArrayXXd all = Eigen::ArrayXXd::Zero(rows, 2 * n + gaussians_.factor().cols());
+  all.leftCols(n) = state.states;
+  all.middleCols(n, n).topRows(members) = gaussians_.mean();
+  all.rightCols(gaussians_.factor().cols()).topRows(members) = gaussians_.factor();
+  state.states = std::move(all);
+  return state;
+}
+
+EnsembleState::OfBlock FilterBlock::OfPoints(const EnsembleState::OfBlock& state) const {
+  EnsembleState::OfBlock points = state;
+  points.states = state.states.leftCols(gaussians_.states());
+  return points;
+}
+
+bool FilterBlock::Fits(const EnsembleState::OfBlock& state) const {
+  return state.states.cols() == 2 * gaussians_.states() + gaussians_.factor().cols() &&
+         state.states.rows() == points_.rows() && state.states.isFinite().all() &&
+         block_.Fits(OfPoints(state));
+}
+
+void FilterBlock::Restore(double time_s, const EnsembleState::OfBlock& state) {
+  block_.Restore(time_s, OfPoints(state));
+  const Eigen::Index n = gaussians_.states(), members = gaussians_.members();
+  gaussians_.mean() = state.states.middleCols(n, n).topRows(members);
+  gaussians_.factor() = state.states.rightCols(gaussians_.factor().cols()).topRows(members);
+  time_s_ = time_s;
+  failures_.clear();
+  failures_seen_ = 0;
+  alive_.assign(alive_.size(), true);
+  NoteFailures();
+}
+
+}  // namespace polyest::internal

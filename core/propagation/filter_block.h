@@ -1,0 +1,104 @@
+#pragma once
+
+// A block of Kalman filters: one for each of a few members of an ensemble, all with the same model,
+// inputs and sample times, each with its own parameters,
+//
+//   dx = f(t, x, θ, u) dt + √q dβ,   z_k = h(t_k, x, θ) + √r e_k,
+//
+// with independent white process noises of spectral densities q (one for each state) and e_k ~
+// N(0, 1). The filters are square-root cubature Kalman filters (gaussian_states.h): exact for
+// models that are linear in their states, and without Jacobians. They begin at t = 0 with the
+// model's initial states, which are known exactly (P = 0); what is uncertain of them is an
+// uncertain parameter.
+//
+// From one sample to the next process noise is added by Simpson's rule,
+//
+//   ∫ Φ(s) q Φ(s)ᵀ ds ≈ Δt/6 (Φ(Δt) q Φ(Δt)ᵀ + 4 Φ(Δt/2) q Φ(Δt/2)ᵀ + q):
+//
+// q Δt/6 before the interval, 4 q Δt/6 at its middle and q Δt/6 after it. Its relative error is
+// about (Δt λ)⁴/180 in a mode with the rate λ, so that an interval is divided until Δt λ ≤ 1 for
+// the fastest mode of the model at the filters' states, but into at most kMaxParts. Channels are
+// taken one by one; one without a sample is left out.
+//
+// A member fails as a whole when a trajectory of one of its points cannot be integrated.
+
+#include <absl/status/status.h>
+
+#include <span>
+#include <vector>
+
+#include "core/common/types.h"
+#include "core/propagation/gaussian_states.h"
+#include "core/propagation/trajectory_block.h"
+#include "core/propagation/trajectory_ensemble.h"
+#include "polyest/stop.h"
+
+namespace polyest::internal {
+
+// What was measured at some sample times: column k belongs to the k-th time, row c to the c-th
+// output read.
+struct FilterSamples {
+  std::span<const double> times_s;  // non-decreasing
+  ConstMatrixRef values;            // m × times
+  ConstMatrixRef noise;             // m × times: σ = √r; ≤ 0 where there is no sample
+};
+
+class FilterBlock {
+ public:
+  static constexpr int kMaxParts = 16;
+
+  // Returns how many members of a model with so many states share a block.
+  static int Members(Eigen::Index states);
+
+  // Takes members first_member … first_member + members − 1 of the specification, which must have
+  // process noise and a model with states. `inputs` must outlive the block. `exact`: the ensemble
+  // StepsExactly (linear_system.h).
+  FilterBlock(const EnsembleSpecification& specification, const InputSignals* inputs,
+              int first_member, int members, bool exact);
+
+  // Takes the samples (times ≥ the time reached) and writes, for this block's members and the
+  // c-th output at the k-th time, the whitened innovation ν/√S into column k·m + c of
+  // `innovations` and log(S/r) into that of `log_variances` (all members × (m · times)). Both are 0
+  // without a sample and NaN from a member's failure on. Fails on a stop request only.
+  absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
+                       const Stop& stop);
+
+  // Returns the members' failures, in the order in which they failed; points are numbers of
+  // members.
+  const std::vector<PointFailure>& failures() const { return failures_; }
+
+  // As those of TrajectoryBlock, with means and factors beside the states in the first rows.
+  void Restart() { block_.Restart(); }
+  EnsembleState::OfBlock State() const;
+  bool Fits(const EnsembleState::OfBlock& state) const;
+  void Restore(double time_s, const EnsembleState::OfBlock& state);
+
+ private:
+  EnsembleState::OfBlock OfPoints(const EnsembleState::OfBlock& state) const;
+  absl::Status Predict(double time_s, const Stop& stop);
+  absl::Status MoveTo(double time_s, const Stop& stop);
+  int Parts(double interval_s);
+  double FastestRate(double interval_s);
+  std::vector<int> PointsOf(int member) const;
+  void Update(const FilterSamples& samples, Eigen::Index sample, int channel, MatrixRef innovations,
+              MatrixRef log_variances);
+  void NoteFailures();
+  int member_count() const { return static_cast<int>(gaussians_.members()); }
+
+  const int first_member_;
+  EnsembleSpecification specification_;  // of the points, 2n for each member
+  Eigen::ArrayXXd spectral_densities_;   // members × n
+  bool noisy_;
+  TrajectoryBlock block_;
+  GaussianStates gaussians_;
+  double time_s_ = 0;
+  Eigen::ArrayXXd points_;               // rows of the block × n
+  Eigen::ArrayXXd rates_, moved_rates_;  // rows of the block × n
+  Matrix jacobian_, square_;             // n × n
+  Eigen::ArrayXd outputs_, innovation_, variance_;
+  std::vector<bool> alive_;  // by member
+  size_t failures_seen_ = 0;
+  std::vector<PointFailure> failures_;
+};
+
+}  // namespace polyest::internal

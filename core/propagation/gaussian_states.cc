@@ -1,0 +1,137 @@
+#include "core/propagation/gaussian_states.h"
+
+#include <cmath>
+
+namespace polyest::internal {
+
+GaussianStates::GaussianStates(Eigen::Index members, Eigen::Index states)
+    : mean_(Eigen::ArrayXXd::Zero(members, states)),
+      factor_(Eigen::ArrayXXd::Zero(members, states * (states + 1) / 2)),
+      vectors_(members, (2 * states + 1) * states),
+      gain_(members, states),
+      deviation_(members, 2 * states),
+      length_(members),
+      inverse_(members),
+      product_(members) {}
+
+void GaussianStates::Diffuse(const Eigen::ArrayXXd& spectral_densities, double duration_s) {
+  const Eigen::Index n = states();
+  for (Eigen::Index a = 0; a < n; ++a) {
+    // P + v vᵀ with v = √(q Δt) e_a, by one Givens rotation for each column of L.
+    auto v = vectors_.leftCols(n);
+    v.setZero();
+    v.col(a) = (spectral_densities.col(a) * duration_s).sqrt();
+    if ((v.col(a) == 0).all()) continue;
+    for (Eigen::Index j = a; j < n; ++j) {
+      length_ = (L(j, j).square() + v.col(j).square()).sqrt();
+      inverse_ = (length_ > 0).select(length_.inverse(), 0);
+      // c = L_jj/length, s = v_j/length; the identity where both are 0
+      gain_.col(0) = (length_ > 0).select(L(j, j) * inverse_, 1);
+      product_ = v.col(j) * inverse_;
+      L(j, j) = length_;
+      for (Eigen::Index i = j + 1; i < n; ++i) {
+        inverse_ = v.col(i);
+        v.col(i) = gain_.col(0) * inverse_ - product_ * L(i, j);
+        L(i, j) = gain_.col(0) * L(i, j) + product_ * inverse_;
+      }
+    }
+  }
+}
+
+void GaussianStates::Draw(Eigen::ArrayXXd& points) const {
+  const Eigen::Index n = states(), m = members();
+  const double root = std::sqrt(static_cast<double>(n));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      auto plus = points.col(i).segment(j * m, m);
+      auto minus = points.col(i).segment((n + j) * m, m);
+      if (j > i) {
+        plus = minus = mean_.col(i);
+      } else {
+        plus = mean_.col(i) + root * L(i, j);
+        minus = mean_.col(i) - root * L(i, j);
+      }
+    }
+  }
+}
+
+void GaussianStates::Collect(const Eigen::ArrayXXd& points) {
+  const Eigen::Index n = states(), m = members();
+  const double share = 1 / static_cast<double>(2 * n);
+  const double root = std::sqrt(share);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    // The mean is taken about one of the points, since deviations may be far smaller than it is.
+    const auto first = points.col(i).head(m);
+    product_.setZero();
+    for (Eigen::Index s = 1; s < 2 * n; ++s) product_ += points.col(i).segment(s * m, m) - first;
+    mean_.col(i) = first + share * product_;
+    for (Eigen::Index s = 0; s < 2 * n; ++s) {
+      vectors_.col(Component(i, s)) = root * (points.col(i).segment(s * m, m) - mean_.col(i));
+    }
+  }
+  Triangularize(2 * n);
+}
+
+void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, double r,
+                            Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance) {
+  const Eigen::Index n = states(), m = members();
+  const double share = 1 / static_cast<double>(2 * n);
+  const double root = std::sqrt(share);
+  const auto first = outputs.head(m);
+  product_.setZero();
+  for (Eigen::Index s = 1; s < 2 * n; ++s) product_ += outputs.segment(s * m, m) - first;
+  product_ = first + share * product_;  // ẑ
+  innovation = z - product_;
+  variance.setConstant(m, r);
+  for (Eigen::Index s = 0; s < 2 * n; ++s) {
+    deviation_.col(s) = root * (outputs.segment(s * m, m) - product_);
+    variance += deviation_.col(s).square();
+  }
+  // The points deviate from the mean by ±√(1/2) L e_j, in units of the root of their number.
+  const double half = std::sqrt(0.5);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    gain_.col(i).setZero();
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      gain_.col(i) += half * L(i, j) * (deviation_.col(j) - deviation_.col(n + j));
+    }
+    gain_.col(i) /= variance;
+    mean_.col(i) += gain_.col(i) * innovation;
+  }
+  // P − K S Kᵀ = Σ (x − K e)(x − K e)ᵀ + K r Kᵀ, in which nothing is subtracted.
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index s = 0; s < 2 * n; ++s) {
+      auto component = vectors_.col(Component(i, s));
+      component = -gain_.col(i) * deviation_.col(s);
+      const Eigen::Index j = s % n;
+      if (j <= i) component += (s < n ? half : -half) * L(i, j);
+    }
+    vectors_.col(Component(i, 2 * n)) = std::sqrt(r) * gain_.col(i);
+  }
+  Triangularize(2 * n + 1);
+}
+
+// Sets L with L Lᵀ = Σ v vᵀ over the first `vectors` vectors, which it uses up. Component i of all
+// vectors is a row; the rows are made orthogonal one after the other.
+void GaussianStates::Triangularize(Eigen::Index vectors) {
+  const Eigen::Index n = states();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    length_.setZero();
+    for (Eigen::Index s = 0; s < vectors; ++s) length_ += vectors_.col(Component(i, s)).square();
+    length_ = length_.sqrt();
+    L(i, i) = length_;
+    inverse_ = (length_ > 0).select(length_.inverse(), 0);
+    for (Eigen::Index s = 0; s < vectors; ++s) vectors_.col(Component(i, s)) *= inverse_;
+    for (Eigen::Index k = i + 1; k < n; ++k) {
+      product_.setZero();
+      for (Eigen::Index s = 0; s < vectors; ++s) {
+        product_ += vectors_.col(Component(k, s)) * vectors_.col(Component(i, s));
+      }
+      L(k, i) = product_;
+      for (Eigen::Index s = 0; s < vectors; ++s) {
+        vectors_.col(Component(k, s)) -= product_ * vectors_.col(Component(i, s));
+      }
+    }
+  }
+}
+
+}  // namespace polyest::internal

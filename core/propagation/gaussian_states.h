@@ -1,0 +1,72 @@
+#pragma once
+
+// The states of many filters at once: each member has the mean m (n) and the covariance P = L Lᵀ (n
+// × n) of a Gaussian. L is lower triangular and is all that is kept of P, so P is symmetric and
+// positive semidefinite whatever the rounding; it may be 0 (states that are known). All operations
+// are loops over the states, vectorized over the members, and none allocates.
+//
+// The square-root cubature Kalman filter takes the moments of a function of the states as means
+// over 2n points,
+//
+//   X_j = m + √n L e_j,   X_{n+j} = m − √n L e_j,   j = 0 … n − 1,
+//
+// which are exact for polynomials of degree 3. Sums of squares of vectors become triangular by an
+// orthogonal transformation from the right, here modified Gram–Schmidt, whose triangular factor is
+// as accurate as Householder's (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch.
+// 19).
+//
+// Source: Arasaratnam and Haykin, Cubature Kalman Filters, IEEE Transactions on Automatic Control
+// 54 (2009) 1254–1269.
+
+#include <Eigen/Core>
+
+namespace polyest::internal {
+
+class GaussianStates {
+ public:
+  // Begins with m = 0 and P = 0.
+  GaussianStates(Eigen::Index members, Eigen::Index states);
+
+  Eigen::Index members() const { return mean_.rows(); }
+  Eigen::Index states() const { return mean_.cols(); }
+  Eigen::ArrayXXd& mean() { return mean_; }              // members × n
+  const Eigen::ArrayXXd& mean() const { return mean_; }  // members × n
+  // Members × n (n + 1)/2: L_ij, i ≥ j, is in column j n − j (j − 1)/2 + i − j.
+  Eigen::ArrayXXd& factor() { return factor_; }
+  const Eigen::ArrayXXd& factor() const { return factor_; }
+
+  // Adds `spectral_densities` (members × n, of independent noises) times `duration_s` to P.
+  void Diffuse(const Eigen::ArrayXXd& spectral_densities, double duration_s);
+  // Writes the points: row s · members + i of `points` (at least 2n · members rows, n columns) is
+  // X_s of member i.
+  void Draw(Eigen::ArrayXXd& points) const;
+  // Takes mean and covariance of points that Draw wrote and the model has moved.
+  void Collect(const Eigen::ArrayXXd& points);
+  // Takes one sample into account. `outputs` (at least 2n · members) are the values at the points
+  // that Draw would write, ẑ their mean, z the sample and r the variance of its noise. Writes ν = z
+  // − ẑ and its variance S, and takes
+  //   K = P_xz/S,   m ← m + K ν,   P ← P − K S Kᵀ.
+  void Update(const Eigen::ArrayXd& outputs, double z, double r, Eigen::ArrayXd& innovation,
+              Eigen::ArrayXd& variance);
+
+ private:
+  Eigen::Index Column(Eigen::Index i, Eigen::Index j) const {
+    return j * states() - j * (j - 1) / 2 + i - j;
+  }
+  auto L(Eigen::Index i, Eigen::Index j) { return factor_.col(Column(i, j)); }
+  auto L(Eigen::Index i, Eigen::Index j) const { return factor_.col(Column(i, j)); }
+  // Column of the vectors' memory with component i of vector `vector`.
+  Eigen::Index Component(Eigen::Index i, Eigen::Index vector) const {
+    return vector * states() + i;
+  }
+  void Triangularize(Eigen::Index vectors);
+
+  Eigen::ArrayXXd mean_, factor_;
+  // Members × (2n + 1) n: vectors v with P = Σ v vᵀ.
+  Eigen::ArrayXXd vectors_;
+  Eigen::ArrayXXd gain_;       // members × n
+  Eigen::ArrayXXd deviation_;  // members × 2n, of the outputs
+  Eigen::ArrayXd length_, inverse_, product_;
+};
+
+}  // namespace polyest::internal
