@@ -90,6 +90,12 @@ double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
+MismatchSums ChannelSums::Known() const {
+  MismatchSums sums = samples;
+  if (log_variance.size() > 0) sums.AddLinear(log_variance, log_variance_at_reference);
+  return sums;
+}
+
 struct Mismatch::Factors {
   std::once_flag once;
   std::vector<FactoredSums> known;        // one
@@ -107,7 +113,7 @@ Mismatch::Mismatch(std::vector<ChannelSums> channels)
   for (ChannelSums& channel : channels) {
     count_ += channel.samples.count();
     if (channel.IsKnown()) {
-      known_.Add(channel.samples);
+      known_.Add(channel.Known());
     } else {
       other_.push_back(std::move(channel));
     }

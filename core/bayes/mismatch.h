@@ -16,6 +16,9 @@
 // prior for a: ∫ e^{−½ Σ (u_k − a u_{k−1})²} da gives the last two lines. The constants are chosen
 // so that a working noise of the right size gives N/2 in all cases.
 //
+// Where the variances S_k of the residuals depend on the germ, as those of a filter's innovations
+// do, ½ Σ log(S_k/R_k) is added; noise is known then.
+//
 // Source: Zellner, An Introduction to Bayesian Inference in Econometrics (1971), ch. 3 and 4.
 
 #include <memory>
@@ -39,12 +42,18 @@ struct ChannelSums {
   // Of u_k − u_{k−1}, and of u_k where a run begins and where it has ended. With the run that has
   // not, Σ (…)² = 2 Σ u_k² − 2 Σ u_k u_{k−1} − u² of the last sample.
   MismatchSums differences;
+  // The coefficients l (S) of ½ Σ log(S_k/R_k) = lᵀφ, and its value at the reference; empty and 0
+  // if the variances are those of the noise.
+  Vector log_variance;
+  double log_variance_at_reference = 0;
   bool scale_unknown = false;
   bool correlation_unknown = false;
   double degrees_factor = 1;  // NoiseModel::DegreesFactor
   double spent = 0;           // degrees of freedom used up by parameters that are eliminated
 
   bool IsKnown() const { return !scale_unknown && !correlation_unknown; }
+  // Returns the sums of J_mismatch of a channel with known noise.
+  MismatchSums Known() const;
   // Returns the expected χ² if the working noise is right: N, or less if outliers are handled or
   // parameters have been eliminated.
   double Degrees() const { return degrees_factor * static_cast<double>(samples.count()) - spent; }

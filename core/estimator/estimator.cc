@@ -185,6 +185,7 @@ absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
 absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate());
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem_.problem(), "a regularization sweep"));
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
                            mixture_->Assess(PosteriorEffort(), stop));
   const RegionalExpansion& expansion = mixture_->component(assessed.order.front()).expansion();

@@ -103,7 +103,7 @@ void serialize(Archive& archive, PreviousSample& sample) {
 
 template <class Archive>
 void serialize(Archive& archive, ChannelSums& sums) {
-  archive(sums.samples, sums.differences);
+  archive(sums.samples, sums.differences, sums.log_variance, sums.log_variance_at_reference);
 }
 
 template <class Archive>
@@ -113,7 +113,7 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.summed_run, absorbed.previous_coefficients, absorbed.previous_error,
           absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
           absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.largest,
-          absorbed.control_scores, absorbed.control_valid);
+          absorbed.control_scores, absorbed.control_valid, absorbed.point_log_variance);
 }
 
 template <class Archive>

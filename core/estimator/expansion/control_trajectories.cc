@@ -102,6 +102,10 @@ void RegionalExpansion::StartControls(int run) {
   const int most = std::numeric_limits<int>::max();
   integration.max_steps =
       integration.max_steps > most / kMoreSteps ? most : kMoreSteps * integration.max_steps;
+  if (problem_.uses_filters()) {
+    control_filters_ = std::make_unique<FilterBank>(std::move(specification), &inputs_->signals());
+    return;
+  }
   control_propagator_ =
       std::make_unique<EnsemblePropagator>(std::move(specification), &inputs_->signals());
 }

@@ -84,6 +84,8 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
   const auto channels = fresh.discount.size();
   for (const ChannelSums& sums : state.sums) {
     if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
+    if (!IsVector(sums.log_variance, fresh.sums.front().log_variance.size())) return false;
+    if (!std::isfinite(sums.log_variance_at_reference)) return false;
   }
   const auto same = [](const CorrelationProfile& a, const CorrelationProfile& b) {
     return a.HasSizesOf(b);
@@ -100,6 +102,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.check_valid.size() == fresh.check_valid.size() &&
          state.point_chi_squared.rows() == fresh.point_chi_squared.rows() &&
          state.point_chi_squared.cols() == channels &&
+         state.point_log_variance.size() == fresh.point_log_variance.size() &&
          IsMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
          state.control_valid.size() == fresh.control_valid.size() && state.rows >= 0 &&
          state.samples >= 0 && state.propagated >= 0;
@@ -161,6 +164,8 @@ ExpansionState RegionalExpansion::State() const {
   state.run = run_;
   if (propagator_) state.ensemble = propagator_->State();
   if (control_propagator_) state.controls = control_propagator_->State();
+  if (filters_) state.ensemble = filters_->State();
+  if (control_filters_) state.controls = control_filters_->State();
   state.previous = whitening_.State();
   return state;
 }
@@ -201,11 +206,13 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
         "the rows that settle the inputs at the snapshot have not been appended");
   }
   const bool controls_fit =
-      controls_ == 0 ||
-      (state.controls && state.controls->samples == samples &&
-       state.controls->time_s == last.time_s && control_propagator_->Restore(*state.controls));
-  return controls_fit && propagator_->Restore(*state.ensemble) ? absl::OkStatus()
-                                                               : Inconsistent("ensemble");
+      controls_ == 0 || (state.controls && state.controls->samples == samples &&
+                         state.controls->time_s == last.time_s &&
+                         (control_filters_ ? control_filters_->Restore(*state.controls)
+                                           : control_propagator_->Restore(*state.controls)));
+  const bool fits = controls_fit && (filters_ ? filters_->Restore(*state.ensemble)
+                                              : propagator_->Restore(*state.ensemble));
+  return fits ? absl::OkStatus() : Inconsistent("ensemble");
 }
 
 // Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
@@ -217,6 +224,8 @@ absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
     ChannelSums sums = absorbed_.sums[c];
     sums.samples = std::move(state.absorbed.sums[c].samples);
     sums.differences = std::move(state.absorbed.sums[c].differences);
+    sums.log_variance = std::move(state.absorbed.sums[c].log_variance);
+    sums.log_variance_at_reference = state.absorbed.sums[c].log_variance_at_reference;
     state.absorbed.sums[c] = std::move(sums);
   }
   absorbed_ = std::move(state.absorbed);

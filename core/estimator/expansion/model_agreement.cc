@@ -27,7 +27,8 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 }
 
 double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
-  return std::sqrt(cost.power() * expansion.OwnError());
+  return std::sqrt(cost.power() * expansion.OwnError()) +
+         cost.power() * expansion.LogVarianceError();
 }
 
 CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const Cost& cost) {
@@ -71,7 +72,8 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   const double spread =
       std::sqrt(weights.dot((checks.differences.array() - mean).square().matrix()));
   const auto samples = static_cast<double>(expansion.Checks().samples);
-  agreement.shift = checks.residuals.maxCoeff() * std::sqrt(samples);
+  agreement.shift = checks.residuals.maxCoeff() * std::sqrt(samples) +
+                    cost.power() * expansion.LogVarianceError();
   if (1 >= kMinEffectiveChecks * weights.squaredNorm()) {
     agreement.shift = std::min(agreement.shift, spread);
     if (spread <= kMaxSpread) agreement.mean_difference = mean;

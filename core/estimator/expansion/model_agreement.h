@@ -15,7 +15,7 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 
 // Returns √(β Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
 // deviations, that the residuals of the expansion at its collocation points allow; β is the cost's
-// power.
+// power. With filters, β times the error of ½ Σ log(S/σ²) is added.
 double LargestShift(const RegionalExpansion& expansion, const Cost& cost);
 
 // What the check points say that could be integrated and have a finite cost, C' of them.
@@ -32,7 +32,8 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
 // error of a posterior mean, in units of its standard deviation, is bounded by each of
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
 //   (at the expansion's lag-1 correlation, where that enters; times the power of the likelihood),
-//   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points.
+//   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points; with
+//   filters, plus the error of ½ Σ log(S/σ²).
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
 // is sharper but needs check points where the posterior is. The second holds wherever they are.
 struct Agreement {

@@ -103,6 +103,7 @@ absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
                                                                      std::vector<int> outputs,
                                                                      int threads) {
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a study of the prior"));
   POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
   const ExpansionOptions& design = problem.problem().expansion;
   const std::vector<Germ>& germs = problem.prior().germs();

@@ -91,6 +91,10 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
     sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned && !found;
     sums.degrees_factor = DegreesFactor(model.outliers);
   }
+  if (problem_.uses_filters()) {
+    for (ChannelSums& sums : absorbed_.sums) sums.log_variance.setZero(reference_phi_.size());
+    absorbed_.point_log_variance.setZero(design_.points.rows());
+  }
   next_row_ = problem_.first_row();
   LookFromPosterior();
   Linearize();
@@ -119,7 +123,10 @@ void RegionalExpansion::StartRun(int run, int64_t first_row) {
   whitening_.BeginRun();
   propagator_.reset();
   control_propagator_.reset();
+  filters_.reset();
+  control_filters_.reset();
   inputs_ = std::make_unique<RunInputs>(problem_, store_, run, first_row);
+  if (problem_.uses_filters()) return StartFilters(run);
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), &inputs_->signals());
   StartControls(run);
@@ -156,7 +163,8 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
 absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
   const double last_s = block_.rows[static_cast<size_t>(first + count - 1)].time_s;
   POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last_s));
-  POLYEST_RETURN_IF_ERROR(Advance(first, count, stop));
+  POLYEST_RETURN_IF_ERROR(filters_ ? AdvanceFilters(first, count, stop)
+                                   : Advance(first, count, stop));
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
   AddDelayErrors(first);
@@ -172,20 +180,31 @@ void RegionalExpansion::FitRows(int first, int count) {
     int end = begin + 1;
     while (end < first + count && !FailsAt(end)) ++end;
     const int columns = (end - begin) * channels_;
-    const auto values = outputs_.block(0, begin * channels_, points(), columns);
-    auto coefficients = coefficients_.middleCols(begin * channels_, columns);
-    auto residual = residual_variance_.segment(begin * channels_, columns);
-    if (matrix_.points() == points()) {
-      matrix_.Solve(values, coefficients, residual);
-    } else {
-      matrix_.Solve(values(kept_, Eigen::all), coefficients, residual);
+    FitColumns(begin * channels_, columns, outputs_, coefficients_, residual_variance_);
+    if (filters_) {
+      FitColumns(begin * channels_, columns, log_variances_, log_variance_coefficients_,
+                 log_variance_residual_);
     }
     fitted_rows_ = begin = end;
   }
 }
 
+// Fits some columns of `all_values` (a row for each trajectory).
+void RegionalExpansion::FitColumns(int first, int count, const Matrix& all_values,
+                                   Matrix& coefficients, Vector& residual) {
+  const auto values = all_values.block(0, first, points(), count);
+  auto fit = coefficients.middleCols(first, count);
+  auto residuals = residual.segment(first, count);
+  if (matrix_.points() == points()) {
+    matrix_.Solve(values, fit, residuals);
+  } else {
+    matrix_.Solve(values(kept_, Eigen::all), fit, residuals);
+  }
+}
+
 // Takes the error of interpolating delayed outputs for one of the expansion's own.
 void RegionalExpansion::AddDelayErrors(int first) {
+  if (filters_) return;
   const Vector& errors = propagator_->delay_errors();
   if (errors.size() == 0) return;
   const int begin = first * channels_;
@@ -227,7 +246,9 @@ absl::Status RegionalExpansion::DropFailed(int row) {
 // Records each trajectory that fails at this row once. The propagator may be ahead of the row and
 // report later failures too.
 void RegionalExpansion::NoteFailures(int row) {
-  for (const PointFailure& failure : propagator_->failures()) {
+  const std::vector<PointFailure>& failures =
+      filters_ ? filters_->failures() : propagator_->failures();
+  for (const PointFailure& failure : failures) {
     const bool kept = std::binary_search(kept_.begin(), kept_.end(), failure.point);
     if (!kept || outputs_.block(failure.point, row * channels_, 1, channels_).allFinite()) continue;
     failures_.push_back({thetas_.row(failure.point).transpose(), run_, failure.time_s, failure.flag,
@@ -321,6 +342,7 @@ void RegionalExpansion::Absorb(int row) {
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);
     CompareControls(column, variance);
+    if (filters_) AddLogVariance(column, noise, variance);
     // χ²_q += (z − y_q)²/R
     absorbed_.point_chi_squared.col(c).array() +=
         (outputs_.col(column).head(points()).array() - z).square() / variance;

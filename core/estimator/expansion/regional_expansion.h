@@ -10,6 +10,11 @@
 // is ρ, because it is then small beside the residuals. The noise is the noise learned so far
 // (learned_noise.h). Correlated samples are whitened first. Outliers lose weight according to their
 // residual at the posterior's centre, compared with the noise and the posterior's own spread there.
+//
+// Where the likelihood is that of prediction errors (polyest/problem.h), each point runs a filter
+// (propagation/filter_bank.h), and what is expanded is the whitened innovation w = ν/√S and
+// log(S/σ²). In the sums the innovations take the place of the residuals: y_k stands for z_k − σ_k
+// w_k. The variances add ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R.
 
 #include <absl/status/statusor.h>
 
@@ -27,6 +32,7 @@
 #include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/whitening.h"
 #include "core/estimator/record/window_sums.h"
+#include "core/propagation/filter_bank.h"
 #include "polyest/samples.h"
 
 namespace polyest::internal {
@@ -67,8 +73,10 @@ struct AbsorbedRows {
   Vector check_residual;          // Σ ((model − expansion)/σ)²
   std::vector<bool> check_valid;  // whether the trajectory could be integrated
   // χ² of the model itself at the collocation points, Q × m, with the variances R of the sums; not
-  // finite where the trajectory could not be integrated.
+  // finite where the trajectory could not be integrated. With filters, Σ log(S/σ²) is included,
+  // here and at the check points.
   Matrix point_chi_squared;
+  Vector point_log_variance;        // Q: ½ Σ log(S/σ²) with filters, discounted; empty without
   Matrix control_scores;            // S × (K · m), column i · m + c (control_trajectories.h)
   std::vector<bool> control_valid;  // whether the trajectory could be integrated; K
 };
@@ -141,6 +149,9 @@ class RegionalExpansion {
   double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
   double OwnError() const { return absorbed_.own_error; }
+  // Returns the root mean square, over the collocation points, of ½ Σ log(S/σ²) of the model minus
+  // that of the expansion; 0 without filters.
+  double LogVarianceError() const;
   // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
   const CorrelationProfile& Profile(int channel) const {
     return absorbed_.profiles[static_cast<size_t>(channel)];
@@ -190,6 +201,8 @@ class RegionalExpansion {
   absl::Status RestoreFit(ExpansionState& state);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
   void FitRows(int first, int count);
+  void FitColumns(int first, int count, const Matrix& all_values, Matrix& coefficients,
+                  Vector& residual);
   void AddDelayErrors(int first);
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row);
@@ -213,6 +226,10 @@ class RegionalExpansion {
   int CountControls() const;
   void StartControls(int run);
   absl::Status Advance(int first, int count, const Stop& stop);
+  void StartFilters(int run);
+  absl::Status AdvanceFilters(int first, int count, const Stop& stop);
+  void SubstituteInnovations(int first, int count);
+  void AddLogVariance(int column, double noise, double variance);
   void CompareControls(int column, double variance);
 
   const ResolvedProblem& problem_;
@@ -233,6 +250,9 @@ class RegionalExpansion {
   std::unique_ptr<RunInputs> inputs_;  // of the present run
   std::unique_ptr<EnsemblePropagator> propagator_;
   std::unique_ptr<EnsemblePropagator> control_propagator_;  // null without controls
+  // In place of the propagators where the likelihood is that of prediction errors; else null.
+  std::unique_ptr<FilterBank> filters_;
+  std::unique_ptr<FilterBank> control_filters_;  // null without controls, too
   std::vector<FailedTrajectory> failures_;
 
   // The block propagated last.
@@ -240,6 +260,10 @@ class RegionalExpansion {
   Matrix outputs_;            // (Q + C + K) × (m · rows)
   Matrix coefficients_;       // S × (m · rows)
   Vector residual_variance_;  // m · rows
+  // With filters, as those above: log(S/σ²), its coefficients and the residual variance of its fit.
+  Matrix log_variances_;
+  Matrix log_variance_coefficients_;
+  Vector log_variance_residual_;
   int fitted_rows_ = 0;
   absl::Status shortage_;
 

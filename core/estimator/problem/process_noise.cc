@@ -60,9 +60,9 @@ std::vector<absl::Status> CheckEach(const Problem& problem) {
     const ModelDescription& model = problem.model->description();
     if (!HasState(problem, noise.state)) {
       const std::string known = ListNames(model.states);
-      refusals.push_back(InvalidField(
-          field, absl::StrFormat("model %s has no state \"%s\"; it has %s", model.name, noise.state,
-                                 known.empty() ? "none" : known)));
+      refusals.push_back(
+          InvalidField(field, absl::StrFormat("model %s has no state \"%s\"; it has %s", model.name,
+                                              noise.state, known.empty() ? "none" : known)));
     } else if (!seen.insert(noise.state).second) {
       refusals.push_back(
           InvalidField(field, absl::StrFormat("state %s is given twice", noise.state)));
@@ -114,7 +114,7 @@ bool UsesFilters(const Problem& problem) {
          LikelihoodForm::kPredictionError;
 }
 
-std::string SpectralDensityName(std::string_view state) {
+std::string SpectralDensityName(const std::string& state) {
   return absl::StrCat("processNoise.", state);
 }
 
@@ -156,11 +156,10 @@ std::vector<absl::Status> CheckFilters(const Problem& problem) {
   return refusals;
 }
 
-absl::Status RefuseFilters(const Problem& problem, std::string_view what) {
+absl::Status RefuseFilters(const Problem& problem, const std::string& what) {
   if (!UsesFilters(problem)) return absl::OkStatus();
-  return InvalidField("likelihood",
-                      absl::StrCat("PREDICTION_ERROR is not available for ", what,
-                                   ", whose trajectories know no process noise"));
+  return InvalidField("likelihood", absl::StrCat("PREDICTION_ERROR is not available for ", what,
+                                                 ", which takes the model for perfect"));
 }
 
 }  // namespace polyest::internal

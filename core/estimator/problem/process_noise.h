@@ -6,7 +6,6 @@
 #include <absl/status/status.h>
 
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "polyest/problem.h"
@@ -23,7 +22,7 @@ bool UsesFilters(const Problem& problem);
 
 // Returns the name of the settable quantity (and uncertain parameter) that is the spectral density
 // of a state's process noise: "processNoise.v".
-std::string SpectralDensityName(std::string_view state);
+std::string SpectralDensityName(const std::string& state);
 
 // Returns the problem with an uncertain parameter for each unknown spectral density that is valid
 // and has none yet, log-uniform between its bounds.
@@ -34,7 +33,7 @@ Problem WithSpectralDensities(Problem problem);
 std::vector<absl::Status> CheckFilters(const Problem& problem);
 
 // Returns OK for a likelihood of output errors; else INVALID_ARGUMENT, because `what` (such as "a
-// cost grid") propagates trajectories without filters and would be wrong.
-absl::Status RefuseFilters(const Problem& problem, std::string_view what);
+// cost grid") takes the model for perfect and would be wrong.
+absl::Status RefuseFilters(const Problem& problem, const std::string& what);
 
 }  // namespace polyest::internal

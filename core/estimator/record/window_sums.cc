@@ -40,7 +40,9 @@ void Copy(const std::vector<ChannelSums>& sums, std::vector<WindowSums::Totals>&
   }
   size_t next = std::ranges::all_of(sums, &ChannelSums::scale_unknown) ? 0 : 1;
   for (const ChannelSums& channel : sums) {
-    AddPacked(channel.samples, totals[channel.scale_unknown ? next++ : 0]);
+    WindowSums::Totals& group = totals[channel.scale_unknown ? next++ : 0];
+    AddPacked(channel.samples, group);
+    if (channel.log_variance.size() > 0) group.b -= channel.log_variance;
   }
 }
 

@@ -260,6 +260,7 @@ absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model
 
 absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
                                           const CostGridOptions& options, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a cost grid"));
   const Prior& prior = problem.prior();
   if (problem.channels() == 0) {
     return InvalidField("measured", "at least one output must be measured");

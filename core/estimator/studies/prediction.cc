@@ -178,6 +178,7 @@ int64_t NumbersPerTime(const PredictionOptions& options) {
 
 absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& problem,
                       int64_t rows) {
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a prediction"));
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
   for (size_t i = 0; i < options.probabilities.size(); ++i) {
     if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;

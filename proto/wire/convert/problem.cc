@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -331,6 +332,19 @@ absl::StatusOr<RegularizationMode> ToRegularizationMode(v1::Problem::Regularizat
   }
 }
 
+absl::StatusOr<std::optional<LikelihoodForm>> ToLikelihood(v1::Problem::Likelihood likelihood) {
+  switch (likelihood) {
+    case v1::Problem::LIKELIHOOD_UNSPECIFIED:
+      return std::nullopt;
+    case v1::Problem::OUTPUT_ERROR:
+      return LikelihoodForm::kOutputError;
+    case v1::Problem::PREDICTION_ERROR:
+      return LikelihoodForm::kPredictionError;
+    default:
+      return UnknownEnumerator("likelihood", likelihood);
+  }
+}
+
 // Converts a problem as far as possible and adds its errors to the refusals.
 Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& refusals) {
   Problem problem;
@@ -341,6 +355,11 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
   problem.derived = {given.derived().begin(), given.derived().end()};
   problem.inputs = ToInputs(given, refusals);
   problem.measured = ToMeasured(given, refusals);
+  for (const v1::ProcessNoise& noise : given.process_noise()) {
+    problem.process_noise.push_back(
+        {noise.state(), noise.spectral_density(), noise.unknown(), noise.lower(), noise.upper()});
+  }
+  problem.likelihood = ValueOr(ToLikelihood(given.likelihood()), {}, refusals);
   problem.expansion = ValueOr(ToExpansion(given.expansion()), {}, refusals);
   if (given.has_regularization()) problem.regularization = given.regularization();
   problem.regularization_mode = ValueOr(ToRegularizationMode(given.regularization_mode()),

@@ -295,6 +295,23 @@ TEST(ToProblem, TakesTheConditionOfUsedRows) {
               StartsWith("useWhen: column 10"));
 }
 
+TEST(ToProblem, TakesProcessNoise) {
+  v1::Problem given = SmallProblem();
+  given.MergeFrom(ProblemFromJson(R"({"processNoise": [
+      {"state": "x", "spectralDensity": 0.01},
+      {"state": "v", "unknown": true, "lower": 1e-4, "upper": 1}]})"));
+  const auto resolved = ToProblem(given);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_TRUE(resolved->uses_filters());
+  EXPECT_EQ(resolved->prior().Names().back(), "processNoise.v");
+  EXPECT_EQ(resolved->problem().process_noise[0].spectral_density, 0.01);
+  EXPECT_FALSE(ToProblem(SmallProblem())->uses_filters());
+  EXPECT_EQ(MessageWith(R"({"processNoise": [{"state": "v", "spectralDensity": -1}]})"),
+            "processNoise[0].spectralDensity: -1 must be a finite number ≥ 0");
+  EXPECT_THAT(MessageWith(R"({"likelihood": "OUTPUT_ERROR", "processNoise": [{"state": "v"}]})"),
+              StartsWith("likelihood: OUTPUT_ERROR takes the model for perfect"));
+}
+
 TEST(ToProblem, KnowsEveryRuleOfRegularization) {
   for (const auto& [given, expected] :
        {std::pair{v1::Problem::REGULARIZATION_MODE_UNSPECIFIED, RegularizationMode::kFixed},

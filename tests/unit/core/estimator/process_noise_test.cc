@@ -1,0 +1,304 @@
+// Tests estimates from the prediction errors of filters, for an oscillator that white force noise
+// drives. The oracle is the exact Kalman filter's likelihood, in dense matrices, with the same
+// discretization of the process noise.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "core/estimator/problem/resolved_problem.h"
+#include "polyest/equation_model.h"
+#include "tests/unit/core/estimator/estimation.h"
+
+namespace polyest::internal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double kStepS = 0.05;
+constexpr double kSigma = 0.005;
+constexpr double kTrueK = 40, kTrueC = 0.4, kTrueQ = 0.02;
+
+Problem ForcedOscillator() {
+  Problem problem;
+  problem.model = *FindBuiltinModel("mass_spring_damper");
+  problem.fixed = {{"m", 1}, {"x0", 1}, {"v0", 0}};
+  problem.uncertain = {UncertainParameter::Uniform("k", 32, 48).value(),
+                       UncertainParameter::Uniform("c", 0.1, 1).value()};
+  problem.measured = {{"x", {.absolute = kSigma}}};
+  return problem;
+}
+
+Problem WithUnknownNoise() {
+  Problem problem = ForcedOscillator();
+  problem.process_noise = {{.state = "v", .unknown = true, .lower = 1e-4, .upper = 1}};
+  return problem;
+}
+
+struct Flow {
+  Eigen::Matrix2d whole, half;
+};
+
+Flow FlowOf(double k, double c) {
+  Eigen::Matrix2d A;
+  A << 0, 1, -k, -c;
+  return {(A * kStepS).exp(), (A * kStepS / 2).exp()};
+}
+
+Eigen::Matrix2d NoiseOf(const Flow& flow, double q) {
+  Eigen::Matrix2d Q = Eigen::Matrix2d::Zero();
+  Q(1, 1) = q;
+  return kStepS / 6 *
+         (flow.whole * Q * flow.whole.transpose() + 4 * flow.half * Q * flow.half.transpose() + Q);
+}
+
+// Returns samples of the oscillator with noise of the given spectral density.
+Samples Measure(int rows, double q, uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const Flow flow = FlowOf(kTrueK, kTrueC);
+  const Eigen::Matrix2d root = Eigen::LLT<Eigen::Matrix2d>(NoiseOf(flow, 1)).matrixL();
+  Eigen::Vector2d x(1, 0);
+  Samples samples;
+  samples.columns = {{"x", {}, {}}};
+  for (int i = 1; i <= rows; ++i) {
+    const Eigen::Vector2d shock(normal(random), normal(random));
+    x = flow.whole * x + std::sqrt(q) * (root * shock);
+    samples.time_s.push_back(i * kStepS);
+    samples.columns[0].value.push_back(x[0] + kSigma * normal(random));
+  }
+  return samples;
+}
+
+// −log of the likelihood of (k, c, log q), up to a constant.
+double ExactCost(const Samples& samples, const Eigen::Vector3d& at) {
+  const Flow flow = FlowOf(at[0], at[1]);
+  const Eigen::Matrix2d Q = NoiseOf(flow, std::exp(at[2]));
+  Eigen::Vector2d m(1, 0);
+  Eigen::Matrix2d P = Eigen::Matrix2d::Zero();
+  double cost = 0;
+  for (const double z : samples.columns[0].value) {
+    m = flow.whole * m;
+    P = flow.whole * P * flow.whole.transpose() + Q;
+    const double nu = z - m[0], S = P(0, 0) + kSigma * kSigma;
+    const Eigen::Vector2d gain = P.col(0) / S;
+    cost += 0.5 * (nu * nu / S + std::log(S / (kSigma * kSigma)));
+    m += gain * nu;
+    P -= S * gain * gain.transpose();
+  }
+  return cost;
+}
+
+struct Maximum {
+  Eigen::Vector3d at, std_dev;
+  double cost = 0;
+};
+
+// Minimizes the exact cost by Newton's method with central differences.
+Maximum Maximize(const Samples& samples) {
+  Eigen::Vector3d at(kTrueK, kTrueC, std::log(kTrueQ));
+  const Eigen::Vector3d step(0.02, 0.004, 0.02);
+  Eigen::Matrix3d hessian;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Eigen::Vector3d gradient;
+    const auto cost = [&](const Eigen::Vector3d& by) {
+      return ExactCost(samples, at + step.cwiseProduct(by));
+    };
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d a = Eigen::Vector3d::Unit(i);
+      gradient[i] = (cost(a) - cost(-a)) / (2 * step[i]);
+      for (int j = 0; j < 3; ++j) {
+        const Eigen::Vector3d b = Eigen::Vector3d::Unit(j);
+        hessian(i, j) =
+            (cost(a + b) - cost(a - b) - cost(b - a) + cost(-a - b)) / (4 * step[i] * step[j]);
+      }
+    }
+    const Eigen::Vector3d move = hessian.inverse() * gradient;
+    at -= move;
+    if (move.norm() < 1e-6) break;
+  }
+  return {at, hessian.inverse().diagonal().cwiseSqrt(), ExactCost(samples, at)};
+}
+
+TEST(ProcessNoise, AgreesWithTheMaximumOfTheExactLikelihood) {
+  const Samples samples = Measure(600, kTrueQ, 11);
+  const Maximum exact = Maximize(samples);
+  const Estimate estimate = EstimateOf(WithUnknownNoise(), samples);
+  ASSERT_EQ(estimate.parameters.size(), 3u);
+  EXPECT_EQ(estimate.parameters[2].name, "processNoise.v");
+  EXPECT_EQ(estimate.parameters[2].unit, "(m/s)^2/s");
+  for (int i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    EXPECT_NEAR(parameter.map, exact.at[i], 0.15 * exact.std_dev[i]) << parameter.name;
+    EXPECT_NEAR(parameter.std_dev, exact.std_dev[i], 0.1 * exact.std_dev[i]) << parameter.name;
+    EXPECT_EQ(parameter.verdict, Verdict::kIdentified);
+  }
+  EXPECT_NEAR(std::log(estimate.parameters[2].map), exact.at[2], 0.15 * exact.std_dev[2]);
+  // The cost's mismatch is −log of the likelihood, to the discount for the expansion's own error:
+  // one that may shift the estimate by half a standard deviation discounts the square of that.
+  EXPECT_NEAR(estimate.cost.mismatch, exact.cost, 0.25);
+}
+
+// The same record of two runs: the likelihood is the product of two, and standard deviations are
+// those of twice as many samples.
+TEST(ProcessNoise, BeginsAgainWithEachRun) {
+  Samples samples = Measure(300, kTrueQ, 3);
+  const Estimate once = EstimateOf(WithUnknownNoise(), samples);
+  const size_t rows = samples.rows();
+  samples.run.assign(rows, 0);
+  for (size_t i = 0; i < rows; ++i) {
+    samples.time_s.push_back(samples.time_s[i]);
+    samples.columns[0].value.push_back(samples.columns[0].value[i]);
+    samples.run.push_back(1);
+  }
+  const Estimate twice = EstimateOf(WithUnknownNoise(), samples);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(twice.parameters[i].map, once.parameters[i].map, 0.15 * once.parameters[i].std_dev);
+    EXPECT_NEAR(twice.parameters[i].std_dev, once.parameters[i].std_dev / std::sqrt(2),
+                0.1 * once.parameters[i].std_dev);
+  }
+}
+
+double SquaredError(const Estimate& estimate) {
+  double sum = 0;
+  for (int i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const double error = parameter.mean - (i == 0 ? kTrueK : kTrueC);
+    sum += error * error / (parameter.std_dev * parameter.std_dev);
+  }
+  return sum;
+}
+
+// Twenty campaigns with k and c each: Σ (error ÷ standard deviation)² is a χ² of 40 degrees of
+// freedom, which lies in 17.9 … 73.4 with the probability 0.998.
+TEST(ProcessNoise, CoversTheTruth) {
+  double sum = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    sum += SquaredError(EstimateOf(WithUnknownNoise(), Measure(300, kTrueQ, seed)));
+  }
+  EXPECT_GT(sum, 17.9);
+  EXPECT_LT(sum, 73.4);
+}
+
+// Takes the model for perfect: the χ² of 10 degrees of freedom is above 29.6 with the probability
+// 0.001.
+TEST(ProcessNoise, MattersForWhatIsKnown) {
+  double sum = 0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    sum += SquaredError(EstimateOf(ForcedOscillator(), Measure(300, kTrueQ, seed)));
+  }
+  EXPECT_GT(sum, 29.6);
+}
+
+// The filters follow the outputs exactly, so estimates differ by what random numbers do.
+TEST(ProcessNoise, IsTheOutputErrorEstimateWithoutProcessNoise) {
+  const Samples samples = Measure(400, 0, 5);
+  const Estimate expected = EstimateOf(ForcedOscillator(), samples);
+  Problem filtered = ForcedOscillator();
+  filtered.likelihood = LikelihoodForm::kPredictionError;
+  Problem tiny = ForcedOscillator();
+  tiny.process_noise = {{.state = "v", .spectral_density = 1e-12}};
+  for (const Problem& problem : {filtered, tiny}) {
+    const Estimate estimate = EstimateOf(problem, samples);
+    for (size_t i = 0; i < 2; ++i) {
+      const ParameterEstimate& a = estimate.parameters[i];
+      const ParameterEstimate& b = expected.parameters[i];
+      EXPECT_NEAR(a.map, b.map, 0.15 * b.std_dev);
+      EXPECT_NEAR(a.std_dev, b.std_dev, 0.05 * b.std_dev);
+    }
+    EXPECT_NEAR(estimate.channels[0].chi_squared, expected.channels[0].chi_squared, 0.05);
+  }
+}
+
+TEST(ProcessNoise, DoesNotDependOnBatchesOrThreads) {
+  const Samples samples = Measure(200, kTrueQ, 2);
+  const Estimate expected = EstimateOf(WithUnknownNoise(), samples);
+  EstimatorOptions options;
+  options.threads = 2;
+  const auto estimator = MakeEstimator(WithUnknownNoise(), options);
+  for (size_t row = 0; row < samples.rows(); row += 7) {
+    Samples batch;
+    batch.columns = {{"x", {}, {}}};
+    for (size_t i = row; i < std::min(row + 7, samples.rows()); ++i) {
+      batch.time_s.push_back(samples.time_s[i]);
+      batch.columns[0].value.push_back(samples.columns[0].value[i]);
+    }
+    ASSERT_TRUE(estimator->Append(batch).ok());
+    ASSERT_TRUE(estimator->Process().ok());
+  }
+  ExpectSame(estimator->CurrentEstimate().value(), expected);
+}
+
+std::string RefusalOf(const Problem& problem) {
+  return std::string(ResolvedProblem::Make(problem).status().message());
+}
+
+TEST(ProcessNoise, MustBeOfAStateAndHaveASize) {
+  Problem problem = ForcedOscillator();
+  problem.process_noise = {{.state = "w", .spectral_density = 1}};
+  EXPECT_THAT(RefusalOf(problem),
+              AllOf(HasSubstr("process_noise[0].state"), HasSubstr("has no state \"w\"")));
+  problem.process_noise = {{.state = "v", .spectral_density = 1},
+                           {.state = "v", .spectral_density = 2}};
+  EXPECT_THAT(RefusalOf(problem), HasSubstr("process_noise[1].state: state v is given twice"));
+  problem.process_noise = {{.state = "v", .spectral_density = -1}};
+  EXPECT_THAT(RefusalOf(problem), HasSubstr("process_noise[0].spectral_density: -1 must be"));
+  problem.process_noise = {{.state = "v", .unknown = true, .lower = 0, .upper = 1}};
+  EXPECT_THAT(RefusalOf(problem), HasSubstr("process_noise[0].lower: 0 must be above 0"));
+  problem.process_noise = {{.state = "v", .spectral_density = 1, .lower = 1, .upper = 2}};
+  EXPECT_THAT(RefusalOf(problem), HasSubstr("have no effect without unknown"));
+  problem.process_noise = {
+      {.state = "v", .spectral_density = 1, .unknown = true, .lower = 1, .upper = 2}};
+  EXPECT_THAT(RefusalOf(problem), HasSubstr("given although it is unknown"));
+}
+
+TEST(ProcessNoise, IsRefusedWithWhatFiltersCannotDo) {
+  const auto refusal = [](const std::function<void(Problem&)>& change) {
+    Problem problem = WithUnknownNoise();
+    change(problem);
+    return RefusalOf(problem);
+  };
+  EXPECT_THAT(refusal([](Problem& p) { p.likelihood = LikelihoodForm::kOutputError; }),
+              HasSubstr("likelihood: OUTPUT_ERROR takes the model for perfect"));
+  EXPECT_THAT(refusal([](Problem& p) { p.uncertain[0].per_run = true; }),
+              HasSubstr("uncertain[0].per_run: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.unknown = true; }),
+              HasSubstr("measured[0].noise.unknown: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.relative = 0.1; }),
+              HasSubstr("measured[0].noise.relative: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.outliers = OutlierHandling::kHuber; }),
+              HasSubstr("measured[0].noise.outliers: is not available"));
+  EXPECT_THAT(
+      refusal([](Problem& p) { p.measured[0].noise.correlation = NoiseCorrelation::kUnknown; }),
+      HasSubstr("measured[0].noise.correlation: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) { p.regularization_mode = RegularizationMode::kEvidence; }),
+              HasSubstr("regularization_mode"));
+  EXPECT_THAT(refusal([](Problem& p) { p.fixed["x.delay"] = 0.1; }),
+              HasSubstr("likelihood: PREDICTION_ERROR is not available with a delay"));
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.model = MakeEquationModel(
+                              {.states = {{"v", "-sign(v) - k*v - c"}}, .outputs = {{"x", "v"}}})
+                              .value();
+                p.fixed = {};
+              }),
+              HasSubstr("whose equations do not switch"));
+}
+
+TEST(ProcessNoise, IsRefusedByStudiesOfAPerfectModel) {
+  const Samples samples = Measure(50, kTrueQ, 2);
+  const auto estimator = MakeEstimator(WithUnknownNoise());
+  ASSERT_TRUE(estimator->Append(samples).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_THAT(std::string(estimator->CurrentPrediction({}).status().message()),
+              HasSubstr("PREDICTION_ERROR is not available for a prediction"));
+  EXPECT_THAT(std::string(estimator->CurrentRegularizationSweep({}).status().message()),
+              HasSubstr("PREDICTION_ERROR is not available for a regularization sweep"));
+}
+
+}  // namespace
+}  // namespace polyest::internal

@@ -1,0 +1,63 @@
+// Counts calls of malloc, by which Eigen allocates: this definition replaces the C library's and
+// passes calls on to it. Sanitizers bring their own malloc, so these tests are skipped under them.
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <vector>
+
+#include "core/common/sanitizer.h"
+#include "core/propagation/filter_bank.h"
+#include "tests/unit/core/propagation/ensemble.h"
+
+#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER && defined(__GLIBC__)
+
+namespace {
+thread_local int allocations = 0;
+}  // namespace
+
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+namespace polyest::internal {
+namespace {
+
+// Returns how often memory is allocated for 20 samples, after the first 5.
+int AllocationsOf(IntegrationMethod method) {
+  Ensemble ensemble("mass_spring_damper", 20, {"x", "v"});
+  ensemble.specification.integration.method = method;
+  ensemble.specification.process_noise.setConstant(20, 2, 0.01);
+  FilterBank bank(ensemble.specification, &ensemble.inputs);
+  const std::vector<double> times_s = TimesUntil(1.2, 0.05);
+  const Matrix values = Matrix::Constant(2, 25, 0.1), noise = Matrix::Constant(2, 25, 0.01);
+  Matrix innovations(20, 40), log_variances(20, 40);
+  const auto advance = [&](size_t first, size_t count) {
+    const auto begin = static_cast<Eigen::Index>(first), columns = static_cast<Eigen::Index>(count);
+    const FilterSamples samples{{times_s.data() + first, count},
+                                values.middleCols(begin, columns),
+                                noise.middleCols(begin, columns)};
+    EXPECT_TRUE(bank.Advance(samples, innovations.leftCols(2 * columns),
+                             log_variances.leftCols(2 * columns), Stop())
+                    .ok());
+  };
+  advance(0, 5);
+  const int before = allocations;
+  advance(5, 20);
+  return allocations - before;
+}
+
+TEST(FilterAllocation, IsNoneForASampleOfALinearModel) {
+  EXPECT_EQ(AllocationsOf(IntegrationMethod::kAuto), 0);
+}
+
+TEST(FilterAllocation, IsNoneForASampleThatIsIntegrated) {
+  EXPECT_EQ(AllocationsOf(IntegrationMethod::kExplicit), 0);
+}
+
+}  // namespace
+}  // namespace polyest::internal
+
+#endif
