@@ -42,12 +42,16 @@ Problem WithUnknownNoise() {
 
 struct Flow {
   Eigen::Matrix2d whole, half;
+  Eigen::Vector2d force;  // what a constant force of 1 N does in an interval
 };
 
 Flow FlowOf(double k, double c) {
   Eigen::Matrix2d A;
   A << 0, 1, -k, -c;
-  return {(A * kStepS).exp(), (A * kStepS / 2).exp()};
+  const Eigen::Matrix2d whole = (A * kStepS).exp();
+  const Eigen::Vector2d force =
+      A.inverse() * (whole - Eigen::Matrix2d::Identity()) * Eigen::Vector2d(0, 1);
+  return {whole, (A * kStepS / 2).exp(), force};
 }
 
 Eigen::Matrix2d NoiseOf(const Flow& flow, double q) {
@@ -55,6 +59,13 @@ Eigen::Matrix2d NoiseOf(const Flow& flow, double q) {
   Q(1, 1) = q;
   return kStepS / 6 *
          (flow.whole * Q * flow.whole.transpose() + 4 * flow.half * Q * flow.half.transpose() + Q);
+}
+
+// The force in the interval that ends with a row: it holds from the row before, and the first one
+// from the beginning. 0 without a column of forces.
+double ForceBefore(const Samples& samples, size_t row) {
+  if (samples.columns.size() < 2) return 0;
+  return samples.columns[1].value[row == 0 ? 0 : row - 1];
 }
 
 // Returns samples of the oscillator with noise of the given spectral density.
@@ -82,9 +93,11 @@ double ExactCost(const Samples& samples, const Eigen::Vector3d& at) {
   Eigen::Vector2d m(1, 0);
   Eigen::Matrix2d P = Eigen::Matrix2d::Zero();
   double cost = 0;
-  for (const double z : samples.columns[0].value) {
-    m = flow.whole * m;
+  for (size_t row = 0; row < samples.rows(); ++row) {
+    const double z = samples.columns[0].value[row];
+    m = flow.whole * m + ForceBefore(samples, row) * flow.force;
     P = flow.whole * P * flow.whole.transpose() + Q;
+    if (!samples.columns[0].missing.empty() && samples.columns[0].missing[row]) continue;
     const double nu = z - m[0], S = P(0, 0) + kSigma * kSigma;
     const Eigen::Vector2d gain = P.col(0) / S;
     cost += 0.5 * (nu * nu / S + std::log(S / (kSigma * kSigma)));
@@ -142,6 +155,32 @@ TEST(ProcessNoise, AgreesWithTheMaximumOfTheExactLikelihood) {
   // The cost's mismatch is −log of the likelihood, to the discount for the expansion's own error:
   // one that may shift the estimate by half a standard deviation discounts the square of that.
   EXPECT_NEAR(estimate.cost.mismatch, exact.cost, 0.25);
+}
+
+// The force is streamed and holds its values; of 20 samples 7 are missing, in gaps and one by one.
+TEST(ProcessNoise, FollowsStreamedInputsAndLeavesOutMissingSamples) {
+  Samples samples = Measure(600, kTrueQ, 11);
+  samples.columns.push_back({"force", {}, {}});
+  // What a force of its own does is added to the samples.
+  const Flow flow = FlowOf(kTrueK, kTrueC);
+  Eigen::Vector2d forced(0, 0);
+  for (size_t row = 0; row < samples.rows(); ++row) {
+    samples.columns[1].value.push_back(std::sin(5 * samples.time_s[row]));
+    forced = flow.whole * forced + ForceBefore(samples, row) * flow.force;
+    samples.columns[0].value[row] += forced[0];
+    samples.columns[0].missing.push_back(row % 20 < 5 || row % 10 == 7);
+  }
+  Problem problem = WithUnknownNoise();
+  problem.inputs = {{"force", StreamedInput{.interpolation = Interpolation::kHold}}};
+  const Maximum exact = Maximize(samples);
+  const Estimate estimate = EstimateOf(problem, samples);
+  EXPECT_EQ(estimate.samples, 390);
+  for (int i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    EXPECT_NEAR(parameter.map, exact.at[i], 0.15 * exact.std_dev[i]) << parameter.name;
+    EXPECT_NEAR(parameter.std_dev, exact.std_dev[i], 0.1 * exact.std_dev[i]) << parameter.name;
+  }
+  EXPECT_NEAR(std::log(estimate.parameters[2].map), exact.at[2], 0.15 * exact.std_dev[2]);
 }
 
 // The same record of two runs: the likelihood is the product of two, and standard deviations are

@@ -125,6 +125,16 @@ TEST(Snapshot, HoldsTheSampleBeforeOfCorrelatedNoise) {
   ExpectSameBitsThroughRestarts(problem, samples);
 }
 
+TEST(Snapshot, HoldsTheStatesOfFilters) {
+  Problem problem = OscillatorProblem();
+  problem.process_noise = {{.state = "v", .spectral_density = 1e-3}};
+  for (const auto method : {IntegrationMethod::kAuto, IntegrationMethod::kExplicit}) {
+    problem.integration.method = method;
+    const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord(200));
+    EXPECT_GE(outcome.restored, 3);
+  }
+}
+
 TEST(Snapshot, HoldsNoiseThatIsWhiteInPart) {
   Problem problem = OscillatorProblem();
   problem.measured = {{"x",

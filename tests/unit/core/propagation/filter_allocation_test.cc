@@ -30,7 +30,9 @@ int AllocationsOf(IntegrationMethod method) {
   Ensemble ensemble("mass_spring_damper", 20, {"x", "v"});
   ensemble.specification.integration.method = method;
   ensemble.specification.process_noise.setConstant(20, 2, 0.01);
+  const int at_first = allocations;
   FilterBank bank(ensemble.specification, &ensemble.inputs);
+  EXPECT_GT(allocations, at_first);  // the counter counts
   const std::vector<double> times_s = TimesUntil(1.2, 0.05);
   const Matrix values = Matrix::Constant(2, 25, 0.1), noise = Matrix::Constant(2, 25, 0.01);
   Matrix innovations(20, 40), log_variances(20, 40);
