@@ -1,5 +1,6 @@
 // Writes a demonstration record to the standard output, by its only argument: oscillator,
-// rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle, damper_rig or chain.
+// disturbed, rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle, damper_rig
+// or chain.
 // Closed forms, or the equations of motion written down again and integrated in small fixed steps,
 // with noise; the same bytes every time.
 
@@ -45,6 +46,33 @@ void WriteOscillator() {
     const double x =
         x0_m * std::exp(-delta * t) * (std::cos(omega * t) + delta / omega * std::sin(omega * t));
     std::printf("%.2f,%.5f\n", t, x + noise_m * StandardNormal(generator));
+  }
+}
+
+// The oscillator again, k = 41.3 N/m and c = 0.23 N s/m, pushed by a random force: white noise of
+// 0.02 (m/s)²/s on the velocity, here a push each millisecond.
+void WriteDisturbed() {
+  constexpr double k = 41.3;
+  constexpr double delta = 0.23 / 2;
+  constexpr double spectral_density = 0.02;
+  constexpr double noise_m = 0.005;
+  constexpr double step_s = 0.001;
+  constexpr int steps_per_sample = 50;
+  const double omega = std::sqrt(k - delta * delta);
+  const double decay = std::exp(-delta * step_s);
+  const double cosine = std::cos(omega * step_s), sine = std::sin(omega * step_s) / omega;
+  std::mt19937_64 generator(20'061'117);
+  double x = 1, v = 0;
+  std::puts("t,x");
+  for (int i = 1; i <= 1000; ++i) {
+    for (int step = 0; step < steps_per_sample; ++step) {
+      const double next = decay * ((cosine + delta * sine) * x + sine * v);
+      v = decay * ((cosine - delta * sine) * v - k * sine * x) +
+          std::sqrt(spectral_density * step_s) * StandardNormal(generator);
+      x = next;
+    }
+    std::printf("%.2f,%.5f\n", i * steps_per_sample * step_s,
+                x + noise_m * StandardNormal(generator));
   }
 }
 
@@ -410,6 +438,8 @@ int main(int argc, char** argv) {
   const std::string record = argc == 2 ? argv[1] : "";
   if (record == "oscillator") {
     WriteOscillator();
+  } else if (record == "disturbed") {
+    WriteDisturbed();
   } else if (record == "rough_sensor") {
     WriteRoughSensor();
   } else if (record == "releases") {
@@ -429,7 +459,7 @@ int main(int argc, char** argv) {
   } else {
     std::fputs(
         "usage: generate_demo "
-        "oscillator|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|bicycle|"
+        "oscillator|disturbed|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|bicycle|"
         "damper_rig|chain\n",
         stderr);
     return 2;

@@ -170,6 +170,13 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
                      parameter.per_run() ? ", each run its own" : ""),
         remarks);
   }
+  for (const v1::ProcessNoise& noise : problem.process_noise()) {
+    Add("process noise", noise.state(),
+        noise.unknown()
+            ? absl::StrCat("unknown, from ", Number(noise.lower()), " to ", Number(noise.upper()))
+            : Number(noise.spectral_density()),
+        remarks);
+  }
   for (const v1::Correlation& pair : problem.correlations()) {
     Add("correlations", absl::StrCat(pair.first(), ", ", pair.second()), Number(pair.coefficient()),
         remarks);

@@ -57,6 +57,7 @@ INSTANTIATE_TEST_SUITE_P(
     Examples, ExampleRecords,
     testing::Values(
         ExampleRecord{"roll_plane_4dof", {{"m_a", 185}, {"d", 0.48}}},
+        ExampleRecord{"disturbed", {{"k", 41.3}, {"c", 0.23}, {"processNoise.v", 0.02}}},
         ExampleRecord{"rough_sensor", {{"k", 41.3}, {"c", 0.23}}},
         ExampleRecord{"releases",
                       {{"k", 41.3},

@@ -90,6 +90,19 @@ TEST(CheckProblem, NamesEveryEquationThatIsWrong) {
                           StartsWith("uncertain[0].uniform: ")));
 }
 
+TEST(CheckProblem, TellsOfProcessNoise) {
+  v1::CheckProblemRequest request;
+  *request.mutable_problem() = SmallProblem();
+  request.mutable_problem()->MergeFrom(ProblemFromJson(R"({"processNoise": [
+      {"state": "x", "spectralDensity": 0.01},
+      {"state": "v", "unknown": true, "lower": 0.001, "upper": 1}]})"));
+  const v1::CheckProblemResponse response = CheckProblem(request);
+  ASSERT_TRUE(response.errors().empty()) << response.errors(0).description();
+  std::string said;
+  for (const auto& remark : response.summary()) said += remark.description() + '\n';
+  EXPECT_THAT(said, HasSubstr("0.01\nunknown, from 0.001 to 1"));
+}
+
 TEST(CheckProblem, TellsOfRowsLeftOutAndOfInputsWithoutSamples) {
   v1::CheckProblemRequest request;
   *request.mutable_problem() = SmallProblem();
