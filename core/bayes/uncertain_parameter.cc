@@ -200,9 +200,11 @@ double UncertainParameter::Mean() const {
 double UncertainParameter::StandardDeviation() const {
   // The mean square is e^(2μ) sinh(2σ)/(2σ).
   if (IsLogUniform(*this)) {
-    const double mean = std::sinh(scale) / scale;
-    const double variance = std::sinh(2 * scale) / (2 * scale) - mean * mean;
-    return std::exp(location) * std::sqrt(std::max(0.0, variance));
+    // For close bounds the difference would be rounding errors; it is σ²/3 + 4σ⁴/45 + ….
+    const double mean = std::sinh(scale) / scale, square = scale * scale;
+    const double variance = scale < 0.01 ? square / 3 + 4 * square * square / 45
+                                         : std::sinh(2 * scale) / (2 * scale) - mean * mean;
+    return std::exp(location) * std::sqrt(variance);
   }
   // The standard deviation is mean √(e^(σ²) − 1).
   if (map == ParameterMap::kExponential) return Mean() * std::sqrt(std::expm1(scale * scale));

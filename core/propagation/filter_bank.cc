@@ -15,8 +15,9 @@ FilterBank::FilterBank(EnsembleSpecification specification, const InputSignals* 
     : specification_(std::move(specification)) {
   const Eigen::Index states = std::ssize(specification_.model->description().states);
   POLYEST_CHECK(states > 0);
-  POLYEST_CHECK(specification_.process_noise.rows() == members());
-  POLYEST_CHECK(specification_.process_noise.cols() == states);
+  Matrix& process_noise = specification_.process_noise;
+  if (process_noise.size() == 0) process_noise.setZero(members(), states);
+  POLYEST_CHECK(process_noise.rows() == members() && process_noise.cols() == states);
   POLYEST_CHECK(specification_.output_delays_s.size() == 0);
   const bool exact = StepsExactly(specification_, *inputs);
   const int most = FilterBlock::Members(states);

@@ -24,8 +24,8 @@ namespace polyest::internal {
 
 class FilterBank {
  public:
-  // Starts the filters at t = 0. The specification must have process noise (zeros, if there is
-  // none), no output delays, and a StateSpaceModel with states. `inputs` as for EnsemblePropagator.
+  // Starts the filters at t = 0. The specification must have no output delays, and a
+  // StateSpaceModel with states. `inputs` as for EnsemblePropagator.
   FilterBank(EnsembleSpecification specification, const InputSignals* inputs);
 
   int members() const { return static_cast<int>(specification_.parameters.rows()); }

@@ -131,12 +131,12 @@ int FilterBlock::Parts(double interval_s) {
                               : kMaxParts;
 }
 
-// Returns the spectral radius of ∂f/∂x at the mean of the first member, in 1/s, by differences and
-// Gelfand's formula, ‖A^k‖^{1/k} with k = 32, in which the units of the states hardly matter.
-double FilterBlock::FastestRate(double interval_s) {
+// Writes ∂f/∂x at the mean of the first member, by differences.
+void FilterBlock::Differentiate(double interval_s) {
   const Eigen::Index n = gaussians_.states(), members = gaussians_.members();
-  for (Eigen::Index s = 0; s < 2 * n; ++s)
+  for (Eigen::Index s = 0; s < 2 * n; ++s) {
     points_.middleRows(s * members, members) = gaussians_.mean();
+  }
   block_.SetStates(points_);
   const Eigen::ArrayXXd& states = block_.state_values();
   block_.Derivatives(time_s_, states, rates_);
@@ -154,6 +154,12 @@ double FilterBlock::FastestRate(double interval_s) {
       jacobian_.col(j) = ((moved_rates_.row(0) - rates_.row(0)) / step).matrix().transpose();
     }
   }
+}
+
+// Returns the spectral radius of ∂f/∂x at the mean of the first member, in 1/s, by Gelfand's
+// formula, ‖A^k‖^{1/k} with k = 32, in which the units of the states hardly matter.
+double FilterBlock::FastestRate(double interval_s) {
+  Differentiate(interval_s);
   double log_rate = 0, weight = 1;
   for (int doubling = 0; doubling < 5; ++doubling) {
     const double norm = jacobian_.norm();
@@ -164,7 +170,8 @@ double FilterBlock::FastestRate(double interval_s) {
     jacobian_.swap(square_);
     weight /= 2;
   }
-  return jacobian_.norm() > 0 ? std::exp(log_rate + weight * std::log(jacobian_.norm())) : 0;
+  const double norm = jacobian_.norm();
+  return norm > 0 ? std::exp(log_rate + weight * std::log(norm)) : 0;
 }
 
 void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int channel,

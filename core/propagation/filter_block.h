@@ -79,6 +79,7 @@ class FilterBlock {
   absl::Status MoveTo(double time_s, const Stop& stop);
   int Parts(double interval_s);
   double FastestRate(double interval_s);
+  void Differentiate(double interval_s);
   std::vector<int> PointsOf(int member) const;
   void Update(const FilterSamples& samples, Eigen::Index sample, int channel, MatrixRef innovations,
               MatrixRef log_variances);

@@ -132,6 +132,7 @@ Problem WithSpectralDensities(Problem problem) {
 }
 
 std::vector<absl::Status> CheckFilters(const Problem& problem) {
+  if (problem.model == nullptr) return {};
   std::vector<absl::Status> refusals = CheckEach(problem);
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));

@@ -28,8 +28,8 @@ std::string SpectralDensityName(const std::string& state);
 // and has none yet, log-uniform between its bounds.
 Problem WithSpectralDensities(Problem problem);
 
-// Returns what is wrong with the problem's process noise, and what cannot be combined with filters.
-// The problem's model must not be null.
+// Returns what is wrong with the problem's process noise, and what cannot be combined with filters;
+// nothing without a model.
 std::vector<absl::Status> CheckFilters(const Problem& problem);
 
 // Returns OK for a likelihood of output errors; else INVALID_ARGUMENT, because `what` (such as "a

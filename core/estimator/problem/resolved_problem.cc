@@ -58,11 +58,8 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int fir
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));
   };
-  if (problem.model == nullptr) {
-    add(InvalidField("model", "a model must be given"));
-  } else {
-    for (absl::Status& status : CheckFilters(problem)) add(std::move(status));
-  }
+  if (problem.model == nullptr) add(InvalidField("model", "a model must be given"));
+  for (absl::Status& status : CheckFilters(problem)) add(std::move(status));
   if (problem.uncertain.empty()) {
     add(InvalidField("uncertain", "at least one parameter must be uncertain"));
   }
@@ -381,10 +378,6 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.model = problem_.model;
   specification.outputs = std::move(outputs);
   settable_.Fill(values, specification);
-  if (uses_filters() && specification.process_noise.size() == 0) {
-    specification.process_noise.setZero(thetas.rows(),
-                                        std::ssize(problem_.model->description().states));
-  }
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;

@@ -47,6 +47,29 @@ Prior Chain() {
       .value();
 }
 
+// Moments of a constant density of log θ, by the midpoint rule in 10⁵ intervals.
+TEST(LogUniform, HasItsMoments) {
+  for (const auto& [lower, upper] : {std::pair{1e-4, 1.0}, {2.0, 3.0}, {1.0, 1.001}}) {
+    const UncertainParameter q = UncertainParameter::LogUniform("q", lower, upper).value();
+    EXPECT_TRUE(q.Validate().ok());
+    EXPECT_NEAR(q.ToParameter(-1), lower, 1e-12 * lower);
+    EXPECT_NEAR(q.ToParameter(1), upper, 1e-12 * upper);
+    constexpr int kIntervals = 100'000;
+    double mean = 0, variance = 0;
+    for (const bool second : {false, true}) {
+      for (int i = 0; i < kIntervals; ++i) {
+        const double theta = q.ToParameter(-1 + (2 * i + 1.0) / kIntervals);
+        (second ? variance : mean) += (second ? std::pow(theta - mean, 2) : theta) / kIntervals;
+      }
+    }
+    EXPECT_NEAR(q.Mean(), mean, 1e-7 * mean);
+    EXPECT_NEAR(q.StandardDeviation(), std::sqrt(variance), 1e-6 * std::sqrt(variance));
+  }
+  EXPECT_THAT(std::string(UncertainParameter::LogUniform("q", 0, 1).status().message()),
+              HasSubstr("lower 0 must be > 0"));
+  EXPECT_FALSE(UncertainParameter::LogUniform("q", 2, 1).ok());
+}
+
 // Returns points of the prior, count × n.
 Matrix PriorPoints(const Prior& prior, int count) {
   Matrix points = CollocationPoints(PointSet::kHalton, prior.germs(), 1, count).value();
