@@ -5,9 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
+#include <functional>
 #include <random>
+#include <string>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "core/estimator/problem/resolved_problem.h"
