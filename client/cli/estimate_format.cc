@@ -76,6 +76,19 @@ void PrintBias(const v1::Estimate& estimate, std::ostream& out) {
   table.Print(out);
 }
 
+// Prints the states and the parameters that drift as the last sample left them.
+void PrintFiltered(const v1::Estimate& estimate, std::ostream& out) {
+  if (estimate.filtered().empty()) return;
+  TextTable table({"now", "mean", "sd", "unit", "95 % interval"});
+  for (const v1::FilteredQuantity& one : estimate.filtered()) {
+    table.AddRow({one.name(), FormatNumber(one.mean()), FormatNumber(one.std_dev(), 3),
+                  UnitText(one.unit()),
+                  absl::StrCat(FormatNumber(one.lower95()), " … ", FormatNumber(one.upper95()))});
+  }
+  out << absl::StrFormat("\nat t = %.6g s, by the filters\n", estimate.time());
+  table.Print(out);
+}
+
 // Prints what windows of the record say on their own, one row for each window.
 void PrintWindows(const v1::Estimate& estimate, std::ostream& out) {
   if (estimate.windows().empty()) return;
@@ -235,6 +248,7 @@ void PrintEstimate(const v1::Estimate& estimate, std::ostream& out) {
   PrintParameters(estimate, out);
   PrintBias(estimate, out);
   PrintComponents(estimate, out);
+  PrintFiltered(estimate, out);
   PrintWindows(estimate, out);
   PrintChannels(estimate, out);
   PrintDirections(estimate, out);

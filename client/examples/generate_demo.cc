@@ -1,6 +1,6 @@
 // Writes a demonstration record to the standard output, by its only argument: oscillator,
-// disturbed, rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle, damper_rig
-// or chain.
+// disturbed, warming, rough_sensor, releases, roll_plane, roll_plane_4dof, quarter_car, bicycle,
+// damper_rig or chain.
 // Closed forms, or the equations of motion written down again and integrated in small fixed steps,
 // with noise; the same bytes every time.
 
@@ -72,6 +72,31 @@ void WriteDisturbed() {
       x = next;
     }
     std::printf("%.2f,%.5f\n", i * steps_per_sample * step_s,
+                x + noise_m * StandardNormal(generator));
+  }
+}
+
+// The oscillator again, k = 41.3 N/m, shaken by a force of 2 N at 1 Hz, with a damper that warms
+// up: c falls from 1.2 to 0.8 N s/m, with a time constant of 20 s.
+void WriteWarming() {
+  constexpr double k = 41.3;
+  constexpr double noise_m = 0.005;
+  constexpr double step_s = 0.001;
+  constexpr int steps_per_sample = 50;
+  std::mt19937_64 generator(20'061'118);
+  double x = 0, v = 0;
+  std::puts("t,x");
+  for (int i = 0; i < 1200; ++i) {
+    for (int step = 0; step < steps_per_sample; ++step) {
+      // Leapfrog: the middle of the step for the force and the damper.
+      const double t = (i * steps_per_sample + step + 0.5) * step_s;
+      const double c = 0.8 + 0.4 * std::exp(-t / 20);
+      x += 0.5 * step_s * v;
+      const double force = 2 * std::sin(2 * pi * t) - k * x;
+      v = ((1 - 0.5 * step_s * c) * v + step_s * force) / (1 + 0.5 * step_s * c);
+      x += 0.5 * step_s * v;
+    }
+    std::printf("%.2f,%.5f\n", (i + 1) * steps_per_sample * step_s,
                 x + noise_m * StandardNormal(generator));
   }
 }
@@ -440,6 +465,8 @@ int main(int argc, char** argv) {
     WriteOscillator();
   } else if (record == "disturbed") {
     WriteDisturbed();
+  } else if (record == "warming") {
+    WriteWarming();
   } else if (record == "rough_sensor") {
     WriteRoughSensor();
   } else if (record == "releases") {
@@ -459,8 +486,8 @@ int main(int argc, char** argv) {
   } else {
     std::fputs(
         "usage: generate_demo "
-        "oscillator|disturbed|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|bicycle|"
-        "damper_rig|chain\n",
+        "oscillator|disturbed|warming|rough_sensor|releases|roll_plane|roll_plane_4dof|quarter_car|"
+        "bicycle|damper_rig|chain\n",
         stderr);
     return 2;
   }

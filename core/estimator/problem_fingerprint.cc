@@ -34,7 +34,10 @@ void Add(Archive& archive, const ModelDescription& model) {
 void Add(Archive& archive, const UncertainParameter& parameter) {
   const Germ germ(parameter.germ);
   archive(parameter.name, Number(germ.family()), germ.first_shape(), germ.second_shape(),
-          parameter.location, parameter.scale, Number(parameter.map), parameter.per_run);
+          parameter.location, parameter.scale, Number(parameter.map), parameter.per_run,
+          parameter.drift.has_value());
+  const RandomWalk walk = parameter.drift.value_or(RandomWalk());
+  archive(walk.std_dev_per_sqrt_s, walk.unknown, walk.lower, walk.upper);
 }
 
 void Add(Archive& archive, const ConstantInput& input) { archive(input.amplitude); }

@@ -69,6 +69,18 @@ absl::Status FilterBank::AdvanceBlocks(const FilterSamples& samples, MatrixRef i
   return absl::OkStatus();
 }
 
+void FilterBank::ReadStates(Matrix& means, Matrix& deviations) const {
+  means.resize(members(), specification_.process_noise.cols());
+  deviations.resizeLike(means);
+  Eigen::Index row = 0;
+  for (const auto& block : blocks_) {
+    const GaussianStates& states = block->states();
+    means.middleRows(row, states.members()) = states.mean().matrix();
+    deviations.middleRows(row, states.members()) = states.Deviations().matrix();
+    row += states.members();
+  }
+}
+
 bool FilterBank::AtCheckpoint() const {
   return samples_ > 0 && samples_ % specification_.integration.samples_between_checkpoints == 0;
 }

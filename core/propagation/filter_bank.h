@@ -35,6 +35,10 @@ class FilterBank {
   absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
                        const Stop& stop);
 
+  // Writes the means and the standard deviations of the states at the time reached, as the samples
+  // up to there tell them (members × states each).
+  void ReadStates(Matrix& means, Matrix& deviations) const;
+
   // The failures so far, ordered by member.
   const std::vector<PointFailure>& failures() const { return failures_; }
 

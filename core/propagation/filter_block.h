@@ -67,6 +67,9 @@ class FilterBlock {
   // members.
   const std::vector<PointFailure>& failures() const { return failures_; }
 
+  // The states that the samples so far tell, of each of the block's members.
+  const GaussianStates& states() const { return gaussians_; }
+
   // As those of TrajectoryBlock, with means and factors beside the states in the first rows.
   void Restart() { block_.Restart(); }
   EnsembleState::OfBlock State() const;

@@ -14,6 +14,14 @@ GaussianStates::GaussianStates(Eigen::Index members, Eigen::Index states)
       inverse_(members),
       product_(members) {}
 
+Eigen::ArrayXXd GaussianStates::Deviations() const {
+  Eigen::ArrayXXd variances = Eigen::ArrayXXd::Zero(members(), states());
+  for (Eigen::Index j = 0; j < states(); ++j) {
+    for (Eigen::Index i = j; i < states(); ++i) variances.col(i) += L(i, j).square();
+  }
+  return variances.sqrt();
+}
+
 void GaussianStates::Diffuse(const Eigen::ArrayXXd& spectral_densities, double duration_s) {
   const Eigen::Index n = states();
   for (Eigen::Index a = 0; a < n; ++a) {

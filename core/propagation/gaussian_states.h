@@ -35,6 +35,9 @@ class GaussianStates {
   Eigen::ArrayXXd& factor() { return factor_; }
   const Eigen::ArrayXXd& factor() const { return factor_; }
 
+  // Returns the standard deviations of the states (members × n).
+  Eigen::ArrayXXd Deviations() const;
+
   // Adds `spectral_densities` (members × n, of independent noises) times `duration_s` to P.
   void Diffuse(const Eigen::ArrayXXd& spectral_densities, double duration_s);
   // Writes the points: row s · members + i of `points` (at least 2n · members rows, n columns) is

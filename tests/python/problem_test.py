@@ -54,6 +54,23 @@ def test_everything_that_a_problem_may_say(client):
     assert fields <= {"uncertain", "measured", "derived", "correlations", "fixed"}, str(check)
 
 
+def test_process_noise_and_drift_are_written_as_in_the_examples():
+    disturbed = (
+        polyest.Problem.builtin("mass_spring_damper").fix(m=1.0, x0=1.0)
+        .uncertain("k", polyest.Uniform(31.58, 47.37)).uncertain("c", polyest.Uniform(0.05, 1))
+        .measure("x", polyest.Noise(absolute=0.005)).process_noise("v", (1e-4, 1)))
+    assert disturbed == polyest.Problem.read(EXAMPLES / "disturbed.json")
+    warming = (
+        polyest.Problem.builtin("mass_spring_damper").fix(m=1.0)
+        .drive("force", polyest.Sinusoid(2, 1))
+        .uncertain("k", polyest.Uniform(31.58, 47.37))
+        .uncertain("c", polyest.Lognormal(1, 0.4), drift=(0.001, 1))
+        .measure("x", polyest.Noise(absolute=0.005)))
+    assert warming == polyest.Problem.read(EXAMPLES / "warming.json")
+    known = polyest.Problem({}).uncertain("c", polyest.Normal(1, 0.4), drift=0.05)
+    assert known.as_dict()["uncertain"][0]["drift"] == {"randomWalk": {"stdDevPerSqrtS": 0.05}}
+
+
 @pytest.mark.parametrize("signal", [
     polyest.Constant(1.0), polyest.Step(1.0, 0.5), polyest.Sinusoid(1.0, 2.0, 0.1),
     polyest.Chirp(1.0, 0.1, 5.0, 10.0), polyest.HalfSineBump(1.0, 0.5, 0.2),

@@ -75,6 +75,19 @@ void RegionalExpansion::AddLogVariance(int column, double noise, double variance
   }
 }
 
+std::optional<FilteredStates> RegionalExpansion::Filtered() const {
+  if (!filters_ || !shortage_.ok()) return std::nullopt;
+  Matrix means, deviations;
+  filters_->ReadStates(means, deviations);
+  FilteredStates filtered{Matrix(design_.basis->size(), means.cols()),
+                          Matrix(design_.basis->size(), means.cols())};
+  Vector residual(means.cols());
+  CollocationMatrix matrix = matrix_;
+  matrix.Solve(means(kept_, Eigen::all), filtered.mean, residual);
+  matrix.Solve(deviations(kept_, Eigen::all), filtered.deviation, residual);
+  return filtered;
+}
+
 double RegionalExpansion::LogVarianceError() const {
   if (absorbed_.point_log_variance.size() == 0) return 0;
   Vector coefficients = Vector::Zero(design_.basis->size());

@@ -83,6 +83,12 @@ struct AbsorbedRows {
 
 struct ExpansionState;
 
+// Expansions of the means and the standard deviations of filters' states, S × states each.
+struct FilteredStates {
+  Matrix mean;
+  Matrix deviation;
+};
+
 class RegionalExpansion {
  public:
   // Makes an expansion that has absorbed no rows. Returns FailedPrecondition when the design's
@@ -152,6 +158,9 @@ class RegionalExpansion {
   // Returns the root mean square, over the collocation points, of ½ Σ log(S/σ²) of the model minus
   // that of the expansion; 0 without filters.
   double LogVarianceError() const;
+  // Returns the expansions of the filters' states after the rows propagated; nothing without
+  // filters or before the first row.
+  std::optional<FilteredStates> Filtered() const;
   // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
   const CorrelationProfile& Profile(int channel) const {
     return absorbed_.profiles[static_cast<size_t>(channel)];

@@ -69,6 +69,7 @@ class Assessment {
         noise_widening_, MarginalizeNoise(problem_, *request_.expansion, cost, *request_.guesses,
                                           request_.effort, stop, posterior_));
     Correct(cost);
+    filtered_ = DrawFiltered(problem_, *request_.expansion, posterior_);
     findings_.shift = std::hypot(findings_.shift, findings_.integration_shift);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
@@ -78,9 +79,10 @@ class Assessment {
     DescribeParameters(cost, eta);
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
+    DescribeFilters();
     estimate_.diagnostics = Diagnose(findings_, estimate_);
     return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share,
-                    log_evidence};
+                    std::move(filtered_), log_evidence};
   }
 
  private:
@@ -253,6 +255,12 @@ class Assessment {
     estimate_.windows = findings_.windows.estimates;
   }
 
+  // What the filters know is as doubtful as the most doubtful parameter.
+  void DescribeFilters() {
+    filtered_.deviation *= shift_widening_ * findings_.windows.widening.maxCoeff();
+    estimate_.filtered = DescribeFiltered(problem_, filtered_, posterior_.weights);
+  }
+
   void DescribeBias(const Cost& cost, const Vector& eta, const Stop& stop) {
     const Vector bias = RegularizationBias(cost, eta, stop);
     for (int i = 0; i < prior_.dimension(); ++i) {
@@ -355,6 +363,7 @@ class Assessment {
   double fitted_ = 0;  // number of parameters fitted by the data
   double spent_ = 0;   // degrees of freedom used up, see Cost::MismatchHessian
   PosteriorDraws posterior_;
+  FilteredDraws filtered_;     // at these draws
   double shift_widening_ = 1;  // factor of the uncertainty for the expansion's own error
   Vector noise_widening_;      // factors of it for the noise's correlation, by parameter
   Vector deviation_;           // standard deviations of the parameters

@@ -10,6 +10,7 @@
 
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/filtered_quantities.h"
 #include "core/estimator/posterior/mixture_share.h"
 #include "core/estimator/posterior/posterior_draws.h"
 #include "core/estimator/record/record_summary.h"
@@ -39,6 +40,7 @@ struct Assessed {
   PosteriorDraws posterior;  // the draws that the estimate summarizes
   Findings findings;         // the basis of the diagnostics; refers to the request's objects
   MixtureShare share;        // for a component of a mixture
+  FilteredDraws filtered;    // at the draws; empty without filters
   std::optional<double> log_evidence;  // if asked for and there is one (model_evidence.h)
 };
 

@@ -168,6 +168,22 @@ PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<do
   return mixture;
 }
 
+// Returns what filters know at the draws of all components, in the order of Mix; nothing if one of
+// them knows nothing.
+FilteredDraws MixFiltered(const std::vector<Assessed>& components) {
+  FilteredDraws all;
+  for (const Assessed& component : components) {
+    const Matrix& mean = component.filtered.mean;
+    if (mean.cols() == 0) return {};
+    const Eigen::Index rows = all.mean.rows();
+    all.mean.conservativeResize(rows + mean.rows(), mean.cols());
+    all.deviation.conservativeResize(rows + mean.rows(), mean.cols());
+    all.mean.bottomRows(mean.rows()) = mean;
+    all.deviation.bottomRows(mean.rows()) = component.filtered.deviation;
+  }
+  return all;
+}
+
 void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, Estimate& estimate) {
   for (int i = 0; i < prior.dimension(); ++i) {
     ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
@@ -228,7 +244,7 @@ ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
 }
 
 Assessed Combine(const std::vector<Assessed>& components, const std::vector<double>& weights,
-                 const std::vector<Places>& pieces, const Prior& prior) {
+                 const std::vector<Places>& pieces, const ResolvedProblem& problem) {
   const Assessed& best = components[BestOf(components, pieces.front())];
   Assessed whole;
   whole.estimate = best.estimate;
@@ -249,14 +265,17 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   }
   if (pieces.size() > 1) {
     for (const Places& places : pieces) {
-      whole.estimate.components.push_back(DescribePiece(components, weights, places, prior));
+      whole.estimate.components.push_back(
+          DescribePiece(components, weights, places, problem.prior()));
     }
   }
   std::vector<std::optional<double>> evidences;
   for (const Assessed& component : components) evidences.push_back(component.log_evidence);
   whole.log_evidence = LogSumOfExponentials(evidences);
   whole.posterior = Mix(components, weights, all);
-  DescribeWhole(prior, whole.posterior, whole.estimate);
+  DescribeWhole(problem.prior(), whole.posterior, whole.estimate);
+  whole.filtered = MixFiltered(components);
+  whole.estimate.filtered = DescribeFiltered(problem, whole.filtered, whole.posterior.weights);
   return whole;
 }
 
@@ -347,9 +366,9 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
     mixture.components.push_back(std::move(assessed[k]));
     k = places[k];
   }
-  mixture.whole = Combine(mixture.components, in_order,
-                          PiecesOf(requests_in_order, mixture.components, in_order),
-                          requests.front().problem->prior());
+  mixture.whole =
+      Combine(mixture.components, in_order,
+              PiecesOf(requests_in_order, mixture.components, in_order), *requests.front().problem);
   if (!AreLevel(requests)) mixture.whole.log_evidence.reset();
   mixture.whole.estimate.expansion.reexpansions = reexpansions;
   mixture.whole.estimate.expansion.trajectories = trajectories;

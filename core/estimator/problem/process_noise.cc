@@ -10,6 +10,8 @@
 
 #include "core/bayes/noise.h"
 #include "core/common/field_error.h"
+#include "core/common/status.h"
+#include "core/estimator/problem/drifting_model.h"
 #include "core/model/list_names.h"
 #include "core/model/switching_model.h"
 
@@ -18,37 +20,59 @@ namespace {
 
 constexpr char kRefusal[] = "is not available with likelihood PREDICTION_ERROR";
 
+bool Drifts(const Problem& problem) {
+  return std::ranges::any_of(problem.uncertain, [](const UncertainParameter& parameter) {
+    return parameter.drift.has_value();
+  });
+}
+
 bool HasState(const Problem& problem, const std::string& state) {
   return std::ranges::any_of(problem.model->description().states,
                              [&](const Quantity& quantity) { return quantity.name == state; });
 }
 
-bool AreBounds(const ProcessNoise& noise) {
-  return noise.lower > 0 && noise.lower < noise.upper && std::isfinite(noise.upper);
+// The size of a noise that drives a state: a value, or bounds of an unknown one.
+struct Size {
+  const char* name;  // of the field
+  double value;
+  bool unknown;
+  double lower, upper;
+};
+
+Size SizeOf(const ProcessNoise& noise) {
+  return {"spectral_density", noise.spectral_density, noise.unknown, noise.lower, noise.upper};
 }
 
-absl::Status CheckSize(size_t index, const ProcessNoise& noise) {
-  const auto field = [index](const char* name) { return FieldPath{"process_noise", index, name}; };
-  if (!std::isfinite(noise.spectral_density) || noise.spectral_density < 0) {
-    return InvalidField(field("spectral_density"),
-                        absl::StrFormat("%g must be a finite number ≥ 0", noise.spectral_density));
+Size SizeOf(const RandomWalk& walk) {
+  return {"std_dev_per_sqrt_s", walk.std_dev_per_sqrt_s, walk.unknown, walk.lower, walk.upper};
+}
+
+bool AreBounds(const Size& size) {
+  return size.lower > 0 && size.lower < size.upper && std::isfinite(size.upper);
+}
+
+absl::Status CheckSize(const FieldPath& path, const Size& size) {
+  const auto field = [&path](const char* name) { return path.Then(name); };
+  if (!std::isfinite(size.value) || size.value < 0) {
+    return InvalidField(field(size.name),
+                        absl::StrFormat("%g must be a finite number ≥ 0", size.value));
   }
-  if (!noise.unknown) {
-    if (noise.lower == 0 && noise.upper == 0) return absl::OkStatus();
+  if (!size.unknown) {
+    if (size.lower == 0 && size.upper == 0) return absl::OkStatus();
     return InvalidField(field("lower"), absl::StrFormat("%g and upper %g have no effect without "
                                                         "unknown, for which they are bounds",
-                                                        noise.lower, noise.upper));
+                                                        size.lower, size.upper));
   }
-  if (noise.spectral_density > 0) {
-    return InvalidField(field("spectral_density"),
+  if (size.value > 0) {
+    return InvalidField(field(size.name),
                         absl::StrFormat("%g is given although it is unknown; give lower and upper "
                                         "instead",
-                                        noise.spectral_density));
+                                        size.value));
   }
-  if (AreBounds(noise)) return absl::OkStatus();
+  if (AreBounds(size)) return absl::OkStatus();
   return InvalidField(field("lower"), absl::StrFormat("%g must be above 0 and below upper %g, "
                                                       "which must be finite",
-                                                      noise.lower, noise.upper));
+                                                      size.lower, size.upper));
 }
 
 std::vector<absl::Status> CheckEach(const Problem& problem) {
@@ -67,9 +91,27 @@ std::vector<absl::Status> CheckEach(const Problem& problem) {
       refusals.push_back(
           InvalidField(field, absl::StrFormat("state %s is given twice", noise.state)));
     }
-    if (absl::Status size = CheckSize(i, noise); !size.ok()) refusals.push_back(std::move(size));
+    absl::Status size = CheckSize({"process_noise", i}, SizeOf(noise));
+    if (!size.ok()) refusals.push_back(std::move(size));
   }
   return refusals;
+}
+
+absl::Status CheckDrift(const Problem& problem, size_t index) {
+  const UncertainParameter& parameter = problem.uncertain[index];
+  const FieldPath field{"uncertain", index, "drift"};
+  const FieldPath walk = field.Then("random_walk");
+  POLYEST_RETURN_IF_ERROR(CheckSize(walk, SizeOf(*parameter.drift)));
+  if (!parameter.drift->unknown && parameter.drift->std_dev_per_sqrt_s == 0) {
+    return InvalidField(walk.Then("std_dev_per_sqrt_s"), "0 must be > 0, or unknown");
+  }
+  const ModelDescription& model = problem.model->description();
+  if (!model.FindParameter(parameter.name)) {
+    return InvalidField(field, absl::StrFormat("%s is not a parameter of model %s; only these can "
+                                               "drift",
+                                               parameter.name, model.name));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckModel(const Problem& problem) {
@@ -81,9 +123,13 @@ absl::Status CheckModel(const Problem& problem) {
   if (dynamic_cast<const StateSpaceModel*>(&model) == nullptr) {
     return refuse("needs a model whose states can be set: a built-in one or equations");
   }
-  const size_t states = model.description().states.size();
+  const auto walks = std::ranges::count_if(
+      problem.uncertain,
+      [](const UncertainParameter& parameter) { return parameter.drift.has_value(); });
+  const size_t states = model.description().states.size() + static_cast<size_t>(walks);
   if (states < 1 || states > static_cast<size_t>(kMaxFilteredStates)) {
-    return refuse(absl::StrFormat("needs a model with 1 to %d states", kMaxFilteredStates));
+    return refuse(absl::StrFormat(
+        "needs a model with 1 to %d states, drifting parameters among them", kMaxFilteredStates));
   }
   const auto* switching = dynamic_cast<const SwitchingModel*>(&model);
   if (switching != nullptr && !switching->switches().empty()) {
@@ -108,10 +154,8 @@ absl::Status CheckSensor(size_t index, const NoiseModel& noise) {
 }  // namespace
 
 bool UsesFilters(const Problem& problem) {
-  return problem.likelihood.value_or(problem.process_noise.empty()
-                                         ? LikelihoodForm::kOutputError
-                                         : LikelihoodForm::kPredictionError) ==
-         LikelihoodForm::kPredictionError;
+  if (problem.likelihood) return *problem.likelihood == LikelihoodForm::kPredictionError;
+  return !problem.process_noise.empty() || Drifts(problem);
 }
 
 std::string SpectralDensityName(const std::string& state) {
@@ -119,16 +163,27 @@ std::string SpectralDensityName(const std::string& state) {
 }
 
 Problem WithSpectralDensities(Problem problem) {
-  for (const ProcessNoise& noise : problem.process_noise) {
-    const std::string name = SpectralDensityName(noise.state);
+  const auto add = [&problem](const std::string& name, const Size& size) {
     const bool there = std::ranges::any_of(
         problem.uncertain,
         [&name](const UncertainParameter& parameter) { return parameter.name == name; });
-    if (there || !noise.unknown || !AreBounds(noise)) continue;
-    auto parameter = UncertainParameter::LogUniform(name, noise.lower, noise.upper);
+    if (there || !size.unknown || !AreBounds(size)) return;
+    auto parameter = UncertainParameter::LogUniform(name, size.lower, size.upper);
     if (parameter.ok()) problem.uncertain.push_back(*std::move(parameter));
+  };
+  for (const ProcessNoise& noise : problem.process_noise) {
+    add(SpectralDensityName(noise.state), SizeOf(noise));
+  }
+  const std::vector<UncertainParameter> given = problem.uncertain;
+  for (const UncertainParameter& parameter : given) {
+    if (parameter.drift) add(DriftName(parameter.name), SizeOf(*parameter.drift));
   }
   return problem;
+}
+
+std::shared_ptr<const Model> WithDrifts(const Problem& problem) {
+  if (!Drifts(problem)) return problem.model;
+  return std::make_shared<DriftingModel>(problem);
 }
 
 std::vector<absl::Status> CheckFilters(const Problem& problem) {
@@ -137,11 +192,14 @@ std::vector<absl::Status> CheckFilters(const Problem& problem) {
   const auto add = [&refusals](absl::Status status) {
     if (!status.ok()) refusals.push_back(std::move(status));
   };
+  for (size_t i = 0; i < problem.uncertain.size(); ++i) {
+    if (problem.uncertain[i].drift) add(CheckDrift(problem, i));
+  }
   if (!UsesFilters(problem)) {
-    if (problem.process_noise.empty()) return refusals;
+    if (problem.process_noise.empty() && !Drifts(problem)) return refusals;
     add(InvalidField("likelihood",
                      "OUTPUT_ERROR takes the model for perfect and leaves no room for "
-                     "processNoise; use PREDICTION_ERROR"));
+                     "processNoise and drift; use PREDICTION_ERROR"));
     return refusals;
   }
   add(CheckModel(problem));

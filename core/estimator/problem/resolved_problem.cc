@@ -301,6 +301,12 @@ void ResolvedProblem::Resolver::ResolveDerived() {
   for (const std::string& variable : variables) {
     resolved_.derived_variables_.push_back(*settable_.Find(variable));
   }
+  for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
+    const UncertainParameter& parameter = problem_.uncertain[i];
+    if (!parameter.drift || !derived->variables_used().contains(parameter.name)) continue;
+    Refuse({"uncertain", i, "drift"}, "%s cannot drift, because others are derived from it",
+           parameter.name);
+  }
   resolved_.derived_ = std::make_shared<const Expressions>(*std::move(derived));
 }
 
@@ -331,6 +337,7 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs,
   ResolvedProblem resolved(std::move(problem), std::move(prior), runs, first_run);
   refusals = Resolver(resolved).Run();
   if (!refusals.empty()) return refusals.front();
+  resolved.model_ = WithDrifts(resolved.problem_);
   return resolved;
 }
 
@@ -344,56 +351,6 @@ std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   ResolvedProblem resolved(std::move(problem), std::move(prior), 1, 0);
   for (absl::Status& refusal : Resolver(resolved).Run()) refusals.push_back(std::move(refusal));
   return refusals;
-}
-
-InputSignals ResolvedProblem::MakeInputs() const {
-  const ModelDescription& model = problem_.model->description();
-  InputSignals signals;
-  for (const Quantity& input : model.inputs) {
-    InputSpecification specification = ConstantInput{};
-    for (const NamedInput& given : problem_.inputs) {
-      if (given.name == input.name) specification = given.signal;
-    }
-    absl::StatusOr<InputSignal> signal = InputSignal::Make(specification);
-    POLYEST_CHECK(signal.ok());
-    signals.push_back(*std::move(signal));
-  }
-  return signals;
-}
-
-EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas,
-                                                    std::vector<int> outputs, int threads,
-                                                    int run) const {
-  POLYEST_CHECK(thetas.cols() == dimension() && (run < runs_ || !per_run()));
-  if (per_run() && run < first_run_) {
-    return MakeEnsemble(ThetasOfEndedRun(thetas, run), std::move(outputs), threads, first_run_);
-  }
-  Matrix values = base_.transpose().replicate(thetas.rows(), 1);
-  for (size_t i = 0; i < targets_.size(); ++i) {
-    if (target_run_[i] >= 0 && target_run_[i] != run) continue;
-    values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
-  }
-  if (derived_ != nullptr) Derive(values);
-  EnsembleSpecification specification;
-  specification.model = problem_.model;
-  specification.outputs = std::move(outputs);
-  settable_.Fill(values, specification);
-  specification.integration = problem_.integration;
-  specification.threads = threads;
-  return specification;
-}
-
-// A derived value that is not finite makes the whole point fail.
-void ResolvedProblem::Derive(Matrix& values) const {
-  Matrix results(values.rows(), std::ssize(derived_targets_));
-  derived_->Evaluate(values(Eigen::all, derived_variables_), results);
-  for (size_t i = 0; i < derived_targets_.size(); ++i) {
-    values.col(derived_targets_[i]) = results.col(static_cast<Eigen::Index>(i));
-  }
-  for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    if (results.row(row).allFinite()) continue;
-    values.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
-  }
 }
 
 }  // namespace polyest::internal

@@ -98,6 +98,9 @@ class ResolvedProblem {
   // Whether the likelihood is that of the prediction errors of filters (process_noise.h), which
   // MakeEnsemble then specifies.
   bool uses_filters() const { return UsesFilters(problem_); }
+  // Returns the model whose states the ensembles have: the problem's, with states for parameters
+  // that drift (drifting_model.h).
+  const std::shared_ptr<const Model>& model() const { return model_; }
   // Whether an output may have a delay other than 0.
   bool delays_outputs() const { return delays_outputs_; }
 
@@ -116,7 +119,7 @@ class ResolvedProblem {
         prior_(std::move(prior)),
         runs_(runs),
         first_run_(first_run),
-        settable_(problem_.model->description(), problem_.process_noise),
+        settable_(problem_.model->description(), problem_.process_noise, problem_.uncertain),
         base_(settable_.Defaults()) {}
 
   void Derive(Matrix& values) const;
@@ -128,6 +131,7 @@ class ResolvedProblem {
   int first_run_;  // the first one whose parameters are among the uncertain ones
   int parameters_per_run_ = 0;
   std::shared_ptr<const EndedRuns> ended_runs_;
+  std::shared_ptr<const Model> model_;
   SettableQuantities settable_;
   Vector base_;                  // values of the settable quantities that are not uncertain
   std::vector<int> targets_;     // settable quantity of each uncertain parameter

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "core/estimator/problem/drifting_model.h"
 #include "core/estimator/problem/process_noise.h"
 
 namespace polyest::internal {
@@ -16,7 +17,8 @@ Matrix UnlessNeutral(const Matrix& block, double neutral) {
 }  // namespace
 
 SettableQuantities::SettableQuantities(const ModelDescription& model,
-                                       const std::vector<ProcessNoise>& process_noise)
+                                       const std::vector<ProcessNoise>& process_noise,
+                                       const std::vector<UncertainParameter>& uncertain)
     : parameters_(static_cast<int>(model.parameters.size())),
       inputs_(static_cast<int>(model.inputs.size())),
       outputs_(static_cast<int>(model.outputs.size())),
@@ -48,6 +50,15 @@ SettableQuantities::SettableQuantities(const ModelDescription& model,
                       Kind::kSpectralDensity, i});
     }
   }
+  for (const UncertainParameter& parameter : uncertain) {
+    const auto column = model.FindParameter(parameter.name);
+    if (!parameter.drift || !column) continue;
+    const std::string& unit = model.parameters[static_cast<size_t>(*column)].unit;
+    all_.push_back({DriftName(parameter.name),
+                    unit.empty() ? "" : absl::StrCat("(", unit, ")/s^0.5"),
+                    parameter.drift->std_dev_per_sqrt_s, true, Kind::kDriftRate, states_++,
+                    parameter.StandardDeviation()});
+  }
 }
 
 std::optional<int> SettableQuantities::Find(std::string_view name) const {
@@ -73,7 +84,8 @@ std::string SettableQuantities::Describe() const {
   std::vector<std::string> parts, inputs, outputs;
   for (const Settable& settable : all_) {
     const std::string channel = settable.name.substr(0, settable.name.rfind('.'));
-    if (settable.kind == Kind::kParameter || settable.kind == Kind::kSpectralDensity) {
+    if (settable.kind == Kind::kParameter || settable.kind == Kind::kSpectralDensity ||
+        settable.kind == Kind::kDriftRate) {
       parts.push_back(settable.name);
     }
     if (settable.kind == Kind::kAmplitude) inputs.push_back(channel);
@@ -112,7 +124,10 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
   ensemble.output_offsets = UnlessNeutral(of_outputs(2), 0);
   for (int i = OutputDelay(outputs_) - 1; i < size(); ++i) {
     if (ensemble.process_noise.size() == 0) ensemble.process_noise.setZero(values.rows(), states_);
-    ensemble.process_noise.col((*this)[i].column) = values.col(i);
+    const Settable& settable = (*this)[i];
+    auto noise = ensemble.process_noise.col(settable.column);
+    noise = values.col(i);
+    if (settable.kind == Kind::kDriftRate) noise = (noise / settable.unit_rate).cwiseAbs2();
   }
 }
 

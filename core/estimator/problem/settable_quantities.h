@@ -6,9 +6,9 @@
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
 //   sample(t) = x.gain · x(t − x.delay) + x.offset + noise         of an output x.
 //
-// and the spectral densities of process noise. Their values form one vector: the parameters, then
-// amplitude, gain, delay and offset of each input, then gain, delay and offset of each output, then
-// the spectral density of each process noise.
+// the spectral densities of process noise and the rates of drifting parameters. Their values form
+// one vector: the parameters, then amplitude, gain, delay and offset of each input, then gain,
+// delay and offset of each output, then the spectral density of each process noise, then the rates.
 
 #include <optional>
 #include <string>
@@ -33,7 +33,8 @@ class SettableQuantities {
     kOutputGain,
     kOutputDelay,
     kOutputOffset,
-    kSpectralDensity
+    kSpectralDensity,
+    kDriftRate  // of a drifting parameter
   };
   struct Settable {
     std::string name;
@@ -41,7 +42,10 @@ class SettableQuantities {
     double default_value;  // 0 for an amplitude, until the input has a signal
     bool has_default;
     Kind kind;
-    int column;  // column of the model's parameters, inputs, outputs or states
+    // Column of the model's parameters, inputs, outputs or states; of a rate, that of its state in
+    // the drifting model.
+    int column;
+    double unit_rate = 1;  // of a rate: the one by which the normal score gains 1/√s
 
     bool of_input() const {
       return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
@@ -54,7 +58,8 @@ class SettableQuantities {
   };
 
   explicit SettableQuantities(const ModelDescription& model,
-                              const std::vector<ProcessNoise>& process_noise = {});
+                              const std::vector<ProcessNoise>& process_noise = {},
+                              const std::vector<UncertainParameter>& uncertain = {});
 
   int size() const { return static_cast<int>(all_.size()); }
   const Settable& operator[](int index) const { return all_[static_cast<size_t>(index)]; }
@@ -79,7 +84,7 @@ class SettableQuantities {
   int parameters_;
   int inputs_;
   int outputs_;
-  int states_;
+  int states_;  // of the model, and one for each drifting parameter
 };
 
 }  // namespace polyest::internal

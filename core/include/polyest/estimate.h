@@ -121,6 +121,18 @@ struct ChannelEstimate {
   double noise_white_share = 0;
 };
 
+// A state of the model, or the present value of a parameter that drifts, as the samples up to the
+// last one tell it; in its unit. Only where filters are behind the estimate
+// (LikelihoodForm::kPredictionError).
+struct FilteredQuantity {
+  std::string name;    // of the state or of the parameter
+  std::string unit;    // as ParameterEstimate::unit
+  double mean = 0;     // of its distribution at Estimate::time_s
+  double std_dev = 0;  // of that distribution
+  double lower95 = 0;  // 2.5 % quantile of it
+  double upper95 = 0;  // 97.5 % quantile of it
+};
+
 // The expansion that the estimate was computed on.
 struct ExpansionSummary {
   int order = 0;   // p
@@ -154,10 +166,12 @@ struct Estimate {
   std::vector<TradeOff> trade_offs;           // pairs of which only a combination is known
   ExpansionSummary expansion;                 // what it was computed on
   double disagreement = 0;                    // of windows; 0 if there are too few
-  std::vector<WindowEstimate> windows;        // at most 16, in order; none unless they disagree
-  std::vector<Diagnostic> diagnostics;        // warnings; empty is good
-  double time_s = 0;                          // of the last sample
-  int64_t samples = 0;                        // values used, over all outputs and runs
+  // At time_s: the model's states, then the parameters that drift; empty for output errors.
+  std::vector<FilteredQuantity> filtered;
+  std::vector<WindowEstimate> windows;  // at most 16, in order; none unless they disagree
+  std::vector<Diagnostic> diagnostics;  // warnings; empty is good
+  double time_s = 0;                    // of the last sample
+  int64_t samples = 0;                  // values used, over all outputs and runs
 };
 
 }  // namespace polyest

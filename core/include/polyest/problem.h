@@ -41,8 +41,8 @@ struct MeasuredOutput {
 };
 
 // White noise w of spectral density q that drives a state, dx/dt = f + w: what a model that is not
-// perfect leaves out, disturbing forces above all (on the state that is a velocity). In Itô's terms,
-// dx = f dt + √q dβ: without f, the state would wander by √(q t) in the time t.
+// perfect leaves out, disturbing forces above all (on the state that is a velocity). In Itô's
+// terms, dx = f dt + √q dβ: without f, the state would wander by √(q t) in the time t.
 struct ProcessNoise {
   std::string state;            // one of the model's states; each at most once
   double spectral_density = 0;  // q ≥ 0, in (unit of the state)²/s; 0 if unknown
@@ -78,16 +78,16 @@ struct Problem {
   // Settable quantities tied to others by expressions: {"k2": "k1"}. Expressions may use all
   // settable quantities, other derived ones among them, but not in a circle.
   std::map<std::string, std::string> derived;
-  std::vector<NamedInput> inputs;        // an input not listed is 0
-  std::vector<MeasuredOutput> measured;  // at least one for an estimator; studies may have none
+  std::vector<NamedInput> inputs;           // an input not listed is 0
+  std::vector<MeasuredOutput> measured;     // at least one for an estimator; studies may have none
   std::vector<ProcessNoise> process_noise;  // what drives the states beside the inputs
-  // Default: kPredictionError if there is process noise, else kOutputError. With kPredictionError
-  // the model must have from 1 to 32 states, must be a StateSpaceModel whose equations do not
-  // switch, and outputs have no delays; noise of the samples is known, white and not relative;
-  // uncertain parameters are shared by all runs; regularization_mode is kFixed.
+  // Default: kPredictionError if there is process noise or a parameter drifts, else kOutputError.
+  // With kPredictionError the model must have from 1 to 32 states, must be a StateSpaceModel whose
+  // equations do not switch, and outputs have no delays; noise of the samples is known, white and
+  // not relative; uncertain parameters are shared by all runs; regularization_mode is kFixed.
   std::optional<LikelihoodForm> likelihood;
-  ExpansionOptions expansion;            // how the outputs are expanded
-  double regularization = 1;             // α² ≥ 0 of the cost J_mismatch + α² J_prior
+  ExpansionOptions expansion;  // how the outputs are expanded
+  double regularization = 1;   // α² ≥ 0 of the cost J_mismatch + α² J_prior
   RegularizationMode regularization_mode = RegularizationMode::kFixed;  // how α² is chosen
   IntegrationOptions integration;  // how trajectories are integrated
   // Whether integration.relative_tolerance is tightened, down to 1e-12, where the noise of the

@@ -15,6 +15,7 @@
 #include <absl/status/statusor.h>
 
 #include <limits>
+#include <optional>
 #include <string>
 
 namespace polyest {
@@ -41,6 +42,20 @@ enum class ParameterMap {
   kExponential,  // θ = exp(location + scale ξ)
 };
 
+// A random walk of a parameter in time. In a time Δt its normal score gains a normal step of the
+// standard deviation `std_dev_per_sqrt_s` √Δt ÷ the prior's standard deviation, so that it keeps
+// within its prior's bounds; for a normal prior, `std_dev_per_sqrt_s` √Δt is that of the step of
+// the parameter itself.
+struct RandomWalk {
+  double std_dev_per_sqrt_s = 0;  // in the parameter's unit/√s, > 0; 0 if unknown
+  // Whether it is estimated, as the uncertain parameter "<name>.drift" with a constant prior
+  // density of its logarithm between the bounds.
+  bool unknown = false;
+  double lower = 0, upper = 0;  // bounds of an unknown one, 0 < lower < upper; else 0
+
+  friend bool operator==(const RandomWalk&, const RandomWalk&) = default;
+};
+
 // An uncertain parameter: its name and its prior. Make one with the functions below, which check
 // their arguments: INVALID_ARGUMENT names the argument, its value and the rule.
 struct UncertainParameter {
@@ -53,6 +68,10 @@ struct UncertainParameter {
   // ended are integrated out of the posterior once all would be more parameters than an expansion
   // bears.
   bool per_run = false;
+  // How the parameter changes with time, if it does: each run begins at its value θ, and the
+  // likelihood is then that of prediction errors (Problem::likelihood). Only parameters of the
+  // model can drift, and not initial states nor what others are derived from.
+  std::optional<RandomWalk> drift = std::nullopt;
 
   // Makes a normal prior. `std_dev` > 0, both in the parameter's unit.
   static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);

@@ -157,6 +157,13 @@ std::string DescribeSignal(const v1::Input& input, const std::string& unit) {
   return "no signal";
 }
 
+// Describes the size of process noise or of a drift.
+template <class Noise>
+std::string DescribeSize(double value, const Noise& noise) {
+  if (!noise.unknown()) return Number(value);
+  return absl::StrCat("unknown, from ", Number(noise.lower()), " to ", Number(noise.upper()));
+}
+
 absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
                                          const ResolvedProblem& resolved) {
   POLYEST_ASSIGN_OR_RETURN(const ExpansionDesign design, DesignForPrior(resolved));
@@ -170,12 +177,13 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
                      parameter.per_run() ? ", each run its own" : ""),
         remarks);
   }
+  for (const v1::UncertainParameter& parameter : problem.uncertain()) {
+    if (!parameter.has_drift()) continue;
+    const auto& walk = parameter.drift().random_walk();
+    Add("drift", parameter.name(), DescribeSize(walk.std_dev_per_sqrt_s(), walk), remarks);
+  }
   for (const v1::ProcessNoise& noise : problem.process_noise()) {
-    Add("process noise", noise.state(),
-        noise.unknown()
-            ? absl::StrCat("unknown, from ", Number(noise.lower()), " to ", Number(noise.upper()))
-            : Number(noise.spectral_density()),
-        remarks);
+    Add("process noise", noise.state(), DescribeSize(noise.spectral_density(), noise), remarks);
   }
   for (const v1::Correlation& pair : problem.correlations()) {
     Add("correlations", absl::StrCat(pair.first(), ", ", pair.second()), Number(pair.coefficient()),

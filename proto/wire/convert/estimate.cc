@@ -116,6 +116,18 @@ void AddWindows(const Estimate& estimate, v1::Estimate& proto) {
   }
 }
 
+void AddFiltered(const Estimate& estimate, v1::Estimate& proto) {
+  for (const FilteredQuantity& quantity : estimate.filtered) {
+    v1::FilteredQuantity& added = *proto.add_filtered();
+    added.set_name(quantity.name);
+    added.set_unit(quantity.unit);
+    added.set_mean(quantity.mean);
+    added.set_std_dev(quantity.std_dev);
+    added.set_lower95(quantity.lower95);
+    added.set_upper95(quantity.upper95);
+  }
+}
+
 void AddTradeOffs(const Estimate& estimate, v1::Estimate& proto) {
   for (const TradeOff& trade_off : estimate.trade_offs) {
     v1::TradeOff& added = *proto.add_trade_offs();
@@ -185,6 +197,7 @@ v1::Estimate ToProto(const Estimate& estimate) {
   AddComponents(estimate, proto);
   proto.set_disagreement(estimate.disagreement);
   AddWindows(estimate, proto);
+  AddFiltered(estimate, proto);
   ToProto(estimate.expansion, *proto.mutable_expansion());
   for (const auto& diagnostic : estimate.diagnostics) {
     *proto.add_diagnostics() = ToProto(diagnostic);

@@ -128,6 +128,21 @@ absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& paramet
       name.empty() ? "the parameter" : name));
 }
 
+std::optional<RandomWalk> ToDrift(const v1::UncertainParameter& parameter, const FieldPath& field,
+                                  Refusals& refusals) {
+  if (!parameter.has_drift()) return std::nullopt;
+  if (!parameter.drift().has_random_walk()) {
+    refusals.push_back(
+        InvalidField(field, "needs a kind: {\"randomWalk\": {\"stdDevPerSqrtS\": 0.1}}"));
+    return std::nullopt;
+  }
+  const auto& walk = parameter.drift().random_walk();
+  return RandomWalk{.std_dev_per_sqrt_s = walk.std_dev_per_sqrt_s(),
+                    .unknown = walk.unknown(),
+                    .lower = walk.lower(),
+                    .upper = walk.upper()};
+}
+
 std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals& refusals) {
   std::vector<UncertainParameter> uncertain;
   for (int i = 0; i < problem.uncertain_size(); ++i) {
@@ -136,6 +151,7 @@ std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals
     uncertain.push_back(ValueOr(Within({"uncertain", i}, ToPrior(problem.uncertain(i))),
                                 {name, Germ::Gamma(1)}, refusals));
     uncertain.back().per_run = problem.uncertain(i).per_run();
+    uncertain.back().drift = ToDrift(problem.uncertain(i), {"uncertain", i, "drift"}, refusals);
   }
   return uncertain;
 }

@@ -88,6 +88,25 @@ INSTANTIATE_TEST_SUITE_P(
             {{"m", 42.5}, {"k1", 11300}, {"s", 1.17}, {"y.delay", 0.0073}, {"force.offset", 21}}}),
     [](const auto& record) { return std::string(record.param.name); });
 
+// The damper's coefficient falls to 0.8 + 0.4 e⁻³ N s/m.
+TEST_F(ExamplesTest, FollowsADamperThatWarmsUp) {
+  const Finished run =
+      Run({"estimate", Example("warming.json"), Example("warming.csv"), "--format", "json"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  ASSERT_EQ(estimate.parameters_size(), 3);
+  EXPECT_NEAR(estimate.parameters(0).map(), 41.3, 4 * estimate.parameters(0).std_dev());
+  EXPECT_NEAR(estimate.parameters(1).map(), 1.2, 4 * estimate.parameters(1).std_dev());
+  EXPECT_EQ(estimate.parameters(2).name(), "c.drift");
+  ASSERT_EQ(estimate.filtered_size(), 3);
+  const v1::FilteredQuantity& now = estimate.filtered(2);
+  EXPECT_EQ(now.name(), "c");
+  EXPECT_EQ(now.unit(), "N s/m");
+  EXPECT_NEAR(now.mean(), 0.8 + 0.4 * std::exp(-3), 4 * now.std_dev());
+  EXPECT_LT(now.std_dev(), 0.02);
+  EXPECT_EQ(estimate.diagnostics_size(), 0);
+}
+
 // Compares a model as text with the built-in one. The integrator takes the same steps, so that only
 // rounding differs.
 TEST_F(ExamplesTest, EstimatesTheSameFromAModelAsText) {

@@ -44,6 +44,7 @@ from polyest.estimate_parts import (
     Diagnostic,
     Direction,
     ExpansionSummary,
+    FilteredQuantity,
     MixtureComponent,
     Parameter,
     TradeOff,
@@ -62,7 +63,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Aborted", "AlreadyExists", "Beta", "Cancelled", "ChannelEstimate", "Check", "Chirp", "Client",
     "Constant", "Cost", "DaemonStatus", "DataLoss", "DeadlineExceeded", "Diagnostic", "Direction",
-    "Estimate", "ExpansionSummary", "Experiment", "FailedPrecondition", "Finding", "Gamma",
+    "Estimate", "ExpansionSummary", "Experiment", "FailedPrecondition", "FilteredQuantity", "Finding", "Gamma",
     "HalfSineBump", "InternalError", "InvalidInput", "LocalClient", "Lognormal",
     "MixtureComponent", "Model", "Noise", "Normal", "NotFound", "Parameter", "PermissionDenied",
     "PolyestError", "Problem", "Quantity", "Remark", "ResourceExhausted", "Samples", "Session",

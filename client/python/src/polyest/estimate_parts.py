@@ -207,3 +207,27 @@ class WindowEstimate:
         """Returns a window as the daemon has sent it."""
         return cls(message.first_run, message.last_run, message.start_time_s, message.end_time_s,
                    {one.parameter: (one.value, one.std_dev) for one in message.values})
+
+
+@dataclass(frozen=True)
+class FilteredQuantity:
+    """A state of the model or the present value of a parameter that drifts."""
+
+    #: The name of the state or parameter.
+    name: str
+    #: Its unit; "1" for a pure number.
+    unit: str
+    #: The mean of its distribution, in `unit`.
+    mean: float
+    #: The standard deviation of its distribution, in `unit`.
+    std_dev: float
+    #: The 2.5 % quantile of its distribution, in `unit`.
+    lower95: float
+    #: The 97.5 % quantile of its distribution, in `unit`.
+    upper95: float
+
+    @classmethod
+    def of_message(cls, message: estimate_pb2.FilteredQuantity) -> FilteredQuantity:
+        """Returns a quantity as the daemon has sent it."""
+        return cls(message.name, message.unit, message.mean, message.std_dev, message.lower95,
+                   message.upper95)

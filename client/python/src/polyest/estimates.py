@@ -20,6 +20,7 @@ from polyest.estimate_parts import (
     Diagnostic,
     Direction,
     ExpansionSummary,
+    FilteredQuantity,
     MixtureComponent,
     Parameter,
     TradeOff,
@@ -72,6 +73,8 @@ class Estimate:
     disagreement: float
     #: What windows of the record say on their own; empty unless they disagree.
     windows: list[WindowEstimate]
+    #: With process noise or drift: the states and the parameters that drift, at `time`.
+    filtered: list[FilteredQuantity]
     #: The message of the daemon.
     message: estimate_pb2.Estimate
     _source: Optional[Studies] = None
@@ -234,4 +237,5 @@ def of_message(message: estimate_pb2.Estimate, source: Optional[Studies] = None)
                     for one in message.components],
         disagreement=message.disagreement,
         windows=[WindowEstimate.of_message(one) for one in message.windows],
+        filtered=[FilteredQuantity.of_message(one) for one in message.filtered],
         message=message, _source=source)

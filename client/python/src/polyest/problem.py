@@ -80,12 +80,37 @@ class Problem:
         self._document.setdefault("fixed", {}).update({**(values or {}), **named})
         return self
 
-    def uncertain(self, name: str, prior: Prior, *, per_run: bool = False) -> Problem:
-        """Makes a quantity uncertain; with `per_run` each run of the record has its own value."""
+    def uncertain(self, name: str, prior: Prior, *, per_run: bool = False,
+                  drift: Union[float, tuple[float, float], None] = None) -> Problem:
+        """Makes a quantity uncertain; with `per_run` each run of the record has its own value.
+
+        `drift` makes it a random walk: its rate in the quantity's unit/√s, or the bounds of an
+        unknown rate, which is then estimated, too.
+        """
         entry: dict[str, Any] = {"name": name, **prior.as_json()}
         if per_run:
             entry["perRun"] = True
+        if isinstance(drift, tuple):
+            entry["drift"] = {"randomWalk": {"unknown": True, "lower": drift[0],
+                                             "upper": drift[1]}}
+        elif drift is not None:
+            entry["drift"] = {"randomWalk": {"stdDevPerSqrtS": drift}}
         self._document.setdefault("uncertain", []).append(entry)
+        return self
+
+    def process_noise(self, state: str,
+                      spectral_density: Union[float, tuple[float, float]]) -> Problem:
+        """Drives a state of the model with white noise: what a model that is not perfect leaves out.
+
+        Its spectral density is in (unit of the state)²/s; the bounds of an unknown one make it
+        another uncertain parameter.
+        """
+        entry: dict[str, Any] = {"state": state}
+        if isinstance(spectral_density, tuple):
+            entry.update(unknown=True, lower=spectral_density[0], upper=spectral_density[1])
+        else:
+            entry["spectralDensity"] = spectral_density
+        self._document.setdefault("processNoise", []).append(entry)
         return self
 
     def correlate(self, first: str, second: str, coefficient: float) -> Problem:

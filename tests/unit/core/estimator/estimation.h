@@ -89,6 +89,9 @@ inline std::vector<double> NumbersOf(const Estimate& estimate) {
     all.push_back(d.information);
     all.insert(all.end(), d.coefficients.begin(), d.coefficients.end());
   }
+  for (const FilteredQuantity& one : estimate.filtered) {
+    all.insert(all.end(), {one.mean, one.std_dev, one.lower95, one.upper95});
+  }
   const ExpansionSummary& e = estimate.expansion;
   all.insert(all.end(), {static_cast<double>(e.order), static_cast<double>(e.terms),
                          static_cast<double>(e.points), e.residual_to_noise,

@@ -103,6 +103,20 @@ TEST(CheckProblem, TellsOfProcessNoise) {
   EXPECT_THAT(said, HasSubstr("0.01\nunknown, from 0.001 to 1"));
 }
 
+TEST(CheckProblem, TellsOfDrift) {
+  v1::CheckProblemRequest request;
+  *request.mutable_problem() = SmallProblem();
+  auto& walk = *request.mutable_problem()->mutable_uncertain(0)->mutable_drift();
+  walk.mutable_random_walk()->set_std_dev_per_sqrt_s(0.25);
+  const v1::CheckProblemResponse response = CheckProblem(request);
+  ASSERT_TRUE(response.errors().empty()) << response.errors(0).description();
+  std::string said;
+  for (const auto& remark : response.summary()) {
+    said += remark.topic() + ' ' + remark.description() + '\n';
+  }
+  EXPECT_THAT(said, HasSubstr("drift 0.25\n"));
+}
+
 TEST(CheckProblem, TellsOfRowsLeftOutAndOfInputsWithoutSamples) {
   v1::CheckProblemRequest request;
   *request.mutable_problem() = SmallProblem();

@@ -312,6 +312,29 @@ TEST(ToProblem, TakesProcessNoise) {
               StartsWith("likelihood: OUTPUT_ERROR takes the model for perfect"));
 }
 
+TEST(ToProblem, TakesDrift) {
+  v1::Problem given = SmallProblem();
+  const std::string name = given.uncertain(0).name();
+  auto& walk = *given.mutable_uncertain(0)->mutable_drift()->mutable_random_walk();
+  walk.set_std_dev_per_sqrt_s(0.2);
+  const auto resolved = ToProblem(given);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_TRUE(resolved->uses_filters());
+  EXPECT_EQ(resolved->problem().uncertain[0].drift, RandomWalk{.std_dev_per_sqrt_s = 0.2});
+  walk.set_std_dev_per_sqrt_s(0);
+  walk.set_unknown(true);
+  walk.set_lower(0.1);
+  walk.set_upper(1);
+  EXPECT_EQ(ToProblem(given)->prior().Names().back(), name + ".drift");
+  walk.set_upper(0.1);
+  EXPECT_EQ(ToProblem(given).status().message(),
+            "uncertain[0].drift.randomWalk.lower: 0.1 must be above 0 and below upper 0.1, which "
+            "must be finite");
+  given.mutable_uncertain(0)->mutable_drift()->Clear();
+  EXPECT_THAT(std::string(ToProblem(given).status().message()),
+              StartsWith("uncertain[0].drift: needs a kind"));
+}
+
 TEST(ToProblem, KnowsEveryRuleOfRegularization) {
   for (const auto& [given, expected] :
        {std::pair{v1::Problem::REGULARIZATION_MODE_UNSPECIFIED, RegularizationMode::kFixed},
