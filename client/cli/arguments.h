@@ -155,6 +155,7 @@ struct FitArguments {
   std::vector<double> probabilities;  // of the quantiles; empty: the default
   int draws = 0;                      // 0: the default
   int64_t rows = 0;                   // 0: the default
+  double horizon_s = 0;               // of forecasts by filters
   std::string plot_file;              // empty: none
   Format format = Format::kTable;
 };

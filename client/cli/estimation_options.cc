@@ -87,6 +87,13 @@ void AddFit(CommandRegistry& registry) {
       ->check(CLI::Range(2, 10'000));
   command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
       ->check(CLI::Range(1, 1'000'000));
+  command
+      .add_option(
+          "--horizon", arguments->horizon_s,
+          "With process noise or drift: use no sample of the last S seconds, in windows of\n"
+          "that length (default 0: predict each row from all rows before it)")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
   AddPlot(command, arguments->plot_file, "the fit");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }

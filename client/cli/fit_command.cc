@@ -38,6 +38,7 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
                                        arguments.probabilities.end());
   request.set_draw_count(arguments.draws);
   request.set_max_row_count(arguments.rows);
+  request.set_horizon_s(arguments.horizon_s);
   auto response = MakeBackend(arguments.place)->Predict(request);
   if (!response.ok()) return InInput(response.status(), arguments);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);

@@ -69,6 +69,26 @@ absl::Status FilterBank::AdvanceBlocks(const FilterSamples& samples, MatrixRef i
   return absl::OkStatus();
 }
 
+absl::Status FilterBank::Predict(double time_s, MatrixRef means, MatrixRef deviations,
+                                 const Stop& stop) {
+  ParallelFor(static_cast<int>(blocks_.size()), specification_.threads, [&](int block) {
+    const auto index = static_cast<size_t>(block);
+    statuses_[index] = blocks_[index]->PredictOutputs(time_s, means, deviations, stop);
+  });
+  CollectFailures();
+  time_s_ = time_s;
+  for (const absl::Status& status : statuses_) {
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+void FilterBank::TakeStatesOf(const FilterBank& other) {
+  POLYEST_CHECK(other.blocks_.size() == blocks_.size());
+  for (size_t i = 0; i < blocks_.size(); ++i) blocks_[i]->TakeStatesOf(*other.blocks_[i]);
+  CollectFailures();
+}
+
 void FilterBank::ReadStates(Matrix& means, Matrix& deviations) const {
   means.resize(members(), specification_.process_noise.cols());
   deviations.resizeLike(means);

@@ -35,6 +35,10 @@ class FilterBank {
   absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
                        const Stop& stop);
 
+  // As FilterBlock::PredictOutputs and TakeStatesOf, for all members.
+  absl::Status Predict(double time_s, MatrixRef means, MatrixRef deviations, const Stop& stop);
+  void TakeStatesOf(const FilterBank& other);
+
   // Writes the means and the standard deviations of the states at the time reached, as the samples
   // up to there tell them (members × states each).
   void ReadStates(Matrix& means, Matrix& deviations) const;

@@ -174,6 +174,58 @@ double FilterBlock::FastestRate(double interval_s) {
   return norm > 0 ? std::exp(log_rate + weight * std::log(norm)) : 0;
 }
 
+// Reads the outputs at the points of the present states.
+void FilterBlock::ReadOutputs() {
+  gaussians_.Draw(points_);
+  block_.SetStates(points_);
+  all_outputs_ = &block_.OutputsOfStates();
+  NoteFailures();
+}
+
+// Sets outputs_ to y = gain · h + offset of one channel.
+void FilterBlock::SelectOutput(int channel) {
+  outputs_ = all_outputs_->col(channel).head(outputs_.size());
+  if (specification_.output_gains.size() > 0) {
+    outputs_ *= specification_.output_gains.col(channel).array();
+  }
+  if (specification_.output_offsets.size() > 0) {
+    outputs_ += specification_.output_offsets.col(channel).array();
+  }
+}
+
+absl::Status FilterBlock::PredictOutputs(double time_s, MatrixRef means, MatrixRef deviations,
+                                         const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(Predict(time_s, stop));
+  ReadOutputs();
+  const int members = member_count();
+  const auto points = outputs_.size() / members;
+  for (int c = 0; c < static_cast<int>(means.cols()); ++c) {
+    SelectOutput(c);
+    const auto at_points = outputs_.reshaped(members, points);
+    const Eigen::ArrayXd mean = at_points.rowwise().mean();
+    means.col(c).segment(first_member_, members) = mean;
+    deviations.col(c).segment(first_member_, members) =
+        (at_points.colwise() - mean).square().rowwise().mean().sqrt();
+  }
+  for (int i = 0; i < members; ++i) {
+    if (alive_[static_cast<size_t>(i)]) continue;
+    means.row(first_member_ + i).setConstant(std::numeric_limits<double>::quiet_NaN());
+    deviations.row(first_member_ + i).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return absl::OkStatus();
+}
+
+void FilterBlock::TakeStatesOf(const FilterBlock& other) {
+  POLYEST_CHECK(other.time_s_ == time_s_ && other.first_member_ == first_member_ &&
+                other.member_count() == member_count());
+  gaussians_ = other.gaussians_;
+  for (int i = 0; i < member_count(); ++i) {
+    if (other.alive_[static_cast<size_t>(i)]) continue;
+    block_.LeaveOut(PointsOf(i), "it failed while it took samples");
+  }
+  NoteFailures();
+}
+
 void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int channel,
                          MatrixRef innovations, MatrixRef log_variances) {
   const int members = member_count();
@@ -183,17 +235,8 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
   innovation.segment(first_member_, members).setZero();
   log_variance.segment(first_member_, members).setZero();
   if (sigma > 0) {
-    gaussians_.Draw(points_);
-    block_.SetStates(points_);
-    outputs_ = block_.OutputsOfStates().col(channel).head(outputs_.size());
-    NoteFailures();
-    // y = gain · h + offset
-    if (specification_.output_gains.size() > 0) {
-      outputs_ *= specification_.output_gains.col(channel).array();
-    }
-    if (specification_.output_offsets.size() > 0) {
-      outputs_ += specification_.output_offsets.col(channel).array();
-    }
+    ReadOutputs();
+    SelectOutput(channel);
     gaussians_.Update(outputs_, samples.values(channel, sample), sigma * sigma, innovation_,
                       variance_);
     // Roots and logarithms of a vector may differ in the last bit from those of a number, so they

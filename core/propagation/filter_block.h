@@ -63,6 +63,14 @@ class FilterBlock {
   absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
                        const Stop& stop);
 
+  // Predicts the outputs at `time_s` ≥ the time reached without a sample: writes for this block's
+  // members their means and standard deviations (all members × outputs); NaN from a member's
+  // failure on. Fails on a stop request only.
+  absl::Status PredictOutputs(double time_s, MatrixRef means, MatrixRef deviations,
+                              const Stop& stop);
+  // Takes the states of a block of the same members, model and inputs at the same time.
+  void TakeStatesOf(const FilterBlock& other);
+
   // Returns the members' failures, in the order in which they failed; points are numbers of
   // members.
   const std::vector<PointFailure>& failures() const { return failures_; }
@@ -84,6 +92,8 @@ class FilterBlock {
   double FastestRate(double interval_s);
   void Differentiate(double interval_s);
   std::vector<int> PointsOf(int member) const;
+  void ReadOutputs();
+  void SelectOutput(int channel);
   void Update(const FilterSamples& samples, Eigen::Index sample, int channel, MatrixRef innovations,
               MatrixRef log_variances);
   void NoteFailures();
@@ -96,9 +106,10 @@ class FilterBlock {
   TrajectoryBlock block_;
   GaussianStates gaussians_;
   double time_s_ = 0;
-  Eigen::ArrayXXd points_;               // rows of the block × n
-  Eigen::ArrayXXd rates_, moved_rates_;  // rows of the block × n
-  Matrix jacobian_, square_;             // n × n
+  Eigen::ArrayXXd points_;                        // rows of the block × n
+  Eigen::ArrayXXd rates_, moved_rates_;           // rows of the block × n
+  Matrix jacobian_, square_;                      // n × n
+  const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
   Eigen::ArrayXd outputs_, innovation_, variance_;
   std::vector<bool> alive_;  // by member
   size_t failures_seen_ = 0;

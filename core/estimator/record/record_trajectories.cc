@@ -17,11 +17,13 @@ constexpr int64_t kRowsAtOnce = 64;
 }  // namespace
 
 RecordTrajectories::RecordTrajectories(const ResolvedProblem& problem, const SampleStore& store,
-                                       Matrix thetas, std::vector<int> outputs, int threads)
+                                       Matrix thetas, std::vector<int> outputs, double horizon_s,
+                                       int threads)
     : problem_(problem),
       store_(store),
       thetas_(std::move(thetas)),
       outputs_(std::move(outputs)),
+      horizon_s_(horizon_s),
       threads_(threads),
       failed_(static_cast<size_t>(thetas_.rows()), false) {}
 
@@ -74,7 +76,13 @@ absl::Status RecordTrajectories::Run(int64_t rows, std::span<const SampleRow> ti
 void RecordTrajectories::StartRun(int run, int64_t first_row) {
   run_ = run;
   propagator_.reset();
+  filters_.reset();
   inputs_ = std::make_unique<RunInputs>(problem_, &store_, run, first_row);
+  if (problem_.uses_filters()) {
+    filters_ = std::make_unique<RunFilters>(problem_, thetas_, outputs_, &inputs_->signals(),
+                                            horizon_s_, threads_);
+    return;
+  }
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, outputs_, threads_, run), &inputs_->signals());
 }
@@ -92,13 +100,12 @@ absl::Status RecordTrajectories::FinishRun(Visit visit, const Stop& stop) {
                           "known there",
                           time.time_s, run_));
     }
-    instants.push_back({time, -1, {}});
+    instants.push_back({time, -1, {}, {}});
   }
   POLYEST_RETURN_IF_ERROR(VisitAll(instants, visit, stop));
-  if (propagator_) {
-    for (const PointFailure& failure : propagator_->failures()) {
-      failed_[static_cast<size_t>(failure.point)] = true;
-    }
+  if (run_ < 0) return absl::OkStatus();
+  for (const PointFailure& failure : filters_ ? filters_->failures() : propagator_->failures()) {
+    failed_[static_cast<size_t>(failure.point)] = true;
   }
   return absl::OkStatus();
 }
@@ -115,13 +122,14 @@ absl::Status RecordTrajectories::Advance(const RowBlock& block, int first, int c
     for (; next_time_ < times_.size() && times_[next_time_].run == run_ &&
            times_[next_time_].time_s < place.time_s;
          ++next_time_) {
-      instants.push_back({times_[next_time_], -1, {}});
+      instants.push_back({times_[next_time_], -1, {}, {}});
     }
     const double* samples = block.values.data() + static_cast<size_t>(k) * width;
-    instants.push_back({place, row, {samples, channels}});
+    const double* noise = block.noise.data() + static_cast<size_t>(k) * channels;
+    instants.push_back({place, row, {samples, channels}, {noise, channels}});
     if (next_time_ < times_.size() && times_[next_time_].run == run_ &&
         times_[next_time_].time_s == place.time_s) {
-      instants.push_back({times_[next_time_++], -1, {}});
+      instants.push_back({times_[next_time_++], -1, {}, {}});
     }
   }
   return VisitAll(instants, visit, stop);
@@ -129,6 +137,7 @@ absl::Status RecordTrajectories::Advance(const RowBlock& block, int first, int c
 
 absl::Status RecordTrajectories::VisitAll(std::span<const TrajectoryInstant> instants, Visit visit,
                                           const Stop& stop) {
+  if (filters_) return FilterAll(instants, visit, stop);
   const auto width = std::ssize(outputs_);
   for (size_t begin = 0; begin < instants.size(); begin += kRowsAtOnce) {
     const auto part =
@@ -139,8 +148,19 @@ absl::Status RecordTrajectories::VisitAll(std::span<const TrajectoryInstant> ins
     POLYEST_RETURN_IF_ERROR(propagator_->Advance(times, outputs, stop));
     for (size_t i = 0; i < part.size(); ++i) {
       const auto column = static_cast<Eigen::Index>(i) * width;
-      POLYEST_RETURN_IF_ERROR(visit(part[i], outputs.middleCols(column, width)));
+      POLYEST_RETURN_IF_ERROR(visit(part[i], outputs.middleCols(column, width), Matrix()));
     }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RecordTrajectories::FilterAll(std::span<const TrajectoryInstant> instants, Visit visit,
+                                           const Stop& stop) {
+  Matrix means(thetas_.rows(), std::ssize(outputs_)), deviations = means;
+  for (const TrajectoryInstant& instant : instants) {
+    POLYEST_RETURN_IF_ERROR(filters_->Predict(instant.place.time_s, means, deviations, stop));
+    POLYEST_RETURN_IF_ERROR(visit(instant, means, deviations));
+    filters_->Take(instant.place.time_s, instant.samples, instant.noise);
   }
   return absl::OkStatus();
 }

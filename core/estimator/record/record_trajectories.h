@@ -1,7 +1,7 @@
 #pragma once
 
-// Trajectories of the model over a record, for given values of the uncertain parameters. Beside the
-// record's rows, outputs may be asked for at other times.
+// Trajectories of the model over a record, for given values of the uncertain parameters, or what
+// filters predict along it. Beside the record's rows, outputs may be asked for at other times.
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/status.h>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/run_filters.h"
 #include "core/estimator/record/run_inputs.h"
 #include "core/propagation/ensemble_propagator.h"
 #include "polyest/samples.h"
@@ -24,18 +25,22 @@ struct TrajectoryInstant {
   int64_t row = -1;  // of the record; −1 for a time asked for
   // The row's samples, one for each measured output, NaN where missing; empty for a time asked for.
   std::span<const double> samples;
+  std::span<const double> noise;  // standard deviations of their noise
 };
 
 class RecordTrajectories {
  public:
   // Receives the outputs at an instant, trajectories × outputs; NaN from a trajectory's failure on.
-  using Visit =
-      absl::FunctionRef<absl::Status(const TrajectoryInstant&, const ConstMatrixRef& outputs)>;
+  // With filters they are the means of normal distributions with these standard deviations, which
+  // are empty without.
+  using Visit = absl::FunctionRef<absl::Status(
+      const TrajectoryInstant&, const ConstMatrixRef& outputs, const ConstMatrixRef& deviations)>;
 
   // `thetas`: one trajectory for each row, trajectories × n. `outputs`: columns of the model's
-  // outputs. `problem` and `store` must outlive the trajectories.
+  // outputs. `horizon_s`: of filters (run_filters.h). `problem` and `store` must outlive the
+  // trajectories.
   RecordTrajectories(const ResolvedProblem& problem, const SampleStore& store, Matrix thetas,
-                     std::vector<int> outputs, int threads);
+                     std::vector<int> outputs, double horizon_s, int threads);
 
   // Integrates over the first `rows` ≥ 1 rows, and visits every row and every time of `times`, in
   // time order. Returns InvalidArgument that names the element if `times` is not in time order,
@@ -53,16 +58,20 @@ class RecordTrajectories {
   absl::Status Advance(const RowBlock& block, int first, int count, int64_t row, Visit visit,
                        const Stop& stop);
   absl::Status VisitAll(std::span<const TrajectoryInstant> instants, Visit visit, const Stop& stop);
+  absl::Status FilterAll(std::span<const TrajectoryInstant> instants, Visit visit,
+                         const Stop& stop);
 
   const ResolvedProblem& problem_;
   const SampleStore& store_;
   Matrix thetas_;
   std::vector<int> outputs_;
+  double horizon_s_;
   int threads_;
 
   int run_ = -1;
-  std::unique_ptr<RunInputs> inputs_;  // of the present run
-  std::unique_ptr<EnsemblePropagator> propagator_;
+  std::unique_ptr<RunInputs> inputs_;               // of the present run
+  std::unique_ptr<EnsemblePropagator> propagator_;  // one of these two
+  std::unique_ptr<RunFilters> filters_;
   std::vector<bool> failed_;  // by trajectory
   std::span<const SampleRow> times_;
   size_t next_time_ = 0;  // the first of `times_` not visited yet

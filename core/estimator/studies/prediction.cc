@@ -60,16 +60,17 @@ class OutputPrediction {
     result_.standardized_residual.setConstant(times, kNone);
   }
 
-  // `values`: of all draws that can be integrated to here, `alive` their indices. `place`: in the
-  // answer; −1 if the time is not returned.
+  // `values`: of all draws that can be integrated to here, `alive` their indices, with the standard
+  // deviations of filters (0 without). `place`: in the answer; −1 if the time is not returned.
   void Add(const TrajectoryInstant& instant, const ConstVectorRef& values,
-           const std::vector<Eigen::Index>& alive, Eigen::Index place) {
+           const ConstVectorRef& deviations, const std::vector<Eigen::Index>& alive,
+           Eigen::Index place) {
     if (instant.row >= 0 && instant.place.run != run_) {
       run_ = instant.place.run;
       if (sums_) sums_->EndRun();
     }
     const double mean = values.mean();
-    if (place >= 0) Describe(values, mean, place);
+    if (place >= 0) Describe(values, deviations, mean, place);
     if (channel_ < 0) return;
     const double z = instant.row >= 0 ? instant.samples[static_cast<size_t>(channel_)] : kNone;
     if (!std::isnan(z)) noise_.largest = std::max(noise_.largest, std::abs(z));
@@ -83,7 +84,8 @@ class OutputPrediction {
       if (place >= 0) DescribeExactSample(place);
       return;
     }
-    const Vector scales = sigma * factors_(alive);
+    const Vector scales =
+        (deviations.cwiseAbs2() + (sigma * factors_(alive)).cwiseAbs2()).cwiseSqrt();
     AddSample(PredictiveDensity(kernel_, values, scales), z, z - mean, place);
   }
 
@@ -93,8 +95,12 @@ class OutputPrediction {
   }
 
  private:
-  void Describe(const ConstVectorRef& values, double mean, Eigen::Index place) {
+  void Describe(const ConstVectorRef& values, const ConstVectorRef& deviations, double mean,
+                Eigen::Index place) {
     result_.mean[place] = mean;
+    if (deviations.minCoeff() > 0) {
+      return DescribeMixture(PredictiveDensity(NoiseKernel::kNormal, values, deviations), place);
+    }
     result_.std_dev[place] =
         std::sqrt((values.array() - mean).square().sum() / static_cast<double>(values.size() - 1));
     Vector sorted = values;
@@ -102,6 +108,14 @@ class OutputPrediction {
     for (size_t i = 0; i < options_.probabilities.size(); ++i) {
       result_.quantiles(place, static_cast<Eigen::Index>(i)) =
           QuantileOfSamples(sorted, options_.probabilities[i]);
+    }
+  }
+
+  void DescribeMixture(const PredictiveDensity& density, Eigen::Index place) {
+    result_.std_dev[place] = density.StandardDeviation();
+    for (size_t i = 0; i < options_.probabilities.size(); ++i) {
+      result_.quantiles(place, static_cast<Eigen::Index>(i)) =
+          density.Quantile(options_.probabilities[i]);
     }
   }
 
@@ -178,7 +192,6 @@ int64_t NumbersPerTime(const PredictionOptions& options) {
 
 absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& problem,
                       int64_t rows) {
-  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a prediction"));
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
   for (size_t i = 0; i < options.probabilities.size(); ++i) {
     if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;
@@ -187,6 +200,16 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
   }
   POLYEST_RETURN_IF_ERROR(CheckRange("draws", options.draws, kLeastDraws, kMaxPredictionDraws));
   POLYEST_RETURN_IF_ERROR(CheckRange("max_rows", options.max_rows, 1, kMaxPredictionRows));
+  if (!std::isfinite(options.horizon_s) || options.horizon_s < 0) {
+    return InvalidField("horizon_s",
+                        absl::StrFormat("%g must be a finite time ≥ 0", options.horizon_s));
+  }
+  if (options.horizon_s > 0 && !problem.uses_filters()) {
+    return InvalidField("horizon_s",
+                        absl::StrFormat("%g needs likelihood PREDICTION_ERROR; a perfect model is "
+                                        "predicted from its parameters alone, at any time",
+                                        options.horizon_s));
+  }
   POLYEST_RETURN_IF_ERROR(CheckRange("lags", options.lags, 0, kMaxPredictionLags));
   POLYEST_RETURN_IF_ERROR(CheckRange("times", std::ssize(options.times), 0, kMaxPredictionRows));
   const int64_t times =
@@ -271,9 +294,9 @@ absl::StatusOr<Prediction> Predict(const PredictionSubject& subject,
   prediction.draws = static_cast<int>(subject.thetas.rows());
   prediction.record_rows = subject.rows;
   RecordTrajectories trajectories(*subject.problem, *subject.store, subject.thetas, columns,
-                                  threads);
-  const auto visit = [&](const TrajectoryInstant& instant,
-                         const ConstMatrixRef& values) -> absl::Status {
+                                  options.horizon_s, threads);
+  const auto visit = [&](const TrajectoryInstant& instant, const ConstMatrixRef& values,
+                         const ConstMatrixRef& deviations) -> absl::Status {
     const std::vector<Eigen::Index> alive = Alive(values);
     if (std::ssize(alive) < std::max(kLeastDraws, values.rows() / 2)) {
       return TooFewTrajectories(instant, alive.size(), values.rows());
@@ -284,8 +307,10 @@ absl::StatusOr<Prediction> Predict(const PredictionSubject& subject,
       place = asked ? std::ssize(prediction.rows) : selection.PlaceOf(instant.row);
     if (place >= 0) prediction.rows.push_back(instant.place);
     for (size_t i = 0; i < outputs.size(); ++i) {
-      const Vector column = values(alive, static_cast<Eigen::Index>(i));
-      outputs[i].Add(instant, column, alive, place);
+      const auto column = static_cast<Eigen::Index>(i);
+      const Vector spread = deviations.size() > 0 ? Vector(deviations(alive, column))
+                                                  : Vector(Vector::Zero(std::ssize(alive)));
+      outputs[i].Add(instant, values(alive, column), spread, alive, place);
     }
     return absl::OkStatus();
   };

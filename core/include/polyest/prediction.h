@@ -10,7 +10,10 @@
 // where k is the standard normal density, or the t density with 4 degrees of freedom for a channel
 // with OutlierHandling::kStudentT, and s_d the noise's standard deviation; where its size was
 // estimated from ν degrees of freedom, s_d² is a draw of its scaled inverse χ² distribution.
-// Estimator::CurrentPrediction computes it.
+//
+// With LikelihoodForm::kPredictionError a filter runs at each θ_d in place of a trajectory. It
+// predicts each row from the samples before it, and y(θ_d) is a normal distribution; times after
+// the last row are forecasts. Estimator::CurrentPrediction computes it.
 
 #include <cstdint>
 #include <optional>
@@ -39,6 +42,11 @@ struct PredictionOptions {
   // Times to predict at instead of the record's rows: in time order, in runs of the record, and
   // with streamed inputs not after the run's last row.
   std::vector<SampleRow> times;
+  // Of filters: the record is divided into windows of this length in s (each to the last row within
+  // it of the row that it begins after), and no sample is used within its own window, so that rows
+  // are forecasts up to this time ahead; ≥ 0, 0 for output errors. 0: each row is predicted from
+  // all rows before it.
+  double horizon_s = 0;
   int lags = 50;  // of the residuals' autocorrelation, ≥ 0
   // Another record of the same problem to predict, whose samples did not enter the estimate. Its
   // runs' own parameters are drawn from the prior.

@@ -59,6 +59,7 @@ absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& 
   for (const v1::RecordTime& time : request.times()) {
     options.times.push_back({time.run(), time.time_s()});
   }
+  options.horizon_s = request.horizon_s();
   if (request.lag_count() != 0) options.lags = request.lag_count();
   if (request.has_record()) {
     absl::StatusOr<Samples> record = ToSamples(request.record(), model);

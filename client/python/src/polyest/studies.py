@@ -61,7 +61,7 @@ class Studies(Subjects):
     def predict(self, outputs: Sequence[str] = (), *, record: Optional[Data] = None,
                 times: Optional[npt.ArrayLike] = None, run: int = 0,
                 probabilities: Sequence[float] = (0.025, 0.5, 0.975), draws: int = 0,
-                max_rows: int = 0, lags: int = 0) -> results.Prediction:
+                max_rows: int = 0, lags: int = 0, horizon_s: float = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores.
 
         outputs: names of outputs; by default the measured ones.
@@ -69,10 +69,14 @@ class Studies(Subjects):
         times: (T,), s, increasing, in run `run`; by default the record's rows, at most `max_rows`
             (2000).
         draws: trajectories of the model, 2 … 10000 (400). lags: of the autocorrelation (50).
+        horizon_s: with process noise or drift, the length of windows within which no sample is
+            used, s; 0: each row is predicted from all rows before it. `times` after the last row
+            are forecasts.
         """
         return self._run(self._predict_call(record, outputs=outputs, times=times, run=run,
                                             probabilities=probabilities, draws=draws,
-                                            max_rows=max_rows, lags=lags))
+                                            max_rows=max_rows, lags=lags,
+                                            horizon_s=horizon_s))
 
     def posterior(self, *, probabilities: Sequence[float] = (), density_bins: int = 0,
                   joints: Sequence[tuple[str, str]] = (), all_joints: bool = False,

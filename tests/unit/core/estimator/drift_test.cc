@@ -67,9 +67,11 @@ struct LocalLevel {
   double log_likelihood = 0;
 };
 
-LocalLevel ExactFilter(const Samples& samples, double rate) {
+// Takes the first `rows` rows.
+LocalLevel ExactFilter(const Samples& samples, double rate, size_t rows) {
   LocalLevel level;
-  for (const double z : samples.columns[0].value) {
+  for (size_t i = 0; i < rows; ++i) {
+    const double z = samples.columns[0].value[i];
     level.variance += rate * rate * kStepS;
     const double S = level.variance + kSigma * kSigma, nu = z - level.mean;
     level.log_likelihood -= 0.5 * (nu * nu / S + std::log(S));
@@ -77,6 +79,10 @@ LocalLevel ExactFilter(const Samples& samples, double rate) {
     level.variance -= level.variance * level.variance / S;
   }
   return level;
+}
+
+LocalLevel ExactFilter(const Samples& samples, double rate) {
+  return ExactFilter(samples, rate, samples.rows());
 }
 
 // The exact level is a normal distribution, and a normal prior's level is linear in the germ, so
@@ -145,6 +151,73 @@ TEST(Drift, IntervalsCoverTheLevel) {
   }
   EXPECT_GE(now, 16);
   EXPECT_GE(rate, 16);
+}
+
+// Expects the predictions from row 60 on, where the level at the beginning no longer matters, to be
+// those of the exact filter after the rows that `used` returns for a row.
+void ExpectExact(const Samples& samples, const Prediction& prediction,
+                 const std::function<size_t(size_t)>& used) {
+  ASSERT_EQ(prediction.outputs.size(), 1u);
+  const PredictedOutput& y = prediction.outputs[0];
+  for (size_t row = 60; row < prediction.rows.size(); ++row) {
+    const size_t rows = used(row);
+    const LocalLevel level = ExactFilter(samples, kRate, rows);
+    const double since = prediction.rows[row].time_s - static_cast<double>(rows) * kStepS;
+    const double deviation = std::sqrt(level.variance + kRate * kRate * since);
+    const auto k = static_cast<Eigen::Index>(row);
+    EXPECT_NEAR(y.mean[k], level.mean, 1e-6 * deviation) << row;
+    EXPECT_NEAR(y.std_dev[k], deviation, 1e-6 * deviation) << row;
+    EXPECT_NEAR(y.quantiles(k, 2), level.mean + 1.959964 * deviation, 1e-5 * deviation) << row;
+    if (row < samples.rows()) {
+      EXPECT_NEAR(y.sample_std_dev[k], std::hypot(deviation, kSigma), 1e-6 * deviation) << row;
+    }
+  }
+}
+
+TEST(Drift, PredictsEachRowFromTheRowsBefore) {
+  const Samples samples = Walk(150, 4);
+  const auto estimator = MakeEstimator(DriftingLevel());
+  ASSERT_TRUE(estimator->Append(samples).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  PredictionOptions options;
+  options.draws = 50;
+  const auto each = estimator->CurrentPrediction(options);
+  ASSERT_TRUE(each.ok()) << each.status();
+  ExpectExact(samples, *each, [](size_t row) { return row; });
+  EXPECT_EQ(each->outputs[0].score.samples, 150);
+  // 95 % of 150: 142.5 ± 3 · 2.7.
+  EXPECT_NEAR(each->outputs[0].score.coverage95, 0.95, 3 * 2.7 / 150);
+
+  // Windows of ten rows: row 60 is the first of the seventh.
+  options.horizon_s = 10.5 * kStepS;
+  const auto windows = estimator->CurrentPrediction(options);
+  ASSERT_TRUE(windows.ok()) << windows.status();
+  ExpectExact(samples, *windows, [](size_t row) { return row / 10 * 10; });
+
+  // Forecasts after the last row, from all.
+  options.horizon_s = 0;
+  for (int i = 1; i <= 100; ++i) options.times.push_back({0, (150 + i) * kStepS});
+  const auto forecasts = estimator->CurrentPrediction(options);
+  ASSERT_TRUE(forecasts.ok()) << forecasts.status();
+  ExpectExact(samples, *forecasts, [](size_t) { return size_t{150}; });
+}
+
+TEST(Drift, RefusesHorizonsThatAreNone) {
+  const auto estimator = MakeEstimator(DriftingLevel());
+  ASSERT_TRUE(estimator->Append(Walk(20, 4)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  PredictionOptions options;
+  options.horizon_s = -1;
+  EXPECT_EQ(estimator->CurrentPrediction(options).status().message(),
+            "horizon_s: -1 must be a finite time ≥ 0");
+  Problem perfect = DriftingLevel();
+  perfect.uncertain[0].drift.reset();
+  const auto other = MakeEstimator(perfect);
+  ASSERT_TRUE(other->Append(Walk(20, 4)).ok());
+  ASSERT_TRUE(other->Process().ok());
+  options.horizon_s = 1;
+  EXPECT_THAT(std::string(other->CurrentPrediction(options).status().message()),
+              HasSubstr("horizon_s: 1 needs likelihood PREDICTION_ERROR"));
 }
 
 TEST(Drift, KeepsWithinTheBoundsOfThePrior) {

@@ -334,8 +334,6 @@ TEST(ProcessNoise, IsRefusedByStudiesOfAPerfectModel) {
   const auto estimator = MakeEstimator(WithUnknownNoise());
   ASSERT_TRUE(estimator->Append(samples).ok());
   ASSERT_TRUE(estimator->Process().ok());
-  EXPECT_THAT(std::string(estimator->CurrentPrediction({}).status().message()),
-              HasSubstr("PREDICTION_ERROR is not available for a prediction"));
   EXPECT_THAT(std::string(estimator->CurrentRegularizationSweep({}).status().message()),
               HasSubstr("PREDICTION_ERROR is not available for a regularization sweep"));
 }

@@ -35,11 +35,12 @@ class Studies(Subjects):
     async def predict(self, outputs: Sequence[str] = (), *, record: Optional[Data] = None,
                       times: Optional[npt.ArrayLike] = None, run: int = 0,
                       probabilities: Sequence[float] = (0.025, 0.5, 0.975), draws: int = 0,
-                      max_rows: int = 0, lags: int = 0) -> results.Prediction:
+                      max_rows: int = 0, lags: int = 0,
+                      horizon_s: float = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores."""
         return await self._run(self._predict_call(
             record, outputs=outputs, times=times, run=run, probabilities=probabilities,
-            draws=draws, max_rows=max_rows, lags=lags))
+            draws=draws, max_rows=max_rows, lags=lags, horizon_s=horizon_s))
 
     async def posterior(self, *, probabilities: Sequence[float] = (), density_bins: int = 0,
                         joints: Sequence[tuple[str, str]] = (), all_joints: bool = False,
