@@ -93,7 +93,7 @@ void AddFit(CommandRegistry& registry) {
           "With process noise or drift: use no sample of the last S seconds, in windows of\n"
           "that length (default 0: predict each row from all rows before it)")
       ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, 1e9));
   AddPlot(command, arguments->plot_file, "the fit");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }

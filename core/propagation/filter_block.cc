@@ -22,7 +22,7 @@ Matrix Repeated(const Matrix& matrix, int first, int count, Eigen::Index copies)
 EnsembleSpecification OfPointsOf(const EnsembleSpecification& members, int first, int count) {
   const auto copies = 2 * std::ssize(members.model->description().states);
   EnsembleSpecification points = members;
-  points.process_noise = Matrix();
+  points.process_noise = points.noise_factors = Matrix();
   for (Matrix EnsembleSpecification::*part :
        {&EnsembleSpecification::parameters, &EnsembleSpecification::amplitudes,
         &EnsembleSpecification::input_delays_s, &EnsembleSpecification::input_offsets,
@@ -43,6 +43,9 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
     : first_member_(first_member),
       specification_(OfPointsOf(specification, first_member, members)),
       spectral_densities_(specification.process_noise.middleRows(first_member, members).array()),
+      noise_factors_(specification.noise_factors.size() == 0
+                         ? Matrix()
+                         : Matrix(specification.noise_factors.middleRows(first_member, members))),
       noisy_((spectral_densities_ != 0).any()),
       block_(&specification_, inputs, 0, static_cast<int>(specification_.parameters.rows()), exact),
       gaussians_(members, spectral_densities_.cols()),
@@ -52,6 +55,7 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       jacobian_(points_.cols(), points_.cols()),
       square_(points_.cols(), points_.cols()),
       outputs_(specification_.parameters.rows()),
+      noise_variance_(members),
       innovation_(members),
       variance_(members),
       alive_(static_cast<size_t>(members), true) {
@@ -237,7 +241,9 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
   if (sigma > 0) {
     ReadOutputs();
     SelectOutput(channel);
-    gaussians_.Update(outputs_, samples.values(channel, sample), sigma * sigma, innovation_,
+    noise_variance_.setConstant(sigma * sigma);
+    if (noise_factors_.size() > 0) noise_variance_ *= noise_factors_.col(channel).square();
+    gaussians_.Update(outputs_, samples.values(channel, sample), noise_variance_, innovation_,
                       variance_);
     // Roots and logarithms of a vector may differ in the last bit from those of a number, so they
     // are taken in memory of one alignment.

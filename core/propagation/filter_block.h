@@ -6,10 +6,10 @@
 //   dx = f(t, x, θ, u) dt + √q dβ,   z_k = h(t_k, x, θ) + √r e_k,
 //
 // with independent white process noises of spectral densities q (one for each state) and e_k ~
-// N(0, 1). The filters are square-root cubature Kalman filters (gaussian_states.h): exact for
-// models that are linear in their states, and without Jacobians. They begin at t = 0 with the
-// model's initial states, which are known exactly (P = 0); what is uncertain of them is an
-// uncertain parameter.
+// N(0, 1), where r is a sample's variance times the square of a member's own factor. The filters
+// are square-root cubature Kalman filters (gaussian_states.h): exact for models that are linear in
+// their states, and without Jacobians. They begin at t = 0 with the model's initial states, which
+// are known exactly (P = 0); what is uncertain of them is an uncertain parameter.
 //
 // From one sample to the next process noise is added by Simpson's rule,
 //
@@ -102,6 +102,7 @@ class FilterBlock {
   const int first_member_;
   EnsembleSpecification specification_;  // of the points, 2n for each member
   Eigen::ArrayXXd spectral_densities_;   // members × n
+  Eigen::ArrayXXd noise_factors_;        // members × outputs; empty: 1
   bool noisy_;
   TrajectoryBlock block_;
   GaussianStates gaussians_;
@@ -110,7 +111,7 @@ class FilterBlock {
   Eigen::ArrayXXd rates_, moved_rates_;           // rows of the block × n
   Matrix jacobian_, square_;                      // n × n
   const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
-  Eigen::ArrayXd outputs_, innovation_, variance_;
+  Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;
   std::vector<bool> alive_;  // by member
   size_t failures_seen_ = 0;
   std::vector<PointFailure> failures_;

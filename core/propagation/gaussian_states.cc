@@ -80,7 +80,7 @@ void GaussianStates::Collect(const Eigen::ArrayXXd& points) {
   Triangularize(2 * n);
 }
 
-void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, double r,
+void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& r,
                             Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance) {
   const Eigen::Index n = states(), m = members();
   const double share = 1 / static_cast<double>(2 * n);
@@ -90,7 +90,7 @@ void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, double r,
   for (Eigen::Index s = 1; s < 2 * n; ++s) product_ += outputs.segment(s * m, m) - first;
   product_ = first + share * product_;  // ẑ
   innovation = z - product_;
-  variance.setConstant(m, r);
+  variance = r;
   for (Eigen::Index s = 0; s < 2 * n; ++s) {
     deviation_.col(s) = root * (outputs.segment(s * m, m) - product_);
     variance += deviation_.col(s).square();
@@ -106,6 +106,7 @@ void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, double r,
     mean_.col(i) += gain_.col(i) * innovation;
   }
   // P − K S Kᵀ = Σ (x − K e)(x − K e)ᵀ + K r Kᵀ, in which nothing is subtracted.
+  r = r.sqrt();
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index s = 0; s < 2 * n; ++s) {
       auto component = vectors_.col(Component(i, s));
@@ -113,7 +114,7 @@ void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, double r,
       const Eigen::Index j = s % n;
       if (j <= i) component += (s < n ? half : -half) * L(i, j);
     }
-    vectors_.col(Component(i, 2 * n)) = std::sqrt(r) * gain_.col(i);
+    vectors_.col(Component(i, 2 * n)) = r * gain_.col(i);
   }
   Triangularize(2 * n + 1);
 }

@@ -46,11 +46,12 @@ class GaussianStates {
   // Takes mean and covariance of points that Draw wrote and the model has moved.
   void Collect(const Eigen::ArrayXXd& points);
   // Takes one sample into account. `outputs` (at least 2n · members) are the values at the points
-  // that Draw would write, ẑ their mean, z the sample and r the variance of its noise. Writes ν = z
+  // that Draw would write, ẑ their mean, z the sample and r the variance of its noise (members),
+  // which is used up. Writes ν = z
   // − ẑ and its variance S, and takes
   //   K = P_xz/S,   m ← m + K ν,   P ← P − K S Kᵀ.
-  void Update(const Eigen::ArrayXd& outputs, double z, double r, Eigen::ArrayXd& innovation,
-              Eigen::ArrayXd& variance);
+  void Update(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& r,
+              Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance);
 
  private:
   Eigen::Index Column(Eigen::Index i, Eigen::Index j) const {

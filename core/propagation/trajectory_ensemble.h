@@ -58,6 +58,8 @@ struct EnsembleSpecification {
   // Q × states: spectral densities of white process noise, in (unit of the state)²/s. Filters alone
   // use it (filter_bank.h); a trajectory has none. Empty: none.
   Matrix process_noise;
+  // Q × outputs read: factors of the noise of samples. Filters alone use it. Empty: 1.
+  Matrix noise_factors;
   IntegrationOptions integration;
   int threads = 1;
 };

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/problem/settable_quantities.h"
 
 namespace polyest::internal {
 namespace {
@@ -56,6 +60,14 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
                      : (1 - a) / (1 + a));
 }
 
+// Returns the uncertain parameter that is the output's noise, if there is one.
+std::optional<Eigen::Index> UncertainNoise(const Prior& prior, const std::string& output) {
+  const std::vector<std::string> names = prior.Names();
+  const auto found = std::ranges::find(names, NoiseName(output));
+  if (found == names.end()) return std::nullopt;
+  return found - names.begin();
+}
+
 }  // namespace
 
 std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, const Cost& cost,
@@ -68,6 +80,9 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
     channel.output = request.problem->problem().measured[static_cast<size_t>(c)].output;
     if (!request.record->channels().empty()) {
       DescribeChannel(request, cost, d, posterior, fitted, c, channel);
+    }
+    if (const auto i = UncertainNoise(cost.prior(), channel.output)) {
+      channel.noise_std_dev = cost.prior().ToParameters(cost.region().ToGerm(eta))[*i];
     }
     channels.push_back(std::move(channel));
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/remedies.h"
 #include "core/estimator/posterior/residual_tests.h"
 
 namespace polyest::internal {
@@ -44,9 +45,9 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
-                           "prior is wrong; %s",
+                           "prior is wrong; %s%s",
                            channel.output, std::sqrt(channel.chi_squared / samples),
-                           WideningText(findings))});
+                           WideningText(findings), AdviseProcessNoise(*findings.problem))});
     }
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
@@ -56,9 +57,9 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat(
                "output %s: residuals are only %.3g times the noise assumed, which makes "
-               "the uncertainty reported too large; give the noise its own size or let "
-               "it be unknown",
-               channel.output, std::sqrt(channel.chi_squared / samples))});
+               "the uncertainty reported too large; give the noise its own size%s",
+               channel.output, std::sqrt(channel.chi_squared / samples),
+               findings.problem->uses_filters() ? "" : " or let it be unknown")});
     }
   }
 }
@@ -83,10 +84,13 @@ void AddCorrelation(const Findings& findings, const Estimate& estimate,
       diagnostics.push_back(
           {DiagnosticCode::kCorrelatedResiduals,
            absl::StrFormat("output %s: successive residuals are correlated (%.2f), so that %d "
-                           "samples tell no more than %.0f independent ones; %s; let the noise "
-                           "have a correlation ({\"auto\": true}), or improve the model",
+                           "samples tell no more than %.0f independent ones; %s; %s, or improve "
+                           "the model",
                            channel.output, correlation, channel.samples, channel.effective_samples,
-                           WideningText(findings))});
+                           WideningText(findings),
+                           findings.problem->uses_filters()
+                               ? "give other states process noise, too"
+                               : "let the noise have a correlation ({\"auto\": true})")});
     } else {
       diagnostics.push_back(
           {DiagnosticCode::kCorrelatedResiduals,
@@ -168,10 +172,11 @@ void AddInconsistency(const Findings& findings, std::vector<Diagnostic>& diagnos
       {DiagnosticCode::kInconsistentOverTime,
        absl::StrFormat(
            "%s is not constant over the record: %s and %s, %.3g standard deviations apart; the "
-           "model or an input lacks what changes",
+           "model or an input lacks what changes%s",
            findings.NameOf(found.parameter),
            DescribeChange(findings, found.parameter, found.first, name_runs),
-           DescribeChange(findings, found.parameter, found.second, name_runs), found.separation)});
+           DescribeChange(findings, found.parameter, found.second, name_runs), found.separation,
+           AdviseDrift(*findings.problem, found.parameter))});
 }
 
 // Reports scores of windows that scatter more than the noise explains.
@@ -180,8 +185,9 @@ void AddDisagreement(const Findings& findings, std::vector<Diagnostic>& diagnost
   diagnostics.push_back(
       {DiagnosticCode::kWindowsDisagree,
        absl::StrFormat("windows of the record disagree %.2g times as much as the noise explains "
-                       "(1.1 to 1.7 is usual); model or noise is wrong; %s",
-                       findings.windows.robust.disagreement, WideningText(findings))});
+                       "(1.1 to 1.7 is usual); model or noise is wrong; %s%s",
+                       findings.windows.robust.disagreement, WideningText(findings),
+                       AdviseProcessNoise(*findings.problem))});
 }
 
 }  // namespace

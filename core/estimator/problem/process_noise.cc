@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "core/bayes/noise.h"
+#include "core/chaos/germ.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/problem/drifting_model.h"
+#include "core/estimator/problem/settable_quantities.h"
 #include "core/model/list_names.h"
 #include "core/model/switching_model.h"
 
@@ -140,14 +142,45 @@ absl::Status CheckModel(const Problem& problem) {
   return absl::OkStatus();
 }
 
-absl::Status CheckSensor(size_t index, const NoiseModel& noise) {
+absl::Status CheckSensor(size_t index, const MeasuredOutput& measured) {
+  const NoiseModel& noise = measured.noise;
   const auto refuse = [index](const char* field) {
     return InvalidField(FieldPath{"measured", index, "noise", field}, kRefusal);
   };
-  if (noise.unknown) return refuse("unknown");
+  if (noise.unknown) {
+    return InvalidField(FieldPath{"measured", index, "noise", "unknown"},
+                        absl::StrCat(kRefusal, "; give it a size and make ",
+                                     NoiseName(measured.output), " an uncertain parameter"));
+  }
   if (noise.relative > 0) return refuse("relative");
   if (noise.correlation != NoiseCorrelation::kWhite) return refuse("correlation");
   if (noise.outliers != OutlierHandling::kNone) return refuse("outliers");
+  return absl::OkStatus();
+}
+
+// Checks an uncertain parameter that is the noise of a measured output, if there is one.
+absl::Status CheckUncertainNoise(const Problem& problem, const MeasuredOutput& measured) {
+  const std::string name = NoiseName(measured.output);
+  const auto fixed = problem.fixed.find(name);
+  if (fixed != problem.fixed.end() && !(fixed->second > 0)) {
+    return InvalidField(FieldPath{"fixed", FieldStep::Key(name)},
+                        absl::StrFormat("%g must be > 0", fixed->second));
+  }
+  for (size_t i = 0; i < problem.uncertain.size(); ++i) {
+    const UncertainParameter& parameter = problem.uncertain[i];
+    if (parameter.name != name) continue;
+    if (!(measured.noise.absolute > 0) || measured.noise.relative_to_max > 0) {
+      return InvalidField(FieldPath{"uncertain", i},
+                          absl::StrCat(name, " needs noise of output ", measured.output,
+                                       " that is stated by `absolute` alone"));
+    }
+    if (!(parameter.ToParameter(Germ(parameter.germ).Lower()) >= 0)) {
+      return InvalidField(FieldPath{"uncertain", i},
+                          absl::StrCat(name,
+                                       " must be positive; give it a lognormal prior or one "
+                                       "with a lower bound"));
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -207,7 +240,8 @@ std::vector<absl::Status> CheckFilters(const Problem& problem) {
     if (problem.uncertain[i].per_run) add(InvalidField({"uncertain", i, "per_run"}, kRefusal));
   }
   for (size_t i = 0; i < problem.measured.size(); ++i) {
-    add(CheckSensor(i, problem.measured[i].noise));
+    add(CheckSensor(i, problem.measured[i]));
+    add(CheckUncertainNoise(problem, problem.measured[i]));
   }
   if (problem.regularization_mode != RegularizationMode::kFixed) {
     add(InvalidField("regularization_mode", absl::StrCat("other than FIXED ", kRefusal)));

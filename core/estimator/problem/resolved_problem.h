@@ -119,7 +119,7 @@ class ResolvedProblem {
         prior_(std::move(prior)),
         runs_(runs),
         first_run_(first_run),
-        settable_(problem_.model->description(), problem_.process_noise, problem_.uncertain),
+        settable_(problem_.model->description(), problem_),
         base_(settable_.Defaults()) {}
 
   void Derive(Matrix& values) const;

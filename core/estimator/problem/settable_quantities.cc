@@ -14,11 +14,26 @@ Matrix UnlessNeutral(const Matrix& block, double neutral) {
   return (block.array() == neutral).all() ? Matrix() : block;
 }
 
+// Sets the factors of the noise of a measured output, unless they are all 1.
+void SetNoise(const SettableQuantities::Settable& noise, const Vector& values,
+              EnsembleSpecification& ensemble) {
+  const Vector factors = values / noise.unit_value;
+  if ((factors.array() == 1).all()) return;
+  const auto outputs = std::ssize(ensemble.outputs);
+  for (Eigen::Index c = 0; c < outputs; ++c) {
+    if (ensemble.outputs[static_cast<size_t>(c)] != noise.column) continue;
+    if (ensemble.noise_factors.size() == 0) {
+      ensemble.noise_factors.setOnes(values.size(), outputs);
+    }
+    ensemble.noise_factors.col(c) = factors;
+  }
+}
+
 }  // namespace
 
-SettableQuantities::SettableQuantities(const ModelDescription& model,
-                                       const std::vector<ProcessNoise>& process_noise,
-                                       const std::vector<UncertainParameter>& uncertain)
+std::string NoiseName(const std::string& output) { return absl::StrCat(output, ".noise"); }
+
+SettableQuantities::SettableQuantities(const ModelDescription& model, const Problem& problem)
     : parameters_(static_cast<int>(model.parameters.size())),
       inputs_(static_cast<int>(model.inputs.size())),
       outputs_(static_cast<int>(model.outputs.size())),
@@ -41,7 +56,7 @@ SettableQuantities::SettableQuantities(const ModelDescription& model,
     all_.push_back({output.name + ".delay", "s", 0, true, Kind::kOutputDelay, i});
     all_.push_back({output.name + ".offset", output.unit, 0, true, Kind::kOutputOffset, i});
   }
-  for (const ProcessNoise& noise : process_noise) {
+  for (const ProcessNoise& noise : problem.process_noise) {
     for (int i = 0; i < states_; ++i) {
       const Quantity& state = model.states[static_cast<size_t>(i)];
       if (state.name != noise.state) continue;
@@ -50,7 +65,7 @@ SettableQuantities::SettableQuantities(const ModelDescription& model,
                       Kind::kSpectralDensity, i});
     }
   }
-  for (const UncertainParameter& parameter : uncertain) {
+  for (const UncertainParameter& parameter : problem.uncertain) {
     const auto column = model.FindParameter(parameter.name);
     if (!parameter.drift || !column) continue;
     const std::string& unit = model.parameters[static_cast<size_t>(*column)].unit;
@@ -58,6 +73,13 @@ SettableQuantities::SettableQuantities(const ModelDescription& model,
                     unit.empty() ? "" : absl::StrCat("(", unit, ")/s^0.5"),
                     parameter.drift->std_dev_per_sqrt_s, true, Kind::kDriftRate, states_++,
                     parameter.StandardDeviation()});
+  }
+  if (!UsesFilters(problem)) return;
+  for (const MeasuredOutput& measured : problem.measured) {
+    const auto column = model.FindOutput(measured.output);
+    if (!column || !(measured.noise.absolute > 0)) continue;
+    all_.push_back({NoiseName(measured.output), model.outputs[static_cast<size_t>(*column)].unit,
+                    measured.noise.absolute, true, Kind::kNoise, *column, measured.noise.absolute});
   }
 }
 
@@ -85,7 +107,7 @@ std::string SettableQuantities::Describe() const {
   for (const Settable& settable : all_) {
     const std::string channel = settable.name.substr(0, settable.name.rfind('.'));
     if (settable.kind == Kind::kParameter || settable.kind == Kind::kSpectralDensity ||
-        settable.kind == Kind::kDriftRate) {
+        settable.kind == Kind::kDriftRate || settable.kind == Kind::kNoise) {
       parts.push_back(settable.name);
     }
     if (settable.kind == Kind::kAmplitude) inputs.push_back(channel);
@@ -123,11 +145,15 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
   ensemble.output_delays_s = UnlessNeutral(of_outputs(1), 0);
   ensemble.output_offsets = UnlessNeutral(of_outputs(2), 0);
   for (int i = OutputDelay(outputs_) - 1; i < size(); ++i) {
-    if (ensemble.process_noise.size() == 0) ensemble.process_noise.setZero(values.rows(), states_);
     const Settable& settable = (*this)[i];
+    if (settable.kind == Kind::kNoise) {
+      SetNoise(settable, values.col(i), ensemble);
+      continue;
+    }
+    if (ensemble.process_noise.size() == 0) ensemble.process_noise.setZero(values.rows(), states_);
     auto noise = ensemble.process_noise.col(settable.column);
     noise = values.col(i);
-    if (settable.kind == Kind::kDriftRate) noise = (noise / settable.unit_rate).cwiseAbs2();
+    if (settable.kind == Kind::kDriftRate) noise = (noise / settable.unit_value).cwiseAbs2();
   }
 }
 

@@ -6,9 +6,10 @@
 //   u(t) = u.gain · u.amplitude · shape(t − u.delay) + u.offset    of an input u,
 //   sample(t) = x.gain · x(t − x.delay) + x.offset + noise         of an output x.
 //
-// the spectral densities of process noise and the rates of drifting parameters. Their values form
-// one vector: the parameters, then amplitude, gain, delay and offset of each input, then gain,
-// delay and offset of each output, then the spectral density of each process noise, then the rates.
+// and what only filters use: the spectral densities of process noise, the rates of drifting
+// parameters, and the standard deviations of the samples' noise. Their values form one vector: the
+// parameters, then amplitude, gain, delay and offset of each input, then gain, delay and offset of
+// each output, then the spectral density of each process noise, then the rates, then the noises.
 
 #include <optional>
 #include <string>
@@ -22,6 +23,9 @@
 
 namespace polyest::internal {
 
+// Returns the name of the standard deviation of a measured output's noise: "x.noise".
+std::string NoiseName(const std::string& output);
+
 class SettableQuantities {
  public:
   enum class Kind {
@@ -34,7 +38,8 @@ class SettableQuantities {
     kOutputDelay,
     kOutputOffset,
     kSpectralDensity,
-    kDriftRate  // of a drifting parameter
+    kDriftRate,  // of a drifting parameter
+    kNoise       // of a measured output
   };
   struct Settable {
     std::string name;
@@ -45,21 +50,21 @@ class SettableQuantities {
     // Column of the model's parameters, inputs, outputs or states; of a rate, that of its state in
     // the drifting model.
     int column;
-    double unit_rate = 1;  // of a rate: the one by which the normal score gains 1/√s
+    // Of a rate: the one by which the normal score gains 1/√s. Of a noise: as stated.
+    double unit_value = 1;
 
     bool of_input() const {
       return kind == Kind::kAmplitude || kind == Kind::kInputGain || kind == Kind::kDelay ||
              kind == Kind::kInputOffset;
     }
     bool of_output() const {
-      return kind == Kind::kOutputGain || kind == Kind::kOutputDelay || kind == Kind::kOutputOffset;
+      return kind == Kind::kOutputGain || kind == Kind::kOutputDelay ||
+             kind == Kind::kOutputOffset || kind == Kind::kNoise;
     }
     bool is_delay() const { return kind == Kind::kDelay || kind == Kind::kOutputDelay; }
   };
 
-  explicit SettableQuantities(const ModelDescription& model,
-                              const std::vector<ProcessNoise>& process_noise = {},
-                              const std::vector<UncertainParameter>& uncertain = {});
+  explicit SettableQuantities(const ModelDescription& model, const Problem& problem = {});
 
   int size() const { return static_cast<int>(all_.size()); }
   const Settable& operator[](int index) const { return all_[static_cast<size_t>(index)]; }
@@ -75,8 +80,8 @@ class SettableQuantities {
   // Returns a list of all names, for a message.
   std::string Describe() const;
 
-  // Sets the ensemble's parameters and channels from `values` (Q × size), and its process noise if
-  // there is any. The outputs to read must already be set.
+  // Sets the ensemble's parameters and channels from `values` (Q × size), and what only filters
+  // use. The outputs to read must already be set.
   void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
 
  private:

@@ -14,6 +14,7 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/prior_expansion.h"
+#include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_score.h"
 
 namespace polyest::internal {
@@ -54,6 +55,7 @@ class OutputPrediction {
     const int draws = static_cast<int>(subject.thetas.rows());
     factors_ = noise_.degrees_of_freedom > 0 ? ScaleFactors(noise_.degrees_of_freedom, draws)
                                              : Vector(Vector::Ones(draws));
+    UseUncertainNoise(subject);
     sums_.emplace(options.lags);
     result_.sample_std_dev.resize(times);
     result_.sample_quantiles.resize(times, probabilities);
@@ -95,6 +97,15 @@ class OutputPrediction {
   }
 
  private:
+  // Takes the noise at each draw where it is an uncertain parameter.
+  void UseUncertainNoise(const PredictionSubject& subject) {
+    const std::vector<std::string> names = subject.problem->prior().Names();
+    const auto found = std::ranges::find(names, NoiseName(result_.output));
+    if (found != names.end()) {
+      factors_ = subject.thetas.col(found - names.begin()) / model_.absolute;
+    }
+  }
+
   void Describe(const ConstVectorRef& values, const ConstVectorRef& deviations, double mean,
                 Eigen::Index place) {
     result_.mean[place] = mean;

@@ -68,12 +68,12 @@ struct LocalLevel {
 };
 
 // Takes the first `rows` rows.
-LocalLevel ExactFilter(const Samples& samples, double rate, size_t rows) {
+LocalLevel ExactFilter(const Samples& samples, double rate, size_t rows, double sigma = kSigma) {
   LocalLevel level;
   for (size_t i = 0; i < rows; ++i) {
     const double z = samples.columns[0].value[i];
     level.variance += rate * rate * kStepS;
-    const double S = level.variance + kSigma * kSigma, nu = z - level.mean;
+    const double S = level.variance + sigma * sigma, nu = z - level.mean;
     level.log_likelihood -= 0.5 * (nu * nu / S + std::log(S));
     level.mean += level.variance / S * nu;
     level.variance -= level.variance * level.variance / S;
@@ -102,6 +102,19 @@ TEST(Drift, OfALevelIsThatOfTheExactFilter) {
   EXPECT_NEAR(now.std_dev, deviation, 0.01 * deviation);
   EXPECT_NEAR(now.lower95, exact.mean - 1.96 * deviation, 0.03 * deviation);
   EXPECT_NEAR(now.upper95, exact.mean + 1.96 * deviation, 0.03 * deviation);
+}
+
+TEST(Drift, NeedsNoStatesOfTheModel) {
+  const Samples samples = Walk(100, 1);
+  Problem problem = DriftingLevel();
+  const Estimate with_state = EstimateOf(problem, samples);
+  problem.model =
+      MakeEquationModel({.outputs = {{"y", "a"}}, .parameters = {{"a", 1}}, .units = {{"a", "N"}}})
+          .value();
+  const Estimate estimate = EstimateOf(problem, samples);
+  ASSERT_EQ(estimate.filtered.size(), 1u);
+  EXPECT_NEAR(estimate.filtered[0].mean, with_state.filtered[1].mean, 1e-9);
+  EXPECT_NEAR(estimate.filtered[0].std_dev, with_state.filtered[1].std_dev, 1e-9);
 }
 
 // An unknown rate has the posterior ∝ likelihood on a grid of log r, and the level is the mixture.
@@ -281,6 +294,37 @@ TEST(Drift, FollowsAStiffness) {
             5 * estimate.parameters[0].posterior_std_dev);
 }
 
+// Rate and noise have the posterior ∝ prior · likelihood on a grid of their logarithms.
+TEST(Drift, IsToldApartFromTheNoise) {
+  const Samples samples = Walk(300, 6);
+  Problem problem = WithUnknownRate();
+  problem.measured[0].noise.absolute = 0.3;
+  problem.uncertain.push_back(UncertainParameter::LogUniform("y.noise", 0.05, 1).value());
+  const Estimate estimate = EstimateOf(problem, samples);
+  double all = 0, rate = 0, noise = 0;
+  const double most = ExactFilter(samples, kRate).log_likelihood;
+  for (int i = 0; i <= 200; ++i) {
+    const double r = std::exp(std::log(0.01) + i / 200.0 * std::log(300.0));
+    for (int j = 0; j <= 200; ++j) {
+      const double sigma = std::exp(std::log(0.05) + j / 200.0 * std::log(20.0));
+      const double weight =
+          std::exp(ExactFilter(samples, r, samples.rows(), sigma).log_likelihood - most);
+      all += weight;
+      rate += weight * r;
+      noise += weight * sigma;
+    }
+  }
+  ASSERT_EQ(estimate.parameters.size(), 3u);
+  const ParameterEstimate& sigma = estimate.parameters[1];
+  const ParameterEstimate& walk = estimate.parameters[2];
+  EXPECT_EQ(sigma.name, "y.noise");
+  EXPECT_EQ(sigma.unit, "N");
+  EXPECT_NEAR(sigma.mean, noise / all, 0.05 * sigma.posterior_std_dev);
+  EXPECT_NEAR(walk.mean, rate / all, 0.05 * walk.posterior_std_dev);
+  EXPECT_NEAR(estimate.channels[0].noise_std_dev, sigma.map, 1e-12);
+  EXPECT_THAT(estimate.diagnostics, testing::IsEmpty());
+}
+
 TEST(Drift, RefusesWhatItCannotDo) {
   const auto refusal = [](const std::function<void(Problem&)>& change) {
     Problem problem = DriftingLevel();
@@ -306,6 +350,21 @@ TEST(Drift, RefusesWhatItCannotDo) {
               HasSubstr("leaves no room for processNoise and drift"));
   EXPECT_THAT(refusal([](Problem& p) { p.uncertain[0].per_run = true; }),
               HasSubstr("uncertain[0].per_run: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.uncertain.push_back(UncertainParameter::Normal("y.noise", 1, 0.1).value());
+              }),
+              HasSubstr("uncertain[1]: y.noise must be positive"));
+  EXPECT_EQ(refusal([](Problem& p) {
+              p.fixed = {{"y.noise", 0}};
+            }),
+            "fixed.y.noise: 0 must be > 0");
+  EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.unknown = true; }),
+              HasSubstr("make y.noise an uncertain parameter"));
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.uncertain[0].drift.reset();
+                p.fixed = {{"y.noise", 1}};
+              }),
+              HasSubstr("no parameter \"y.noise\""));
   EXPECT_THAT(refusal([](Problem& p) {
                 p.derived = {{"z_0", "2*a"}};
               }),

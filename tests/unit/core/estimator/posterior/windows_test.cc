@@ -64,6 +64,8 @@ TEST(Windows, NameAParameterThatDrifts) {
   EXPECT_FALSE(Has(estimate, DiagnosticCode::kCorrelatedResiduals));
   EXPECT_THAT(Message(estimate, DiagnosticCode::kInconsistentOverTime),
               HasSubstr("g is not constant over the record: 0.9"));
+  EXPECT_THAT(Message(estimate, DiagnosticCode::kInconsistentOverTime),
+              HasSubstr("; if g changes with time, let it drift"));
   EXPECT_TRUE(Has(estimate, DiagnosticCode::kWindowsDisagree));
   EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kWeak);
   // The windows follow the drift, each within five of its deviations.
