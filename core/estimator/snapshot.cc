@@ -113,7 +113,8 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.summed_run, absorbed.previous_coefficients, absorbed.previous_error,
           absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
           absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.largest,
-          absorbed.control_scores, absorbed.control_valid, absorbed.point_log_variance);
+          absorbed.control_scores, absorbed.control_valid, absorbed.point_log_variance,
+          absorbed.carried_error, absorbed.carried_rate);
 }
 
 template <class Archive>
@@ -172,9 +173,10 @@ void serialize(Archive& archive, ComponentState& component) {
           component.particles, component.weight, component.room);
   Flag(archive, component.bisected);
   archive(component.taken, component.windows_from, component.window_end, component.edges_row,
-          component.patient_until, component.whole_until, component.settled_row,
-          component.settlements_at_row, component.comparable_row, component.settlements,
-          component.reexpansions, component.abandoned_rows, component.summary);
+          component.ahead_row, component.patient_until, component.whole_until,
+          component.settled_row, component.settlements_at_row, component.comparable_row,
+          component.settlements, component.reexpansions, component.abandoned_rows,
+          component.summary);
 }
 
 template <class Archive>

@@ -143,6 +143,12 @@ double ClosedFormBreak(const HalfSineBumpInput& input, double time_s) {
   return FirstAfter(time_s, input.start_s, input.start_s + input.duration_s);
 }
 
+// How many knots up to a time are kept for it: the two of its interval, and those that slopes yet
+// to come depend on.
+constexpr std::ptrdiff_t kKnotsBehind = 2 * kSplineReach + 2;
+// So few knots are not worth moving the others.
+constexpr std::ptrdiff_t kLeastForgotten = 1024;
+
 template <class Input>
 constexpr bool kHasKnots =
     std::is_same_v<Input, TableInput> || std::is_same_v<Input, StreamedInput>;
@@ -224,6 +230,20 @@ void InputSignal::SettleSlopes() {
                               ? SplineSlope(knot_time_s_, knot_value_, k)
                               : MonotoneSlope(knot_time_s_, knot_value_, k));
   }
+}
+
+void InputSignal::Forget(double time_s) {
+  POLYEST_CHECK(streamed());
+  const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
+  const std::ptrdiff_t kept = next - knot_time_s_.begin() - kKnotsBehind;
+  // The first knot, where a smooth curve begins, stays.
+  if (kept < kLeastForgotten || kept < std::ssize(knot_time_s_) / 2) return;
+  const auto forget = [kept](std::vector<double>& of_knots) {
+    if (!of_knots.empty()) of_knots.erase(of_knots.begin() + 1, of_knots.begin() + kept);
+  };
+  forget(knot_time_s_);
+  forget(knot_value_);
+  forget(knot_slope_);
 }
 
 void InputSignal::Clear() {

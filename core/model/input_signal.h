@@ -36,6 +36,9 @@ class InputSignal {
   // Declares that no more knots of a streamed signal will follow.
   void Finish();
   bool finished() const { return finished_; }
+  // Releases the memory of knots that Shape and the slopes yet to come do not need at or after
+  // `time_s`, in amortized O(1). The signal must not be evaluated before that time any more.
+  void Forget(double time_s);
   // Removes the knots of a streamed signal, for a new run.
   void Clear();
 

@@ -10,6 +10,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/propagation/bdf_integrator.h"
+#include "core/propagation/block_rows.h"
 #include "core/propagation/erk_integrator.h"
 #include "core/propagation/linear_integrator.h"
 #include "core/propagation/linear_system.h"
@@ -25,15 +26,6 @@ constexpr int kStepsAtOnce = 500;
 // a bump that is 0 at both ends would miss the bump. So after each break the integrator stops once
 // after this fraction of the interval to the next break.
 constexpr double kLook = 1.0 / 64;
-
-// Returns rows 0 … points − 1, followed by copies of the last row up to a multiple of kLanes.
-std::vector<int> PaddedRows(int points) {
-  std::vector<int> rows;
-  for (int row = 0; row < points || row % kLanes != 0; ++row) {
-    rows.push_back(std::min(row, points - 1));
-  }
-  return rows;
-}
 
 std::vector<int> Shifted(std::vector<int> rows, int first) {
   for (int& row : rows) row += first;

@@ -105,7 +105,9 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.point_log_variance.size() == fresh.point_log_variance.size() &&
          IsMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
          state.control_valid.size() == fresh.control_valid.size() && state.rows >= 0 &&
-         state.samples >= 0 && state.propagated >= 0;
+         state.samples >= 0 && state.propagated >= 0 && state.carried_error >= 0 &&
+         std::isfinite(state.carried_error) && state.carried_rate >= 0 &&
+         std::isfinite(state.carried_rate);
 }
 
 bool IsAscendingBelow(const std::vector<int>& numbers, int end) {
@@ -199,7 +201,13 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
       last.time_s != state.ensemble->time_s) {
     return absl::FailedPreconditionError("the rows appended are not those of the snapshot");
   }
-  StartRun(state.run, begin);
+  const double reach_s = InputReach(state.run);
+  int64_t first_knots = begin;
+  if (reach_s < kInfinity) {
+    POLYEST_ASSIGN_OR_RETURN(first_knots,
+                             RowOfFirstKnots(problem_, store, begin, rows, last.time_s - reach_s));
+  }
+  StartRun(state.run, begin, first_knots);
   POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last.time_s));
   if (!inputs_->SettledUpTo(last.time_s)) {
     return absl::FailedPreconditionError(

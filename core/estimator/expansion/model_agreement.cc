@@ -75,7 +75,8 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   agreement.shift = checks.residuals.maxCoeff() * std::sqrt(samples) +
                     cost.power() * expansion.LogVarianceError();
   if (1 >= kMinEffectiveChecks * weights.squaredNorm()) {
-    agreement.shift = std::min(agreement.shift, spread);
+    const double carried = std::sqrt(cost.power() * expansion.CarriedError());
+    agreement.shift = std::min(agreement.shift, spread + carried);
     if (spread <= kMaxSpread) agreement.mean_difference = mean;
   }
   return agreement;

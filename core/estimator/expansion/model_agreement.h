@@ -35,7 +35,9 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
 //   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points; with
 //   filters, plus the error of ½ Σ log(S/σ²).
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
-// is sharper but needs check points where the posterior is. The second holds wherever they are.
+// is sharper but needs check points where the posterior is. The second holds wherever they are. Of
+// sums taken over from an expansion over another region, the check points know nothing; the first
+// bound is increased by √(β Σ ρ_k/R_k) of those, and the second contains it (carry_over.h).
 struct Agreement {
   double shift = 0;  // the smaller of the available bounds, ≥ 0
   // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the

@@ -9,6 +9,7 @@
 
 #include "core/bayes/newton_starts.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/problem/truncation.h"
@@ -89,6 +90,35 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpans
                 *request.store, request.rows, request.threads, stop);
 }
 
+// Returns the model's cost at points (local coordinates), +∞ where it fails; empty if it cannot be
+// run there. Over a long record an expansion that is accurate in all of its region stands for it.
+absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, const Cost& cost,
+                                            const Matrix& etas, const Matrix& particles,
+                                            const SettleRequest& request, const Stop& stop,
+                                            ConfirmedMinima& confirmed) {
+  std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
+  if (request.rows > RowsOfShortRecord(*request.problem) &&
+      LargestShift(expansion, cost) <= kMaxCarriedShift) {
+    for (size_t i = 0; i < costs.size(); ++i) {
+      costs[i] = cost.Evaluate(etas.row(static_cast<Eigen::Index>(i)).transpose()).total;
+    }
+    return costs;
+  }
+  const Vector inside = particles.colwise().mean().transpose();
+  auto model = RunModel(expansion, etas, inside, request, stop);
+  if (absl::IsFailedPrecondition(model.status())) return std::vector<double>();
+  if (!model.ok()) return model.status();
+  confirmed.propagated_rows = (*model)->propagated_rows();
+  const RegionalExpansion::Check checks = (*model)->Checks();
+  for (size_t i = 0; i < costs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (!checks.valid[i]) continue;
+    costs[i] = ModelCost(expansion, cost, etas.row(row).transpose(),
+                         checks.chi_squared.row(row).transpose());
+  }
+  return costs;
+}
+
 }  // namespace
 
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
@@ -98,19 +128,9 @@ absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expans
   const Matrix etas = LowestAndOutside(expansion, cost, particles, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());
   if (etas.rows() == 1) return confirmed;
-  const Vector inside = particles.colwise().mean().transpose();
-  auto model = RunModel(expansion, etas, inside, request, stop);
-  if (absl::IsFailedPrecondition(model.status())) return confirmed;
-  if (!model.ok()) return model.status();
-  confirmed.propagated_rows = (*model)->propagated_rows();
-  const RegionalExpansion::Check checks = (*model)->Checks();
-  std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
-  for (size_t i = 0; i < costs.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (!checks.valid[i]) continue;
-    costs[i] = ModelCost(expansion, cost, etas.row(row).transpose(),
-                         checks.chi_squared.row(row).transpose());
-  }
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<double> costs,
+                           CostsAt(expansion, cost, etas, particles, request, stop, confirmed));
+  if (costs.empty()) return confirmed;
   std::vector<Eigen::Index> rows;
   const double limit = *std::min_element(costs.begin(), costs.end()) + kMostAbove;
   for (size_t i = 1; i < costs.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/overlooked_minima.h"
 #include "core/estimator/expansion/settlement_particles.h"
@@ -138,8 +139,8 @@ class Settler {
     return absl::OkStatus();
   }
 
-  // Returns false when the new expansion cannot be built; the present one then stays.
-  absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
+  // Returns a design over the region whose check points are the first particles.
+  ExpansionDesign DesignOn(Region region, const Truncation& truncation) const {
     const Vector inside = result_.particles.colwise().mean().transpose();
     ExpansionDesign design =
         DesignForRegion(*request_.problem, truncation, std::move(region), inside);
@@ -149,9 +150,28 @@ class Settler {
     design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
     design.check_costs = particles_.costs.head(checks);
     design.checks_are_draws = true;
-    absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
-        Replay(*request_.problem, std::move(design), present_.noise().ForNewExpansion(),
-               *request_.store, request_.rows, request_.threads, stop_);
+    return design;
+  }
+
+  // Moves the sums to the region without propagating the record, with no fewer terms.
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> Carried(const Region& region,
+                                                             const Truncation& truncation) const {
+    if (request_.rows <= RowsOfShortRecord(*request_.problem)) {
+      return absl::FailedPreconditionError("the record is short");
+    }
+    const Truncation& terms = truncation.order < present().order ? present() : truncation;
+    return CarryOver(*request_.problem, expansion(), DesignOn(region, terms), *request_.store,
+                     request_.rows, request_.threads, stop_);
+  }
+
+  // Returns false when the new expansion cannot be built; the present one then stays.
+  absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
+    absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
+    if (absl::IsFailedPrecondition(moved.status()) && request_.may_replay) {
+      moved = Replay(*request_.problem, DesignOn(std::move(region), truncation),
+                     present_.noise().ForNewExpansion(), *request_.store, request_.rows,
+                     request_.threads, stop_);
+    }
     if (absl::IsFailedPrecondition(moved.status())) return false;
     if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
@@ -183,15 +203,23 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   POLYEST_ASSIGN_OR_RETURN(
       std::unique_ptr<RegionalExpansion> expansion,
       RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads));
+  POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, *expansion));
+  return expansion;
+}
+
+absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
+                      RegionalExpansion& expansion) {
   RowBlock block;
-  for (int64_t first = problem.first_row(); first < rows; first += kReplayRows) {
+  for (int64_t first = expansion.absorbed_rows(); first < rows; first += block.count()) {
     const int64_t count = std::min(kReplayRows, rows - first);
     POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
-    POLYEST_RETURN_IF_ERROR(expansion->Propagate(block, stop));
-    if (expansion->fitted_rows() < block.count()) return expansion->shortage();
-    for (int row = 0; row < block.count(); ++row) expansion->Absorb(row);
+    const int kept = expansion.RowsToKeptState(block);
+    if (kept < count) POLYEST_RETURN_IF_ERROR(store.Read(first, kept, block));
+    POLYEST_RETURN_IF_ERROR(expansion.Propagate(block, stop));
+    if (expansion.fitted_rows() < block.count()) return expansion.shortage();
+    for (int row = 0; row < block.count(); ++row) expansion.Absorb(row);
   }
-  return expansion;
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

@@ -10,7 +10,9 @@
 // first at minima that the model confirms and the sampler overlooked (overlooked_minima.h). This
 // repeats until neither is needed. If moving gains nothing, an expansion of automatic order stays
 // in place and tries higher orders; it takes the first one that follows the model there, if any.
-// Each move lowers the order by one. The region is derived from particles and never from a minimum
+// Each move lowers the order by one. Where the record is long and the present expansion is accurate
+// the sums are carried over instead of propagating the record, with the order as it is
+// (carry_over.h). The region is derived from particles and never from a minimum
 // and its Hessian: in a direction that the data do not inform yet, the position of the minimum is
 // arbitrary.
 
@@ -30,6 +32,7 @@ struct SettleRequest {
   uint64_t seed = 1;
   int threads = 1;
   bool may_raise_order = true;  // has an effect only if the order is automatic
+  bool may_replay = true;       // whether the record may be propagated from its beginning
 };
 
 struct Settlement {
@@ -52,5 +55,10 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           LearnedNoise noise,
                                                           const SampleStore& store, int64_t rows,
                                                           int threads, const Stop& stop);
+
+// Lets the expansion absorb further rows of the store, up to the first `rows`. Returns
+// FailedPrecondition when too few trajectories are left.
+absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
+                      RegionalExpansion& expansion);
 
 }  // namespace polyest::internal

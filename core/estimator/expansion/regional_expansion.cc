@@ -117,15 +117,18 @@ void RegionalExpansion::LookFromPosterior() {
   spread_ = phi_gradient * Inverse(design_.region.axes()) * noise_.posterior.factor;
 }
 
-// Each run begins at t = 0 from the initial states, with its own inputs.
-void RegionalExpansion::StartRun(int run, int64_t first_row) {
+// Each run begins at t = 0 from the initial states, with its own inputs, whose knots are read from
+// the row `first_knots` on.
+void RegionalExpansion::StartRun(int run, int64_t first_row, int64_t first_knots) {
   run_ = run;
+  run_begin_ = first_row;
   whitening_.BeginRun();
   propagator_.reset();
   control_propagator_.reset();
   filters_.reset();
   control_filters_.reset();
-  inputs_ = std::make_unique<RunInputs>(problem_, store_, run, first_row);
+  inputs_ = std::make_unique<RunInputs>(problem_, store_, run, first_knots);
+  input_reach_s_ = InputReach(run);
   if (problem_.uses_filters()) return StartFilters(run);
   propagator_ = std::make_unique<EnsemblePropagator>(
       problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), &inputs_->signals());
@@ -140,6 +143,7 @@ bool RegionalExpansion::StepsExactly() const {
 }
 
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
+  KeepState(block.rows.front().run);
   block_ = block;
   fitted_rows_ = 0;
   outputs_.resize(thetas_.rows() + controls_, channels_ * block.count());
@@ -152,7 +156,7 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
            block.rows[static_cast<size_t>(first + count)].run == run) {
       ++count;
     }
-    if (run != run_) StartRun(run, next_row_);
+    if (run != run_) StartRun(run, next_row_, next_row_);
     POLYEST_RETURN_IF_ERROR(PropagateRun(first, count, stop));
     first += count;
     next_row_ += count;
@@ -165,6 +169,7 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
   POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last_s));
   POLYEST_RETURN_IF_ERROR(filters_ ? AdvanceFilters(first, count, stop)
                                    : Advance(first, count, stop));
+  if (input_reach_s_ < kInfinity) inputs_->Forget(last_s - input_reach_s_);
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
   FitRows(first, count);
   AddDelayErrors(first);
@@ -271,6 +276,7 @@ void RegionalExpansion::Absorb(int row) {
   if (run != absorbed_.summed_run) {
     EndRunOfSums();
     absorbed_.summed_run = run;
+    absorbed_.carried_rate = 0;
   }
   for (int c = 0; c < channels_; ++c) {
     const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
@@ -297,7 +303,8 @@ void RegionalExpansion::Absorb(int row) {
     AddDifference(c, coefficients, error, variance);
     AddToProfile(row, c, coefficients, z, variance);
     absorbed_.discount[c] += own_error / variance;
-    absorbed_.own_error += residual_variance_[column] / variance;
+    absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
+    absorbed_.carried_error += absorbed_.carried_rate;
     Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
     if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
     Compare(column, z, noise);

@@ -59,6 +59,10 @@ struct AbsorbedRows {
   WindowSums windows;             // the sums by windows of the record; none after ended runs
   Vector discount;                // per channel: Σ ρ_k/R_k, with ρ divided by the misfit
   double own_error = 0;           // Σ ρ_k/R_k over all channels, with ρ as it is
+  // The part of `own_error` that was taken over from an expansion over another region, and what
+  // each further sample adds to it because of the states taken over (carry_over.h).
+  double carried_error = 0;
+  double carried_rate = 0;
   double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
   double log_variance = 0;  // as log_noise, with R in place of σ²
   std::vector<int64_t> outliers;  // per channel
@@ -130,6 +134,12 @@ class RegionalExpansion {
   void Absorb(int row);
   // Sets the row of the store that is the first to be propagated; no row has been yet.
   void BeginAt(int64_t row) { next_row_ = row; }
+  // Returns how many rows of a block that follows the rows propagated, at least one, to propagate
+  // with the next call so that it ends where a state can be kept.
+  int RowsToKeptState(const RowBlock& block) const;
+  // Returns the state after the last checkpoint in the run, or before a run if many rows have
+  // passed since the last one; null without any. What it says of noise may have been revised since.
+  const std::shared_ptr<const ExpansionState>& kept_state() const { return kept_state_; }
   // Ends the run absorbed so far. No more rows are absorbed then.
   void EndRun() { EndRunOfSums(); }
 
@@ -155,6 +165,9 @@ class RegionalExpansion {
   double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
   double OwnError() const { return absorbed_.own_error; }
+  // Returns the part of OwnError() that the check points' own trajectories do not show, because it
+  // was taken over from an expansion over another region.
+  double CarriedError() const { return absorbed_.carried_error; }
   // Returns the root mean square, over the collocation points, of ½ Σ log(S/σ²) of the model minus
   // that of the expansion; 0 without filters.
   double LogVarianceError() const;
@@ -205,7 +218,9 @@ class RegionalExpansion {
                     ExpansionDesign design, LearnedNoise noise, CollocationMatrix matrix,
                     int threads);
 
-  void StartRun(int run, int64_t first_row);
+  void StartRun(int run, int64_t first_row, int64_t first_knots);
+  void KeepState(int next_run);
+  double InputReach(int run) const;
   absl::Status PropagateRun(int first, int count, const Stop& stop);
   absl::Status RestoreFit(ExpansionState& state);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
@@ -254,9 +269,12 @@ class RegionalExpansion {
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // collocation points that are still in the fit
   int run_ = -1;
-  int64_t next_row_ = 0;               // of the store: the first row not propagated
+  int64_t run_begin_ = 0;  // row of the store at which the present run began
+  int64_t next_row_ = 0;   // of the store: the first row not propagated
+  std::shared_ptr<const ExpansionState> kept_state_;
   int controls_;                       // K
   std::unique_ptr<RunInputs> inputs_;  // of the present run
+  double input_reach_s_ = 0;           // how far back its trajectories may need the inputs
   std::unique_ptr<EnsemblePropagator> propagator_;
   std::unique_ptr<EnsemblePropagator> control_propagator_;  // null without controls
   // In place of the propagators where the likelihood is that of prediction errors; else null.

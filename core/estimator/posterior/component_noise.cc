@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/control_trajectories.h"
 #include "core/estimator/expansion/prior_prediction.h"
+#include "core/estimator/expansion/rescaled.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/mixture_component.h"
 #include "core/estimator/posterior/noise_learning.h"
@@ -115,29 +117,49 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
   return moved;
 }
 
-// Propagates the expansion along the record so far again, with the samples weighed by `noise`.
+// Weighs the samples of the record so far by `noise`; propagates it again unless its sums tell what
+// they would be.
 absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(auto replayed,
-                           Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_,
-                                  taken_, threads_, stop));
-  Adopt(std::move(replayed));
+  auto reweighed = Rescaled(problem_, *expansion_, noise, *store_, taken_, threads_, stop);
+  if (absl::IsFailedPrecondition(reweighed.status())) {
+    reweighed = Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_,
+                       threads_, stop);
+  }
+  POLYEST_RETURN_IF_ERROR(reweighed.status());
+  Adopt(*std::move(reweighed));
   return absl::OkStatus();
 }
 
-// Returns the tolerance that the control trajectories ask for, the present one if they do not
-// object. They are compared with the noise as stated, since errors of integration may be what the
-// misfit consists of.
-double MixtureComponent::ToleranceForControls() const {
-  const double present = problem_.problem().integration.relative_tolerance;
-  if (expansion_->controls() == 0) return present;
+// Returns the present expansion with the problem's new tolerance. If the trajectories so far are
+// accurate enough, only those to come are integrated with it.
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::WithNewTolerance(
+    double shift, const Stop& stop) const {
+  const LearnedNoise& noise = expansion_->noise();
+  if (shift <= kMaxCarriedShift) {
+    auto going_on = Rescaled(problem_, *expansion_, noise, *store_, taken_, threads_, stop);
+    if (!absl::IsFailedPrecondition(going_on.status())) return going_on;
+  }
+  return Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_, threads_,
+                stop);
+}
+
+// Returns the shift that the control trajectories show; 0 without any. They are compared with the
+// noise as stated, since errors of integration may be what the misfit consists of.
+double MixtureComponent::ShiftOfControls() const {
+  if (expansion_->controls() == 0) return 0;
   Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   cost.set_power(1);
-  const double shift = IntegrationShift(*expansion_, cost);
+  return IntegrationShift(*expansion_, cost);
+}
+
+// Returns the tolerance that a shift of the controls asks for, the present one if it is small.
+double MixtureComponent::ToleranceForControls(double shift) const {
+  const double present = problem_.problem().integration.relative_tolerance;
   return shift > kMaxIntegrationShift ? present * kAimedIntegrationShift / shift : present;
 }
 
-// Returns true when the noise or the control trajectories required a tighter tolerance and the
-// record was propagated again with it.
+// Returns true when the noise or the control trajectories required a tighter tolerance, with which
+// the expansion has been made again.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
   const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
@@ -148,11 +170,11 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
   // replays: four times as many samples come before the next.
   if (needed < present) tolerance = 0.5 * needed;
-  tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls()));
+  const double shift = ShiftOfControls();
+  tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls(shift)));
   if (tolerance >= present || expansion_->StepsExactly()) return false;
   problem_.set_relative_tolerance(tolerance);
-  auto replayed = Replay(problem_, expansion_->design(), expansion_->noise().ForNewExpansion(),
-                         *store_, taken_, threads_, stop);
+  auto replayed = WithNewTolerance(shift, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
     if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays

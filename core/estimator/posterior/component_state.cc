@@ -80,6 +80,7 @@ ComponentState MixtureComponent::State() const {
   state.windows_from = windows_from_;
   state.window_end = window_end_;
   state.edges_row = edges_row_;
+  state.ahead_row = ahead_row_;
   state.patient_until = patient_until_;
   state.whole_until = whole_until_;
   state.settled_row = settled_row_;
@@ -110,6 +111,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
   component->windows_from_ = state.windows_from;
   component->window_end_ = state.window_end;
   component->edges_row_ = state.edges_row;
+  component->ahead_row_ = state.ahead_row;
   component->patient_until_ = state.patient_until;
   component->whole_until_ = state.whole_until;
   component->settled_row_ = state.settled_row;

@@ -24,6 +24,7 @@ struct ComponentState {
   int64_t windows_from = 0;
   int64_t window_end = 0;
   int64_t edges_row = 0;
+  int64_t ahead_row = 0;
   int64_t patient_until = 0;
   int64_t whole_until = 0;
   int64_t settled_row = -1;

@@ -101,6 +101,7 @@ class MixtureComponent {
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
   bool automatic_order() const { return !problem_.problem().expansion.order; }
   bool LooksAtEdges() const { return adaptive() && taken_ >= edges_row_; }
+  bool LooksAhead() const;
   bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
   absl::Status Recover(const Stop& stop);
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
@@ -124,14 +125,18 @@ class MixtureComponent {
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
-  double ToleranceForControls() const;
+  double ShiftOfControls() const;
+  double ToleranceForControls(double shift) const;
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> WithNewTolerance(double shift,
+                                                                      const Stop& stop) const;
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
-  absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order);
+  absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order, bool may_replay = true);
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);
   int64_t NextLook() const;
   bool Leans() const;
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
+  absl::StatusOr<bool> SettleAhead(const Stop& stop);
   bool LookForPieces();
   bool MayBisect() const;
   bool BisectElement();
@@ -159,6 +164,7 @@ class MixtureComponent {
   int64_t windows_from_ = 0;  // row from which the present windows are counted
   int64_t window_end_ = 2;
   int64_t edges_row_ = 2;               // row at which to look at the region's edges next
+  int64_t ahead_row_ = 0;               // no move ahead of need before this row
   int64_t patient_until_ = 0;           // rows before this one are taken regardless of residual
   int64_t whole_until_ = 0;             // no search for pieces before this row
   TemperedBeginning tempered_;          // what is left of it

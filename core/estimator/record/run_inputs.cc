@@ -7,13 +7,49 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/model/interpolation.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr int64_t kKnotRowsAtOnce = 64;
 
+// Knots of each input up to a time on which its curve from there on may depend (interpolation.h).
+constexpr int kKnotsBehind = 2 * kSplineReach + 2;
+
+// Adds the knots up to `time_s` in a block to their numbers, by input.
+void CountKnots(const RowBlock& block, double time_s, std::vector<int>& counts) {
+  const size_t width = block.values.size() / block.rows.size();
+  for (size_t row = 0; row < block.rows.size(); ++row) {
+    if (block.rows[row].time_s > time_s) break;
+    for (size_t i = 0; i < counts.size(); ++i) {
+      const double value = block.values[row * width + width - counts.size() + i];
+      if (!std::isnan(value)) ++counts[i];
+    }
+  }
+}
+
 }  // namespace
+
+absl::StatusOr<int64_t> RowOfFirstKnots(const ResolvedProblem& problem, const SampleStore& store,
+                                        int64_t run_begin, int64_t rows, double time_s) {
+  std::vector<int> counts(problem.streamed_inputs().size(), 0);
+  const auto few = [](int count) { return count < kKnotsBehind; };
+  RowBlock block;
+  int64_t first = rows;
+  while (first > run_begin && std::ranges::any_of(counts, few)) {
+    const int64_t count = std::min(kKnotRowsAtOnce, first - run_begin);
+    first -= count;
+    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
+    CountKnots(block, time_s, counts);
+  }
+  return first;
+}
+
+double LargestInputDelay(const EnsembleSpecification& specification) {
+  const Matrix& delays_s = specification.input_delays_s;
+  return delays_s.size() == 0 ? 0 : std::max(0.0, delays_s.maxCoeff());
+}
 
 RunInputs::RunInputs(const ResolvedProblem& problem, const SampleStore* store, int run,
                      int64_t first_row)
@@ -24,6 +60,12 @@ RunInputs::RunInputs(const ResolvedProblem& problem, const SampleStore* store, i
       next_row_(first_row),
       last_row_s_(-std::numeric_limits<double>::infinity()) {
   POLYEST_CHECK(store != nullptr || problem.streamed_inputs().empty());
+}
+
+void RunInputs::Forget(double time_s) {
+  for (const int input : problem_.streamed_inputs()) {
+    signals_[static_cast<size_t>(input)].Forget(time_s);
+  }
 }
 
 bool RunInputs::SettledUpTo(double time_s) const {

@@ -20,6 +20,18 @@ size_t Groups(const std::vector<ChannelSums>& sums) {
 
 Eigen::Index PackedSize(Eigen::Index terms) { return terms * (terms + 1) / 2; }
 
+// Returns the lower triangle by columns, of the mean of both.
+Vector Pack(const Matrix& g) {
+  Vector packed(PackedSize(g.rows()));
+  Eigen::Index first = 0;
+  for (Eigen::Index j = 0; j < g.rows(); ++j) {
+    const Eigen::Index count = g.rows() - j;
+    packed.segment(first, count) = 0.5 * (g.col(j).tail(count) + g.row(j).tail(count).transpose());
+    first += count;
+  }
+  return packed;
+}
+
 void AddPacked(const MismatchSums& sums, WindowSums::Totals& totals) {
   const Eigen::Index terms = sums.terms();
   Eigen::Index first = 0;
@@ -115,6 +127,30 @@ void WindowSums::MergeNeighbours() {
     windows_[i].span.start_s = first.start_s;
   }
   length_ *= 2;
+}
+
+void WindowSums::Substitute(const ConstMatrixRef& t, const ConstVectorRef& shift) {
+  for (size_t i = 0; i < closed_; ++i) {
+    for (Totals& group : windows_[i].totals) {
+      const Matrix g = Unpack(group.g, static_cast<int>(shift.size()));
+      // G′ = T G Tᵀ,  b′ = T (b − G δ)
+      group.b = t * (group.b - g * shift);
+      group.g = Pack(t * g * t.transpose());
+    }
+  }
+  windows_.resize(closed_);
+}
+
+void WindowSums::Divide(const Vector& factors, const std::vector<ChannelSums>& sums) {
+  size_t group = std::ranges::all_of(sums, &ChannelSums::scale_unknown) ? 0 : 1;
+  for (size_t c = 0; c < sums.size(); ++c) {
+    if (!sums[c].scale_unknown) continue;
+    for (size_t i = 0; i < closed_; ++i) {
+      windows_[i].totals[group].g /= factors[static_cast<Eigen::Index>(c)];
+      windows_[i].totals[group].b /= factors[static_cast<Eigen::Index>(c)];
+    }
+    ++group;
+  }
 }
 
 const WindowSpan& WindowSums::span(int window) const {

@@ -45,6 +45,14 @@ class WindowSums {
   // of a window. Channels and their kinds of noise must be those of earlier calls.
   void EndRow(const std::vector<ChannelSums>& sums, int run, double time_s);
 
+  // Replaces the terms φ by others φ′ with φ ≈ Tᵀφ′, as MismatchSums::Substituted does: `t` is
+  // S′ × S, `shift` = δ (S).
+  void Substitute(const ConstMatrixRef& t, const ConstVectorRef& shift);
+
+  // Divides the sums of each channel by its factor (m). Channels without a learned scale must have
+  // the factor 1.
+  void Divide(const Vector& factors, const std::vector<ChannelSums>& sums);
+
   // Returns the number of windows, including the present one, if it has rows.
   int count() const { return static_cast<int>(closed_) + (open_.rows > 0 ? 1 : 0); }
   const WindowSpan& span(int window) const;

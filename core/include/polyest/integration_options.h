@@ -35,7 +35,9 @@ struct IntegrationOptions {
   int max_steps = 100'000;
   // ≥ 1. Each time this number of samples of a run has passed, the integrators start anew from the
   // states there, so that an estimator can be restored there (EstimatorOptions::snapshot). That
-  // changes results, within the tolerance.
+  // changes results, within the tolerance. An expansion that moves later takes its sums along from
+  // there if they are accurate enough, which changes results by at most 0.005 of their standard
+  // deviations.
   int samples_between_checkpoints = 4096;
 
   // Returns OK, or INVALID_ARGUMENT with the field, the value and the rule.

@@ -81,6 +81,19 @@ TEST(Snapshot, LetsAnEstimatorGoOnToTheSameBits) {
   EXPECT_GE(outcome.restored, 4);
 }
 
+// The phase tells ever more of the frequency, so that the expansion moves again and again, with its
+// sums, while nothing is propagated from the beginning.
+TEST(Snapshot, HoldsSumsThatWereCarriedOver) {
+  Problem problem = OscillatorProblem(0.005);
+  problem.fixed = {{"m", 1}, {"c", 0}};
+  const Samples samples = Record(
+      "x", [](double t) { return 1.1 * std::cos(std::sqrt(9.7) * t); }, 0.005, 4000);
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, samples, 450);
+  const Estimate &first = outcome.estimates[2], &last = outcome.estimates.back();
+  EXPECT_GT(last.expansion.reexpansions, first.expansion.reexpansions + 1);
+  EXPECT_LT(last.expansion.trajectories, 1.5 * first.expansion.trajectories);
+}
+
 TEST(Snapshot, ChangesNoAnswer) {
   Problem problem = OscillatorProblem();
   problem.integration.samples_between_checkpoints = kInterval;

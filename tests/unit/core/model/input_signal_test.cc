@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -188,6 +189,32 @@ TEST(StreamedInput, BeginsANewRunWhenCleared) {
   signal.Append(1, 3);  // earlier than the last knot of the previous run
   EXPECT_EQ(signal.Shape(0), 3);
   EXPECT_EQ(Breaks(signal, 0), (std::vector<double>{1}));
+}
+
+TEST(StreamedInput, IsTheSameAfterForgettingKnots) {
+  for (const Interpolation interpolation :
+       {Interpolation::kLinear, Interpolation::kHold, Interpolation::kCubic,
+        Interpolation::kShapePreserving}) {
+    StreamedInput input;
+    input.interpolation = interpolation;
+    InputSignal all = InputSignal::Make(input).value(), bounded = all;
+    size_t most = 0;
+    for (int k = 0; k < 20'000; ++k) {
+      const double time_s = 0.1 * k, value = std::sin(0.7 * k) + 0.01 * (k % 7);
+      all.Append(time_s, value);
+      bounded.Append(time_s, value);
+      if (k % 50 != 49) continue;
+      const double now_s = time_s - 0.53;  // four knots ahead are more than any curve needs
+      bounded.Forget(now_s);
+      most = std::max(most, bounded.knot_times_s().size());
+      ASSERT_EQ(bounded.Shape(now_s), all.Shape(now_s));
+      ASSERT_EQ(bounded.Shape(now_s + 0.07), all.Shape(now_s + 0.07));
+      ASSERT_EQ(bounded.NextBreak(now_s), all.NextBreak(now_s));
+      ASSERT_EQ(bounded.NextKnot(now_s), all.NextKnot(now_s));
+      ASSERT_EQ(bounded.SettledUpTo(now_s), all.SettledUpTo(now_s));
+    }
+    EXPECT_LT(most, 2'500);
+  }
 }
 
 TEST(StreamedInputDeathTest, TakesOnlyFiniteKnotsInIncreasingTime) {

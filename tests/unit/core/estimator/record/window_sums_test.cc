@@ -95,5 +95,47 @@ TEST(WindowSums, DoNotSuitOtherRowsOrTerms) {
   EXPECT_FALSE(windows.Suits(std::vector<ChannelSums>(1, ChannelSums(kTerms + 1)), 70));
 }
 
+// Substitutes terms and compares with windows of the substituted coefficients.
+TEST(WindowSums, AreThoseOfOtherTerms) {
+  std::vector<ChannelSums> sums = ThreeChannels(), expected_sums = ThreeChannels();
+  WindowSums windows, expected;
+  const Matrix t{{2, -1, 0.5}, {0, 1, 3}, {1, 0, -1}};
+  const Vector shift{{0.3, -0.2, 0.1}};
+  for (int64_t row = 0; row < 150; ++row) {
+    AddRow(row, sums, windows);
+    for (int c = 0; c < 3; ++c) {
+      // e′ = e − cᵀδ for the coefficients c′ = T c
+      const Vector before = Coefficients(row, c);
+      expected_sums[static_cast<size_t>(c)].samples.Add(
+          t * before, std::cos(0.1 * static_cast<double>(row)) - before.dot(shift), 0.25);
+    }
+    expected.EndRow(expected_sums, static_cast<int>(row / 100), 0.5 * static_cast<double>(row));
+  }
+  windows.Substitute(t, shift);
+  ASSERT_EQ(windows.count(), expected.count());
+  for (int w = 0; w + 1 < windows.count(); ++w) {
+    const auto a = windows.TotalsAt(w, sums), b = expected.TotalsAt(w, expected_sums);
+    for (size_t group = 0; group < 3; ++group) {
+      // Sums of 150 products of at most 10 each.
+      EXPECT_LT((a[group].g - b[group].g).cwiseAbs().maxCoeff(), 1e-9);
+      EXPECT_LT((a[group].b - b[group].b).cwiseAbs().maxCoeff(), 1e-9);
+    }
+  }
+}
+
+TEST(WindowSums, OfALearnedScaleAreDividedAlone) {
+  std::vector<ChannelSums> sums = ThreeChannels();
+  WindowSums windows;
+  for (int64_t row = 0; row < 70; ++row) AddRow(row, sums, windows);
+  const auto before = windows.TotalsAt(3, sums);
+  windows.Divide(Vector{{4, 2, 1}}, sums);
+  const auto after = windows.TotalsAt(3, sums);
+  const double factors[] = {1, 4, 2};  // the known channel's group comes first
+  for (size_t group = 0; group < 3; ++group) {
+    EXPECT_EQ(after[group].g, before[group].g / factors[group]);
+    EXPECT_EQ(after[group].b, before[group].b / factors[group]);
+  }
+}
+
 }  // namespace
 }  // namespace polyest::internal

@@ -1,0 +1,162 @@
+#include "core/estimator/expansion/carried_state.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/common/status.h"
+#include "core/propagation/ensemble_points.h"
+
+namespace polyest::internal {
+namespace {
+
+// Makes the state of an expansion over the new region after the rows of the state kept.
+class Substitution {
+ public:
+  Substitution(const RegionalExpansion& present, const ExpansionState& kept, int controls)
+      : present_(present), kept_(kept), before_(present.design()), controls_(controls) {}
+
+  // Finds T, δ and the terms at the new points. Fails if a collocation matrix cannot be factored.
+  absl::Status Prepare(const ExpansionDesign& design) {
+    first_check_ = design.points.rows();
+    POLYEST_ASSIGN_OR_RETURN(CollocationMatrix after,
+                             CollocationMatrix::Factor(*design.basis, design.points));
+    Matrix points(design.points.rows() + design.check_points.rows(), design.points.cols());
+    points << design.points, design.check_points;
+    before_.basis->EvaluateMany(before_.region.ManyToLocal(design.region.ManyToGerm(points)), phi_);
+    const Eigen::Index old_terms = phi_.cols();
+    transfer_.resize(design.basis->size(), old_terms);
+    Vector residual(old_terms);
+    after.Solve(phi_.topRows(design.points.rows()), transfer_, residual);
+    Vector reference(old_terms), new_reference(transfer_.rows());
+    before_.basis->Evaluate(before_.reference, reference);
+    design.basis->Evaluate(design.reference, new_reference);
+    shift_ = transfer_.transpose() * new_reference - reference;
+    design.basis->EvaluateMany(points, new_phi_);
+    new_phi_.rowwise() -= new_reference.transpose();
+    return absl::OkStatus();
+  }
+
+  // Returns the state; `error` is Σ ρ/R that the sums keep.
+  absl::StatusOr<ExpansionState> StateOn(const ExpansionDesign& design, double error) const {
+    ExpansionState state;
+    state.design = StateOf(design);
+    state.noise = present_.noise().ForNewExpansion();
+    state.absorbed = Absorbed(design, error);
+    for (int q = 0; q < static_cast<int>(design.points.rows()); ++q) state.kept.push_back(q);
+    state.run = kept_.run;
+    POLYEST_RETURN_IF_ERROR(SetTrajectories(state));
+    return state;
+  }
+
+ private:
+  Eigen::Index channels() const { return std::ssize(kept_.absorbed.sums); }
+  Eigen::Index old_controls() const {
+    return kept_.absorbed.control_scores.cols() / std::max<Eigen::Index>(1, channels());
+  }
+  Eigen::Index old_points() const { return before_.points.rows() + before_.check_points.rows(); }
+
+  AbsorbedRows Absorbed(const ExpansionDesign& design, double error) const {
+    const AbsorbedRows& old = kept_.absorbed;
+    AbsorbedRows absorbed = old;
+    absorbed.own_error = absorbed.carried_error = error;
+    absorbed.windows.Substitute(transfer_, shift_);
+    absorbed.previous_coefficients = transfer_ * old.previous_coefficients;
+    absorbed.previous_error -= old.previous_coefficients.transpose() * shift_;
+    const Eigen::Index points = design.points.rows(), checks = design.check_points.rows();
+    absorbed.check_residual.setConstant(checks, error);
+    absorbed.check_valid.assign(static_cast<size_t>(checks), true);
+    absorbed.check_chi_squared.resize(checks, channels());
+    absorbed.point_chi_squared.resize(points, channels());
+    for (Eigen::Index c = 0; c < channels(); ++c) {
+      ChannelSums& sums = absorbed.sums[static_cast<size_t>(c)];
+      sums.samples = sums.samples.Substituted(transfer_, shift_);
+      sums.differences = sums.differences.Substituted(transfer_, shift_);
+      for (Eigen::Index i = 0; i < new_phi_.rows(); ++i) {
+        const double chi_squared = sums.samples.ChiSquared(new_phi_.row(i).transpose());
+        (i < points ? absorbed.point_chi_squared(i, c)
+                    : absorbed.check_chi_squared(i - points, c)) = chi_squared;
+      }
+    }
+    SetControlScores(absorbed);
+    return absorbed;
+  }
+
+  // A control trajectory belongs to a check point. What the error of integration does changes
+  // little over the posterior, so that the scores of one stand for those of another.
+  void SetControlScores(AbsorbedRows& absorbed) const {
+    absorbed.control_valid.assign(static_cast<size_t>(controls_), true);
+    const Matrix scores = transfer_ * kept_.absorbed.control_scores;
+    absorbed.control_scores.resize(transfer_.rows(), controls_ * channels());
+    for (Eigen::Index i = 0; i < controls_; ++i) {
+      absorbed.control_scores.middleCols(i * channels(), channels()) =
+          scores.middleCols(i % old_controls() * channels(), channels());
+    }
+  }
+
+  // Returns what the polynomial fitted to the values of the collocation points (the first rows) is
+  // at the new points. Below them, the new control trajectories differ from their check points as
+  // the old ones did.
+  absl::StatusOr<Matrix> AtNewPoints(const Matrix& values) const {
+    const Eigen::Index points = before_.points.rows();
+    POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
+                             CollocationMatrix::Factor(*before_.basis, before_.points));
+    Matrix coefficients(phi_.cols(), values.cols());
+    Vector residual(values.cols());
+    fit.Solve(values.topRows(points), coefficients, residual);
+    Matrix moved(phi_.rows() + controls_, values.cols());
+    moved.topRows(phi_.rows()) = phi_ * coefficients;
+    for (Eigen::Index i = 0; i < controls_; ++i) {
+      const Eigen::Index old = i % old_controls();
+      moved.row(phi_.rows() + i) =
+          moved.row(first_check_ + i) + values.row(old_points() + old) - values.row(points + old);
+    }
+    return moved;
+  }
+
+  absl::Status SetTrajectories(ExpansionState& state) const {
+    for (const PreviousSample& sample : kept_.previous) {
+      PreviousSample& moved = state.previous.emplace_back(sample);
+      Matrix outputs = sample.output;
+      POLYEST_ASSIGN_OR_RETURN(outputs, AtNewPoints(outputs));
+      moved.output = outputs.col(0);
+    }
+    if (!kept_.ensemble) return absl::OkStatus();
+    const Matrix own = StatesOf(*kept_.ensemble);
+    Matrix states(old_points() + old_controls(), own.cols());
+    states.topRows(own.rows()) = own;
+    if (kept_.controls) states.bottomRows(old_controls()) = StatesOf(*kept_.controls);
+    POLYEST_ASSIGN_OR_RETURN(const Matrix moved, AtNewPoints(states));
+    state.ensemble = WithStates(*kept_.ensemble, moved.topRows(phi_.rows()));
+    if (controls_ > 0) state.controls = WithStates(*kept_.controls, moved.bottomRows(controls_));
+    return absl::OkStatus();
+  }
+
+  const RegionalExpansion& present_;
+  const ExpansionState& kept_;
+  const ExpansionDesign& before_;
+  Eigen::Index controls_;
+  Eigen::Index first_check_ = 0;  // its row among the new points
+  Matrix transfer_;               // T, S′ × S
+  Vector shift_;                  // δ, S
+  Matrix phi_, new_phi_;  // φ and φ′ − φ′_0 at the new points, (Q′ + C′) × S and × S′
+};
+
+}  // namespace
+
+absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
+                                            const RegionalExpansion& present,
+                                            const ExpansionState& kept,
+                                            const ExpansionDesign& design, double error) {
+  // A new expansion knows how many control trajectories it has.
+  POLYEST_ASSIGN_OR_RETURN(
+      const auto fresh,
+      RegionalExpansion::Make(problem, nullptr, design, present.noise().ForNewExpansion(), 1));
+  if (fresh->controls() > 0 && kept.absorbed.control_scores.cols() == 0) {
+    return absl::FailedPreconditionError("there are no control trajectories");
+  }
+  Substitution substitution(present, kept, fresh->controls());
+  POLYEST_RETURN_IF_ERROR(substitution.Prepare(design));
+  return substitution.StateOn(design, error);
+}
+
+}  // namespace polyest::internal

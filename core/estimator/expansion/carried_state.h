@@ -1,0 +1,21 @@
+#pragma once
+
+// The state of an expansion that has been moved to another region (carry_over.h).
+
+#include <absl/status/statusor.h>
+
+#include "core/estimator/expansion/expansion_state.h"
+
+namespace polyest::internal {
+
+// Returns the state that an expansion of the design has after the rows of the state `kept`, which
+// is one of `present`: the sums by its own terms, and trajectories in states interpolated between
+// those of the collocation points. `error` is Σ ρ/R of the sums in the new region. Returns
+// FailedPrecondition if a collocation matrix cannot be factored or the new expansion has control
+// trajectories and the present one none.
+absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
+                                            const RegionalExpansion& present,
+                                            const ExpansionState& kept,
+                                            const ExpansionDesign& design, double error);
+
+}  // namespace polyest::internal

@@ -1,0 +1,74 @@
+// The state that an expansion keeps on its way along the record (regional_expansion.h), so that it
+// can be made again, or another one in its place, without its first rows.
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "core/estimator/expansion/expansion_state.h"
+#include "core/estimator/expansion/regional_expansion.h"
+#include "core/propagation/ensemble_propagator.h"
+
+namespace polyest::internal {
+namespace {
+
+int64_t Interval(const ResolvedProblem& problem) {
+  return problem.problem().integration.samples_between_checkpoints;
+}
+
+bool HasStatesInRuns(const ResolvedProblem& problem) {
+  return HasCheckpointsInRuns(*problem.problem().model) && !problem.delays_outputs();
+}
+
+// Returns the number of rows after which a state was kept.
+int64_t KeptRows(const std::shared_ptr<const ExpansionState>& state) {
+  return state ? state->absorbed.rows : 0;
+}
+
+}  // namespace
+
+int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
+  const int64_t interval = Interval(problem_);
+  const bool inside = HasStatesInRuns(problem_);
+  int64_t kept = KeptRows(kept_state_), begin = run_begin_;
+  int run = run_;
+  for (int k = 0; k < block.count(); ++k) {
+    const int64_t row = next_row_ + k;
+    const bool begins = block.rows[static_cast<size_t>(k)].run != run;
+    const bool due = begins ? row - kept >= interval : inside && (row - begin) % interval == 0;
+    if (due && k > 0) return k;
+    if (due) kept = row;
+    if (!begins) continue;
+    begin = row;
+    run = block.rows[static_cast<size_t>(k)].run;
+  }
+  return block.count();
+}
+
+// Returns the time before the present one from which trajectories of the run may need the inputs,
+// +∞ if they may need them from its beginning.
+double RegionalExpansion::InputReach(int run) const {
+  if (problem_.streamed_inputs().empty() || !HasStatesInRuns(problem_)) return kInfinity;
+  return LargestInputDelay(problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run));
+}
+
+// Keeps the present state if it is one that can be gone on from. `next_run` is the run of the next
+// row.
+void RegionalExpansion::KeepState(int next_run) {
+  if (absorbed_.rows != next_row_ || next_row_ == problem_.first_row()) return;
+  const bool begins = next_run != run_;
+  const int64_t interval = Interval(problem_);
+  const bool due = begins ? next_row_ - KeptRows(kept_state_) >= interval
+                          : HasStatesInRuns(problem_) && (next_row_ - run_begin_) % interval == 0;
+  if (!due || KeptRows(kept_state_) == next_row_) return;
+  ExpansionState state = State();
+  if (begins) {
+    state.ensemble.reset();
+    state.controls.reset();
+  } else if (!state.ensemble) {
+    return;
+  }
+  kept_state_ = std::make_shared<const ExpansionState>(std::move(state));
+}
+
+}  // namespace polyest::internal
