@@ -102,6 +102,12 @@ std::string Process::ReadAll() {
 
 void Process::Signal(int signal_number) { kill(pid_, signal_number); }
 
+bool Process::HasEnded() const {
+  siginfo_t info = {};
+  return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         info.si_pid == pid_;
+}
+
 int Process::Wait() {
   int status = 0;
   while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {

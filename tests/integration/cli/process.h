@@ -24,6 +24,8 @@ class Process {
   std::string ReadLine();
   std::string ReadAll();
   void Signal(int signal_number);
+  // Returns whether the process has ended; Wait is then still to be called.
+  bool HasEnded() const;
   // Waits for the end; returns the exit status, or 128 + the signal that ended the process.
   int Wait();
   // Returns all that the process has written to its standard error so far.

@@ -226,7 +226,9 @@ class CountingStore final : public SampleStore {
 std::pair<Estimate, int64_t> TakeCounted(const Problem& problem, const Samples& record,
                                          size_t batch) {
   const auto store = std::make_shared<CountingStore>();
-  const auto estimator = MakeEstimator(problem, {.store = store});
+  EstimatorOptions options;
+  options.store = store;
+  const auto estimator = MakeEstimator(problem, options);
   int64_t most = 0;
   for (size_t first = 0; first < record.rows(); first += batch) {
     EXPECT_TRUE(estimator->Append(testing::Rows(record, first, batch)).ok());

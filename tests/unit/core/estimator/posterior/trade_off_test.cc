@@ -16,7 +16,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr int kDraws = 4'000;
+constexpr int kJointDraws = 4'000;
 
 // Finds the trade-offs between draws of a, spread by 20 %, and of b = known(a) with a spread of 0.1
 // %.
@@ -25,12 +25,12 @@ std::vector<TradeOff> TradeOffsOf(Function known, const std::string& unit,
                                   Verdict verdict = Verdict::kNotIdentified) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
-  Matrix thetas(kDraws, 2);
-  for (int i = 0; i < kDraws; ++i) {
+  Matrix thetas(kJointDraws, 2);
+  for (int i = 0; i < kJointDraws; ++i) {
     thetas(i, 0) = 10 * std::exp(0.2 * normal(random));
     thetas(i, 1) = known(thetas(i, 0)) * (1 + 0.001 * normal(random));
   }
-  const Vector weights = Vector::Constant(kDraws, 1.0 / kDraws);
+  const Vector weights = Vector::Constant(kJointDraws, 1.0 / kJointDraws);
   return FindTradeOffs(thetas, weights, {"a", "b"}, {"kg", unit}, {verdict, verdict});
 }
 
