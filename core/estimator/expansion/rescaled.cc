@@ -83,7 +83,8 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(const ResolvedProble
                                                             LearnedNoise noise,
                                                             const SampleStore& store, int64_t rows,
                                                             int threads, const Stop& stop) {
-  if (!present.kept_state() || rows != present.absorbed_rows()) {
+  const bool is_short = rows <= RowsOfShortRecord(problem);
+  if (is_short || !present.kept_state() || rows != present.absorbed_rows()) {
     return absl::FailedPreconditionError("there is no state to go on from");
   }
   const std::optional<Vector> factors = VarianceFactors(problem, present, noise);
