@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_format.h>
 
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "polyest/catalogue.h"
 #include "proto/wire/convert/annotate.h"
 #include "proto/wire/convert/problem_columns.h"
+#include "proto/wire/convert/uncertain_parameter.h"
 #include "proto/wire/convert/wire_fields.h"
 
 namespace polyest::internal {
@@ -83,75 +83,15 @@ std::shared_ptr<const Model> ToModel(const v1::Problem& problem, const ModelLibr
   return nullptr;
 }
 
-absl::StatusOr<UncertainParameter> ToTruncatedNormal(
-    const std::string& name, const v1::UncertainParameter::TruncatedNormalPrior& prior) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  if (!prior.has_lower() && !prior.has_upper()) {
-    return InvalidField("truncated_normal", "lower or upper must be given");
-  }
-  return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
-                                             prior.has_lower() ? prior.lower() : -kInfinity,
-                                             prior.has_upper() ? prior.upper() : kInfinity);
-}
-
-absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& parameter) {
-  const std::string& name = parameter.name();
-  switch (parameter.prior_case()) {
-    case v1::UncertainParameter::kUniform: {
-      const auto& prior = parameter.uniform();
-      return UncertainParameter::Uniform(name, prior.lower(), prior.upper());
-    }
-    case v1::UncertainParameter::kNormal: {
-      const auto& prior = parameter.normal();
-      return UncertainParameter::Normal(name, prior.mean(), prior.std_dev());
-    }
-    case v1::UncertainParameter::kBeta: {
-      const auto& prior = parameter.beta();
-      return UncertainParameter::Beta(name, prior.alpha(), prior.beta(), prior.lower(),
-                                      prior.upper());
-    }
-    case v1::UncertainParameter::kGamma: {
-      const auto& prior = parameter.gamma();
-      return UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift());
-    }
-    case v1::UncertainParameter::kLognormal: {
-      const auto& prior = parameter.lognormal();
-      return UncertainParameter::Lognormal(name, prior.mean(), prior.std_dev());
-    }
-    case v1::UncertainParameter::kTruncatedNormal:
-      return ToTruncatedNormal(name, parameter.truncated_normal());
-    case v1::UncertainParameter::PRIOR_NOT_SET:
-      break;
-  }
-  return absl::InvalidArgumentError(absl::StrFormat(
-      "%s needs a prior: uniform, normal, beta, gamma, lognormal or truncatedNormal",
-      name.empty() ? "the parameter" : name));
-}
-
-std::optional<RandomWalk> ToDrift(const v1::UncertainParameter& parameter, const FieldPath& field,
-                                  Refusals& refusals) {
-  if (!parameter.has_drift()) return std::nullopt;
-  if (!parameter.drift().has_random_walk()) {
-    refusals.push_back(
-        InvalidField(field, "needs a kind: {\"randomWalk\": {\"stdDevPerSqrtS\": 0.1}}"));
-    return std::nullopt;
-  }
-  const auto& walk = parameter.drift().random_walk();
-  return RandomWalk{.std_dev_per_sqrt_s = walk.std_dev_per_sqrt_s(),
-                    .unknown = walk.unknown(),
-                    .lower = walk.lower(),
-                    .upper = walk.upper()};
-}
-
 std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals& refusals) {
   std::vector<UncertainParameter> uncertain;
   for (int i = 0; i < problem.uncertain_size(); ++i) {
-    const std::string& name = problem.uncertain(i).name();
+    const FieldPath field{"uncertain", i};
     // An invalid prior is replaced by one on the positive half-line, which suits every quantity.
-    uncertain.push_back(ValueOr(Within({"uncertain", i}, ToPrior(problem.uncertain(i))),
-                                {name, Germ::Gamma(1)}, refusals));
+    uncertain.push_back(ValueOr(Within(field, ToPrior(problem.uncertain(i))),
+                                {problem.uncertain(i).name(), Germ::Gamma(1)}, refusals));
     uncertain.back().per_run = problem.uncertain(i).per_run();
-    uncertain.back().drift = ToDrift(problem.uncertain(i), {"uncertain", i, "drift"}, refusals);
+    uncertain.back().drift = ValueOr(Within(field, ToDrift(problem.uncertain(i))), {}, refusals);
   }
   return uncertain;
 }

@@ -1,0 +1,72 @@
+#include "proto/wire/convert/uncertain_parameter.h"
+
+#include <absl/strings/str_format.h>
+
+#include <limits>
+#include <string>
+
+#include "core/common/field_error.h"
+
+namespace polyest::internal {
+namespace {
+
+absl::StatusOr<UncertainParameter> ToTruncatedNormal(
+    const std::string& name, const v1::UncertainParameter::TruncatedNormalPrior& prior) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!prior.has_lower() && !prior.has_upper()) {
+    return InvalidField("truncated_normal", "lower or upper must be given");
+  }
+  return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
+                                             prior.has_lower() ? prior.lower() : -kInfinity,
+                                             prior.has_upper() ? prior.upper() : kInfinity);
+}
+
+}  // namespace
+
+absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& parameter) {
+  const std::string& name = parameter.name();
+  switch (parameter.prior_case()) {
+    case v1::UncertainParameter::kUniform: {
+      const auto& prior = parameter.uniform();
+      return UncertainParameter::Uniform(name, prior.lower(), prior.upper());
+    }
+    case v1::UncertainParameter::kNormal: {
+      const auto& prior = parameter.normal();
+      return UncertainParameter::Normal(name, prior.mean(), prior.std_dev());
+    }
+    case v1::UncertainParameter::kBeta: {
+      const auto& prior = parameter.beta();
+      return UncertainParameter::Beta(name, prior.alpha(), prior.beta(), prior.lower(),
+                                      prior.upper());
+    }
+    case v1::UncertainParameter::kGamma: {
+      const auto& prior = parameter.gamma();
+      return UncertainParameter::Gamma(name, prior.shape(), prior.scale(), prior.shift());
+    }
+    case v1::UncertainParameter::kLognormal: {
+      const auto& prior = parameter.lognormal();
+      return UncertainParameter::Lognormal(name, prior.mean(), prior.std_dev());
+    }
+    case v1::UncertainParameter::kTruncatedNormal:
+      return ToTruncatedNormal(name, parameter.truncated_normal());
+    case v1::UncertainParameter::PRIOR_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s needs a prior: uniform, normal, beta, gamma, lognormal or truncatedNormal",
+      name.empty() ? "the parameter" : name));
+}
+
+absl::StatusOr<std::optional<RandomWalk>> ToDrift(const v1::UncertainParameter& parameter) {
+  if (!parameter.has_drift()) return std::nullopt;
+  if (!parameter.drift().has_random_walk()) {
+    return InvalidField("drift", "needs a kind: {\"randomWalk\": {\"stdDevPerSqrtS\": 0.1}}");
+  }
+  const auto& walk = parameter.drift().random_walk();
+  return RandomWalk{.std_dev_per_sqrt_s = walk.std_dev_per_sqrt_s(),
+                    .unknown = walk.unknown(),
+                    .lower = walk.lower(),
+                    .upper = walk.upper()};
+}
+
+}  // namespace polyest::internal
