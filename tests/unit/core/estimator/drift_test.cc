@@ -143,27 +143,23 @@ TEST(Drift, OfUnknownRateIsWeightedByItsEvidence) {
   EXPECT_NEAR(estimate.filtered[1].std_dev, deviation, 0.03 * deviation);
 }
 
-// 95 % intervals hold the level and the rate in 19 of 20 records; three standard deviations of a
-// binomial less are 16.
+// 95 % intervals hold the level in 19 of 20 records; three standard deviations of a binomial less
+// are 16.
 TEST(Drift, IntervalsCoverTheLevel) {
-  int now = 0, rate = 0;
+  int covered = 0;
   for (uint64_t seed = 1; seed <= 20; ++seed) {
-    const Samples samples = Walk(60, seed);
+    const Samples samples = Walk(40, seed);
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     double truth = 6;
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 40; ++i) {
       truth += kRate * std::sqrt(kStepS) * normal(random);
       normal(random);
     }
-    const Estimate estimate = EstimateOf(WithUnknownRate(), samples);
-    const FilteredQuantity& a = estimate.filtered[1];
-    const ParameterEstimate& found = estimate.parameters[1];
-    now += a.lower95 <= truth && truth <= a.upper95;
-    rate += found.lower95 <= kRate && kRate <= found.upper95;
+    const FilteredQuantity a = EstimateOf(DriftingLevel(), samples).filtered[1];
+    covered += a.lower95 <= truth && truth <= a.upper95;
   }
-  EXPECT_GE(now, 16);
-  EXPECT_GE(rate, 16);
+  EXPECT_GE(covered, 16);
 }
 
 // Expects the predictions from row 60 on, where the level at the beginning no longer matters, to be
@@ -296,17 +292,18 @@ TEST(Drift, FollowsAStiffness) {
 
 // Rate and noise have the posterior ∝ prior · likelihood on a grid of their logarithms.
 TEST(Drift, IsToldApartFromTheNoise) {
-  const Samples samples = Walk(300, 6);
-  Problem problem = WithUnknownRate();
+  const Samples samples = Walk(200, 6);
+  Problem problem = DriftingLevel();
+  problem.uncertain[0].drift = RandomWalk{.unknown = true, .lower = 0.1, .upper = 1};
   problem.measured[0].noise.absolute = 0.3;
-  problem.uncertain.push_back(UncertainParameter::LogUniform("y.noise", 0.05, 1).value());
+  problem.uncertain.push_back(UncertainParameter::LogUniform("y.noise", 0.1, 0.4).value());
   const Estimate estimate = EstimateOf(problem, samples);
   double all = 0, rate = 0, noise = 0;
   const double most = ExactFilter(samples, kRate).log_likelihood;
-  for (int i = 0; i <= 200; ++i) {
-    const double r = std::exp(std::log(0.01) + i / 200.0 * std::log(300.0));
-    for (int j = 0; j <= 200; ++j) {
-      const double sigma = std::exp(std::log(0.05) + j / 200.0 * std::log(20.0));
+  for (int i = 0; i <= 60; ++i) {
+    const double r = std::exp(std::log(0.1) + i / 60.0 * std::log(10.0));
+    for (int j = 0; j <= 60; ++j) {
+      const double sigma = std::exp(std::log(0.1) + j / 60.0 * std::log(4.0));
       const double weight =
           std::exp(ExactFilter(samples, r, samples.rows(), sigma).log_likelihood - most);
       all += weight;
