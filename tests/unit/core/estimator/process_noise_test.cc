@@ -214,8 +214,8 @@ double SquaredError(const Estimate& estimate) {
   return sum;
 }
 
-// Six campaigns with k and c each: Σ (error ÷ standard deviation)² is a χ² of 12 degrees of freedom,
-// which lies in 2.21 … 32.9 with the probability 0.998.
+// Six campaigns with k and c each: Σ (error ÷ standard deviation)² is a χ² of 12 degrees of
+// freedom, which lies in 2.21 … 32.9 with the probability 0.998.
 TEST(ProcessNoise, CoversTheTruth) {
   double sum = 0;
   for (uint64_t seed = 1; seed <= 6; ++seed) {
