@@ -81,7 +81,7 @@ TEST_F(DataFilesTest, EstimateFromAGermanSpreadsheet) {
       Run({"estimate", problem_, german_, "--time-zero", "first", "--format", "json"});
   ASSERT_EQ(run.exit_status, 0) << run.err;
   EXPECT_EQ(run.err, absl::StrCat(german_, ": ", kFound, "\n"));
-  const v1::ParameterEstimate& k = ParseEstimate(run.out).parameters(0);
+  const v1::ParameterEstimate k = ParseEstimate(run.out).parameters(0);
   EXPECT_NEAR(k.mean(), kStiffness, 4 * k.posterior_std_dev());
   EXPECT_LT(k.posterior_std_dev(), 0.02);
   EXPECT_EQ(k.verdict(), v1::Identifiability::IDENTIFIED);
@@ -89,7 +89,7 @@ TEST_F(DataFilesTest, EstimateFromAGermanSpreadsheet) {
   ASSERT_EQ(plain.exit_status, 0) << plain.err;
   EXPECT_THAT(plain.err, IsEmpty());
   // The times of the two files differ by the rounding of a subtraction.
-  const v1::ParameterEstimate& same = ParseEstimate(plain.out).parameters(0);
+  const v1::ParameterEstimate same = ParseEstimate(plain.out).parameters(0);
   EXPECT_NEAR(k.mean(), same.mean(), 1e-6 * kStiffness);
   EXPECT_NEAR(k.std_dev(), same.std_dev(), 1e-4 * same.std_dev());
 }
@@ -123,7 +123,7 @@ TEST_F(DataFilesTest, StreamsThemToo) {
   // What is said after the first batch knows its rows only.
   EXPECT_THAT(run.err, AllOf(StartsWith("standard input: semicolons, decimal comma, UTF-16; 'Disp"),
                              HasSubstr("100 rows, t = 0 at 12,345\n")));
-  const v1::ParameterEstimate& k = ParseEstimate(Lines(run.out).back()).parameters(0);
+  const v1::ParameterEstimate k = ParseEstimate(Lines(run.out).back()).parameters(0);
   EXPECT_NEAR(k.mean(), kStiffness, 4 * k.posterior_std_dev());
 }
 
