@@ -8,8 +8,8 @@
 
 #include "core/common/check.h"
 #include "core/common/field_error.h"
-#include "core/common/parallel.h"
 #include "core/common/status.h"
+#include "core/propagation/ensemble_blocks.h"
 #include "core/propagation/linear_system.h"
 #include "core/propagation/trajectory_block.h"
 
@@ -41,38 +41,34 @@ namespace {
 // An ensemble of a state-space model, integrated in blocks of trajectories.
 class IntegratedEnsemble final : public TrajectoryEnsemble {
  public:
-  IntegratedEnsemble(EnsembleSpecification specification, const InputSignals* inputs);
+  IntegratedEnsemble(EnsembleSpecification specification, const InputSignals* inputs)
+      : specification_(std::move(specification)),
+        blocks_(MakeBlocks(inputs), specification_.threads,
+                specification_.integration.samples_between_checkpoints) {}
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
                        const Stop& stop) override;
   int points() const override { return static_cast<int>(specification_.parameters.rows()); }
-  const std::vector<PointFailure>& failures() const override { return failures_; }
-  std::optional<EnsembleState> State() const override;
-  bool Restore(const EnsembleState& state) override;
+  const std::vector<PointFailure>& failures() const override { return blocks_.failures(); }
+  std::optional<EnsembleState> State() const override { return blocks_.State(); }
+  bool Restore(const EnsembleState& state) override { return blocks_.Restore(state); }
 
  private:
-  bool AtCheckpoint() const;
-  absl::Status AdvanceBlocks(std::span<const double> times_s, MatrixRef outputs, const Stop& stop);
-  void CollectFailures();
+  std::vector<std::unique_ptr<TrajectoryBlock>> MakeBlocks(const InputSignals* inputs) const;
 
   EnsembleSpecification specification_;
-  int64_t samples_ = 0;
-  double time_s_ = 0;  // time of the last sample
-  std::vector<std::unique_ptr<TrajectoryBlock>> blocks_;
-  std::vector<absl::Status> statuses_;  // one per block
-  std::vector<PointFailure> failures_;
+  EnsembleBlocks<TrajectoryBlock> blocks_;
 };
 
-IntegratedEnsemble::IntegratedEnsemble(EnsembleSpecification specification,
-                                       const InputSignals* inputs)
-    : specification_(std::move(specification)) {
+std::vector<std::unique_ptr<TrajectoryBlock>> IntegratedEnsemble::MakeBlocks(
+    const InputSignals* inputs) const {
+  std::vector<std::unique_ptr<TrajectoryBlock>> blocks;
   const bool exact = StepsExactly(specification_, *inputs);
   for (int first = 0; first < points(); first += TrajectoryBlock::kPoints) {
     const int count = std::min(TrajectoryBlock::kPoints, points() - first);
-    blocks_.push_back(
+    blocks.push_back(
         std::make_unique<TrajectoryBlock>(&specification_, inputs, first, count, exact));
   }
-  statuses_.resize(blocks_.size());
-  CollectFailures();
+  return blocks;
 }
 
 absl::Status IntegratedEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -80,70 +76,11 @@ absl::Status IntegratedEnsemble::Advance(std::span<const double> times_s, Matrix
   POLYEST_CHECK(outputs.rows() == points());
   const Eigen::Index m = std::ssize(specification_.outputs);
   POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * m);
-  const int64_t interval = specification_.integration.samples_between_checkpoints;
-  for (size_t first = 0; first < times_s.size();) {
-    if (AtCheckpoint()) {
-      for (const auto& block : blocks_) block->Restart();
-    }
-    const auto left = static_cast<int64_t>(times_s.size() - first);
-    const auto count = static_cast<size_t>(std::min(left, interval - samples_ % interval));
-    const std::span<const double> stretch = times_s.subspan(first, count);
-    const auto columns = static_cast<Eigen::Index>(count) * m;
-    POLYEST_RETURN_IF_ERROR(AdvanceBlocks(
-        stretch, outputs.middleCols(static_cast<Eigen::Index>(first) * m, columns), stop));
-    samples_ += static_cast<int64_t>(count);
-    time_s_ = stretch.back();
-    first += count;
-  }
-  return absl::OkStatus();
-}
-
-absl::Status IntegratedEnsemble::AdvanceBlocks(std::span<const double> times_s, MatrixRef outputs,
-                                               const Stop& stop) {
-  ParallelFor(static_cast<int>(blocks_.size()), specification_.threads, [&](int block) {
-    statuses_[block] = blocks_[block]->Advance(times_s, outputs, stop);
+  return blocks_.AdvanceSamples(times_s, [&](TrajectoryBlock& block, Eigen::Index first,
+                                             Eigen::Index count) {
+    return block.Advance(times_s.subspan(static_cast<size_t>(first), static_cast<size_t>(count)),
+                         outputs.middleCols(first * m, count * m), stop);
   });
-  CollectFailures();
-  for (const absl::Status& status : statuses_) {
-    if (!status.ok()) return status;
-  }
-  return absl::OkStatus();
-}
-
-bool IntegratedEnsemble::AtCheckpoint() const {
-  return samples_ > 0 && samples_ % specification_.integration.samples_between_checkpoints == 0;
-}
-
-std::optional<EnsembleState> IntegratedEnsemble::State() const {
-  if (!AtCheckpoint()) return std::nullopt;
-  EnsembleState state{.samples = samples_, .time_s = time_s_, .blocks = {}};
-  for (const auto& block : blocks_) state.blocks.push_back(block->State());
-  return state;
-}
-
-bool IntegratedEnsemble::Restore(const EnsembleState& state) {
-  bool fits = state.blocks.size() == blocks_.size() && state.samples > 0 &&
-              state.samples % specification_.integration.samples_between_checkpoints == 0 &&
-              std::isfinite(state.time_s) && state.time_s >= 0;
-  for (size_t i = 0; fits && i < blocks_.size(); ++i) fits = blocks_[i]->Fits(state.blocks[i]);
-  if (!fits) return false;
-  for (size_t i = 0; i < blocks_.size(); ++i) blocks_[i]->Restore(state.time_s, state.blocks[i]);
-  samples_ = state.samples;
-  time_s_ = state.time_s;
-  CollectFailures();
-  return true;
-}
-
-void IntegratedEnsemble::CollectFailures() {
-  size_t count = 0;
-  for (const auto& block : blocks_) count += block->failures().size();
-  if (count == failures_.size()) return;
-  failures_.clear();
-  for (const auto& block : blocks_) {
-    failures_.insert(failures_.end(), block->failures().begin(), block->failures().end());
-  }
-  std::sort(failures_.begin(), failures_.end(),
-            [](const PointFailure& a, const PointFailure& b) { return a.point < b.point; });
 }
 
 void CheckSpecification(const EnsembleSpecification& specification, const InputSignals& inputs) {
@@ -163,6 +100,7 @@ void CheckSpecification(const EnsembleSpecification& specification, const InputS
   POLYEST_CHECK(fits_or_empty(specification.output_offsets, specification.outputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.output_delays_s, specification.outputs.size()));
   POLYEST_CHECK(fits_or_empty(specification.process_noise, description.states.size()));
+  POLYEST_CHECK(fits_or_empty(specification.noise_factors, specification.outputs.size()));
   POLYEST_CHECK(inputs.size() == description.inputs.size());
   POLYEST_CHECK(specification.integration.Validate().ok());
   for (const int output : specification.outputs) {

@@ -8,9 +8,8 @@
 //
 // which is exact for models that are linear in their states.
 //
-// Members are dealt into blocks of fixed size. Blocks are independent, so results have the same
-// bits for any number of threads and for any division of the samples into calls of Advance. At
-// checkpoints the integrators restart, as those of EnsemblePropagator do.
+// Members are dealt into blocks of fixed size (ensemble_blocks.h), so that results have the same
+// bits for any number of threads and for any division of the samples into calls of Advance.
 
 #include <absl/status/status.h>
 
@@ -18,6 +17,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/propagation/ensemble_blocks.h"
 #include "core/propagation/filter_block.h"
 
 namespace polyest::internal {
@@ -44,24 +44,17 @@ class FilterBank {
   void ReadStates(Matrix& means, Matrix& deviations) const;
 
   // The failures so far, ordered by member.
-  const std::vector<PointFailure>& failures() const { return failures_; }
+  const std::vector<PointFailure>& failures() const { return blocks_.failures(); }
 
   // As those of TrajectoryEnsemble.
-  std::optional<EnsembleState> State() const;
-  bool Restore(const EnsembleState& state);
+  std::optional<EnsembleState> State() const { return blocks_.State(); }
+  bool Restore(const EnsembleState& state) { return blocks_.Restore(state); }
 
  private:
-  bool AtCheckpoint() const;
-  absl::Status AdvanceBlocks(const FilterSamples& samples, MatrixRef innovations,
-                             MatrixRef log_variances, const Stop& stop);
-  void CollectFailures();
+  std::vector<std::unique_ptr<FilterBlock>> MakeBlocks(const InputSignals* inputs) const;
 
   EnsembleSpecification specification_;
-  int64_t samples_ = 0;
-  double time_s_ = 0;
-  std::vector<std::unique_ptr<FilterBlock>> blocks_;
-  std::vector<absl::Status> statuses_;  // one per block
-  std::vector<PointFailure> failures_;
+  EnsembleBlocks<FilterBlock> blocks_;
 };
 
 }  // namespace polyest::internal
