@@ -1,27 +1,11 @@
-// Counts calls of malloc, by which Eigen allocates: this definition replaces the C library's and
-// passes calls on to it. Sanitizers bring their own malloc, so these tests are skipped under them.
-
 #include <gtest/gtest.h>
-
-#include <cstddef>
-#include <vector>
 
 #include "core/chaos/basis.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/collocation_points.h"
-#include "core/common/sanitizer.h"
+#include "tests/testing/count_allocations.h"
 
-#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER && defined(__GLIBC__)
-
-namespace {
-thread_local int allocations = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#if POLYEST_COUNTS_ALLOCATIONS
 
 namespace polyest::internal {
 namespace {
@@ -34,10 +18,10 @@ class NoAllocation : public ::testing::Test {
 };
 
 TEST_F(NoAllocation, TheCounterCounts) {
-  const int before = allocations;
+  const int before = testing::allocations;
   const Vector vector = basis_.indices().col(0).cast<double>();
   EXPECT_EQ(vector[0], 0);
-  EXPECT_EQ(allocations, before + 1);
+  EXPECT_EQ(testing::allocations, before + 1);
 }
 
 TEST_F(NoAllocation, WhenTheBasisIsEvaluated) {
@@ -45,11 +29,11 @@ TEST_F(NoAllocation, WhenTheBasisIsEvaluated) {
   Vector phi(basis_.size());
   Matrix gradient(basis_.size(), basis_.dimension()), values;
   basis_.EvaluateMany(points_, values);
-  const int before = allocations;
+  const int before = testing::allocations;
   basis_.Evaluate(xi, phi);
   basis_.EvaluateWithGradient(xi, phi, gradient);
   basis_.EvaluateMany(points_, values);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(testing::allocations, before);
 }
 
 TEST_F(NoAllocation, WhenCoefficientsAreSolvedFor) {
@@ -57,9 +41,9 @@ TEST_F(NoAllocation, WhenCoefficientsAreSolvedFor) {
   const Matrix values = points_.leftCols(3).array().sin();
   Matrix coefficients(basis_.size(), 3);
   Vector variance(3);
-  const int before = allocations;
+  const int before = testing::allocations;
   matrix.Solve(values, coefficients, variance);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(testing::allocations, before);
 }
 
 }  // namespace
@@ -67,8 +51,8 @@ TEST_F(NoAllocation, WhenCoefficientsAreSolvedFor) {
 
 #else
 
-TEST(NoAllocation, IsNotCountedUnderASanitizer) {
-  GTEST_SKIP() << "malloc is the sanitizer's or another C library's";
+TEST(NoAllocation, IsCountedByTheTestsOwnMalloc) {
+  GTEST_SKIP() << "a sanitizer or another C library has a malloc of its own";
 }
 
 #endif

@@ -1,26 +1,12 @@
-// Counts calls of malloc, by which Eigen allocates: this definition replaces the C library's and
-// passes calls on to it. Sanitizers bring their own malloc, so these tests are skipped under them.
-
 #include <gtest/gtest.h>
 
-#include <cstddef>
 #include <vector>
 
-#include "core/common/sanitizer.h"
 #include "core/propagation/filter_bank.h"
+#include "tests/testing/count_allocations.h"
 #include "tests/unit/core/propagation/ensemble.h"
 
-#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER && defined(__GLIBC__)
-
-namespace {
-thread_local int allocations = 0;
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#if POLYEST_COUNTS_ALLOCATIONS
 
 namespace polyest::internal {
 namespace {
@@ -30,9 +16,9 @@ int AllocationsOf(IntegrationMethod method) {
   Ensemble ensemble("mass_spring_damper", 20, {"x", "v"});
   ensemble.specification.integration.method = method;
   ensemble.specification.process_noise.setConstant(20, 2, 0.01);
-  const int at_first = allocations;
+  const int at_first = testing::allocations;
   FilterBank bank(ensemble.specification, &ensemble.inputs);
-  EXPECT_GT(allocations, at_first);  // the counter counts
+  EXPECT_GT(testing::allocations, at_first);  // the counter counts
   const std::vector<double> times_s = TimesUntil(1.2, 0.05);
   const Matrix values = Matrix::Constant(2, 25, 0.1), noise = Matrix::Constant(2, 25, 0.01);
   Matrix innovations(20, 40), log_variances(20, 40);
@@ -46,9 +32,9 @@ int AllocationsOf(IntegrationMethod method) {
                     .ok());
   };
   advance(0, 5);
-  const int before = allocations;
+  const int before = testing::allocations;
   advance(5, 20);
-  return allocations - before;
+  return testing::allocations - before;
 }
 
 TEST(FilterAllocation, IsNoneForASampleOfALinearModel) {
