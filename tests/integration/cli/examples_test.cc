@@ -18,7 +18,7 @@ TEST_F(ExamplesTest, FindsTheTruthOfTheDemonstrationRecord) {
   ASSERT_EQ(run.exit_status, 0) << run.err;
   const v1::Estimate estimate = ParseEstimate(run.out);
   ASSERT_EQ(estimate.parameters_size(), 2);
-  // The constants of generate_demo.cc; four standard deviations hold but for one record in 10⁴.
+  // The constants of generate_demo; four standard deviations hold but for one record in 10⁴.
   const auto& k = estimate.parameters(0);
   const auto& c = estimate.parameters(1);
   EXPECT_NEAR(k.map(), 41.3, 4 * k.std_dev());
@@ -31,7 +31,7 @@ TEST_F(ExamplesTest, FindsTheTruthOfTheDemonstrationRecord) {
 
 struct ExampleRecord {
   const char* name;
-  std::map<std::string, double> truth;  // the constants of generate_demo.cc
+  std::map<std::string, double> truth;  // the constants of generate_demo
 };
 
 class ExampleRecords : public CommandTest, public testing::WithParamInterface<ExampleRecord> {};
