@@ -41,9 +41,8 @@ class Estimator::Implementation {
         store_(options.store ? std::move(options.store) : std::make_shared<MemoryStore>()),
         checks_(problem_),
         snapshot_(std::move(options.snapshot)),
-        checkpoints_(
-            problem_.problem().integration.samples_between_checkpoints,
-            HasCheckpointsInRuns(*problem_.problem().model) && !problem_.delays_outputs()) {}
+        checkpoints_(problem_.problem().integration.samples_between_checkpoints,
+                     problem_.has_checkpoints_in_runs()) {}
 
   absl::Status Begin() {
     POLYEST_ASSIGN_OR_RETURN(mixture_, ComponentMixture::OfPrior(problem_, store_.get(), threads_));

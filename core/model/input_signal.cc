@@ -143,9 +143,6 @@ double ClosedFormBreak(const HalfSineBumpInput& input, double time_s) {
   return FirstAfter(time_s, input.start_s, input.start_s + input.duration_s);
 }
 
-// How many knots up to a time are kept for it: the two of its interval, and those that slopes yet
-// to come depend on.
-constexpr std::ptrdiff_t kKnotsBehind = 2 * kSplineReach + 2;
 // So few knots are not worth moving the others.
 constexpr std::ptrdiff_t kLeastForgotten = 1024;
 

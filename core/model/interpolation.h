@@ -26,6 +26,9 @@ int KnotsAhead(Interpolation interpolation);
 // exact for cubics from four knots on. The influence of a knot on a spline decays by the factor 2 −
 // √3 ≈ 0.27 per knot, so knots farther away matter little.
 inline constexpr int kSplineReach = 3;
+// Number of knots up to a time that the curve from there on may depend on: the two of its interval,
+// and those that slopes yet to come depend on.
+inline constexpr int kKnotsBehind = 2 * kSplineReach + 2;
 double SplineSlope(std::span<const double> time_s, std::span<const double> value, size_t k);
 
 // Returns the slope of Fritsch and Butland: 0 where the chords on either side differ in sign, else

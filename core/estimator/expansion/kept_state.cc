@@ -7,17 +7,12 @@
 
 #include "core/estimator/expansion/expansion_state.h"
 #include "core/estimator/expansion/regional_expansion.h"
-#include "core/propagation/ensemble_propagator.h"
 
 namespace polyest::internal {
 namespace {
 
 int64_t Interval(const ResolvedProblem& problem) {
   return problem.problem().integration.samples_between_checkpoints;
-}
-
-bool HasStatesInRuns(const ResolvedProblem& problem) {
-  return HasCheckpointsInRuns(*problem.problem().model) && !problem.delays_outputs();
 }
 
 // Returns the number of rows after which a state was kept.
@@ -29,7 +24,7 @@ int64_t KeptRows(const std::shared_ptr<const ExpansionState>& state) {
 
 int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
   const int64_t interval = Interval(problem_);
-  const bool inside = HasStatesInRuns(problem_);
+  const bool inside = problem_.has_checkpoints_in_runs();
   int64_t kept = KeptRows(kept_state_), begin = run_begin_;
   int run = run_;
   for (int k = 0; k < block.count(); ++k) {
@@ -48,7 +43,7 @@ int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
 // Returns the time before the present one from which trajectories of the run may need the inputs,
 // +∞ if they may need them from its beginning.
 double RegionalExpansion::InputReach(int run) const {
-  if (problem_.streamed_inputs().empty() || !HasStatesInRuns(problem_)) return kInfinity;
+  if (problem_.streamed_inputs().empty() || !problem_.has_checkpoints_in_runs()) return kInfinity;
   return LargestInputDelay(problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run));
 }
 
@@ -58,8 +53,9 @@ void RegionalExpansion::KeepState(int next_run) {
   if (absorbed_.rows != next_row_ || next_row_ == problem_.first_row()) return;
   const bool begins = next_run != run_;
   const int64_t interval = Interval(problem_);
-  const bool due = begins ? next_row_ - KeptRows(kept_state_) >= interval
-                          : HasStatesInRuns(problem_) && (next_row_ - run_begin_) % interval == 0;
+  const bool due =
+      begins ? next_row_ - KeptRows(kept_state_) >= interval
+             : problem_.has_checkpoints_in_runs() && (next_row_ - run_begin_) % interval == 0;
   if (!due || KeptRows(kept_state_) == next_row_) return;
   ExpansionState state = State();
   if (begins) {

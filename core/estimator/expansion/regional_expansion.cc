@@ -271,55 +271,57 @@ double RegionalExpansion::Magnitude(int row, int channel) const {
 }
 
 void RegionalExpansion::Absorb(int row) {
-  const size_t width = block_.values.size() / block_.rows.size();
   const int run = block_.rows[static_cast<size_t>(row)].run;
   if (run != absorbed_.summed_run) {
     EndRunOfSums();
     absorbed_.summed_run = run;
     absorbed_.carried_rate = 0;
   }
-  for (int c = 0; c < channels_; ++c) {
-    const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
-    if (sigma <= 0) continue;  // no sample
-    double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
-    const int column = row * channels_ + c;
-    const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
-    const auto coefficients = coefficients_.col(column);
-    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
-    const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
-    const double weight = OutlierWeight(model.outliers, deviation);
-    // e = z − cᵀφ_0,  R = σ²/w + ρ
-    double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
-    double lack = LackOfWeight(model.outliers, deviation);
-    if (IsScored(c)) {
-      const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
-      z = scored.value;
-      noise = scored.noise_variance;
-      lack += scored.lack;
-    }
-    const double variance = noise + own_error;
-    const double error = z - coefficients.dot(reference_phi_);
-    absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
-    AddDifference(c, coefficients, error, variance);
-    AddToProfile(row, c, coefficients, z, variance);
-    absorbed_.discount[c] += own_error / variance;
-    absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
-    absorbed_.carried_error += absorbed_.carried_rate;
-    Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
-    if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
-    Compare(column, z, noise);
-    CompareControls(column, variance);
-    if (filters_) AddLogVariance(column, noise, variance);
-    // χ²_q += (z − y_q)²/R
-    absorbed_.point_chi_squared.col(c).array() +=
-        (outputs_.col(column).head(points()).array() - z).square() / variance;
-    ++absorbed_.samples;
-  }
+  for (int c = 0; c < channels_; ++c) AbsorbSample(row, c);
   if (problem_.ended_runs() == nullptr) {
     absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
   }
   ++absorbed_.rows;
   absorbed_.propagated += thetas_.rows() + controls_;
+}
+
+void RegionalExpansion::AbsorbSample(int row, int c) {
+  const size_t width = block_.values.size() / block_.rows.size();
+  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+  if (sigma <= 0) return;  // no sample
+  double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
+  const int column = row * channels_ + c;
+  const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
+  const auto coefficients = coefficients_.col(column);
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+  const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
+  const double weight = OutlierWeight(model.outliers, deviation);
+  // e = z − cᵀφ_0,  R = σ²/w + ρ
+  double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
+  double lack = LackOfWeight(model.outliers, deviation);
+  if (IsScored(c)) {
+    const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
+    z = scored.value;
+    noise = scored.noise_variance;
+    lack += scored.lack;
+  }
+  const double variance = noise + own_error;
+  const double error = z - coefficients.dot(reference_phi_);
+  absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
+  AddDifference(c, coefficients, error, variance);
+  AddToProfile(row, c, coefficients, z, variance);
+  absorbed_.discount[c] += own_error / variance;
+  absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
+  absorbed_.carried_error += absorbed_.carried_rate;
+  Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
+  if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
+  Compare(column, z, noise);
+  CompareControls(column, variance);
+  if (filters_) AddLogVariance(column, noise, variance);
+  // χ²_q += (z − y_q)²/R
+  absorbed_.point_chi_squared.col(c).array() +=
+      (outputs_.col(column).head(points()).array() - z).square() / variance;
+  ++absorbed_.samples;
 }
 
 // Returns the deviation of the sample in units of its possible error there, or 0 if outliers are

@@ -195,7 +195,7 @@ std::string SpectralDensityName(const std::string& state) {
   return absl::StrCat("processNoise.", state);
 }
 
-Problem WithSpectralDensities(Problem problem) {
+Problem WithHyperparameters(Problem problem) {
   const auto add = [&problem](const std::string& name, const Size& size) {
     const bool there = std::ranges::any_of(
         problem.uncertain,

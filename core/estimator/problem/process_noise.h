@@ -27,7 +27,7 @@ std::string SpectralDensityName(const std::string& state);
 
 // Returns the problem with an uncertain parameter for each unknown spectral density or rate of a
 // drift that is valid and has none yet, log-uniform between its bounds.
-Problem WithSpectralDensities(Problem problem);
+Problem WithHyperparameters(Problem problem);
 
 // Returns the problem's model, with states for the parameters that drift if any does.
 std::shared_ptr<const Model> WithDrifts(const Problem& problem);

@@ -329,7 +329,7 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
 
 absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs, int first_run) {
   POLYEST_CHECK(runs > first_run && first_run >= 0);
-  problem = WithSpectralDensities(std::move(problem));
+  problem = WithHyperparameters(std::move(problem));
   std::vector<absl::Status> refusals = CheckOptions(problem, runs, first_run);
   if (!refusals.empty()) return refusals.front();
   POLYEST_ASSIGN_OR_RETURN(Prior prior,
@@ -342,7 +342,7 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs,
 }
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
-  problem = WithSpectralDensities(std::move(problem));
+  problem = WithHyperparameters(std::move(problem));
   std::vector<absl::Status> refusals = CheckOptions(problem, 1, 0);
   if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
   // The prior only provides the names, because the correlations may be invalid. It needs at least

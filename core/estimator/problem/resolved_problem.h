@@ -103,6 +103,10 @@ class ResolvedProblem {
   const std::shared_ptr<const Model>& model() const { return model_; }
   // Whether an output may have a delay other than 0.
   bool delays_outputs() const { return delays_outputs_; }
+  // Whether ensembles have a State at the checkpoints inside of a run.
+  bool has_checkpoints_in_runs() const {
+    return HasCheckpointsInRuns(*problem_.model) && !delays_outputs_;
+  }
 
   // Returns an ensemble with one trajectory for each row of `thetas` (Q × n, values of the
   // uncertain parameters) that reads the model's `outputs`. If runs have their own parameters, 0 ≤

@@ -38,6 +38,11 @@ SettableQuantities::SettableQuantities(const ModelDescription& model, const Prob
       inputs_(static_cast<int>(model.inputs.size())),
       outputs_(static_cast<int>(model.outputs.size())),
       states_(static_cast<int>(model.states.size())) {
+  AddQuantitiesOfModel(model);
+  AddHyperparameters(model, problem);
+}
+
+void SettableQuantities::AddQuantitiesOfModel(const ModelDescription& model) {
   for (int i = 0; i < parameters_; ++i) {
     const Quantity& parameter = model.parameters[static_cast<size_t>(i)];
     all_.push_back({parameter.name, parameter.unit, parameter.default_value, parameter.has_default,
@@ -56,6 +61,9 @@ SettableQuantities::SettableQuantities(const ModelDescription& model, const Prob
     all_.push_back({output.name + ".delay", "s", 0, true, Kind::kOutputDelay, i});
     all_.push_back({output.name + ".offset", output.unit, 0, true, Kind::kOutputOffset, i});
   }
+}
+
+void SettableQuantities::AddHyperparameters(const ModelDescription& model, const Problem& problem) {
   for (const ProcessNoise& noise : problem.process_noise) {
     for (int i = 0; i < states_; ++i) {
       const Quantity& state = model.states[static_cast<size_t>(i)];

@@ -85,6 +85,11 @@ class SettableQuantities {
   void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
 
  private:
+  // Adds the parameters, and what is settable of each input and output.
+  void AddQuantitiesOfModel(const ModelDescription& model);
+  // Adds spectral densities, rates of drifts and, with filters, the noise of sensors.
+  void AddHyperparameters(const ModelDescription& model, const Problem& problem);
+
   std::vector<Settable> all_;
   int parameters_;
   int inputs_;

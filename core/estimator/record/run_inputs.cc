@@ -14,9 +14,6 @@ namespace {
 
 constexpr int64_t kKnotRowsAtOnce = 64;
 
-// Knots of each input up to a time on which its curve from there on may depend (interpolation.h).
-constexpr int kKnotsBehind = 2 * kSplineReach + 2;
-
 // Adds the knots up to `time_s` in a block to their numbers, by input.
 void CountKnots(const RowBlock& block, double time_s, std::vector<int>& counts) {
   const size_t width = block.values.size() / block.rows.size();

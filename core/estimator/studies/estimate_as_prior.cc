@@ -4,6 +4,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/estimator/problem/assumed_noise.h"
+#include "core/estimator/problem/process_noise.h"
 #include "core/estimator/studies/experiment_design.h"
 
 namespace polyest::internal {
@@ -38,6 +39,7 @@ void TakeNoise(const Estimate& estimate, std::vector<MeasuredOutput>& measured) 
 
 absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& problem,
                                                     const Estimate& estimate) {
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a design after an estimate"));
   const auto n = static_cast<int>(problem.problem().uncertain.size());
   POLYEST_CHECK(estimate.covariance.rows() >= n);  // the parameters of the first run come first
   const Vector std_dev = estimate.covariance.diagonal().cwiseSqrt();

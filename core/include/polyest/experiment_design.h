@@ -89,7 +89,8 @@ absl::StatusOr<ExperimentDesign> DesignExperiment(const Problem& problem,
 // Returns the problem with an estimate of its parameters as the prior: normal, with the estimate's
 // means and covariance, cut off at bounds of the old prior that are within five standard
 // deviations. An output whose noise is unknown gets the estimated noise. INVALID_ARGUMENT if the
-// problem cannot be used or the estimate is not an estimate of it.
+// problem cannot be used, has a likelihood of prediction errors, or the estimate is not an estimate
+// of it.
 absl::StatusOr<Problem> WithEstimateAsPrior(const Problem& problem, const Estimate& estimate);
 
 }  // namespace polyest

@@ -13,6 +13,7 @@
 
 #include "core/estimator/problem/resolved_problem.h"
 #include "polyest/equation_model.h"
+#include "polyest/experiment_design.h"
 #include "tests/unit/core/estimator/estimation.h"
 
 namespace polyest::internal {
@@ -336,6 +337,12 @@ TEST(ProcessNoise, IsRefusedByStudiesOfAPerfectModel) {
   ASSERT_TRUE(estimator->Process().ok());
   EXPECT_THAT(std::string(estimator->CurrentRegularizationSweep({}).status().message()),
               HasSubstr("PREDICTION_ERROR is not available for a regularization sweep"));
+  // The estimate as a prior would be that of a perfect model.
+  Problem known = ForcedOscillator();
+  known.process_noise = {{.state = "v", .spectral_density = kTrueQ}};
+  EXPECT_THAT(
+      std::string(WithEstimateAsPrior(known, EstimateOf(known, samples)).status().message()),
+      HasSubstr("PREDICTION_ERROR is not available for a design after an estimate"));
 }
 
 }  // namespace
