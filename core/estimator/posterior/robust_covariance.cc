@@ -91,17 +91,36 @@ Sandwich SandwichOf(const std::vector<WindowScore>& windows, const Matrix& preci
   return result;
 }
 
+// Returns the parameters of which any window says something: not those of a run without windows,
+// whose directions would all have the eigenvalue 1.
+std::vector<int> InformedParameters(const std::vector<WindowScore>& windows) {
+  std::vector<int> informed;
+  if (windows.empty()) return informed;
+  const Matrix information = SumOf(windows).information;
+  for (int i = 0; i < information.rows(); ++i) {
+    if (information(i, i) != 0) informed.push_back(i);
+  }
+  return informed;
+}
+
 }  // namespace
 
 RobustCovariance RobustCovarianceOf(std::vector<WindowScore> windows, const Matrix& precision) {
   RobustCovariance robust;
+  const std::vector<int> informed = InformedParameters(windows);
+  for (WindowScore& window : windows) {
+    window.score = Vector(window.score(informed));
+    window.information = Matrix(window.information(informed, informed));
+  }
+  const Matrix precision_of_informed = precision(informed, informed);
   double largest = 0;
-  for (; windows.size() >= kMinWindows; windows = MergePairs(windows)) {
-    Sandwich sandwich = SandwichOf(windows, precision);
+  for (; !informed.empty() && windows.size() >= kMinWindows; windows = MergePairs(windows)) {
+    const Sandwich sandwich = SandwichOf(windows, precision_of_informed);
     robust.significant = robust.significant || sandwich.significant;
     if (sandwich.largest <= largest) continue;
     largest = sandwich.largest;
-    robust.ratio = std::move(sandwich.ratio);
+    robust.ratio = Vector::Ones(precision.rows());
+    robust.ratio(informed) = sandwich.ratio;
   }
   robust.disagreement = std::sqrt(largest);
   return robust;

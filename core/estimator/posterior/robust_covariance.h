@@ -25,7 +25,8 @@ namespace polyest::internal {
 struct RobustCovariance {
   double disagreement = 0;   // r; 0 if there are fewer than 12 windows with information
   bool significant = false;  // whether r is larger than chance allows in a right model
-  // Per parameter: robust standard deviation ÷ that of (I + P)⁻¹, ≥ 0; empty if r is 0.
+  // Per parameter: robust standard deviation ÷ that of (I + P)⁻¹, ≥ 0, 1 if no window says anything
+  // of it; empty if r is 0.
   Vector ratio;
 };
 

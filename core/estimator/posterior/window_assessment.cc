@@ -124,14 +124,16 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
   WindowAssessment assessment;
   assessment.widening = Vector::Ones(prior.dimension());
   assessment.doubtful.assign(static_cast<size_t>(prior.dimension()), false);
-  if (expansion.windows().count() == 0) {
-    // After ended runs there are no windows, and the residuals alone tell of a wrong model.
-    assessment.contradicted =
-        problem.ended_runs() != nullptr && ResidualsContradict(problem, record, channels);
+  const Vector xi = expansion.design().region.ToGerm(eta);
+  const bool has_ended = problem.ended_runs() != nullptr;
+  const std::vector<WindowScore> windows =
+      has_ended ? ScoresByEndedRuns(problem, xi) : ScoresByWindow(expansion, prior, eta);
+  if (windows.empty()) {
+    // Runs that share a population have no windows, and the residuals alone tell of a wrong model.
+    assessment.contradicted = has_ended && ResidualsContradict(problem, record, channels);
     if (assessment.contradicted) Widen(LargestDispersion(problem, channels), assessment);
     return assessment;
   }
-  const std::vector<WindowScore> windows = ScoresByWindow(expansion, prior, eta);
   const Matrix precision = PriorPrecision(prior);
   const double dispersion = LargestDispersion(problem, channels);
   assessment.robust = RobustCovarianceOf(windows, precision);
@@ -140,8 +142,7 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
   assessment.contradicted = windows_contradict || ResidualsContradict(problem, record, channels);
   if (assessment.contradicted) Widen(dispersion, assessment);
   if (windows_contradict) {
-    assessment.estimates = EstimatesByWindow(windows, prior, expansion.design().region.ToGerm(eta),
-                                             precision, regularization);
+    assessment.estimates = EstimatesByWindow(windows, prior, xi, precision, regularization);
   }
   return assessment;
 }

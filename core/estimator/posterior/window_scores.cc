@@ -1,5 +1,6 @@
 #include "core/estimator/posterior/window_scores.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/common/check.h"
@@ -36,21 +37,21 @@ std::vector<double> GroupWeights(const std::vector<ChannelSums>& sums, const Vec
 // Computes the score and information of all rows up to the end of a window, in local coordinates.
 class ScoreOfTotals {
  public:
-  ScoreOfTotals(const RegionalExpansion& expansion, const Vector& eta) : expansion_(expansion) {
-    const ExpansionDesign& design = expansion.design();
-    const int terms = design.basis->size();
-    Vector phi(terms), reference_phi(terms);
-    gradient_.resize(terms, eta.size());
-    design.basis->EvaluateWithGradient(eta, phi, gradient_);
-    design.basis->Evaluate(design.reference, reference_phi);
+  ScoreOfTotals(const WindowSums& windows, const std::vector<ChannelSums>& sums, const Basis& basis,
+                const Vector& reference, const Vector& eta)
+      : windows_(windows), sums_(sums) {
+    Vector phi(basis.size()), reference_phi(basis.size());
+    gradient_.resize(basis.size(), eta.size());
+    basis.EvaluateWithGradient(eta, phi, gradient_);
+    basis.Evaluate(reference, reference_phi);
     difference_ = phi - reference_phi;
-    weights_ = GroupWeights(expansion.sums(), difference_);
+    weights_ = GroupWeights(sums, difference_);
   }
 
   WindowScore At(int window) const {
     const Eigen::Index n = gradient_.cols();
-    WindowScore score{expansion_.windows().span(window), Vector::Zero(n), Matrix::Zero(n, n)};
-    const auto totals = expansion_.windows().TotalsAt(window, expansion_.sums());
+    WindowScore score{windows_.span(window), Vector::Zero(n), Matrix::Zero(n, n)};
+    const auto totals = windows_.TotalsAt(window, sums_);
     POLYEST_CHECK(totals.size() == weights_.size());
     for (size_t k = 0; k < totals.size(); ++k) {
       const Matrix g = WindowSums::Unpack(totals[k].g, static_cast<int>(difference_.size()));
@@ -62,36 +63,34 @@ class ScoreOfTotals {
   }
 
  private:
-  const RegionalExpansion& expansion_;
+  const WindowSums& windows_;
+  const std::vector<ChannelSums>& sums_;
   Matrix gradient_;    // ∂φ/∂η, S × n
   Vector difference_;  // φ(η) − φ_0
   std::vector<double> weights_;
 };
 
-// Returns ∂η/∂s.
-Matrix LocalByScaled(const Region& region, const Prior& prior) {
+// Returns ∂ξ/∂s.
+Matrix GermByScaled(const Prior& prior) {
   const Vector unit = prior.GermStandardDeviation();
-  const Matrix by_germ = Inverse(region.axes());
-  if (!prior.correlated()) return by_germ * unit.asDiagonal();
-  return by_germ * Inverse(prior.factor()) * unit.asDiagonal();
+  if (!prior.correlated()) return unit.asDiagonal();
+  return Inverse(prior.factor()) * unit.asDiagonal();
 }
 
-}  // namespace
-
-std::vector<WindowScore> ScoresByWindow(const RegionalExpansion& expansion, const Prior& prior,
-                                        const Vector& eta) {
-  const ScoreOfTotals totals(expansion, eta);
-  const Matrix to_local = LocalByScaled(expansion.design().region, prior);
+// Returns the scores of windows in the coordinates s from those of all rows up to the end of each,
+// in local coordinates η; `by_scaled` is ∂η/∂s.
+std::vector<WindowScore> Differences(const std::vector<WindowScore>& totals,
+                                     const Matrix& by_scaled) {
   std::vector<WindowScore> windows;
-  Vector score_before = Vector::Zero(eta.size());
-  Matrix information_before = Matrix::Zero(eta.size(), eta.size());
-  for (int w = 0; w < expansion.windows().count(); ++w) {
-    WindowScore window = totals.At(w);
-    std::swap(score_before, window.score);
-    std::swap(information_before, window.information);
-    window.score = to_local.transpose() * (score_before - window.score);
+  Vector score_before = Vector::Zero(by_scaled.rows());
+  Matrix information_before = Matrix::Zero(by_scaled.rows(), by_scaled.rows());
+  for (const WindowScore& total : totals) {
+    WindowScore window = total;
+    window.score = by_scaled.transpose() * (total.score - score_before);
     window.information =
-        to_local.transpose() * (information_before - window.information) * to_local;
+        by_scaled.transpose() * (total.information - information_before) * by_scaled;
+    score_before = total.score;
+    information_before = total.information;
     if (!windows.empty() && 2 * window.span.rows < windows.back().span.rows) {
       Append(window, windows.back());
     } else {
@@ -99,6 +98,39 @@ std::vector<WindowScore> ScoresByWindow(const RegionalExpansion& expansion, cons
     }
   }
   return windows;
+}
+
+}  // namespace
+
+std::vector<WindowScore> ScoresByWindow(const RegionalExpansion& expansion, const Prior& prior,
+                                        const Vector& eta) {
+  const ExpansionDesign& design = expansion.design();
+  const ScoreOfTotals scores(expansion.windows(), expansion.sums(), *design.basis, design.reference,
+                             eta);
+  std::vector<WindowScore> totals;
+  for (int w = 0; w < expansion.windows().count(); ++w) totals.push_back(scores.At(w));
+  return Differences(totals, Inverse(design.region.axes()) * GermByScaled(prior));
+}
+
+std::vector<WindowScore> ScoresByEndedRuns(const ResolvedProblem& problem, const Vector& xi) {
+  const EndedRuns& ended = *problem.ended_runs();
+  const std::vector<int> shared = problem.SharedParameters();
+  const Vector eta = ended.region.ToLocal(xi(shared));
+  const std::vector<ChannelSums> sums = SumsWithRemainder(problem.problem().measured, ended);
+  const Vector centre = Vector::Zero(eta.size());
+  const ScoreOfTotals scores(ended.windows, sums, *ended.basis, centre, eta);
+  std::vector<WindowScore> totals;
+  const int64_t rows_of_run = std::max<int64_t>(1, ended.rows / std::ssize(ended.run));
+  for (int w = 0; w < ended.windows.count(); ++w) {
+    totals.push_back(scores.At(w));
+    totals.back().span.rows *= rows_of_run;
+    // ∂²E/∂η², which is what the prior of the runs' own parameters leaves of their information.
+    const Vector remainder = -ended.windows.TotalsAt(w, sums).back().b;
+    totals.back().information += ended.basis->WeightedHessian(eta, remainder);
+  }
+  Matrix by_germ = Matrix::Zero(eta.size(), problem.dimension());
+  by_germ(Eigen::all, shared) = Inverse(ended.region.axes());
+  return Differences(totals, by_germ * GermByScaled(problem.prior()));
 }
 
 std::vector<WindowScore> MergePairs(const std::vector<WindowScore>& windows) {

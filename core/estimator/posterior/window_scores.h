@@ -9,8 +9,8 @@
 
 #include <vector>
 
+#include "core/bayes/window_sums.h"
 #include "core/estimator/expansion/regional_expansion.h"
-#include "core/estimator/record/window_sums.h"
 
 namespace polyest::internal {
 
@@ -24,6 +24,12 @@ struct WindowScore {
 // window shorter than half of the others is merged into the one before.
 std::vector<WindowScore> ScoresByWindow(const RegionalExpansion& expansion, const Prior& prior,
                                         const Vector& eta);
+
+// Returns the scores of windows of the runs that have ended (there must be some; `problem` has
+// them), at `xi`, with what their own parameters follow and take up integrated out:
+//   g_w = −∂ log L_w/∂s,   I_w = Σ (∂y_k/∂s)(∂y_k/∂s)ᵀ/R_k along the runs' paths + ∂²E_w/∂s²
+// (problem/ended_runs.h). There are none if the runs share a population.
+std::vector<WindowScore> ScoresByEndedRuns(const ResolvedProblem& problem, const Vector& xi);
 
 // Returns the scores of windows twice as long: pairs of neighbours are merged. A window left over
 // at the end joins the last pair if it has fewer than half of its rows.

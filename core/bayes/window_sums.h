@@ -43,7 +43,11 @@ class WindowSums {
 
   // Ends a row whose samples have been added to `sums`. Takes O(1) operations, but O(S²) at the end
   // of a window. Channels and their kinds of noise must be those of earlier calls.
-  void EndRow(const std::vector<ChannelSums>& sums, int run, double time_s);
+  void EndRow(const std::vector<ChannelSums>& sums, int run, double time_s) {
+    EndRow(sums, run, time_s, time_s);
+  }
+  // Does the same for what counts as one row and lasts from `start_s` to `end_s`.
+  void EndRow(const std::vector<ChannelSums>& sums, int run, double start_s, double end_s);
 
   // Replaces the terms φ by others φ′ with φ ≈ Tᵀφ′, as MismatchSums::Substituted does: `t` is
   // S′ × S, `shift` = δ (S).

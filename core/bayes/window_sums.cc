@@ -1,4 +1,4 @@
-#include "core/estimator/record/window_sums.h"
+#include "core/bayes/window_sums.h"
 
 #include <algorithm>
 #include <cmath>
@@ -97,13 +97,14 @@ int WindowSums::Capacity(const std::vector<ChannelSums>& sums) {
   return static_cast<int>(room / 2 * 2);
 }
 
-void WindowSums::EndRow(const std::vector<ChannelSums>& sums, int run, double time_s) {
+void WindowSums::EndRow(const std::vector<ChannelSums>& sums, int run, double start_s,
+                        double end_s) {
   if (open_.rows == 0) {
     open_.first_run = run;
-    open_.start_s = time_s;
+    open_.start_s = start_s;
   }
   open_.last_run = run;
-  open_.end_s = time_s;
+  open_.end_s = end_s;
   if (++open_.rows < length_) return;
   if (static_cast<int>(closed_) == Capacity(sums)) {
     MergeNeighbours();

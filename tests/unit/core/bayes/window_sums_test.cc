@@ -1,6 +1,6 @@
 // Compares the windows with sums taken over their rows directly.
 
-#include "core/estimator/record/window_sums.h"
+#include "core/bayes/window_sums.h"
 
 #include <gtest/gtest.h>
 
