@@ -55,6 +55,7 @@ CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   value.total =
       Supports(xi) ? Total(power_ * value.mismatch, value.prior, regularization_) : kInfinity;
   if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
+  if (population_ != nullptr) value.total += population_->Evaluate(xi);
   return value;
 }
 
@@ -79,6 +80,11 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
     }
   }
   if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
+  if (population_ != nullptr) {
+    const PopulationCost::Derivatives derivatives = population_->Differentiate(xi);
+    value.total += derivatives.value;
+    gradient += region_.axes().transpose() * derivatives.gradient;
+  }
   return value;
 }
 
@@ -95,8 +101,17 @@ Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
   return 0.5 * power_ * (hessian + hessian.transpose());
 }
 
-Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
+Matrix Cost::InformationHessian(const ConstVectorRef& eta, double spent) const {
   Matrix hessian = MismatchHessian(eta, spent);
+  if (population_ != nullptr) {
+    const Matrix of_population = population_->Differentiate(region_.ToGerm(eta)).hessian;
+    hessian += region_.axes().transpose() * of_population * region_.axes();
+  }
+  return hessian;
+}
+
+Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
+  Matrix hessian = InformationHessian(eta, spent);
   if (regularization_ > 0) {
     // + α² axesᵀ diag(J_apriori″) axes
     const Vector curvature = prior_.Curvature(region_.ToGerm(eta));
@@ -132,6 +147,7 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
       const double prior = prior_.NegativeLogDensity(xi);
       total = Supports(xi) ? Total(power_ * total, prior, regularization_) : kInfinity;
       if (has_remainder()) total += remainders[i] + remainder_constant_;
+      if (population_ != nullptr) total += population_->Evaluate(xi);
     }
   }
 }

@@ -1,15 +1,18 @@
 #pragma once
 
 // The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
-//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)) + J_0(η),   ξ = centre + axes η,
-// with the power β = 1 of the likelihood unless the posterior is tempered, and a polynomial J_0
-// that is 0 unless parameters have been eliminated (estimator/problem/ended_runs.h), with exact
-// derivatives: J_mismatch is a function of quadratic forms in φ(η) (mismatch.h), φ a polynomial.
+//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)) + J_0(η) + J_P(ξ(η)),   ξ = centre + axes η,
+// with the power β = 1 of the likelihood unless the posterior is tempered, a polynomial J_0 that is
+// 0 unless parameters have been eliminated (estimator/problem/ended_runs.h), and J_P that is 0
+// unless runs share a population (population_cost.h), with exact derivatives: J_mismatch is a
+// function of quadratic forms in φ(η) (mismatch.h), φ a polynomial.
 
 #include <memory>
+#include <utility>
 
 #include "core/bayes/element.h"
 #include "core/bayes/mismatch.h"
+#include "core/bayes/population_cost.h"
 #include "core/bayes/prior.h"
 #include "core/bayes/region.h"
 #include "core/chaos/basis.h"
@@ -37,6 +40,11 @@ class Cost {
   // Sets J_0(η) = coefficientsᵀ φ(η). It enters the total and its derivatives alone.
   void set_remainder(Vector coefficients);
 
+  // Sets J_P. It enters the total and its derivatives alone.
+  void set_population(std::shared_ptr<const PopulationCost> population) {
+    population_ = std::move(population);
+  }
+
   CostValue Evaluate(const ConstVectorRef& eta) const;
   // `gradient` (n) is with respect to η.
   CostValue EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradient) const;
@@ -45,6 +53,8 @@ class Cost {
   // narrow a Gaussian; subtracting `spent` degrees of freedom (parameters fitted, plus 2) gives the
   // curvature of a Gaussian with the variance of the t.
   Matrix MismatchHessian(const ConstVectorRef& eta, double spent = 0) const;
+  // Returns the same with J_P, which knows of the runs' parameters what the prior does not.
+  Matrix InformationHessian(const ConstVectorRef& eta, double spent = 0) const;
   Matrix Hessian(const ConstVectorRef& eta, double spent = 0) const;  // of the total
   // Writes the total at W points (W × n) into `totals` (resized) by matrix products.
   void EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const;
@@ -65,8 +75,9 @@ class Cost {
   double regularization_;
   Element element_;
   double power_ = 1;
-  Vector remainder_;               // coefficients of J_0; empty if it is 0
-  double remainder_constant_ = 0;  // J_0 at the reference
+  Vector remainder_;                                  // coefficients of J_0; empty if it is 0
+  double remainder_constant_ = 0;                     // J_0 at the reference
+  std::shared_ptr<const PopulationCost> population_;  // J_P; null if it is 0
 };
 
 }  // namespace polyest::internal

@@ -16,6 +16,12 @@ Matrix Independent(size_t count) {
   return Matrix::Identity(n, n);
 }
 
+// A population is one of normal scores.
+bool HasNormalScore(const UncertainParameter& parameter) {
+  const bool in_population = parameter.population || parameter.part == PopulationPart::kMean;
+  return in_population && parameter.germ.family != GermFamily::kNormal;
+}
+
 double NormalDensity(double z) { return Germ::Normal().Density(z); }
 
 }  // namespace
@@ -29,8 +35,9 @@ Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlati
   for (int i = 0; i < n; ++i) {
     const UncertainParameter& parameter = parameters_[static_cast<size_t>(i)];
     POLYEST_CHECK(parameter.scale > 0);
-    in_copula_.push_back((correlation.row(i).array() != 0).count() > 1);
-    correlated_ = correlated_ || in_copula_.back();
+    const bool correlated = (correlation.row(i).array() != 0).count() > 1;
+    in_copula_.push_back(correlated || HasNormalScore(parameter));
+    correlated_ = correlated_ || correlated;
     marginal_germs_.push_back(Germ(parameter.germ));
     germs_.push_back(in_copula_.back() ? Germ::Normal() : marginal_germs_.back());
     lower_[i] = germs_.back().Lower();

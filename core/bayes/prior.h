@@ -7,7 +7,8 @@
 // and t_i is the parameter's own map (uncertain_parameter.h). The parameters that occur in a
 // correlation have standard normal germs and scores, F Fᵀ = P (copula.h; F lower triangular, rows
 // and columns of the others those of I), and t_i maps to the parameter of the same cumulative
-// probability. So every t_i increases, and parameter i's marginal is that of its score.
+// probability; so are those of a population (population_cost.h). So every t_i increases, and
+// parameter i's marginal is that of its score.
 
 #include <absl/status/statusor.h>
 

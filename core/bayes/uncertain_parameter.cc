@@ -65,6 +65,17 @@ bool IsLogUniform(const UncertainParameter& parameter) {
          parameter.germ.family == GermFamily::kUniform;
 }
 
+bool IsCutLognormal(const UncertainParameter& parameter) {
+  return parameter.map == ParameterMap::kExponential &&
+         parameter.germ.family == GermFamily::kTruncatedNormal;
+}
+
+// Returns E[e^(kσξ)] = e^(k²σ²/2) P(a − kσ, b − kσ)/P(a, b) of a normal ξ cut to [a, b].
+double CutMoment(const UncertainParameter& parameter, int k) {
+  const double a = parameter.germ.first, b = parameter.germ.second, t = k * parameter.scale;
+  return std::exp(0.5 * t * t) * NormalProbability(a - t, b - t) / NormalProbability(a, b);
+}
+
 }  // namespace
 
 absl::StatusOr<UncertainParameter> UncertainParameter::Normal(std::string name, double mean,
@@ -155,10 +166,11 @@ absl::Status UncertainParameter::Validate() const {
   const auto is_shape = [](double shape) { return shape >= 1 && shape <= kGreatestShape; };
   bool valid = !name.empty() && std::abs(location) <= kGreatestMagnitude && scale >= kMinScale &&
                scale <= kGreatestMagnitude;
-  // A lognormal must be the exponential of a normal, of a ratio of at most kGreatestRatio; a
-  // log-uniform one must lie within the limits of magnitude.
+  // A lognormal must be the exponential of a normal, which may be cut off, of a ratio of at most
+  // kGreatestRatio; a log-uniform one must lie within the limits of magnitude.
   if (map == ParameterMap::kExponential && germ.family != GermFamily::kUniform) {
-    valid = valid && germ.family == GermFamily::kNormal &&
+    valid = valid &&
+            (germ.family == GermFamily::kNormal || germ.family == GermFamily::kTruncatedNormal) &&
             std::expm1(scale * scale) <= 1.0001 * kGreatestRatio * kGreatestRatio;
   } else if (map == ParameterMap::kExponential) {
     valid = valid && std::abs(location) + scale <= 1.0001 * std::log(kGreatestMagnitude);
@@ -192,6 +204,7 @@ double UncertainParameter::Slope(double xi) const {
 double UncertainParameter::Mean() const {
   // The mean is E[e^(μ + σξ)] = e^μ sinh(σ)/σ for a uniform ξ.
   if (IsLogUniform(*this)) return std::exp(location) * std::sinh(scale) / scale;
+  if (IsCutLognormal(*this)) return std::exp(location) * CutMoment(*this, 1);
   // The mean is E[e^(μ + σξ)] = e^(μ + σ²/2).
   if (map == ParameterMap::kExponential) return std::exp(location + 0.5 * scale * scale);
   return location + scale * Germ(germ).Mean();
@@ -205,6 +218,10 @@ double UncertainParameter::StandardDeviation() const {
     const double variance = scale < 0.01 ? square / 3 + 4 * square * square / 45
                                          : std::sinh(2 * scale) / (2 * scale) - mean * mean;
     return std::exp(location) * std::sqrt(variance);
+  }
+  if (IsCutLognormal(*this)) {
+    const double mean = CutMoment(*this, 1);
+    return std::exp(location) * std::sqrt(CutMoment(*this, 2) - mean * mean);
   }
   // The standard deviation is mean √(e^(σ²) − 1).
   if (map == ParameterMap::kExponential) return Mean() * std::sqrt(std::expm1(scale * scale));

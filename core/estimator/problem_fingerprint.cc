@@ -38,6 +38,8 @@ void Add(Archive& archive, const UncertainParameter& parameter) {
           parameter.drift.has_value());
   const RandomWalk walk = parameter.drift.value_or(RandomWalk());
   archive(walk.std_dev_per_sqrt_s, walk.unknown, walk.lower, walk.upper);
+  // Their values follow from those of the parameter that has the population.
+  if (parameter.population) archive(std::string("population"));
 }
 
 void Add(Archive& archive, const ConstantInput& input) { archive(input.amplitude); }

@@ -133,6 +133,11 @@ void serialize(Archive& archive, ExpansionState& expansion) {
 }
 
 template <class Archive>
+void serialize(Archive& archive, ScoreMixture& shape) {
+  archive(shape.first, shape.step, shape.log_weights);
+}
+
+template <class Archive>
 void save(Archive& archive, const EndedRuns& ended) {
   std::vector<double> spent;
   for (const ChannelSums& sums : ended.sums) spent.push_back(sums.spent);
@@ -140,7 +145,8 @@ void save(Archive& archive, const EndedRuns& ended) {
           ended.factor, ended.region.centre(), ended.region.axes(), ended.basis->truncation().order,
           ended.basis->truncation().exponent, ended.sums, spent, ended.discount, ended.own_error,
           ended.log_noise, ended.log_variance, ended.outliers, ended.largest, ended.remainder,
-          ended.noise_scale, ended.noise_time_constant_s);
+          ended.noise_scale, ended.noise_time_constant_s, ended.shapes, ended.left_out,
+          ended.unresolved, ended.windows);
 }
 
 template <class Archive>
@@ -152,7 +158,8 @@ void load(Archive& archive, EndedRuns& ended) {
   archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
           ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
           ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
-          ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s);
+          ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s,
+          ended.shapes, ended.left_out, ended.unresolved, ended.windows);
   const Eigen::Index n = centre.size();
   if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
       !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||

@@ -17,7 +17,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kStarts = 12;
+constexpr int kMostStarts = 12;
 constexpr int kMostRuns = 6;  // of the model, at the lowest minima outside
 // How far the model's cost at such a minimum may be above its cost at the lowest one. The minimum
 // of an inaccurate expansion lies beside the model's, so that more than its weight is allowed for.
@@ -46,7 +46,7 @@ Matrix StartsOf(const RegionalExpansion& expansion, const Cost& cost) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
                    [&](Eigen::Index a, Eigen::Index b) { return least[a] < least[b]; });
-  order.resize(std::min<size_t>(kStarts, order.size()));
+  order.resize(std::min<size_t>(kMostStarts, order.size()));
   return points(order, Eigen::all);
 }
 

@@ -10,6 +10,7 @@
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/population_of_runs.h"
 #include "core/propagation/linear_system.h"
 
 namespace polyest::internal {
@@ -371,6 +372,10 @@ Cost RegionalExpansion::MakeCost(double regularization) const {
             problem_.prior(), regularization, design_.element);
   cost.set_power(1 / noise_.misfit);
   if (remainder_.size() > 0) cost.set_remainder(remainder_);
+  // Without a prior there is no population either.
+  if (regularization > 0 && problem_.population()) {
+    cost.set_population(PopulationCostOf(problem_));
+  }
   return cost;
 }
 

@@ -25,13 +25,13 @@
 
 #include "core/bayes/mismatch.h"
 #include "core/bayes/relative_noise.h"
+#include "core/bayes/window_sums.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/whitening.h"
-#include "core/estimator/record/window_sums.h"
 #include "core/propagation/filter_bank.h"
 #include "polyest/samples.h"
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "core/bayes/domain_cover.h"
@@ -10,26 +12,23 @@
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/population_of_runs.h"
 #include "core/estimator/expansion/run_marginal.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr double kHalfWidth = 4;     // of the region of a run's own germs, standard deviations
-constexpr double kMinSpread = 1e-9;  // of a path, in units of the prior's standard deviation
+constexpr double kHalfWidth = 4;  // of the region of a run's own germs, standard deviations
 constexpr int kMaxEliminations = 5;
 constexpr int64_t kRowsAtOnce = 256;
 constexpr int kPointsPerTerm = 3;  // of the shared germs
 constexpr double kWithinDomain = 1 - 1e-9;
-
-// Returns the lower triangular factor of a covariance, at least kMinSpread of `unit`.
-Matrix SpreadOf(const Matrix& covariance, const Vector& unit) {
-  const Matrix least = (kMinSpread * unit).cwiseAbs2().asDiagonal();
-  const CholeskyFactor factor(0.5 * (covariance + covariance.transpose()) + least);
-  if (factor.positive_definite()) return factor.Lower();
-  return Matrix(covariance.diagonal().cwiseMax(least.diagonal()).cwiseSqrt().asDiagonal());
-}
+// What a population is told of a run that is expanded over all that its own data leave open: the
+// expansion's error squared, in units of the noise, from which on its order is raised.
+constexpr double kMaxOwnError = 1e-4;
+// Ratio of a score's standard deviation to that for which the region was chosen.
+constexpr double kLeastScoreRatio = 0.6, kMostScoreRatio = 1.25;
 
 void AddCountsTo(EndedRuns& ended, const AbsorbedRows& absorbed) {
   ended.samples += absorbed.samples;
@@ -50,14 +49,18 @@ class Elimination {
         shared_(problem.SharedParameters()),
         own_(problem.OwnParameters(problem.runs() - 1)),
         n_shared_(std::ssize(shared_)),
-        n_own_(std::ssize(own_)) {}
+        n_own_(std::ssize(own_)),
+        truncation_(FirstTruncation(problem.problem().expansion, problem.dimension())) {}
 
   absl::Status Expand(const RunPath& path, const SampleStore& store, const RunRows& rows,
                       int threads, const Stop& stop);
+  // Raises the order of the next expansion if the present one is not accurate enough.
+  bool RaiseOrder();
   absl::Status FindMinima();
   bool IsWithinRegion() const;
   RunPath PathFound() const;
-  absl::Status AddTo(EndedRuns& ended) const;
+  // Adds the run, whose path is the one found.
+  absl::Status AddTo(const RunPath& path, EndedRuns& ended) const;
   int64_t propagated() const { return expansion_->propagated_rows(); }
 
  private:
@@ -65,6 +68,9 @@ class Elimination {
   LearnedNoise NoiseAbout(const Vector& centre) const;
   Matrix SharedPoints() const;
   Cost OwnCost() const;
+  Matrix OwnDirections() const;
+  Vector Origin(const ConstVectorRef& eta_shared) const;
+  bool IsScoreWithinRegion() const;
   double SharedPrior(const Vector& xi) const;
   Vector StartAt(const ConstVectorRef& eta_shared) const;
   Vector SpentDegrees() const;
@@ -78,10 +84,14 @@ class Elimination {
   const EndedRuns& ended_;
   std::vector<int> shared_, own_;
   Eigen::Index n_shared_, n_own_;
+  Truncation truncation_;
   std::unique_ptr<RegionalExpansion> expansion_;
   RunPath path_;
+  int run_ = 0;
+  double start_s_ = 0, end_s_ = 0;          // times of its first and last row
   Matrix points_;                           // of the shared germs, local coordinates
   std::vector<ConditionalMinimum> minima_;  // at the points, then at the centre
+  std::optional<ScoreLikelihood> score_;    // at the centre, of a run in a population
 };
 
 Region Elimination::JointRegion(const RunPath& path) const {
@@ -120,12 +130,11 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
   path_ = path;
   Region region = JointRegion(path);
   const Vector inside = NearestInside(problem_.prior(), region.centre());
-  ExpansionDesign design =
-      DesignForRegion(problem_, FirstTruncation(problem_.problem().expansion, problem_.dimension()),
-                      std::move(region), inside);
+  ExpansionDesign design = DesignForRegion(problem_, truncation_, std::move(region), inside);
   POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, &store, std::move(design),
                                                                NoiseAbout(inside), threads));
   expansion_->BeginAt(rows.first);
+  run_ = rows.run;
   RowBlock block;
   for (int64_t first = rows.first; first < rows.end; first += kRowsAtOnce) {
     const int64_t count = std::min(kRowsAtOnce, rows.end - first);
@@ -133,9 +142,19 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     if (expansion_->fitted_rows() < block.count()) return expansion_->shortage();
     for (int row = 0; row < block.count(); ++row) expansion_->Absorb(row);
+    if (first == rows.first) start_s_ = block.rows.front().time_s;
+    end_s_ = block.rows.back().time_s;
   }
   expansion_->EndRun();
   return absl::OkStatus();
+}
+
+bool Elimination::RaiseOrder() {
+  if (!problem_.population() || !(expansion_->OwnError() > kMaxOwnError)) return false;
+  const auto next = NextTruncation(problem_.problem().expansion, problem_.dimension(), truncation_);
+  if (!next) return false;
+  truncation_ = *next;
+  return true;
 }
 
 // The noise counts as known: one run alone tells little of it.
@@ -146,6 +165,16 @@ Cost Elimination::OwnCost() const {
   Cost cost(design.basis, design.region, design.reference, Mismatch(std::move(sums)),
             problem_.prior(), problem_.problem().regularization);
   return cost;
+}
+
+Matrix Elimination::OwnDirections() const {
+  return Matrix::Identity(n_shared_ + n_own_, n_shared_ + n_own_).rightCols(n_own_);
+}
+
+Vector Elimination::Origin(const ConstVectorRef& eta_shared) const {
+  Vector eta = Vector::Zero(n_shared_ + n_own_);
+  eta.head(n_shared_) = eta_shared;
+  return eta;
 }
 
 // Returns collocation points of the shared germs; those outside Ω are moved towards the centre.
@@ -168,26 +197,27 @@ Matrix Elimination::SharedPoints() const {
 // Returns η_φ of the path at η_θ, in Ω.
 Vector Elimination::StartAt(const ConstVectorRef& eta_shared) const {
   const Region& region = expansion_->design().region;
-  Vector eta = Vector::Zero(n_shared_ + n_own_);
-  eta.head(n_shared_) = eta_shared;
-  return region.ToLocal(NearestInside(problem_.prior(), region.ToGerm(eta))).tail(n_own_);
+  const Vector xi = region.ToGerm(Origin(eta_shared));
+  return region.ToLocal(NearestInside(problem_.prior(), xi)).tail(n_own_);
 }
 
 absl::Status Elimination::FindMinima() {
   points_ = SharedPoints();
   const Cost cost = OwnCost();
-  const RunMarginal marginal(cost, static_cast<int>(n_shared_), own_);
+  const RunMarginal marginal(cost, OwnDirections());
   minima_.clear();
-  const Vector middle = Vector::Zero(n_shared_);
-  const ConditionalMinimum centre = marginal.Minimize(middle, StartAt(middle));
   for (Eigen::Index q = 0; q < points_.rows(); ++q) {
     const Vector point = points_.row(q).transpose();
-    minima_.push_back(marginal.Minimize(point, StartAt(point)));
+    minima_.push_back(marginal.Minimize(Origin(point), StartAt(point)));
   }
-  minima_.push_back(centre);
+  const Vector middle = Vector::Zero(n_shared_);
+  minima_.push_back(marginal.Minimize(Origin(middle), StartAt(middle)));
   for (const ConditionalMinimum& minimum : minima_) {
     if (std::isfinite(minimum.value) && minimum.own.allFinite()) continue;
     return absl::FailedPreconditionError("the parameters of a run that has ended were not found");
+  }
+  if (problem_.population()) {
+    score_ = ScoreLikelihoodOf(problem_, cost, middle, minima_.back());
   }
   return absl::OkStatus();
 }
@@ -198,8 +228,18 @@ bool Elimination::IsWithinRegion() const {
   for (const ConditionalMinimum& minimum : minima_) {
     if (minimum.own.cwiseAbs().maxCoeff() > 1) return false;
   }
+  if (score_ && (n_own_ == 1 || !IsScoreWithinRegion())) return IsScoreWithinRegion();
   const Vector deviation = Inverse(minima_.back().hessian).diagonal().cwiseSqrt() * kHalfWidth;
   return deviation.maxCoeff() < 2 && deviation.minCoeff() > 0.5;
+}
+
+// The score's posterior may be skewed, so that its mean and variance count.
+bool Elimination::IsScoreWithinRegion() const {
+  const Eigen::Index own = problem_.population()->own;
+  const double spread = path_.spread.row(own).norm();
+  const double ratio = std::sqrt(score_->posterior().variance) / spread;
+  return ratio > kLeastScoreRatio && ratio < kMostScoreRatio &&
+         std::abs(score_->posterior().mean - path_.centre[own]) < spread;
 }
 
 // Returns 4 spread, the axes of the own germs.
@@ -220,12 +260,14 @@ RunPath Elimination::PathFound() const {
   RunPath path;
   path.centre = region.ToGerm(eta)(own_);
   path.slope = path_.slope + box * follows * Inverse(ended_.region.axes());
+  FreeOfPopulation(problem_, path.slope);
   const Vector unit = problem_.prior().GermStandardDeviation()(own_);
   Matrix covariance = box * inverse * box.transpose();
   // Never wider than the prior: where it is, the integrand is not a Gaussian.
   const Vector most = unit.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMin(1);
   covariance = most.asDiagonal() * covariance * most.asDiagonal();
   path.spread = SpreadOf(covariance, unit);
+  if (score_) SetScore(problem_, score_->posterior(), path);
   return path;
 }
 
@@ -245,14 +287,12 @@ Vector Elimination::Remainder(const Cost& cost, const RunMarginal& marginal,
   const double volume = LuFactors(BoxOfOwn()).LogAbsDeterminant();
   Vector remainder(points_.rows());
   for (Eigen::Index q = 0; q < points_.rows(); ++q) {
-    Vector eta = Vector::Zero(n_shared_ + n_own_);
-    eta.head(n_shared_) = points_.row(q).transpose();
+    const Vector eta = Origin(points_.row(q).transpose());
     const Vector d = terms.row(q).transpose() - at_centre;
     double mismatch = 0;
     for (const ChannelSums& channel : sums) mismatch += 0.5 * channel.samples.ChiSquared(d);
-    remainder[q] =
-        marginal.NegativeLogIntegral(eta.head(n_shared_), minima_[static_cast<size_t>(q)]) -
-        volume - SharedPrior(cost.region().ToGerm(eta)) - mismatch;
+    remainder[q] = marginal.NegativeLogIntegral(eta, minima_[static_cast<size_t>(q)]) - volume -
+                   SharedPrior(cost.region().ToGerm(eta)) - mismatch;
   }
   return remainder;
 }
@@ -290,7 +330,7 @@ Matrix Elimination::AlongPath(CollocationMatrix& matrix) const {
   return along;
 }
 
-absl::Status Elimination::AddTo(EndedRuns& ended) const {
+absl::Status Elimination::AddTo(const RunPath& path, EndedRuns& ended) const {
   const ExpansionDesign& design = expansion_->design();
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
                            CollocationMatrix::Factor(*ended.basis, points_));
@@ -315,7 +355,7 @@ absl::Status Elimination::AddTo(EndedRuns& ended) const {
     ended.outliers[c] += absorbed.outliers[c];
   }
   const Cost cost = OwnCost();
-  const RunMarginal marginal(cost, static_cast<int>(n_shared_), own_);
+  const RunMarginal marginal(cost, OwnDirections());
   const Matrix values = Remainder(cost, marginal, sums, matrix.matrix());
   if (!values.allFinite()) {
     return absl::FailedPreconditionError("the likelihood of a run that has ended vanishes");
@@ -325,57 +365,18 @@ absl::Status Elimination::AddTo(EndedRuns& ended) const {
   matrix.Solve(values, coefficients, ignored);
   ended.remainder += coefficients.col(0);
   AddCountsTo(ended, absorbed);
+  if (!score_) {
+    ended.windows.EndRow(SumsWithRemainder(problem_.problem().measured, ended), run_, start_s_,
+                         end_s_);
+  } else {
+    TellPopulation(problem_, cost, path, *score_, ended);
+    if (expansion_->OwnError() > kMaxOwnError) ended.unresolved += expansion_->OwnError();
+    if (!IsScoreWithinRegion()) ended.unresolved += 1;
+  }
   return absl::OkStatus();
 }
 
-void Append(const RunRows& rows, const RunPath& path, EndedRuns& ended) {
-  ended.run.push_back(rows.run);
-  ended.first_row.push_back(rows.first);
-  ended.rows = rows.end;
-  const Eigen::Index numbers = path.centre.size() + path.slope.size() + path.spread.size();
-  ended.paths.conservativeResize(numbers, std::ssize(ended.run));
-  ended.SetPath(ended.run.size() - 1, path);
-}
-
 }  // namespace
-
-EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
-                           const GermSummary& posterior, const LearnedNoise& noise) {
-  EndedRuns ended;
-  const auto shared = static_cast<size_t>(region.dimension());
-  ended.region = std::move(region);
-  ended.centre = posterior.mean;
-  ended.factor = SpreadOf(posterior.covariance, Vector::Ones(posterior.mean.size()));
-  const auto of_one_run = static_cast<int>(problem.problem().uncertain.size());
-  ended.basis = std::make_shared<Basis>(std::vector<Germ>(shared, Germ::Uniform()),
-                                        FirstTruncation(problem.problem().expansion, of_one_run));
-  const auto channels = static_cast<size_t>(problem.channels());
-  ended.sums.assign(channels, ChannelSums(ended.basis->size()));
-  ended.discount = ended.largest = Vector::Zero(problem.channels());
-  ended.outliers.assign(channels, 0);
-  ended.remainder = Vector::Zero(ended.basis->size());
-  ended.noise_scale.resize(problem.channels());
-  ended.noise_time_constant_s.resize(problem.channels());
-  for (size_t c = 0; c < channels; ++c) {
-    const auto channel = static_cast<Eigen::Index>(c);
-    ended.noise_scale[channel] = noise.channels[c].scale;
-    ended.noise_time_constant_s[channel] = noise.channels[c].time_constant_s;
-  }
-  return ended;
-}
-
-RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
-               const Vector& centre) {
-  const std::vector<int> shared = problem.SharedParameters(), own = problem.OwnParameters(run);
-  const Matrix& covariance = posterior.covariance;
-  RunPath path;
-  const Matrix both = covariance(own, shared);
-  path.slope = both * Inverse(covariance(shared, shared));
-  path.centre = posterior.mean(own) + path.slope * (centre - posterior.mean(shared));
-  path.spread = SpreadOf(covariance(own, own) - path.slope * both.transpose(),
-                         problem.prior().GermStandardDeviation()(own));
-  return path;
-}
 
 absl::StatusOr<int64_t> EliminateRun(const EliminationRequest& request, const RunRows& rows,
                                      const RunPath& path, const Stop& stop, EndedRuns& ended) {
@@ -387,12 +388,16 @@ absl::StatusOr<int64_t> EliminateRun(const EliminationRequest& request, const Ru
     POLYEST_RETURN_IF_ERROR(
         elimination.Expand(present, *request.store, rows, request.threads, stop));
     propagated += elimination.propagated();
+    if (elimination.RaiseOrder()) {
+      --attempt;
+      continue;
+    }
     POLYEST_RETURN_IF_ERROR(elimination.FindMinima());
     present = elimination.PathFound();
     if (elimination.IsWithinRegion() || attempt == kMaxEliminations) break;
   }
-  POLYEST_RETURN_IF_ERROR(elimination.AddTo(ended));
-  Append(rows, present, ended);
+  POLYEST_RETURN_IF_ERROR(elimination.AddTo(present, ended));
+  ended.Append(rows.run, rows.first, rows.end, present);
   return propagated;
 }
 

@@ -16,6 +16,7 @@
 
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/run_path.h"
 #include "core/estimator/problem/ended_runs.h"
 
 namespace polyest::internal {
@@ -25,22 +26,6 @@ struct RunRows {
   int run = 0;
   int64_t first = 0, end = 0;
 };
-
-// Mean and covariance of germs.
-struct GermSummary {
-  Vector mean;
-  Matrix covariance;
-};
-
-// Returns what is known of no ended runs, in terms over `region` of the shared germs, whose
-// posterior is `posterior`. The sums will be taken with the scales of `noise`.
-EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
-                           const GermSummary& posterior, const LearnedNoise& noise);
-
-// Returns the path of run `run` in a posterior of all germs of `problem`, about `centre` of the
-// shared ones.
-RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
-               const Vector& centre);
 
 struct EliminationRequest {
   const ResolvedProblem* problem = nullptr;  // of any runs

@@ -40,31 +40,23 @@ double NegativeLogSum(const Vector& costs, const Vector& weights) {
 
 }  // namespace
 
-RunMarginal::RunMarginal(const Cost& cost, int shared, std::vector<int> own)
-    : cost_(cost), shared_(shared), own_(std::move(own)) {}
+RunMarginal::RunMarginal(const Cost& cost, Matrix directions)
+    : cost_(cost), directions_(std::move(directions)) {}
 
-Vector RunMarginal::Joined(const ConstVectorRef& eta_shared, const ConstVectorRef& eta_own) const {
-  Vector eta(eta_shared.size() + eta_own.size());
-  eta << eta_shared, eta_own;
-  return eta;
-}
-
-ConditionalMinimum RunMarginal::Minimize(const ConstVectorRef& eta_shared,
-                                         const Vector& start) const {
-  const Eigen::Index own = start.size();
-  Vector gradient(shared_ + own);
+ConditionalMinimum RunMarginal::Minimize(const Vector& origin, const Vector& start) const {
+  Vector gradient(origin.size());
   ConditionalMinimum minimum;
   minimum.own = start;
   for (int i = 0; i < kMaxSteps; ++i) {
-    const Vector eta = Joined(eta_shared, minimum.own);
+    const Vector eta = origin + directions_ * minimum.own;
     minimum.value = cost_.EvaluateWithGradient(eta, gradient).total;
-    minimum.hessian = PositiveDefinite(cost_.Hessian(eta).bottomRightCorner(own, own));
-    Vector step = -CholeskyFactor(minimum.hessian).Solve(gradient.tail(own));
+    minimum.hessian = PositiveDefinite(directions_.transpose() * cost_.Hessian(eta) * directions_);
+    Vector step = -CholeskyFactor(minimum.hessian).Solve(directions_.transpose() * gradient);
     if (!step.allFinite() || !(step.norm() > kShortestStep)) break;
     if (step.norm() > kLongestStep) step *= kLongestStep / step.norm();
     int halvings = 0;
     for (; halvings < kMaxHalvings; ++halvings, step /= 2) {
-      const double value = cost_.Evaluate(Joined(eta_shared, minimum.own + step)).total;
+      const double value = cost_.Evaluate(eta + directions_ * step).total;
       if (value < minimum.value || !std::isfinite(minimum.value)) break;
     }
     if (halvings == kMaxHalvings) break;
@@ -73,39 +65,40 @@ ConditionalMinimum RunMarginal::Minimize(const ConstVectorRef& eta_shared,
   return minimum;
 }
 
-double RunMarginal::NegativeLogIntegral(const ConstVectorRef& eta_shared,
+double RunMarginal::NegativeLogIntegral(const Vector& origin,
                                         const ConditionalMinimum& minimum) const {
   const Eigen::Index own = minimum.own.size();
-  if (own == 1) return IntegrateLine(eta_shared, minimum);
-  if (own <= kMostInBox) return IntegrateBox(eta_shared, minimum);
+  if (own == 1) return IntegrateLine(origin, minimum);
+  if (own <= kMostInBox) return IntegrateBox(origin, minimum);
   return minimum.value + CholeskyFactor(minimum.hessian).HalfLogDeterminant() -
          0.5 * static_cast<double>(own) * std::log(2 * std::numbers::pi);
 }
 
-double RunMarginal::IntegrateLine(const ConstVectorRef& eta_shared,
-                                  const ConditionalMinimum& minimum) const {
+double RunMarginal::IntegrateLine(const Vector& origin, const ConditionalMinimum& minimum) const {
   const double reach = kLineReach / std::sqrt(minimum.hessian(0, 0));
-  const auto own = static_cast<Eigen::Index>(own_.front());
-  // ξ_own = base + slope η_φ
+  double lower = minimum.own[0] - reach, upper = minimum.own[0] + reach;
+  // ξ = base + slope η_φ
   const Region& region = cost_.region();
-  const double slope = region.axes()(own, shared_);
-  const double base = region.ToGerm(Joined(eta_shared, Vector::Zero(1)))[own];
-  const double to_lower = (cost_.prior().lower()[own] - base) / slope;
-  const double to_upper = (cost_.prior().upper()[own] - base) / slope;
-  const double lower = std::max(minimum.own[0] - reach, std::min(to_lower, to_upper));
-  const double upper = std::min(minimum.own[0] + reach, std::max(to_lower, to_upper));
+  const Vector slope = region.axes() * directions_;
+  const Vector base = region.ToGerm(origin);
+  for (Eigen::Index i = 0; i < slope.size(); ++i) {
+    if (slope[i] == 0) continue;
+    const double to_lower = (cost_.prior().lower()[i] - base[i]) / slope[i];
+    const double to_upper = (cost_.prior().upper()[i] - base[i]) / slope[i];
+    lower = std::max(lower, std::min(to_lower, to_upper));
+    upper = std::min(upper, std::max(to_lower, to_upper));
+  }
   if (!(upper > lower)) return kInfinity;
   static const GaussRule& rule = *new GaussRule(MakeGaussRule(Germ::Uniform(), kLineNodes));
-  Matrix etas(kLineNodes, shared_ + 1);
-  etas.leftCols(shared_) = eta_shared.transpose().replicate(kLineNodes, 1);
-  etas.col(shared_) = 0.5 * (lower + upper) + (0.5 * (upper - lower) * rule.nodes).array();
+  const Vector places = 0.5 * (lower + upper) + (0.5 * (upper - lower) * rule.nodes).array();
+  Matrix etas = places * directions_.transpose();
+  etas.rowwise() += origin.transpose();
   Vector costs;
   cost_.EvaluateMany(etas, costs);
   return NegativeLogSum(costs, (upper - lower) * rule.weights);
 }
 
-double RunMarginal::IntegrateBox(const ConstVectorRef& eta_shared,
-                                 const ConditionalMinimum& minimum) const {
+double RunMarginal::IntegrateBox(const Vector& origin, const ConditionalMinimum& minimum) const {
   static const GaussRule& rule = *new GaussRule(MakeGaussRule(Germ::Normal(), kBoxNodes));
   const Eigen::Index own = minimum.own.size();
   Eigen::Index count = 1;
@@ -119,10 +112,10 @@ double RunMarginal::IntegrateBox(const ConstVectorRef& eta_shared,
     }
   }
   const CholeskyFactor factor(minimum.hessian);
-  Matrix etas(count, shared_ + own);
-  etas.leftCols(shared_) = eta_shared.transpose().replicate(count, 1);
-  etas.rightCols(own) =
+  const Matrix places =
       SolveLowerTransposedRows(factor.Lower(), deviates).rowwise() + minimum.own.transpose();
+  Matrix etas = places * directions_.transpose();
+  etas.rowwise() += origin.transpose();
   Vector costs;
   cost_.EvaluateMany(etas, costs);
   costs -= 0.5 * deviates.rowwise().squaredNorm();

@@ -3,9 +3,9 @@
 // The likelihood of a run without its own parameters, from an expansion over the shared germs and
 // its own (problem/ended_runs.h has the formulas).
 //
-// In the expansion's local coordinates η = (η_θ, η_φ) the integrand is e^{−J(η_θ, η_φ)}. At a given
-// η_θ, its minimum is found by Newton's method with steps of at most a half width. The integral is
-// taken
+// In the expansion's local coordinates the integrand is e^{−J(η)}, η = origin + D η_φ: the origin
+// is a place of the shared germs and D has the directions of the run's own. The minimum there is
+// found by Newton's method with steps of at most a half width. The integral is taken
 //   for one parameter     by Gauss–Legendre within 7 standard deviations of the minimum and Ω,
 //   for two or three      by Gauss–Hermite about the minimum in the metric of the Hessian,
 //   for more              as that of the Gaussian at the minimum (Laplace).
@@ -15,7 +15,7 @@
 
 namespace polyest::internal {
 
-// The integrand at one place of the shared germs.
+// The integrand about one origin.
 struct ConditionalMinimum {
   Vector own;  // η_φ of the minimum (n_φ)
   // ∂²J/∂η_φ², n_φ × n_φ; positive definite, since a shift is added where it is not.
@@ -25,24 +25,20 @@ struct ConditionalMinimum {
 
 class RunMarginal {
  public:
-  // The first `shared` local coordinates of the cost are those of the shared germs; `own` are the
-  // indices of the run's own germs. `cost` must outlive this.
-  RunMarginal(const Cost& cost, int shared, std::vector<int> own);
+  // `directions` is D, n × n_φ with n_φ ≥ 1. `cost` must outlive this.
+  RunMarginal(const Cost& cost, Matrix directions);
 
-  // Returns the minimum over η_φ at η_θ, from a starting point.
-  ConditionalMinimum Minimize(const ConstVectorRef& eta_shared, const Vector& start) const;
-  // Returns −log ∫ e^{−J} dη_φ at η_θ; +∞ if the integrand vanishes.
-  double NegativeLogIntegral(const ConstVectorRef& eta_shared,
-                             const ConditionalMinimum& minimum) const;
+  // Returns the minimum over η_φ, from a starting point.
+  ConditionalMinimum Minimize(const Vector& origin, const Vector& start) const;
+  // Returns −log ∫ e^{−J} dη_φ; +∞ if the integrand vanishes.
+  double NegativeLogIntegral(const Vector& origin, const ConditionalMinimum& minimum) const;
 
  private:
-  Vector Joined(const ConstVectorRef& eta_shared, const ConstVectorRef& eta_own) const;
-  double IntegrateLine(const ConstVectorRef& eta_shared, const ConditionalMinimum& minimum) const;
-  double IntegrateBox(const ConstVectorRef& eta_shared, const ConditionalMinimum& minimum) const;
+  double IntegrateLine(const Vector& origin, const ConditionalMinimum& minimum) const;
+  double IntegrateBox(const Vector& origin, const ConditionalMinimum& minimum) const;
 
   const Cost& cost_;
-  Eigen::Index shared_;
-  std::vector<int> own_;
+  Matrix directions_;
 };
 
 }  // namespace polyest::internal

@@ -71,6 +71,7 @@ class Assessment {
     Correct(cost);
     filtered_ = DrawFiltered(problem_, *request_.expansion, posterior_);
     findings_.shift = std::hypot(findings_.shift, findings_.integration_shift);
+    NotePopulation();
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
@@ -153,6 +154,19 @@ class Assessment {
         !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
   }
 
+  // What is left out of a population is linear over its posterior: it shifts every mean by as many
+  // standard deviations as it has itself, times its correlation with the parameter. An error of the
+  // outputs shifts by no more than itself in units of the noise.
+  void NotePopulation() {
+    if (!problem_.population() || problem_.ended_runs() == nullptr) return;
+    const Matrix shared = posterior_.Germs(prior_)(Eigen::all, problem_.SharedParameters());
+    const EndedRuns& ended = *problem_.ended_runs();
+    findings_.population_shift =
+        std::hypot(WeightedStandardDeviation(shared * ended.left_out, posterior_.weights),
+                   std::sqrt(ended.unresolved));
+    findings_.shift = std::hypot(findings_.shift, findings_.population_shift);
+  }
+
   void Summarize(const Cost& cost, const Vector& eta) {
     const RecordSummary& record = *request_.record;
     const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
@@ -173,8 +187,10 @@ class Assessment {
     Cost stated = cost;
     stated.set_power(1);
     estimate_.cost = stated.Evaluate(eta);
-    if (problem_.ended_runs() == nullptr || !(regularization_ > 0)) return;
-    // What the parameters of ended runs add when they are integrated out counts with the prior.
+    const bool more_prior = problem_.ended_runs() != nullptr || problem_.population().has_value();
+    if (!more_prior || !(regularization_ > 0)) return;
+    // What the parameters of ended runs add when they are integrated out, and what a population
+    // does, counts with the prior.
     estimate_.cost.prior = (estimate_.cost.total - estimate_.cost.mismatch) / regularization_;
   }
 
@@ -195,7 +211,7 @@ class Assessment {
     const Vector widening =
         shift_widening_ * noise_widening_.cwiseProduct(findings_.windows.widening);
     DescribeSpread(cost, eta, informed, widening);
-    estimate_.directions = Directions(ToGermHessian(cost.MismatchHessian(eta, spent_)), prior_);
+    estimate_.directions = Directions(ToGermHessian(cost.InformationHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
@@ -334,7 +350,7 @@ class Assessment {
   // in which the sharp mode of a skewed prior does not count as information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
     const Vector& xi = findings_.map_xi;
-    const Matrix mismatch = ToGermHessian(cost.MismatchHessian(eta, spent_));
+    const Matrix mismatch = ToGermHessian(cost.InformationHessian(eta, spent_));
     Matrix curved = mismatch;
     curved.diagonal() += prior_.Curvature(xi);
     Matrix spread = mismatch;

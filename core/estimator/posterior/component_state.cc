@@ -31,12 +31,21 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
          IsSummaryFor(problem, state.summary, state.taken);
 }
 
+// Whether the ended runs have the windows that they must have.
+bool HasWindowsOf(const EndedRuns& ended, const ResolvedProblem& problem) {
+  if (problem.population()) return ended.windows.count() == 0;
+  return ended.windows.Suits(SumsWithRemainder(problem.problem().measured, ended),
+                             std::ssize(ended.run));
+}
+
 // Gives the problem what a snapshot says of ended runs.
 absl::Status SetEndedRuns(const std::optional<EndedRuns>& ended, ResolvedProblem& problem) {
   const bool has_ended = problem.runs() > problem.max_joint_runs();
   const auto shared = static_cast<int>(problem.SharedParameters().size());
   if (has_ended != ended.has_value() ||
-      (ended && !IsWellFormed(*ended, shared, problem.dimension() - shared, problem.channels()))) {
+      (ended && !IsWellFormed(*ended, shared, problem.dimension() - shared, problem.channels())) ||
+      (ended && ended->shapes.empty() == problem.population().has_value()) ||
+      (ended && !HasWindowsOf(*ended, problem))) {
     return absl::DataLossError("the snapshot's ended runs cannot be of this problem");
   }
   problem.set_ended_runs(ended ? std::make_shared<const EndedRuns>(*ended) : nullptr);

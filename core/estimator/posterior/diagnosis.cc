@@ -189,7 +189,8 @@ void AddInaccuracy(const Findings& findings, const Estimate& estimate,
              "far as the model's own trajectories confirm it; %s",
              estimate.expansion.order, estimate.expansion.residual_to_noise, findings.power,
              remedy)});
-  } else if (findings.shift > kInaccurateShift && !findings.IntegrationPrevails()) {
+  } else if (findings.shift > kInaccurateShift && !findings.IntegrationPrevails() &&
+             !findings.PopulationPrevails()) {
     diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat(
@@ -223,6 +224,18 @@ void AddIntegrationError(const Findings& findings, std::vector<Diagnostic>& diag
            RemedyForIntegration(problem))});
 }
 
+void AddPopulation(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  if (!(findings.shift > kInaccurateShift) || !findings.PopulationPrevails()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kExpansionInaccurate,
+       absl::StrFormat(
+           "what the population keeps of ended runs leaves out so much of their data that "
+           "estimates may be off by %.3g standard deviations of the fit, by which the uncertainty "
+           "has been widened; more samples in each run, or a prior closer to the population, "
+           "would leave out less",
+           findings.population_shift)});
+}
+
 void AddEdge(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (!findings.leans) return;
   diagnostics.push_back(
@@ -254,6 +267,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddIdentifiability(findings, estimate, diagnostics);
   AddInaccuracy(findings, estimate, diagnostics);
   AddIntegrationError(findings, diagnostics);
+  AddPopulation(findings, diagnostics);
   AddEdge(findings, diagnostics);
   DiagnoseResiduals(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);

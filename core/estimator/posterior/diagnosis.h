@@ -22,6 +22,10 @@ struct Findings {
   bool IntegrationPrevails() const {
     return 2 * integration_shift * integration_shift > shift * shift;
   }
+  // Whether more of it is due to how a population is told of ended runs.
+  bool PopulationPrevails() const {
+    return 2 * population_shift * population_shift > shift * shift;
+  }
   const std::string& NameOf(int parameter) const;
 
   const ResolvedProblem* problem = nullptr;
@@ -34,6 +38,7 @@ struct Findings {
   double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations
   double integration_shift = 0;      // the part of it that the integration causes
+  double population_shift = 0;       // the part of it that ended runs of a population cause
   // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion

@@ -16,6 +16,14 @@ bool AreSumsOf(const MismatchSums& sums, Eigen::Index terms) {
          std::isfinite(sums.w()) && sums.count() >= 0;
 }
 
+bool AreShapes(const std::vector<ScoreMixture>& shapes) {
+  return std::ranges::all_of(shapes, [](const ScoreMixture& shape) {
+    const Eigen::Index count = shape.log_weights.size();
+    return count == 0 || (count <= ScoreMixture::kMostComponents && shape.log_weights.allFinite() &&
+                          std::isfinite(shape.first) && shape.step > 0 && shape.step < 1);
+  });
+}
+
 template <class Number>
 bool AreAscending(const std::vector<Number>& numbers) {
   return std::ranges::adjacent_find(numbers, std::ranges::greater_equal()) == numbers.end();
@@ -46,6 +54,26 @@ void EndedRuns::SetPath(size_t i, const RunPath& path) {
   column << path.centre, path.slope.reshaped(), path.spread.reshaped();
 }
 
+void EndedRuns::Append(int run_index, int64_t first, int64_t end, const RunPath& path) {
+  run.push_back(run_index);
+  first_row.push_back(first);
+  rows = end;
+  const Eigen::Index numbers = path.centre.size() + path.slope.size() + path.spread.size();
+  paths.conservativeResize(numbers, std::ssize(run));
+  SetPath(run.size() - 1, path);
+}
+
+std::vector<ChannelSums> SumsWithRemainder(const std::vector<MeasuredOutput>& measured,
+                                           const EndedRuns& ended) {
+  std::vector<ChannelSums> sums = ended.sums;
+  for (size_t c = 0; c < sums.size(); ++c) sums[c].scale_unknown = measured[c].noise.unknown;
+  ChannelSums& remainder = sums.emplace_back(ended.basis->size());
+  remainder.log_variance = ended.remainder;
+  // A group of its own.
+  remainder.scale_unknown = true;
+  return sums;
+}
+
 Vector TermsAtCentre(const EndedRuns& ended) {
   Vector terms(ended.basis->size());
   ended.basis->Evaluate(Vector::Zero(ended.basis->dimension()), terms);
@@ -71,9 +99,11 @@ bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
          IsFiniteMatrix(ended.discount, channels, 1) &&
          IsFiniteMatrix(ended.largest, channels, 1) && IsFiniteMatrix(ended.remainder, terms, 1) &&
          IsFiniteMatrix(ended.noise_time_constant_s, channels, 1) &&
-         IsFiniteMatrix(ended.noise_scale, channels, 1) && ended.noise_scale.minCoeff() > 0 &&
-         std::isfinite(ended.own_error) && std::isfinite(ended.log_noise) &&
-         std::isfinite(ended.log_variance);
+         IsFiniteMatrix(ended.left_out, shared, 1) && AreShapes(ended.shapes) &&
+         (ended.shapes.empty() || std::ssize(ended.shapes) == runs) &&
+         std::isfinite(ended.unresolved) && IsFiniteMatrix(ended.noise_scale, channels, 1) &&
+         ended.noise_scale.minCoeff() > 0 && std::isfinite(ended.own_error) &&
+         std::isfinite(ended.log_noise) && std::isfinite(ended.log_variance);
 }
 
 }  // namespace polyest::internal

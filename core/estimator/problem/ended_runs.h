@@ -31,9 +31,12 @@
 #include <vector>
 
 #include "core/bayes/mismatch.h"
+#include "core/bayes/population_cost.h"
 #include "core/bayes/region.h"
+#include "core/bayes/window_sums.h"
 #include "core/chaos/basis.h"
 #include "core/common/types.h"
+#include "polyest/problem.h"
 
 namespace polyest::internal {
 
@@ -69,14 +72,34 @@ struct EndedRuns {
   std::vector<int64_t> outliers;
   Vector largest;
 
+  // For runs that share a population: the shape of each one's posterior of its score about the
+  // path's mean (bayes/population_cost.h), and the slope (n_θ, germ coordinates) of what that
+  // leaves out of the cost, over all runs. Empty and 0 without a population.
+  std::vector<ScoreMixture> shapes;
+  Vector left_out;
+  // Sum over those of its runs that no expansion follows: the square of the error in units of the
+  // noise, and 1 where the score was not found within the region of the expansion.
+  double unresolved = 0;
+
   Vector remainder;  // coefficients of Σ_r E_r, S
   // By channel, the noise with which the sums were taken: ChannelNoise::scale and time_constant_s.
   Vector noise_scale, noise_time_constant_s;
 
+  // The sums of windows of runs, one run a row, with the remainder as a channel of its own after
+  // the others (SumsWithRemainder). Without any if the runs share a population.
+  WindowSums windows;
+
   int own_parameters() const;    // n_φ
   RunPath Path(size_t i) const;  // of run run[i]
   void SetPath(size_t i, const RunPath& path);
+  // Appends the rows [first, end) of a run and its path.
+  void Append(int run_index, int64_t first, int64_t end, const RunPath& path);
 };
+
+// Returns the sums of the channels as windows take them (window_sums.h): with the kinds of noise of
+// `measured` and, as the last channel, one without samples whose log variance is the remainder.
+std::vector<ChannelSums> SumsWithRemainder(const std::vector<MeasuredOutput>& measured,
+                                           const EndedRuns& ended);
 
 // Returns the polynomials' terms at the region's centre (S).
 Vector TermsAtCentre(const EndedRuns& ended);

@@ -18,8 +18,8 @@ absl::Status CheckOutputDelay(const FieldPath& field, const std::string& name, d
     return InvalidField(
         field,
         absl::StrFormat("%s may be as small as %g s; with a streamed input the delay of an output "
-                        "must not be negative, since values to come would be needed; delay the "
-                        "inputs instead",
+                        "must not be negative, since values to come would be needed; give the "
+                        "inputs' values at earlier times instead",
                         name, smallest_s));
   }
   return absl::OkStatus();

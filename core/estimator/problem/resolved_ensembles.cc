@@ -33,7 +33,7 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   }
   Matrix values = base_.transpose().replicate(thetas.rows(), 1);
   for (size_t i = 0; i < targets_.size(); ++i) {
-    if (target_run_[i] >= 0 && target_run_[i] != run) continue;
+    if (targets_[i] < 0 || (target_run_[i] >= 0 && target_run_[i] != run)) continue;
     values.col(targets_[i]) = thetas.col(static_cast<Eigen::Index>(i));
   }
   if (derived_ != nullptr) Derive(values);

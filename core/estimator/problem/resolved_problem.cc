@@ -16,6 +16,7 @@
 #include "core/common/status.h"
 #include "core/estimator/problem/output_delay.h"
 #include "core/estimator/problem/parameters_of_runs.h"
+#include "core/estimator/problem/populations.h"
 #include "core/estimator/problem/process_noise.h"
 #include "core/estimator/problem/truncation.h"
 #include "core/estimator/problem/validate_noise.h"
@@ -64,6 +65,7 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int fir
     add(InvalidField("uncertain", "at least one parameter must be uncertain"));
   }
   add(ValidateRegularization(problem));
+  add(ValidatePopulations(problem));
   if (const absl::Status priors = ValidatePriors(problem); !priors.ok()) {
     add(priors);
   } else if (!problem.uncertain.empty()) {
@@ -246,6 +248,7 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
   std::vector<std::optional<int>> found(problem_.uncertain.size());
   for (size_t i = 0; i < problem_.uncertain.size(); ++i) {
     const UncertainParameter& parameter = problem_.uncertain[i];
+    if (parameter.part != PopulationPart::kNone) continue;
     const FieldPath field{"uncertain", i};
     const auto index = Find(field, parameter.name);
     if (!index) continue;
@@ -261,17 +264,7 @@ void ResolvedProblem::Resolver::ResolveUncertain() {
     ResolveDelay(field, settable_[*index], smallest, largest);
     found[i] = *index;
   }
-  const int first_run = resolved_.first_run_;
-  for (int run = first_run; run < resolved_.runs_; ++run) {
-    for (size_t i = 0; i < found.size(); ++i) {
-      const bool per_run = problem_.uncertain[i].per_run;
-      if (!found[i] || (run > first_run && !per_run)) continue;
-      resolved_.targets_.push_back(*found[i]);
-      resolved_.target_run_.push_back(per_run ? run : -1);
-      resolved_.units_.push_back(settable_[*found[i]].unit);
-      if (per_run && run == first_run) ++resolved_.parameters_per_run_;
-    }
-  }
+  resolved_.SetTargets(found);
 }
 
 void ResolvedProblem::Resolver::ResolveDerived() {
@@ -330,6 +323,7 @@ void ResolvedProblem::Resolver::CheckAllHaveValues() {
 absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs, int first_run) {
   POLYEST_CHECK(runs > first_run && first_run >= 0);
   problem = WithHyperparameters(std::move(problem));
+  problem.uncertain = WithPopulations(std::move(problem.uncertain));
   std::vector<absl::Status> refusals = CheckOptions(problem, runs, first_run);
   if (!refusals.empty()) return refusals.front();
   POLYEST_ASSIGN_OR_RETURN(Prior prior,
@@ -343,6 +337,7 @@ absl::StatusOr<ResolvedProblem> ResolvedProblem::Make(Problem problem, int runs,
 
 std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   problem = WithHyperparameters(std::move(problem));
+  problem.uncertain = WithPopulations(std::move(problem.uncertain));
   std::vector<absl::Status> refusals = CheckOptions(problem, 1, 0);
   if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
   // The prior only provides the names, because the correlations may be invalid. It needs at least

@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,8 @@ inline constexpr int kMaxParametersOfRuns = 12;
 // runs. Its uncertain parameters are the problem's own, a per-run one named "x_0[0]" for run 0,
 // followed by the per-run ones for run 1, "x_0[1]", for run 2, … While run r is the last of more
 // runs than kMaxParametersOfRuns allow, they are the problem's own, a per-run one named "x_0[r]".
+// The mean and the spread of a population are uncertain parameters that follow the problem's own
+// (populations.h); the model does not know them.
 class ResolvedProblem {
  public:
   // Resolves the problem for `runs` ≥ 1 runs. Returns InvalidArgument or ResourceExhausted that
@@ -55,8 +58,8 @@ class ResolvedProblem {
     return run < max_joint_runs() ? WithRuns(run + 1) : OfRun(run);
   }
   // Returns the maximum number of runs with parameters in one expansion: as many as
-  // kMaxParametersOfRuns and the expansion's limits allow, or any number if runs have no parameters
-  // of their own.
+  // kMaxParametersOfRuns and the expansion's limits allow, one if they share a population, or any
+  // number if runs have no parameters of their own.
   int max_joint_runs() const;
   // Returns the maximum number of runs of a record: that of one expansion where ended runs cannot
   // be eliminated, because the expansion is not adaptive or the runs share no parameter, else any.
@@ -71,6 +74,14 @@ class ResolvedProblem {
   // Returns the uncertain parameters that all runs share, and those of one run.
   std::vector<int> SharedParameters() const;
   std::vector<int> OwnParameters(int run) const;
+  // The germs of the population that a parameter of the runs shares, and which of OwnParameters
+  // that parameter is; nothing without a population.
+  struct Population {
+    int mean = 0;
+    int spread = 0;
+    int own = 0;
+  };
+  std::optional<Population> population() const;
   // Sets the tolerance of ensembles made from now on; it must be above 0 and within the limits of
   // IntegrationOptions.
   void set_relative_tolerance(double tolerance) {
@@ -126,6 +137,9 @@ class ResolvedProblem {
         settable_(problem_.model->description(), problem_),
         base_(settable_.Defaults()) {}
 
+  // Sets the targets and units of the uncertain parameters; `found` are the settable quantities of
+  // the problem's, where there are any.
+  void SetTargets(const std::vector<std::optional<int>>& found);
   void Derive(Matrix& values) const;
   Matrix ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const;
 
@@ -138,7 +152,7 @@ class ResolvedProblem {
   std::shared_ptr<const Model> model_;
   SettableQuantities settable_;
   Vector base_;                  // values of the settable quantities that are not uncertain
-  std::vector<int> targets_;     // settable quantity of each uncertain parameter
+  std::vector<int> targets_;     // settable quantity of each uncertain parameter; −1 for none
   std::vector<int> target_run_;  // and its run; −1 for all runs
   std::vector<int> derived_targets_;
   std::vector<int> derived_variables_;

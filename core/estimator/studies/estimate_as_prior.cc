@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/problem/assumed_noise.h"
 #include "core/estimator/problem/process_noise.h"
@@ -40,6 +41,9 @@ void TakeNoise(const Estimate& estimate, std::vector<MeasuredOutput>& measured) 
 absl::StatusOr<ResolvedProblem> WithEstimateAsPrior(const ResolvedProblem& problem,
                                                     const Estimate& estimate) {
   POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a design after an estimate"));
+  if (problem.population()) {
+    return InvalidField("uncertain", "the estimate of a population cannot be a prior");
+  }
   const auto n = static_cast<int>(problem.problem().uncertain.size());
   POLYEST_CHECK(estimate.covariance.rows() >= n);  // the parameters of the first run come first
   const Vector std_dev = estimate.covariance.diagonal().cwiseSqrt();

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/population_cost.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 #include "core/chaos/expansion.h"
@@ -233,6 +234,28 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
                       numbers, kMaxPredictedValues));
 }
 
+namespace {
+
+// Draws the runs' parameters that share a population from it: g = μ + s ξ, with the germs in the
+// given order.
+void DrawFromPopulation(const ResolvedProblem& problem, const Matrix& xis,
+                        const std::vector<Eigen::Index>& order, Matrix& thetas) {
+  const ResolvedProblem::Population population = *problem.population();
+  const Prior& prior = problem.prior();
+  for (Eigen::Index d = 0; d < thetas.rows(); ++d) {
+    const RunScore among =
+        PopulationOfGerms(prior.ScoreOf(population.mean, thetas(d, population.mean)),
+                          prior.ScoreOf(population.spread, thetas(d, population.spread)));
+    for (int run = problem.first_run(); run < problem.runs(); ++run) {
+      const int own = problem.OwnParameters(run)[static_cast<size_t>(population.own)];
+      const double xi = xis(order[static_cast<size_t>(d)], own);
+      thetas(d, own) = prior.OfScore(own, among.mean + std::sqrt(among.variance) * xi);
+    }
+  }
+}
+
+}  // namespace
+
 Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
                          const ResolvedProblem& other) {
   const Prior& prior = other.prior();
@@ -250,6 +273,7 @@ Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
     const auto column = static_cast<Eigen::Index>(i);
     if (!given[i].per_run) result.col(column) = thetas.col(column);
   }
+  if (other.population()) DrawFromPopulation(other, xis, order, result);
   return result;
 }
 

@@ -11,7 +11,7 @@
 // by default gain 1, delay 0 and offset 0. The delay of an output must be bounded by its prior.
 // Samples of an output before the largest delay that the prior allows are not used: they show what
 // was before the run. A negative delay, by which an output shows what is to come, is possible
-// without streamed inputs only; with them, delay the inputs instead.
+// without streamed inputs only; with them, give the inputs' values at earlier times.
 
 #include <map>
 #include <memory>

@@ -56,6 +56,14 @@ struct RandomWalk {
   friend bool operator==(const RandomWalk&, const RandomWalk&) = default;
 };
 
+// What a parameter is of a population (UncertainParameter::population).
+enum class PopulationPart {
+  kNone,    // a quantity of the model
+  kMean,    // the population's median, F⁻¹(Φ(μ)), which for a normal prior is its mean
+  kSpread,  // its standard deviation, s times that of a normal prior or of a lognormal's logarithm;
+            // s itself for other priors
+};
+
 // An uncertain parameter: its name and its prior. Make one with the functions below, which check
 // their arguments: INVALID_ARGUMENT names the argument, its value and the rule.
 struct UncertainParameter {
@@ -72,6 +80,16 @@ struct UncertainParameter {
   // likelihood is then that of prediction errors (Problem::likelihood). Only parameters of the
   // model can drift, and not initial states nor what others are derived from.
   std::optional<RandomWalk> drift = std::nullopt;
+  // Runs share a population, whose mean and spread are estimated with the rest: in units of normal
+  // scores g of the prior F, θ = F⁻¹(Φ(g)), run r has g_r ~ N(μ, s²), with the priors μ ~ N(0, 1)
+  // and s lognormal with median 0.5 and log-standard deviation 1 (cut off at five of these).
+  // Requires `per_run`, an adaptive expansion and a regularization weight of 1; one parameter of a
+  // problem may have a population, and it must not be correlated. Runs that have ended are
+  // integrated out as soon as the next one begins.
+  bool population = false;
+  // Which part of a population this is, for the two parameters that are added to a problem with
+  // one; those of a problem that is made by hand are kNone.
+  PopulationPart part = PopulationPart::kNone;
 
   // Makes a normal prior. `std_dev` > 0, both in the parameter's unit.
   static absl::StatusOr<UncertainParameter> Normal(std::string name, double mean, double std_dev);

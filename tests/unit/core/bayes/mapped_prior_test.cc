@@ -94,6 +94,23 @@ Vector Ranks(const Vector& values) {
   return ranks;
 }
 
+TEST(Lognormal, HasItsMomentsWhereItIsCutOff) {
+  constexpr int kNodes = 100'000;
+  UncertainParameter cut = Lognormal("cut", 40, 50);
+  cut.germ = Germ::TruncatedNormal(-0.7, 1.9);
+  ASSERT_TRUE(cut.Validate().ok());
+  double weight = 0, first = 0, second = 0;
+  for (int i = 0; i < kNodes; ++i) {  // by the midpoint rule
+    const double xi = -0.7 + 2.6 * (i + 0.5) / kNodes, density = std::exp(-0.5 * xi * xi);
+    weight += density;
+    first += density * cut.ToParameter(xi);
+    second += density * std::pow(cut.ToParameter(xi), 2);
+  }
+  const double mean = first / weight;
+  EXPECT_NEAR(cut.Mean(), mean, 1e-8 * mean);
+  EXPECT_NEAR(cut.StandardDeviation(), std::sqrt(second / weight - mean * mean), 1e-8 * mean);
+}
+
 TEST(Lognormal, HasTheMeanAndStandardDeviationGivenAndItsMedianAtTheGermsMode) {
   const Prior prior({Lognormal("k", 40, 5), Lognormal("wide", 1e-6, 5e-5)});
   EXPECT_TRUE(prior.Mean().isApprox(Eigen::Vector2d(40, 1e-6), 1e-13));

@@ -10,6 +10,7 @@
 namespace polyest::internal {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -333,6 +334,19 @@ TEST(ToProblem, TakesDrift) {
   given.mutable_uncertain(0)->mutable_drift()->Clear();
   EXPECT_THAT(std::string(ToProblem(given).status().message()),
               StartsWith("uncertain[0].drift: needs a kind"));
+}
+
+TEST(ToProblem, TakesRunsOfAPopulation) {
+  v1::Problem problem = SmallProblem();
+  EXPECT_FALSE(ToProblem(problem)->population());
+  problem.mutable_uncertain(0)->set_population(true);
+  EXPECT_THAT(std::string(ToProblem(problem).status().message()),
+              StartsWith("uncertain[0].population: v0 needs perRun"));
+  problem.mutable_uncertain(0)->set_per_run(true);
+  const auto resolved = ToProblem(problem);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_TRUE(resolved->population());
+  EXPECT_THAT(resolved->prior().Names(), ElementsAre("v0[0]", "v0.median", "v0.spread"));
 }
 
 TEST(ToProblem, KnowsEveryRuleOfRegularization) {

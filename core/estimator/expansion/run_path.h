@@ -1,0 +1,34 @@
+#pragma once
+
+// Where the parameters of runs are before and after a run is eliminated (run_elimination.h).
+
+#include "core/estimator/problem/ended_runs.h"
+#include "core/estimator/problem/resolved_problem.h"
+#include "core/estimator/record/learned_noise.h"
+
+namespace polyest::internal {
+
+// Mean and covariance of germs.
+struct GermSummary {
+  Vector mean;
+  Matrix covariance;
+};
+
+// Returns the lower triangular factor of a covariance, at least 10⁻⁹ of `unit`.
+Matrix SpreadOf(const Matrix& covariance, const Vector& unit);
+
+// Returns what is known of no ended runs, in terms over `region` of the shared germs, whose
+// posterior is `posterior`. The sums will be taken with the scales of `noise`.
+EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
+                           const GermSummary& posterior, const LearnedNoise& noise);
+
+// Sets to 0 how a path follows the mean and the spread of a population, on which outputs do not
+// depend: what they say of the run is told apart (population_cost.h).
+void FreeOfPopulation(const ResolvedProblem& problem, Matrix& slope);
+
+// Returns the path of run `run` in a posterior of all germs of `problem`, about `centre` of the
+// shared ones.
+RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
+               const Vector& centre);
+
+}  // namespace polyest::internal
