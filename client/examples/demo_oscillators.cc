@@ -130,4 +130,22 @@ void WriteReleases() {
   }
 }
 
+// Twenty specimens of the oscillator, whose springs are of one population, each let go once.
+void WriteSpecimens() {
+  constexpr double mean_n_per_m = 41.3, spread_n_per_m = 1.6;
+  constexpr double delta = 0.23 / 2, noise_m = 0.05;
+  std::mt19937_64 generator(20'061'157);
+  std::puts("t,run,x");
+  for (int run = 0; run < 20; ++run) {
+    const double stiffness = mean_n_per_m + spread_n_per_m * StandardNormal(generator);
+    const double omega = std::sqrt(stiffness - delta * delta);
+    for (int i = 1; i <= 20; ++i) {
+      const double t = 0.05 * i;
+      const double x =
+          std::exp(-delta * t) * (std::cos(omega * t) + delta / omega * std::sin(omega * t));
+      std::printf("%.2f,%d,%.4f\n", t, run, x + noise_m * StandardNormal(generator));
+    }
+  }
+}
+
 }  // namespace demo

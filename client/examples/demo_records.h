@@ -17,6 +17,7 @@ void WriteDisturbed();
 void WriteWarming();
 void WriteRoughSensor();
 void WriteReleases();
+void WriteSpecimens();
 void WriteRollPlane();
 void WriteHalfCar();
 void WriteQuarterCar();

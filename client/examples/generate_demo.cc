@@ -9,17 +9,12 @@
 namespace {
 
 constexpr std::pair<std::string_view, void (*)()> kRecords[] = {
-    {"oscillator", demo::WriteOscillator},
-    {"disturbed", demo::WriteDisturbed},
-    {"warming", demo::WriteWarming},
-    {"rough_sensor", demo::WriteRoughSensor},
-    {"releases", demo::WriteReleases},
-    {"roll_plane", demo::WriteRollPlane},
-    {"roll_plane_4dof", demo::WriteHalfCar},
-    {"quarter_car", demo::WriteQuarterCar},
-    {"bicycle", demo::WriteBicycle},
-    {"damper_rig", demo::WriteDamperRig},
-    {"chain", demo::WriteChain},
+    {"oscillator", demo::WriteOscillator},  {"disturbed", demo::WriteDisturbed},
+    {"warming", demo::WriteWarming},        {"rough_sensor", demo::WriteRoughSensor},
+    {"releases", demo::WriteReleases},      {"specimens", demo::WriteSpecimens},
+    {"roll_plane", demo::WriteRollPlane},   {"roll_plane_4dof", demo::WriteHalfCar},
+    {"quarter_car", demo::WriteQuarterCar}, {"bicycle", demo::WriteBicycle},
+    {"damper_rig", demo::WriteDamperRig},   {"chain", demo::WriteChain},
 };
 
 }  // namespace

@@ -174,7 +174,8 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
     const auto& parameter = problem.uncertain(i);
     Add("unknowns", parameter.name(),
         absl::StrCat(DescribePrior(parameter, resolved.units()[static_cast<size_t>(i)]),
-                     parameter.per_run() ? ", each run its own" : ""),
+                     parameter.per_run() ? ", each run its own" : "",
+                     parameter.population() ? ", of one population" : ""),
         remarks);
   }
   for (const v1::UncertainParameter& parameter : problem.uncertain()) {

@@ -92,6 +92,7 @@ std::vector<UncertainParameter> ToUncertain(const v1::Problem& problem, Refusals
                                 {problem.uncertain(i).name(), Germ::Gamma(1)}, refusals));
     uncertain.back().per_run = problem.uncertain(i).per_run();
     uncertain.back().drift = ValueOr(Within(field, ToDrift(problem.uncertain(i))), {}, refusals);
+    uncertain.back().population = problem.uncertain(i).population();
   }
   return uncertain;
 }

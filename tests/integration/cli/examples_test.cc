@@ -107,6 +107,23 @@ TEST_F(ExamplesTest, FollowsADamperThatWarmsUp) {
   EXPECT_EQ(estimate.diagnostics_size(), 0);
 }
 
+// The constants are those of generate_demo.cc; the spread's interval holds it, too.
+TEST_F(ExamplesTest, FindsThePopulationOfTheSpecimens) {
+  const Finished run =
+      Run({"estimate", Example("specimens.json"), Example("specimens.csv"), "--format", "json"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  const v1::Estimate estimate = ParseEstimate(run.out);
+  ASSERT_EQ(estimate.parameters_size(), 3);
+  const auto& mean = estimate.parameters(1);
+  const auto& spread = estimate.parameters(2);
+  EXPECT_EQ(mean.name(), "k.mean");
+  EXPECT_NEAR(mean.mean(), 41.3, 4 * mean.posterior_std_dev());
+  EXPECT_EQ(spread.name(), "k.spread");
+  EXPECT_EQ(spread.unit(), "N/m");
+  EXPECT_LT(spread.lower95(), 1.6);
+  EXPECT_GT(spread.upper95(), 1.6);
+}
+
 // Compares a model as text with the built-in one. The integrator takes the same steps, so that only
 // rounding differs.
 TEST_F(ExamplesTest, EstimatesTheSameFromAModelAsText) {
