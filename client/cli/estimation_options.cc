@@ -78,7 +78,9 @@ void AddFit(CommandRegistry& registry) {
   AddStudyInput(command, *arguments);
   command.add_option("--validate", arguments->validation_file,
                      "Predict and score this CSV file, whose samples are not used to estimate");
-  AddOutputs(command, arguments->outputs, "Outputs to predict (default: the measured ones)");
+  AddOutputs(command, arguments->outputs,
+             "Outputs to predict, and parameters that drift (default: the measured outputs and\n"
+             "what drifts)");
   command
       .add_option("--quantiles", arguments->probabilities,
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")

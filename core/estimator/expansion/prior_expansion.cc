@@ -92,12 +92,13 @@ absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbe
 
 absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
                                                const std::vector<std::string>& asked) {
-  const ModelDescription& model = problem.problem().model->description();
-  if (!asked.empty()) return FindOutputs(model, asked);
-  if (problem.channels() > 0) return problem.outputs();
-  std::vector<int> all(model.outputs.size());
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+  if (!asked.empty()) return FindOutputs(problem.model()->description(), asked);
+  const std::vector<Quantity>& outputs = problem.model()->description().outputs;
+  std::vector<int> chosen = problem.outputs();
+  // The parameters that drift follow the model's own outputs.
+  size_t next = chosen.empty() ? 0 : problem.problem().model->description().outputs.size();
+  for (; next < outputs.size(); ++next) chosen.push_back(static_cast<int>(next));
+  return chosen;
 }
 
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,

@@ -39,8 +39,9 @@ struct TimeGrid {
 // total.
 absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbers, int64_t most);
 
-// Returns the model's columns of the requested outputs. Without a request these are the outputs
-// that the problem measures, or all outputs if it measures none. Returns InvalidArgument that names
+// Returns the model's columns of the requested outputs, among which are the parameters that drift.
+// Without a request these are the outputs that the problem measures, or all outputs if it measures
+// none, and what drifts. Returns InvalidArgument that names
 // the field `outputs`, the value and the rule.
 absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
                                                const std::vector<std::string>& asked);

@@ -28,7 +28,13 @@ DriftingModel::DriftingModel(const Problem& problem)
     if (!parameter.drift) continue;
     const auto column = description_.FindParameter(parameter.name);
     POLYEST_CHECK(column.has_value());
-    walks_.push_back({*column, parameter});
+    const bool read = !description_.FindOutput(parameter.name);
+    walks_.push_back({*column, parameter, read});
+    if (read) {
+      const Quantity& shown = description_.parameters[static_cast<size_t>(*column)];
+      description_.outputs.push_back(
+          {shown.name, shown.unit, absl::StrCat("present value of ", shown.name)});
+    }
     description_.states.push_back(
         {DriftName(parameter.name), "1", absl::StrCat("departure of ", parameter.name), 0, true});
   }
@@ -52,7 +58,12 @@ void DriftingModel::Derivatives(double time_s, const ConstBlock& states,
 void DriftingModel::Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                             const ConstBlock& inputs, Block outputs) const {
   const auto own = states.cols() - std::ssize(walks_);
-  model_->Outputs(time_s, states.leftCols(own), Present(states, parameters), inputs, outputs);
+  auto column = std::ssize(model_->description().outputs);
+  const Eigen::ArrayXXd& present = Present(states, parameters);
+  model_->Outputs(time_s, states.leftCols(own), present, inputs, outputs.leftCols(column));
+  for (const Walk& walk : walks_) {
+    if (walk.read) outputs.col(column++) = present.col(walk.column);
+  }
 }
 
 const Eigen::ArrayXXd& DriftingModel::Present(const ConstBlock& states,

@@ -8,7 +8,8 @@
 //
 // with F_j the cumulative probability of the prior, s_j its standard deviation and r_j the rate of
 // the walk in the parameter's unit/√s. θ_j keeps within the prior's bounds; for a normal prior it
-// is θ_j + s_j g_j.
+// is θ_j + s_j g_j. What θ_j(t) is can be read as an output of the parameter's name, behind the
+// model's own outputs, unless one of these has that name.
 
 #include <memory>
 #include <string>
@@ -47,6 +48,7 @@ class DriftingModel : public StateSpaceModel {
   struct Walk {
     int column;  // of the model's parameters
     UncertainParameter prior;
+    bool read;  // whether an output shows it
   };
 
   // Returns the parameters at those states, in memory of the thread's own.

@@ -137,21 +137,22 @@ void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensem
     for (int i = 0; i < inputs_; ++i) columns.col(i) = values.col(Amplitude(i) + which);
     return columns;
   };
-  const auto of_outputs = [&](int which) {
-    Matrix columns(values.rows(), std::ssize(ensemble.outputs));
+  // The model's own outputs have channels; those that show what drifts are read as they are.
+  const auto of_outputs = [&](int which, double neutral) {
+    Matrix columns = Matrix::Constant(values.rows(), std::ssize(ensemble.outputs), neutral);
     for (Eigen::Index c = 0; c < columns.cols(); ++c) {
       const int output = ensemble.outputs[static_cast<size_t>(c)];
-      columns.col(c) = values.col(Amplitude(inputs_) + 3 * output + which);
+      if (output < outputs_) columns.col(c) = values.col(Amplitude(inputs_) + 3 * output + which);
     }
-    return columns;
+    return UnlessNeutral(columns, neutral);
   };
   ensemble.parameters = values.leftCols(parameters_);
   ensemble.amplitudes = of_inputs(0).cwiseProduct(of_inputs(1));
   ensemble.input_delays_s = UnlessNeutral(of_inputs(2), 0);
   ensemble.input_offsets = UnlessNeutral(of_inputs(3), 0);
-  ensemble.output_gains = UnlessNeutral(of_outputs(0), 1);
-  ensemble.output_delays_s = UnlessNeutral(of_outputs(1), 0);
-  ensemble.output_offsets = UnlessNeutral(of_outputs(2), 0);
+  ensemble.output_gains = of_outputs(0, 1);
+  ensemble.output_delays_s = of_outputs(1, 0);
+  ensemble.output_offsets = of_outputs(2, 0);
   for (int i = OutputDelay(outputs_) - 1; i < size(); ++i) {
     const Settable& settable = (*this)[i];
     if (settable.kind == Kind::kNoise) {

@@ -38,7 +38,7 @@ class OutputPrediction {
                    int64_t times)
       : options_(options), channel_(ChannelOf(*subject.problem, column)) {
     const Quantity& quantity =
-        subject.problem->problem().model->description().outputs[static_cast<size_t>(column)];
+        subject.problem->model()->description().outputs[static_cast<size_t>(column)];
     result_.output = quantity.name;
     result_.unit = quantity.unit;
     const auto probabilities = std::ssize(options.probabilities);

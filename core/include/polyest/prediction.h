@@ -35,7 +35,9 @@ inline constexpr int64_t kMaxPredictedValues = 10'000'000;
 
 // What to compute.
 struct PredictionOptions {
-  std::vector<std::string> outputs;  // names of the model's outputs; empty: the measured ones
+  // Names of the model's outputs and of parameters that drift, which are predicted over time as
+  // outputs are; empty: the measured outputs and what drifts.
+  std::vector<std::string> outputs;
   std::vector<double> probabilities = {0.025, 0.5, 0.975};  // of the quantiles, in (0, 1)
   int draws = 400;          // D: trajectories, each at a draw of the posterior, ≥ 2
   int64_t max_rows = 2000;  // ≥ 1; of a longer record evenly spaced rows are returned

@@ -149,7 +149,8 @@ class Session(Studies):
                     min_interval_s: float = 0) -> Iterator[results.Prediction]:
         """Yields predictions of the session's own record as estimates come, for a live picture.
 
-        outputs: names of outputs; by default the measured ones. draws: trajectories, 2 … 10000
+        outputs: names of outputs and of parameters that drift; by default the measured outputs and
+                what drifts. draws: trajectories, 2 … 10000
         (50). max_rows: evenly spaced ones of a longer record (200). min_interval_s: the least time
         from one to the next, s (1). The daemon spends at most a tenth of its time on them. Goes on
         until the loop is left or the session is deleted (NotFound).

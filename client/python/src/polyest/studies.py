@@ -64,7 +64,8 @@ class Studies(Subjects):
                 max_rows: int = 0, lags: int = 0, horizon_s: float = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores.
 
-        outputs: names of outputs; by default the measured ones.
+        outputs: names of outputs and of parameters that drift; by default the measured outputs and
+            what drifts.
         record: another record of the same problem, such as one held out, to predict and score.
         times: (T,), s, increasing, in run `run`; by default the record's rows, at most `max_rows`
             (2000).

@@ -166,7 +166,7 @@ TEST(Drift, IntervalsCoverTheLevel) {
 // those of the exact filter after the rows that `used` returns for a row.
 void ExpectExact(const Samples& samples, const Prediction& prediction,
                  const std::function<size_t(size_t)>& used) {
-  ASSERT_EQ(prediction.outputs.size(), 1u);
+  ASSERT_EQ(prediction.outputs.size(), 2u);  // y and what drifts, a
   const PredictedOutput& y = prediction.outputs[0];
   for (size_t row = 60; row < prediction.rows.size(); ++row) {
     const size_t rows = used(row);
@@ -209,6 +209,32 @@ TEST(Drift, PredictsEachRowFromTheRowsBefore) {
   const auto forecasts = estimator->CurrentPrediction(options);
   ASSERT_TRUE(forecasts.ok()) << forecasts.status();
   ExpectExact(samples, *forecasts, [](size_t) { return size_t{150}; });
+}
+
+// The output is the level itself, so that both are predicted alike; a gain is the channel's alone.
+TEST(Drift, IsPredictedOverTime) {
+  Problem problem = DriftingLevel();
+  problem.fixed = {{"y.gain", 2}};
+  Samples samples = Walk(60, 4);
+  for (double& value : samples.columns[0].value) value *= 2;
+  problem.measured[0].noise.absolute = 2 * kSigma;
+  const auto estimator = MakeEstimator(problem);
+  ASSERT_TRUE(estimator->Append(samples).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  PredictionOptions options;
+  options.outputs = {"y", "a"};
+  options.draws = 50;
+  const auto prediction = estimator->CurrentPrediction(options);
+  ASSERT_TRUE(prediction.ok()) << prediction.status();
+  const PredictedOutput &y = prediction->outputs[0], &a = prediction->outputs[1];
+  EXPECT_EQ(a.output, "a");
+  EXPECT_EQ(a.unit, "N");
+  EXPECT_EQ(a.measured.size(), 0);
+  EXPECT_TRUE(a.mean.isApprox(0.5 * y.mean, 1e-12));
+  EXPECT_TRUE(a.quantiles.isApprox(0.5 * y.quantiles, 1e-9));
+  options.outputs = {"b"};
+  EXPECT_THAT(std::string(estimator->CurrentPrediction(options).status().message()),
+              HasSubstr("it has y, a"));
 }
 
 TEST(Drift, RefusesHorizonsThatAreNone) {
