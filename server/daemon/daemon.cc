@@ -101,7 +101,11 @@ absl::Status Daemon::OpenJournal() {
                                    commit.duration.count()});
     readiness_.OnCommit(commit.outcome.ok());
   };
-  POLYEST_ASSIGN_OR_RETURN(journal_, SqliteJournal::Open(journal));
+  POLYEST_ASSIGN_OR_RETURN(auto opened, SqliteJournal::Open(journal));
+  for (const std::string& damage : opened->damage()) {
+    spdlog::error("the journal is damaged: {}", damage);
+  }
+  journal_ = std::move(opened);
   return absl::OkStatus();
 }
 

@@ -8,7 +8,10 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/journal/seal_check.h"
+#include "server/journal/session_digest.h"
 #include "server/journal/sqlite_schema.h"
+#include "server/journal/sqlite_writes.h"
 
 namespace polyest::internal {
 namespace {
@@ -18,66 +21,6 @@ constexpr int kCheckpointPages = 4'000;
 constexpr int64_t kPageBytes = 4'096;
 // Largest number of batches of a deleted session that one commit removes.
 constexpr int64_t kRemovedBatches = 256;
-
-absl::Status NotThere() { return absl::NotFoundError("the journal has no such session"); }
-
-absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
-  SqliteQuery query(database,
-                    "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE ?2 = 1 + "
-                    "(SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
-                    "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
-  query.Bind(entry.session)
-      .Bind(entry.place.sequence)
-      .BindBlob(entry.measurements)
-      .BindBlob(entry.digest)
-      .Bind(entry.place.samples)
-      .Bind(entry.place.rows)
-      .Bind(static_cast<int64_t>(entry.place.last_row.run))
-      .Bind(entry.place.last_row.time_s);
-  POLYEST_RETURN_IF_ERROR(query.Run());
-  if (database.changes() > 0) return absl::OkStatus();
-  SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
-  session.Bind(entry.session);
-  POLYEST_ASSIGN_OR_RETURN(const bool there, session.Step());
-  if (!there) return NotThere();
-  return absl::FailedPreconditionError(
-      absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
-}
-
-absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,
-                             const JournalSnapshot& snapshot) {
-  SqliteQuery query(database,
-                    "INSERT OR REPLACE INTO snapshot SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
-                    "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?2)");
-  query.Bind(session).Bind(snapshot.sequence).Bind(snapshot.rows).BindBlob(snapshot.state);
-  return query.Run();
-}
-
-absl::Status InsertHistoryPoint(SqliteDatabase& database, int64_t session,
-                                const JournalHistoryPoint& point, int64_t stride) {
-  SqliteQuery insert(database,
-                     "INSERT OR REPLACE INTO history SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
-                     "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?3)");
-  insert.Bind(session).Bind(point.ordinal).Bind(point.sequence).BindBlob(point.point);
-  POLYEST_RETURN_IF_ERROR(insert.Run());
-  if (stride == 1) return absl::OkStatus();
-  SqliteQuery thin(database, "DELETE FROM history WHERE session = ? AND ordinal % ? <> 0");
-  thin.Bind(session).Bind(stride);
-  return thin.Run();
-}
-
-absl::Status RunFor(SqliteDatabase& database, const char* sql, int64_t session) {
-  SqliteQuery query(database, sql);
-  query.Bind(session);
-  return query.Run();
-}
-
-// Deletes the sessions that were never shown: those of imports that did not come to their end.
-absl::Status DeleteHidden(SqliteDatabase& database) {
-  return database.Execute(
-      "BEGIN IMMEDIATE; INSERT INTO deleted SELECT number FROM session WHERE hidden = 1;"
-      "DELETE FROM session WHERE hidden = 1; COMMIT");
-}
 
 absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
@@ -130,17 +73,25 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   if (!writer.ok()) return named(writer.status());
   const absl::Status prepared = SetUpWriter(**writer, options.max_mb);
   if (!prepared.ok()) return named(prepared);
+  POLYEST_ASSIGN_OR_RETURN(auto seals, SessionSeals::Open(folder->seals_file()));
+  auto found = CheckSeals(**writer, *seals);
+  if (!found.ok()) return named(found.status());
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
-  return std::unique_ptr<SqliteJournal>(new SqliteJournal(
-      std::move(folder), *std::move(writer), *std::move(maintainer), options.on_commit));
+  return std::unique_ptr<SqliteJournal>(new SqliteJournal(std::move(folder), *std::move(writer),
+                                                          *std::move(maintainer), std::move(seals),
+                                                          *std::move(found), options.on_commit));
 }
 
 SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
                              std::unique_ptr<SqliteDatabase> writer,
                              std::unique_ptr<SqliteDatabase> maintainer,
+                             std::unique_ptr<SessionSeals> seals, std::vector<std::string> damage,
                              CommitQueue::OnCommit on_commit)
-    : folder_(std::move(folder)), maintainer_(std::move(maintainer)) {
+    : folder_(std::move(folder)),
+      damage_(std::move(damage)),
+      maintainer_(std::move(maintainer)),
+      seals_(std::move(seals)) {
   // This hook takes the place of SQLite's own checkpoint, which would delay the commit that it
   // follows.
   sqlite3_wal_hook(
@@ -152,7 +103,11 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
         return SQLITE_OK;
       },
       this);
-  queue_ = std::make_unique<CommitQueue>(std::move(writer), std::move(on_commit));
+  const auto seal = [this, on_commit = std::move(on_commit)](const CommitReport& commit) {
+    SealCommit(commit.outcome.ok());
+    if (on_commit) on_commit(commit);
+  };
+  queue_ = std::make_unique<CommitQueue>(std::move(writer), seal);
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 
@@ -171,31 +126,41 @@ absl::Status SqliteJournal::CheckWritable() {
   });
 }
 
+// Seals what a commit has kept, on the writer's thread and before anybody hears of it.
+void SqliteJournal::SealCommit(bool kept) {
+  if (kept) {
+    for (const auto& [session, seal] : unsealed_) {
+      if (seal) {
+        seals_->Put(*seal);
+      } else {
+        seals_->Remove(session);
+      }
+    }
+  }
+  unsealed_.clear();
+}
+
 absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   SqliteQuery query(
       *database,
-      "SELECT number, tenant, name, created_s, created_ns, coalesce(sequence, 0), "
-      "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "
-      "coalesce(place_time_s, 0), reorder_window_s FROM session LEFT JOIN batch ON batch.session "
-      "= number AND sequence = (SELECT max(sequence) FROM batch WHERE session = number) "
-      "WHERE hidden = 0 ORDER BY tenant, name");
+      "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, "
+      "session.digest, coalesce(sequence, 0), coalesce(place_samples, 0), coalesce(place_rows, 0), "
+      "coalesce(place_run, 0), coalesce(place_time_s, 0) FROM session LEFT JOIN batch ON "
+      "batch.session = number AND sequence = (SELECT max(sequence) FROM batch WHERE session = "
+      "number) ORDER BY tenant, name");
   std::vector<SessionHead> heads;
   while (true) {
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return heads;
-    SessionHead& head = heads.emplace_back();
-    head.number = query.Integer(0);
-    head.tenant = query.Bytes(1);
-    head.name = query.Bytes(2);
-    head.create_time.set_seconds(query.Integer(3));
-    head.create_time.set_nanos(static_cast<int32_t>(query.Integer(4)));
-    head.place.sequence = query.Integer(5);
-    head.place.samples = query.Integer(6);
-    head.place.rows = query.Integer(7);
-    head.place.last_row = {static_cast<int>(query.Integer(8)), query.Real(9)};
-    head.reorder_window_s = query.Real(10);
+    POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
+    if (!more) return heads;
+    SessionRow row = ReadSessionRow(query);
+    if (row.hidden && !row.damaged) continue;
+    SessionHead& head = heads.emplace_back(std::move(row.head));
+    head.place.sequence = query.Integer(9);
+    head.place.samples = query.Integer(10);
+    head.place.rows = query.Integer(11);
+    head.place.last_row = {static_cast<int>(query.Integer(12)), query.Real(13)};
   }
 }
 
@@ -216,7 +181,8 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
         .Bind(head.reorder_window_s);
     POLYEST_RETURN_IF_ERROR(query.Run());
     number = database.last_insert_rowid();
-    return absl::OkStatus();
+    unsealed_[number] = Seal::At(number, SealLabel(head.tenant, head.name), 0);
+    return WriteSessionDigest(database, number);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(insert));
   return number;
@@ -225,17 +191,21 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
 absl::Status SqliteJournal::Show(int64_t session) {
   return queue_->Run([=](SqliteDatabase& database) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(
-        RunFor(database, "UPDATE session SET hidden = 0 WHERE number = ?", session));
-    return database.changes() > 0 ? absl::OkStatus() : NotThere();
+        RunForSession(database, "UPDATE session SET hidden = 0 WHERE number = ?", session));
+    if (database.changes() == 0) return NoSuchSession();
+    return WriteSessionDigest(database, session);
   });
 }
 
 absl::Status SqliteJournal::Delete(int64_t session) {
-  const absl::Status deleted = queue_->Run([=](SqliteDatabase& database) -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM session WHERE number = ?", session));
-    if (database.changes() == 0) return NotThere();
-    return RunFor(database, "INSERT INTO deleted VALUES (?)", session);
-  });
+  const absl::Status deleted =
+      queue_->Run([this, session](SqliteDatabase& database) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(
+            RunForSession(database, "DELETE FROM session WHERE number = ?", session));
+        if (database.changes() == 0) return NoSuchSession();
+        unsealed_[session] = std::nullopt;
+        return RunForSession(database, "INSERT INTO deleted VALUES (?)", session);
+      });
   if (deleted.ok()) {
     const std::lock_guard lock(maintenance_mutex_);
     deleted_ = true;
@@ -246,7 +216,14 @@ absl::Status SqliteJournal::Delete(int64_t session) {
 
 void SqliteJournal::Append(JournalEntry entry, Done done) {
   queue_->Submit(
-      [entry = std::move(entry)](SqliteDatabase& database) { return InsertBatch(database, entry); },
+      [this, entry = std::move(entry)](SqliteDatabase& database) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(InsertBatch(database, entry));
+        auto& seal = unsealed_[entry.session];
+        if (!seal) seal = seals_->Of(entry.session);
+        if (!seal) seal = Seal::At(entry.session, "", entry.place.sequence - 1);
+        seal->Add(entry.place.sequence, entry.digest);
+        return absl::OkStatus();
+      },
       std::move(done));
 }
 
@@ -267,28 +244,37 @@ void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point,
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database, "SELECT problem FROM session WHERE number = ?");
+  SqliteQuery query(*database,
+                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
+                    "problem, digest FROM session WHERE number = ?");
   query.Bind(session);
-  POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-  if (!row) return NotThere();
+  POLYEST_ASSIGN_OR_RETURN(const bool there, query.Step());
+  if (!there) return NoSuchSession();
+  const SessionRow row = ReadSessionRow(query);
   v1::Problem problem;
-  if (problem.ParseFromString(query.Bytes(0))) return problem;
-  return absl::DataLossError("the session's problem cannot be read from the journal");
+  if (!row.damaged && problem.ParseFromString(row.problem)) return problem;
+  return absl::DataLossError(
+      absl::StrFormat("%s is damaged in the journal: its name, its window or its problem is not "
+                      "what was stored",
+                      row.head.name));
 }
 
 absl::Status SqliteJournal::ReadBatches(
     int64_t session, int64_t after,
     const std::function<absl::Status(const JournalBatch&)>& take) const {
+  // The seal is looked up first, so that the statement sees its batches.
+  const std::optional<Seal> seal = after == 0 ? seals_->Of(session) : std::nullopt;
+  Seal read = Seal::At(session, "", seal ? seal->from : 0);
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   // One statement looks for the session and for its batches, because the session may be deleted and
   // its batches removed between two. Without batches it gives one row, which has no sequence.
   SqliteQuery query(*database,
-                    "SELECT sequence, measurements, digest FROM session LEFT JOIN batch ON "
+                    "SELECT sequence, measurements, batch.digest FROM session LEFT JOIN batch ON "
                     "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
   query.Bind(session).Bind(after);
   POLYEST_ASSIGN_OR_RETURN(bool row, query.Step());
-  if (!row) return NotThere();
+  if (!row) return NoSuchSession();
   JournalBatch batch;
   batch.sequence = after;
   while (row && query.Integer(0) > 0) {
@@ -296,9 +282,15 @@ absl::Status SqliteJournal::ReadBatches(
     const bool whole = query.Integer(0) == batch.sequence + 1 && query.Bytes(2) == Digest(bytes) &&
                        batch.measurements.ParseFromString(bytes);
     ++batch.sequence;
+    if (seal && batch.sequence > seal->from) read.Add(batch.sequence, query.Bytes(2));
     if (!whole) {
       return absl::DataLossError(absl::StrFormat(
           "batch %d of the session is damaged or missing in the journal", batch.sequence));
+    }
+    if (seal && batch.sequence == seal->sequence && read.chain != seal->chain) {
+      return absl::DataLossError(
+          absl::StrFormat("batches %d to %d of the session are not those that were acknowledged",
+                          seal->from + 1, seal->sequence));
     }
     POLYEST_RETURN_IF_ERROR(take(batch));
     POLYEST_ASSIGN_OR_RETURN(row, query.Step());
@@ -375,6 +367,8 @@ void SqliteJournal::Checkpoint() {
 
 // Removes some batches of a deleted session. Returns whether there may be more to remove.
 absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
+  // A seal that came back after a power failure would tell of a session that is missing.
+  seals_->Sync();
   int64_t session = 0;
   {
     SqliteQuery query(*maintainer_, "SELECT session FROM deleted LIMIT 1");
@@ -389,9 +383,11 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
     query.Bind(session).Bind(kRemovedBatches);
     POLYEST_RETURN_IF_ERROR(query.Run());
     if (database.changes() > 0) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM snapshot WHERE session = ?", session));
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM history WHERE session = ?", session));
-    return RunFor(database, "DELETE FROM deleted WHERE session = ?", session);
+    POLYEST_RETURN_IF_ERROR(
+        RunForSession(database, "DELETE FROM snapshot WHERE session = ?", session));
+    POLYEST_RETURN_IF_ERROR(
+        RunForSession(database, "DELETE FROM history WHERE session = ?", session));
+    return RunForSession(database, "DELETE FROM deleted WHERE session = ?", session);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(remove));
   return true;

@@ -4,8 +4,10 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "server/journal/commit_queue.h"
 #include "server/journal/data_folder.h"
 #include "server/journal/session_journal.h"
+#include "server/journal/session_seals.h"
 
 namespace polyest::internal {
 
@@ -33,6 +36,9 @@ class SqliteJournal final : public SessionJournal {
   static absl::StatusOr<std::unique_ptr<SqliteJournal>> Open(const SqliteJournalOptions& options);
   // Writes everything appended, then ends.
   ~SqliteJournal() override;
+
+  // Returns what Open has found to be damaged or missing, a sentence each.
+  const std::vector<std::string>& damage() const { return damage_; }
 
   bool durable() const override { return true; }
   absl::Status CheckWritable() override;
@@ -57,13 +63,16 @@ class SqliteJournal final : public SessionJournal {
   class Reader;
 
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
-                std::unique_ptr<SqliteDatabase> maintainer, CommitQueue::OnCommit on_commit);
+                std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
+                std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+  void SealCommit(bool kept);
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
   void WakeMaintenance();
 
   const std::unique_ptr<DataFolder> folder_;
+  const std::vector<std::string> damage_;
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
 
@@ -72,6 +81,10 @@ class SqliteJournal final : public SessionJournal {
   std::condition_variable_any maintenance_;
   std::atomic<int> log_pages_ = 0;  // pages in the write-ahead log
   bool deleted_ = true;             // whether there may be batches of deleted sessions
+
+  const std::unique_ptr<SessionSeals> seals_;
+  // Seals of the commit under way, null for deleted sessions. Used by the writing thread only.
+  std::map<int64_t, std::optional<Seal>> unsealed_;
 
   std::unique_ptr<CommitQueue> queue_;
   std::jthread maintenance_thread_;
