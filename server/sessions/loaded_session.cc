@@ -85,9 +85,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(loaded->intake_.Take(batch.measurements));
-    POLYEST_RETURN_IF_ERROR(loaded->GiveUpTo(batch.sequence));
-    loaded->Release(batch.sequence);
-    return absl::OkStatus();
+    return loaded->Store(batch.sequence);
   };
   POLYEST_RETURN_IF_ERROR(journal.ReadBatches(head.number, 0, append));
   const SessionPlace reached = loaded->intake_.place();
@@ -121,6 +119,12 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
   }
   computed_ = std::move(anew);
   latest_ = nullptr;
+  return absl::OkStatus();
+}
+
+absl::Status LoadedSession::Store(int64_t sequence) {
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+  Release(sequence);
   return absl::OkStatus();
 }
 

@@ -60,6 +60,13 @@ class LoadedSession {
   double measured_s() const { return computed_.measured_s; }
   // Returns the number of the last batch that the estimator has.
   int64_t sequence() const { return computed_.sequence; }
+  // Gives the estimator the batches up to `sequence`, which the journal must keep, without
+  // processing them, and lets go of their rows.
+  absl::Status Store(int64_t sequence);
+  // Returns the number of rows in memory.
+  int64_t rows_in_memory() const {
+    return intake_.waiting_rows() + computed_.store->rows_in_memory();
+  }
   // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes
   // them. FAILED_PRECONDITION when the model cannot be computed at a row; EndFailedRun then lets
   // the session go on.
