@@ -16,11 +16,7 @@
 namespace polyest::internal {
 namespace {
 
-// Number of pages in the write-ahead log from which on they are copied into the file.
-constexpr int kCheckpointPages = 4'000;
 constexpr int64_t kPageBytes = 4'096;
-// Largest number of batches of a deleted session that one commit removes.
-constexpr int64_t kRemovedBatches = 256;
 
 absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
@@ -107,6 +103,7 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
     SealCommit(commit.outcome.ok());
     if (on_commit) on_commit(commit);
   };
+  ReadTenants(*writer);
   queue_ = std::make_unique<CommitQueue>(std::move(writer), seal);
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
@@ -115,6 +112,11 @@ SqliteJournal::~SqliteJournal() {
   maintenance_thread_.request_stop();
   maintenance_thread_.join();
   queue_ = nullptr;
+}
+
+void SqliteJournal::ReadTenants(SqliteDatabase& database) {
+  SqliteQuery query(database, "SELECT number, tenant FROM session");
+  while (query.Step().value_or(false)) tenants_[query.Integer(0)] = query.Bytes(1);
 }
 
 absl::Status SqliteJournal::CheckWritable() {
@@ -185,7 +187,16 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
     return WriteSessionDigest(database, number);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(insert));
+  const std::lock_guard lock(tenants_mutex_);
+  tenants_[number] = head.tenant;
   return number;
+}
+
+std::string SqliteJournal::LaneOf(int64_t session) const {
+  const std::lock_guard lock(tenants_mutex_);
+  const auto tenant = tenants_.find(session);
+  // No tenant has the lane without a name, in which sessions are created and deleted.
+  return tenant == tenants_.end() ? "" : "tenant " + tenant->second;
 }
 
 absl::Status SqliteJournal::Show(int64_t session) {
@@ -207,6 +218,10 @@ absl::Status SqliteJournal::Delete(int64_t session) {
         return RunForSession(database, "INSERT INTO deleted VALUES (?)", session);
       });
   if (deleted.ok()) {
+    {
+      const std::lock_guard lock(tenants_mutex_);
+      tenants_.erase(session);
+    }
     const std::lock_guard lock(maintenance_mutex_);
     deleted_ = true;
     maintenance_.notify_one();
@@ -215,6 +230,8 @@ absl::Status SqliteJournal::Delete(int64_t session) {
 }
 
 void SqliteJournal::Append(JournalEntry entry, Done done) {
+  const std::string lane = LaneOf(entry.session);
+  const auto bytes = static_cast<int64_t>(entry.measurements.size());
   queue_->Submit(
       [this, entry = std::move(entry)](SqliteDatabase& database) -> absl::Status {
         POLYEST_RETURN_IF_ERROR(InsertBatch(database, entry));
@@ -224,21 +241,24 @@ void SqliteJournal::Append(JournalEntry entry, Done done) {
         seal->Add(entry.place.sequence, entry.digest);
         return absl::OkStatus();
       },
-      std::move(done));
+      std::move(done), lane, bytes);
 }
 
 void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {
+  const auto bytes = static_cast<int64_t>(snapshot.state.size());
   queue_->Submit(
       [session, snapshot = std::move(snapshot)](SqliteDatabase& database) {
         return ReplaceSnapshot(database, session, snapshot);
       },
-      [](const absl::Status&) {});
+      [](const absl::Status&) {}, LaneOf(session), bytes);
 }
 
 void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) {
-  queue_->SubmitLazily([session, point = std::move(point), stride](SqliteDatabase& database) {
-    return InsertHistoryPoint(database, session, point, stride);
-  });
+  queue_->SubmitLazily(
+      [session, point = std::move(point), stride](SqliteDatabase& database) {
+        return InsertHistoryPoint(database, session, point, stride);
+      },
+      LaneOf(session));
 }
 
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
@@ -331,66 +351,6 @@ absl::StatusOr<std::vector<JournalHistoryPoint>> SqliteJournal::ReadHistory(int6
     if (!row) return history;
     history.push_back({query.Integer(0), query.Integer(1), query.Bytes(2)});
   }
-}
-
-void SqliteJournal::WakeMaintenance() {
-  const std::lock_guard lock(maintenance_mutex_);
-  maintenance_.notify_one();
-}
-
-void SqliteJournal::Maintain(std::stop_token stop) {
-  bool removing = true;
-  while (!stop.stop_requested()) {
-    {
-      std::unique_lock lock(maintenance_mutex_);
-      if (!removing) {
-        maintenance_.wait(lock, stop,
-                          [this] { return log_pages_ >= kCheckpointPages || deleted_; });
-      }
-      removing = std::exchange(deleted_, false) || removing;
-    }
-    if (log_pages_ >= kCheckpointPages) Checkpoint();
-    // If the disk fails, what is left is removed after the journal is opened again.
-    if (removing) removing = RemoveSomeDeleted().value_or(false);
-  }
-}
-
-// Copies the write-ahead log into the file. The first pass copies most of it while another thread
-// goes on writing batches, so that they do not wait. The second one holds up the writer and copies
-// the rest, because the log could otherwise grow without end.
-void SqliteJournal::Checkpoint() {
-  for (const int mode : {SQLITE_CHECKPOINT_PASSIVE, SQLITE_CHECKPOINT_TRUNCATE}) {
-    sqlite3_wal_checkpoint_v2(maintainer_->handle(), nullptr, mode, nullptr, nullptr);
-  }
-  log_pages_ = 0;
-}
-
-// Removes some batches of a deleted session. Returns whether there may be more to remove.
-absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
-  // A seal that came back after a power failure would tell of a session that is missing.
-  seals_->Sync();
-  int64_t session = 0;
-  {
-    SqliteQuery query(*maintainer_, "SELECT session FROM deleted LIMIT 1");
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return false;
-    session = query.Integer(0);
-  }
-  const auto remove = [=](SqliteDatabase& database) -> absl::Status {
-    SqliteQuery query(database,
-                      "DELETE FROM batch WHERE rowid IN (SELECT rowid FROM batch WHERE session = ? "
-                      "LIMIT ?)");
-    query.Bind(session).Bind(kRemovedBatches);
-    POLYEST_RETURN_IF_ERROR(query.Run());
-    if (database.changes() > 0) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(
-        RunForSession(database, "DELETE FROM snapshot WHERE session = ?", session));
-    POLYEST_RETURN_IF_ERROR(
-        RunForSession(database, "DELETE FROM history WHERE session = ?", session));
-    return RunForSession(database, "DELETE FROM deleted WHERE session = ?", session);
-  };
-  POLYEST_RETURN_IF_ERROR(queue_->Run(remove));
-  return true;
 }
 
 }  // namespace polyest::internal

@@ -59,6 +59,9 @@ class SqliteJournal final : public SessionJournal {
   absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const override;
 
  private:
+  // Number of pages in the write-ahead log from which on they are copied into the file.
+  static constexpr int kCheckpointPages = 4'000;
+
   // Borrows a connection to read with, and gives it back when destroyed.
   class Reader;
 
@@ -66,6 +69,9 @@ class SqliteJournal final : public SessionJournal {
                 std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
                 std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
   void SealCommit(bool kept);
+  void ReadTenants(SqliteDatabase& database);
+  // Returns the lane of the commit queue in which a session is written: its tenant's.
+  std::string LaneOf(int64_t session) const;
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
@@ -75,6 +81,9 @@ class SqliteJournal final : public SessionJournal {
   const std::vector<std::string> damage_;
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
+
+  mutable std::mutex tenants_mutex_;
+  std::map<int64_t, std::string> tenants_;  // of the sessions
 
   std::unique_ptr<SqliteDatabase> maintainer_;  // connection of the maintenance thread
   std::mutex maintenance_mutex_;
