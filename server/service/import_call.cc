@@ -107,7 +107,7 @@ ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContex
     : flow_(std::make_shared<ImportFlow>(context, response)) {
   absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ImportSession");
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, admitted->tenant, flow_);
     if (ticket.ok()) {
       ticket_ = *std::move(ticket);
     } else {

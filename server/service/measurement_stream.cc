@@ -308,9 +308,10 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
 
 MeasurementStream::MeasurementStream(ServiceContext& context, grpc::CallbackServerContext& call)
     : flow_(std::make_shared<MeasurementFlow>(context, call)) {
-  absl::Status admitted = flow_->Authorize().status();
+  const absl::StatusOr<Caller> caller = flow_->Authorize();
+  absl::Status admitted = caller.status();
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, caller->tenant, flow_);
     admitted = ticket.status();
     if (admitted.ok()) ticket_ = *std::move(ticket);
   }
