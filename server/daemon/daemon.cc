@@ -29,8 +29,10 @@ constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 // Largest number of streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
-// Largest number of tasks of an executor that wait or run.
+// Largest number of tasks of an executor that wait or run, and of those in one lane: a tenant,
+// which has two, takes half of the room at most.
 constexpr int kWaitingTasks = 20'000;
+constexpr int kWaitingTasksOfLane = kWaitingTasks / 4;
 // Number of the executor's lanes that may be busy with long tasks before another lane has to wait.
 // A tenant has two lanes: one for the streams of its sessions and one for all other calls.
 constexpr int kBusyLanes = 8;
@@ -83,12 +85,12 @@ Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
       executor_({.threads_per_lane = Threads(options.threads),
                  .threads = kBusyLanes * Threads(options.threads),
                  .capacity = kWaitingTasks,
-                 .capacity_per_lane = kWaitingTasks / 2,
+                 .capacity_per_lane = kWaitingTasksOfLane,
                  .niceness = kNiceness}),
       intake_({.threads_per_lane = kIntakeThreads / 2,
                .threads = kIntakeThreads,
                .capacity = kWaitingTasks,
-               .capacity_per_lane = kWaitingTasks / 2}) {}
+               .capacity_per_lane = kWaitingTasksOfLane}) {}
 
 absl::Status Daemon::OpenJournal() {
   if (options_.data_dir.empty()) {
