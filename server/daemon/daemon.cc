@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <future>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -48,6 +49,8 @@ constexpr std::chrono::seconds kWatchInterval{1};
 constexpr int kNotListening = -1;
 // Longest time that the last bytes of ended calls may take.
 constexpr int kFlushTimeS = 1;
+// Longest time after the drain for which calls that were cancelled may still compute.
+constexpr std::chrono::seconds kGiveUp{3};
 
 int Threads(int requested) {
   if (requested > 0) return requested;
@@ -232,21 +235,31 @@ absl::Status Daemon::TellMetrics() {
   return absl::OkStatus();
 }
 
-void Daemon::Stop() {
-  if (server_ == nullptr) return;
+bool Daemon::Stop() {
+  if (server_ == nullptr || closing_.joinable()) return true;
   readiness_.Drain();
   server_->GetHealthCheckService()->SetServingStatus(false);
   calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
   stop_.request_stop();
-  server_->Shutdown(
-      gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
-  server_->Wait();
-  self_check_ = nullptr;
-  server_ = nullptr;
+  // gRPC waits for every call, also for those that do not look at their stop.
+  std::promise<void> closed;
+  const std::future<void> is_closed = closed.get_future();
+  closing_ = std::jthread([this, closed = std::move(closed)]() mutable {
+    server_->Shutdown(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                                   gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
+    server_->Wait();
+    closed.set_value();
+  });
+  const auto deadline = std::chrono::steady_clock::now() + kGiveUp;
+  return is_closed.wait_until(deadline) == std::future_status::ready &&
+         executor_.AwaitIdle(deadline) && intake_.AwaitIdle(deadline);
 }
 
 Daemon::~Daemon() {
   Stop();
+  if (closing_.joinable()) closing_.join();
+  self_check_ = nullptr;
+  server_ = nullptr;
   metrics_endpoint_ = nullptr;
   housekeeper_ = nullptr;
 }

@@ -38,6 +38,11 @@ absl::Status Executor::Submit(const std::string& lane, Task task, Admission admi
   return absl::OkStatus();
 }
 
+bool Executor::AwaitIdle(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return idle_.wait_until(lock, deadline, [this] { return accepted_ == 0; });
+}
+
 int Executor::accepted() const {
   const std::lock_guard lock(mutex_);
   return accepted_;
@@ -109,7 +114,9 @@ void Executor::Run() {
     --accepted_;
     GiveTurn(name, lane);
     if (lane.accepted == 0) lanes_.erase(name);
-    if (ending_ && accepted_ == 0) ready_.notify_all();
+    if (accepted_ > 0) continue;
+    idle_.notify_all();
+    if (ending_) ready_.notify_all();
   }
 }
 

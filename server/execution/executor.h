@@ -5,6 +5,7 @@
 
 #include <absl/status/status.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -46,6 +47,8 @@ class Executor {
 
   // Submits a task to a lane. RESOURCE_EXHAUSTED when the queue is full; the task is then not run.
   absl::Status Submit(const std::string& lane, Task task, Admission admission = Admission::kIfRoom);
+  // Waits until no task waits or runs. Returns false if some still do at the deadline.
+  bool AwaitIdle(std::chrono::steady_clock::time_point deadline);
   // Returns the number of tasks that wait or run.
   int accepted() const;
   // Returns the number of tasks that wait.
@@ -72,6 +75,7 @@ class Executor {
   const ExecutorOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable ready_;
+  std::condition_variable idle_;
   std::map<std::string, Lane> lanes_;  // lanes that have tasks
   std::deque<std::string> turns_;
   int accepted_ = 0;

@@ -83,6 +83,16 @@ TEST(Executor, RefusesNoTaskOfWorkThatHasBegun) {
   ran.wait();
 }
 
+TEST(Executor, SaysWhetherItHasBecomeIdle) {
+  std::latch go_on(1);
+  Executor executor(OneLane(1, 2));
+  EXPECT_TRUE(executor.AwaitIdle(std::chrono::steady_clock::now()));
+  ASSERT_TRUE(executor.Submit(kLane, [&] { go_on.wait(); }).ok());
+  EXPECT_FALSE(executor.AwaitIdle(std::chrono::steady_clock::now()));
+  go_on.count_down();
+  EXPECT_TRUE(executor.AwaitIdle(std::chrono::steady_clock::now() + std::chrono::hours(1)));
+}
+
 TEST(Executor, RunsTasksAtTheSameTimeOnItsThreads) {
   std::latch both(2);  // opens only when two tasks run at once
   Executor executor(OneLane(2, 2));
