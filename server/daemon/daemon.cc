@@ -5,6 +5,7 @@
 #include <grpc/support/time.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
@@ -28,6 +29,8 @@ namespace {
 constexpr int kShortestPingIntervalMs = 10'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
+// Memory of gRPC for what clients send where the daemon's memory is not limited, MiB.
+constexpr int64_t kBufferMb = 1'024;
 // Largest number of streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
 // Largest number of tasks of an executor that wait or run, and of those in one lane: a tenant,
@@ -175,6 +178,13 @@ void Daemon::Reload() {
   if (tls_ != nullptr) report("certificates", tls_->Reload());
 }
 
+// Returns how much memory gRPC may have for what clients send, before anybody knows whose it is.
+int64_t Daemon::BufferBytes() const {
+  const int64_t least = 4 * int64_t{options_.max_message_mb};
+  const int64_t mb = options_.max_memory_mb > 0 ? options_.max_memory_mb / 2 : kBufferMb;
+  return std::max(least, mb) << 20;
+}
+
 absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -191,6 +201,8 @@ absl::Status Daemon::Listen() {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
   builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
   SetKeepalive(builder);
+  builder.SetResourceQuota(
+      grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
   for (const auto& service : services_) builder.RegisterService(service.get());
   ObserveCalls(builder, metrics_, [this](const grpc::ServerContextBase& call) {
     const auto caller = access_->Authorize(call, "GetStatus");

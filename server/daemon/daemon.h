@@ -84,6 +84,7 @@ class Daemon {
   absl::Status OpenSessions();
   absl::Status Secure();
   absl::Status Listen();
+  int64_t BufferBytes() const;
   absl::Status TellMetrics();
   // Returns what the log says about the daemon once it is ready.
   LogFields Described() const;
