@@ -31,10 +31,12 @@ absl::Status CheckSession(SqliteDatabase& database, const SessionRow& row, int64
   const std::string label = SealLabel(row.head.tenant, row.head.name);
   if (row.damaged) {
     found.push_back(label + ": its name, its window or its problem is damaged; it is not served");
+    return absl::OkStatus();
   }
+  const std::string head = SessionDigest(row.head, /*hidden=*/false, row.problem);
   const std::optional<Seal> seal = seals.Of(row.head.number);
-  if (!seal) {
-    seals.Put(Seal::At(row.head.number, label, sequence));
+  if (!seal || seal->head != head) {
+    seals.Put(Seal::At(row.head.number, label, head, sequence));
   } else if (seal->sequence > sequence) {
     found.push_back(absl::StrFormat("%s: batches %d to %d were acknowledged and are missing", label,
                                     sequence + 1, seal->sequence));

@@ -18,11 +18,11 @@ namespace polyest::internal {
 namespace {
 
 // A place in the file: session, from and sequence as 64-bit numbers of this machine, the chain, the
-// label with zeros behind it, and the digest of all that. No sector of a disk divides it.
+// head, the label with zeros behind it, and the digest of all that. No sector of a disk divides it.
 constexpr size_t kPlace = 256;
 constexpr size_t kDigest = 32;
 constexpr size_t kNumbers = 3 * sizeof(int64_t);
-constexpr size_t kLabel = kPlace - kNumbers - 2 * kDigest;
+constexpr size_t kLabel = kPlace - kNumbers - 3 * kDigest;
 // Longest time for which a seal may be in the operating system's memory only.
 constexpr std::chrono::seconds kSyncInterval{1};
 
@@ -31,6 +31,8 @@ std::string Encode(const Seal& seal) {
   const int64_t numbers[] = {seal.session, seal.from, seal.sequence};
   std::memcpy(record.data(), numbers, kNumbers);
   record += seal.chain;
+  record += seal.head;
+  record.resize(kNumbers + 2 * kDigest);
   record += seal.label.substr(0, kLabel);
   record.resize(kPlace - kDigest);
   return record + Digest(record);
@@ -42,9 +44,10 @@ std::optional<Seal> Decode(std::string_view record) {
   if (Digest(sealed) != record.substr(kPlace - kDigest)) return std::nullopt;
   int64_t numbers[3];
   std::memcpy(numbers, record.data(), kNumbers);
-  const std::string_view label = sealed.substr(kNumbers + kDigest);
+  const std::string_view label = sealed.substr(kNumbers + 2 * kDigest);
   return Seal{.session = numbers[0],
               .label = std::string(label.substr(0, label.find('\0'))),
+              .head = std::string(sealed.substr(kNumbers + kDigest, kDigest)),
               .from = numbers[1],
               .sequence = numbers[2],
               .chain = std::string(sealed.substr(kNumbers, kDigest))};
@@ -52,16 +55,17 @@ std::optional<Seal> Decode(std::string_view record) {
 
 }  // namespace
 
-Seal Seal::At(int64_t session, std::string label, int64_t sequence) {
+Seal Seal::At(int64_t session, std::string label, std::string head, int64_t sequence) {
   return {.session = session,
           .label = std::move(label),
+          .head = std::move(head),
           .from = sequence,
           .sequence = sequence,
           .chain = std::string(kDigest, '\0')};
 }
 
 void Seal::Add(int64_t next, const std::string& digest) {
-  if (next != sequence + 1) *this = At(session, std::move(label), next - 1);
+  if (next != sequence + 1) *this = At(session, std::move(label), std::move(head), next - 1);
   chain = Digest(chain + digest);
   sequence = next;
 }

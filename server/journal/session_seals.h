@@ -24,8 +24,11 @@
 namespace polyest::internal {
 
 struct Seal {
-  int64_t session = 0;   // its number in the journal
-  std::string label;     // its tenant and name, for people; cut off if long
+  int64_t session = 0;  // its number in the journal
+  std::string label;    // its tenant and name, for people; cut off if long
+  // The digest of its row when it is shown (SessionDigest). A restored database may have another
+  // session of this number.
+  std::string head;
   int64_t from = 0;      // the batches up to here are not in the chain
   int64_t sequence = 0;  // number of the last batch
   // H(… H(H(32 zeros · d₁) · d₂) … dₙ), where H is SHA-256 and dᵢ are the digests of the batches
@@ -33,7 +36,7 @@ struct Seal {
   std::string chain;
 
   // Returns a seal without batches in its chain.
-  static Seal At(int64_t session, std::string label, int64_t sequence);
+  static Seal At(int64_t session, std::string label, std::string head, int64_t sequence);
   // Goes on to the next batch. One that does not follow the last begins a new chain.
   void Add(int64_t next, const std::string& digest);
 };

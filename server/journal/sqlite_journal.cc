@@ -183,7 +183,10 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
         .Bind(head.reorder_window_s);
     POLYEST_RETURN_IF_ERROR(query.Run());
     number = database.last_insert_rowid();
-    unsealed_[number] = Seal::At(number, SealLabel(head.tenant, head.name), 0);
+    SessionHead created = head;
+    created.number = number;
+    unsealed_[number] = Seal::At(number, SealLabel(head.tenant, head.name),
+                                 SessionDigest(created, /*hidden=*/false, bytes), 0);
     return WriteSessionDigest(database, number);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(insert));
@@ -237,7 +240,7 @@ void SqliteJournal::Append(JournalEntry entry, Done done) {
         POLYEST_RETURN_IF_ERROR(InsertBatch(database, entry));
         auto& seal = unsealed_[entry.session];
         if (!seal) seal = seals_->Of(entry.session);
-        if (!seal) seal = Seal::At(entry.session, "", entry.place.sequence - 1);
+        if (!seal) seal = Seal::At(entry.session, "", "", entry.place.sequence - 1);
         seal->Add(entry.place.sequence, entry.digest);
         return absl::OkStatus();
       },
@@ -284,7 +287,7 @@ absl::Status SqliteJournal::ReadBatches(
     const std::function<absl::Status(const JournalBatch&)>& take) const {
   // The seal is looked up first, so that the statement sees its batches.
   const std::optional<Seal> seal = after == 0 ? seals_->Of(session) : std::nullopt;
-  Seal read = Seal::At(session, "", seal ? seal->from : 0);
+  Seal read = Seal::At(session, "", "", seal ? seal->from : 0);
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   // One statement looks for the session and for its batches, because the session may be deleted and

@@ -25,16 +25,16 @@ using ::testing::IsEmpty;
 
 TEST(SessionSeals, AreThereAgainInTheirPlaces) {
   const TestFolder folder;
-  Seal seal = Seal::At(7, "sessions/a of tenant t", 4);
+  Seal seal = Seal::At(7, "sessions/a of tenant t", std::string(32, 'h'), 4);
   seal.Add(5, "five");
   {
     const auto seals = SessionSeals::Open(folder / "seals").value();
     EXPECT_TRUE(seals->made());
-    seals->Put(Seal::At(3, "sessions/b", 0));
-    seals->Put(Seal::At(7, "", 0));
+    seals->Put(Seal::At(3, "sessions/b", "", 0));
+    seals->Put(Seal::At(7, "", "", 0));
     seals->Put(seal);
     seals->Remove(3);
-    seals->Put(Seal::At(9, std::string(500, 'x'), 0));
+    seals->Put(Seal::At(9, std::string(500, 'x'), "", 0));
   }
   EXPECT_EQ(fs::file_size(folder / "seals"), 2 * 256u);
   EXPECT_EQ(fs::status(folder / "seals").permissions(), fs::perms(0600));
@@ -42,6 +42,7 @@ TEST(SessionSeals, AreThereAgainInTheirPlaces) {
   EXPECT_FALSE(seals->made());
   EXPECT_EQ(seals->All().size(), 2u);
   EXPECT_EQ(seals->Of(7)->label, seal.label);
+  EXPECT_EQ(seals->Of(7)->head, seal.head);
   EXPECT_EQ(seals->Of(7)->from, 4);
   EXPECT_EQ(seals->Of(7)->sequence, 5);
   EXPECT_EQ(seals->Of(7)->chain, Digest(std::string(32, '\0') + "five"));
@@ -51,7 +52,7 @@ TEST(SessionSeals, AreThereAgainInTheirPlaces) {
 
 TEST(SessionSeals, AreNotBelievedWithABitFlipped) {
   const TestFolder folder;
-  SessionSeals::Open(folder / "seals").value()->Put(Seal::At(7, "sessions/a", 4));
+  SessionSeals::Open(folder / "seals").value()->Put(Seal::At(7, "sessions/a", "", 4));
   std::fstream file(folder / "seals", std::ios::in | std::ios::out | std::ios::binary);
   file.seekp(17);
   file.put('\x01');
@@ -62,7 +63,7 @@ TEST(SessionSeals, AreNotBelievedWithABitFlipped) {
 }
 
 TEST(SessionSeals, BeginAnewAfterAGap) {
-  Seal seal = Seal::At(1, "", 0);
+  Seal seal = Seal::At(1, "", "", 0);
   seal.Add(1, "one");
   seal.Add(1, "other");
   EXPECT_EQ(seal.from, 0);
@@ -255,6 +256,22 @@ TEST_F(DamagedJournalTest, BringsSealsUpToDateThatAPowerFailureLeftBehind) {
   const auto seal = SessionSeals::Open(folder_ / "seals").value()->Of(a);
   EXPECT_EQ(seal->from, 0);
   EXPECT_EQ(seal->sequence, 4);
+}
+
+TEST_F(DamagedJournalTest, BelievesNoSealOfAnotherSessionOfTheSameNumber) {
+  const int64_t a = Create("sessions/a");
+  for (const int64_t sequence : {1, 2, 3}) ASSERT_TRUE(Append(a, sequence).ok());
+  // The database of another folder is restored into this one.
+  const TestFolder other;
+  Open(other.path());
+  const int64_t b = Create("sessions/b");
+  ASSERT_EQ(b, a);
+  for (const int64_t sequence : {1, 2, 3, 4}) ASSERT_TRUE(Append(b, sequence, 7).ok());
+  journal_ = nullptr;
+  fs::copy(folder_ / "seals", other / "seals", fs::copy_options::overwrite_existing);
+  Open(other.path());
+  EXPECT_THAT(journal_->damage(), IsEmpty());
+  EXPECT_TRUE(Read(b).ok());
 }
 
 TEST_F(DamagedJournalTest, SealsWhatAnOlderVersionHasStored) {
