@@ -5,10 +5,12 @@
 #include <grpc/support/time.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <future>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -27,10 +29,14 @@ namespace {
 constexpr int kShortestPingIntervalMs = 10'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
+// Memory of gRPC for what clients send where the daemon's memory is not limited, MiB.
+constexpr int64_t kBufferMb = 1'024;
 // Largest number of streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
-// Largest number of tasks of an executor that wait or run.
+// Largest number of tasks of an executor that wait or run, and of those in one lane: a tenant,
+// which has two, takes half of the room at most.
 constexpr int kWaitingTasks = 20'000;
+constexpr int kWaitingTasksOfLane = kWaitingTasks / 4;
 // Number of the executor's lanes that may be busy with long tasks before another lane has to wait.
 // A tenant has two lanes: one for the streams of its sessions and one for all other calls.
 constexpr int kBusyLanes = 8;
@@ -46,6 +52,8 @@ constexpr std::chrono::seconds kWatchInterval{1};
 constexpr int kNotListening = -1;
 // Longest time that the last bytes of ended calls may take.
 constexpr int kFlushTimeS = 1;
+// Longest time after the drain for which calls that were cancelled may still compute.
+constexpr std::chrono::seconds kGiveUp{3};
 
 int Threads(int requested) {
   if (requested > 0) return requested;
@@ -83,12 +91,12 @@ Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
       executor_({.threads_per_lane = Threads(options.threads),
                  .threads = kBusyLanes * Threads(options.threads),
                  .capacity = kWaitingTasks,
-                 .capacity_per_lane = kWaitingTasks / 2,
+                 .capacity_per_lane = kWaitingTasksOfLane,
                  .niceness = kNiceness}),
       intake_({.threads_per_lane = kIntakeThreads / 2,
                .threads = kIntakeThreads,
                .capacity = kWaitingTasks,
-               .capacity_per_lane = kWaitingTasks / 2}) {}
+               .capacity_per_lane = kWaitingTasksOfLane}) {}
 
 absl::Status Daemon::OpenJournal() {
   if (options_.data_dir.empty()) {
@@ -101,7 +109,11 @@ absl::Status Daemon::OpenJournal() {
                                    commit.duration.count()});
     readiness_.OnCommit(commit.outcome.ok());
   };
-  POLYEST_ASSIGN_OR_RETURN(journal_, SqliteJournal::Open(journal));
+  POLYEST_ASSIGN_OR_RETURN(auto opened, SqliteJournal::Open(journal));
+  for (const std::string& damage : opened->damage()) {
+    spdlog::error("the journal is damaged: {}", damage);
+  }
+  journal_ = std::move(opened);
   return absl::OkStatus();
 }
 
@@ -166,6 +178,13 @@ void Daemon::Reload() {
   if (tls_ != nullptr) report("certificates", tls_->Reload());
 }
 
+// Returns how much memory gRPC may have for what clients send, before anybody knows whose it is.
+int64_t Daemon::BufferBytes() const {
+  const int64_t least = 4 * int64_t{options_.max_message_mb};
+  const int64_t mb = options_.max_memory_mb > 0 ? options_.max_memory_mb / 2 : kBufferMb;
+  return std::max(least, mb) << 20;
+}
+
 absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -182,6 +201,8 @@ absl::Status Daemon::Listen() {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
   builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
   SetKeepalive(builder);
+  builder.SetResourceQuota(
+      grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
   for (const auto& service : services_) builder.RegisterService(service.get());
   ObserveCalls(builder, metrics_, [this](const grpc::ServerContextBase& call) {
     const auto caller = access_->Authorize(call, "GetStatus");
@@ -226,21 +247,31 @@ absl::Status Daemon::TellMetrics() {
   return absl::OkStatus();
 }
 
-void Daemon::Stop() {
-  if (server_ == nullptr) return;
+bool Daemon::Stop() {
+  if (server_ == nullptr || closing_.joinable()) return true;
   readiness_.Drain();
   server_->GetHealthCheckService()->SetServingStatus(false);
   calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
   stop_.request_stop();
-  server_->Shutdown(
-      gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC), gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
-  server_->Wait();
-  self_check_ = nullptr;
-  server_ = nullptr;
+  // gRPC waits for every call, also for those that do not look at their stop.
+  std::promise<void> closed;
+  const std::future<void> is_closed = closed.get_future();
+  closing_ = std::jthread([this, closed = std::move(closed)]() mutable {
+    server_->Shutdown(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                                   gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
+    server_->Wait();
+    closed.set_value();
+  });
+  const auto deadline = std::chrono::steady_clock::now() + kGiveUp;
+  return is_closed.wait_until(deadline) == std::future_status::ready &&
+         executor_.AwaitIdle(deadline) && intake_.AwaitIdle(deadline);
 }
 
 Daemon::~Daemon() {
   Stop();
+  if (closing_.joinable()) closing_.join();
+  self_check_ = nullptr;
+  server_ = nullptr;
   metrics_endpoint_ = nullptr;
   housekeeper_ = nullptr;
 }

@@ -12,6 +12,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/fmu/model_library.h"
@@ -72,8 +73,10 @@ class Daemon {
   bool IsAlive(std::chrono::milliseconds timeout) const { return self_check_->Answers(timeout); }
 
   // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
-  // sockets. Calls that have not ended within the drain time-out are cancelled.
-  void Stop();
+  // sockets. Calls that have not ended within the drain time-out are cancelled. Returns false if
+  // some still compute a few seconds later, because they do not look at their stop: the process may
+  // then end without them, since everything acknowledged is on disk.
+  bool Stop();
 
  private:
   Daemon(const DaemonOptions& options, ModelLibrary models);
@@ -81,6 +84,7 @@ class Daemon {
   absl::Status OpenSessions();
   absl::Status Secure();
   absl::Status Listen();
+  int64_t BufferBytes() const;
   absl::Status TellMetrics();
   // Returns what the log says about the daemon once it is ready.
   LogFields Described() const;
@@ -104,6 +108,7 @@ class Daemon {
   std::unique_ptr<Housekeeper> housekeeper_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::Server> server_;
+  std::jthread closing_;  // closes the server during Stop
   std::unique_ptr<SelfCheck> self_check_;
   std::unique_ptr<FileWatch> watch_;  // null without files to watch
   std::optional<ListenAddress> metrics_address_;

@@ -76,7 +76,11 @@ int main(int argc, char** argv) {
   spdlog::info("{}: draining", strsignal(signal_number));
   polyest::internal::ReportStopping();
   watchdog.reset();
-  (*daemon)->Stop();
+  if (!(*daemon)->Stop()) {
+    spdlog::warn("stopped without computations that went on after they were cancelled");
+    spdlog::default_logger()->flush();
+    std::_Exit(0);
+  }
   spdlog::info("stopped");
   return 0;
 }

@@ -32,10 +32,15 @@ Executor::~Executor() {
   ready_.notify_all();
 }
 
-absl::Status Executor::Submit(const std::string& lane, Task task) {
-  POLYEST_RETURN_IF_ERROR(Reserve(lane));
+absl::Status Executor::Submit(const std::string& lane, Task task, Admission admission) {
+  POLYEST_RETURN_IF_ERROR(Reserve(lane, admission));
   Enqueue(lane, std::move(task));
   return absl::OkStatus();
+}
+
+bool Executor::AwaitIdle(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  return idle_.wait_until(lock, deadline, [this] { return accepted_ == 0; });
 }
 
 int Executor::accepted() const {
@@ -50,12 +55,13 @@ int Executor::waiting() const {
   return waiting;
 }
 
-absl::Status Executor::Reserve(const std::string& lane) {
+absl::Status Executor::Reserve(const std::string& lane, Admission admission) {
   const std::lock_guard lock(mutex_);
   const auto found = lanes_.find(lane);
   const bool lane_full =
       found != lanes_.end() && found->second.accepted >= options_.capacity_per_lane;
-  if (accepted_ >= options_.capacity || lane_full) {
+  const bool full = accepted_ >= options_.capacity || lane_full;
+  if (full && admission == Admission::kIfRoom) {
     return Refuse(absl::StatusCode::kResourceExhausted,
                   absl::StrCat("the daemon is busy: its queue of ",
                                lane_full ? options_.capacity_per_lane : options_.capacity,
@@ -108,12 +114,14 @@ void Executor::Run() {
     --accepted_;
     GiveTurn(name, lane);
     if (lane.accepted == 0) lanes_.erase(name);
-    if (ending_ && accepted_ == 0) ready_.notify_all();
+    if (accepted_ > 0) continue;
+    idle_.notify_all();
+    if (ending_) ready_.notify_all();
   }
 }
 
-absl::Status Strand::Submit(Task task) {
-  POLYEST_RETURN_IF_ERROR(executor_.Reserve(lane_));
+absl::Status Strand::Submit(Task task, Admission admission) {
+  POLYEST_RETURN_IF_ERROR(executor_.Reserve(lane_, admission));
   bool idle = false;
   {
     const std::lock_guard lock(mutex_);

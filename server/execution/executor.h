@@ -5,6 +5,7 @@
 
 #include <absl/status/status.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -27,6 +28,12 @@ struct ExecutorOptions {
   int niceness = 0;           // nice value added to the threads, ≥ 0
 };
 
+// Whether a task is refused when there is no room for it.
+enum class Admission {
+  kIfRoom,
+  kAlways,  // for work that has begun, and whose owner bounds the number of its tasks
+};
+
 // Runs tasks in lanes. Lanes take turns, and no lane runs on more than threads_per_lane threads at
 // a time: long tasks of one lane do not keep another from its turn, and the operating system shares
 // the cores between the tasks that run. Thread-safe.
@@ -39,7 +46,9 @@ class Executor {
   Executor& operator=(const Executor&) = delete;
 
   // Submits a task to a lane. RESOURCE_EXHAUSTED when the queue is full; the task is then not run.
-  absl::Status Submit(const std::string& lane, Task task);
+  absl::Status Submit(const std::string& lane, Task task, Admission admission = Admission::kIfRoom);
+  // Waits until no task waits or runs. Returns false if some still do at the deadline.
+  bool AwaitIdle(std::chrono::steady_clock::time_point deadline);
   // Returns the number of tasks that wait or run.
   int accepted() const;
   // Returns the number of tasks that wait.
@@ -56,7 +65,7 @@ class Executor {
   };
 
   // Takes room for one task; RESOURCE_EXHAUSTED when there is none.
-  absl::Status Reserve(const std::string& lane);
+  absl::Status Reserve(const std::string& lane, Admission admission);
   // Queues a task whose room has been taken. The room is given back after the task.
   void Enqueue(const std::string& lane, Task task);
   void Run();
@@ -66,6 +75,7 @@ class Executor {
   const ExecutorOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable ready_;
+  std::condition_variable idle_;
   std::map<std::string, Lane> lanes_;  // lanes that have tasks
   std::deque<std::string> turns_;
   int accepted_ = 0;
@@ -81,7 +91,7 @@ class Strand : public std::enable_shared_from_this<Strand> {
 
   // Submits a task that runs after every task submitted to this strand before. RESOURCE_EXHAUSTED
   // when the executor's queue is full; the task is then not run.
-  absl::Status Submit(Task task);
+  absl::Status Submit(Task task, Admission admission = Admission::kIfRoom);
 
  private:
   void RunOne();

@@ -1,7 +1,8 @@
 #include "server/journal/commit_queue.h"
 
+#include <algorithm>
 #include <future>
-#include <iterator>
+#include <set>
 #include <utility>
 
 #include "core/common/status.h"
@@ -31,29 +32,35 @@ CommitQueue::~CommitQueue() {
   submitted_.notify_one();
 }
 
-void CommitQueue::Submit(Write write, Done done) {
+void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_t bytes) {
   const std::lock_guard lock(mutex_);
-  queue_.push_back({std::move(write), std::move(done)});
+  std::deque<Item>& queue = lanes_[lane];
+  if (queue.empty()) turns_.push_back(lane);
+  queue.push_back({std::move(write), std::move(done), bytes});
   submitted_.notify_one();
 }
 
-void CommitQueue::SubmitLazily(Write write) {
+void CommitQueue::SubmitLazily(Write write, const std::string& lane) {
   const std::lock_guard lock(mutex_);
-  lazy_.push_back({std::move(write), [](const absl::Status&) {}});
+  lazy_.emplace_back(lane, std::move(write));
 }
 
 void CommitQueue::Flush() {
+  std::set<std::string> lanes;
   {
     const std::lock_guard lock(mutex_);
-    if (lazy_.empty()) return;
+    for (const auto& [lane, write] : lazy_) lanes.insert(lane);
   }
-  Run([](SqliteDatabase&) { return absl::OkStatus(); }).IgnoreError();
+  for (const std::string& lane : lanes) {
+    Run([](SqliteDatabase&) { return absl::OkStatus(); }, lane).IgnoreError();
+  }
 }
 
-absl::Status CommitQueue::Run(Write write) {
+absl::Status CommitQueue::Run(Write write, const std::string& lane) {
   std::promise<absl::Status> promise;
   auto outcome = promise.get_future();
-  Submit(std::move(write), [&](const absl::Status& status) { promise.set_value(status); });
+  Submit(
+      std::move(write), [&](const absl::Status& status) { promise.set_value(status); }, lane);
   return outcome.get();
 }
 
@@ -65,14 +72,52 @@ void CommitQueue::Serve() {
 std::vector<CommitQueue::Item> CommitQueue::Take() {
   std::vector<Item> items;
   std::unique_lock lock(mutex_);
-  submitted_.wait(lock, [this] { return !queue_.empty() || ending_; });
-  while (!queue_.empty() && items.size() < kMaxWrites) {
-    items.push_back(std::move(queue_.front()));
-    queue_.pop_front();
-  }
-  std::move(lazy_.begin(), lazy_.end(), std::back_inserter(items));
-  lazy_.clear();
+  submitted_.wait(lock, [this] { return !turns_.empty() || ending_; });
+  TakeTurns(items, /*large=*/!large_before_);
+  if (items.empty()) TakeTurns(items, /*large=*/true);
+  large_before_ = std::any_of(items.begin(), items.end(),
+                              [](const Item& item) { return item.bytes > kMaxBytes; });
+  TakeLazy(items);
   return items;
+}
+
+// Takes one write of each lane at a time, as long as there is room; one larger than a commit only
+// if `large` and only once. A lane whose next write has no room keeps its turn.
+void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
+  int64_t bytes = 0;
+  size_t passed_over = 0;  // the lanes at the front of turns_ whose next write has no room
+  while (passed_over < turns_.size() && items.size() < kMaxWrites) {
+    const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(passed_over);
+    const auto lane = lanes_.find(*turn);
+    Item& next = lane->second.front();
+    const bool is_large = next.bytes > kMaxBytes;
+    if (is_large ? !large : bytes + next.bytes > kMaxBytes) {
+      ++passed_over;
+      continue;
+    }
+    if (is_large) {
+      large = false;
+    } else {
+      bytes += next.bytes;
+    }
+    items.push_back(std::move(next));
+    lane->second.pop_front();
+    turns_.erase(turn);
+    if (lane->second.empty()) {
+      lanes_.erase(lane);
+    } else {
+      turns_.push_back(lane->first);
+    }
+  }
+}
+
+void CommitQueue::TakeLazy(std::vector<Item>& items) {
+  const auto due = std::stable_partition(
+      lazy_.begin(), lazy_.end(), [this](const auto& one) { return lanes_.contains(one.first); });
+  for (auto one = due; one != lazy_.end(); ++one) {
+    items.push_back({std::move(one->second), [](const absl::Status&) {}, 0});
+  }
+  lazy_.erase(due, lazy_.end());
 }
 
 void CommitQueue::Commit(std::vector<Item> items) {

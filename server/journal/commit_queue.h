@@ -1,7 +1,8 @@
 #pragma once
 
 // Writes to the journal's database from one thread. Writes that arrive during a commit go into the
-// next one, so that one wait for the disk serves many.
+// next one, so that one wait for the disk serves many. Lanes take turns, and a commit is bounded in
+// bytes, so that nobody waits for the many or large writes of another lane.
 
 #include <absl/status/status.h>
 
@@ -9,9 +10,12 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/journal/sqlite_database.h"
@@ -42,24 +46,33 @@ class CommitQueue {
   CommitQueue(const CommitQueue&) = delete;
   CommitQueue& operator=(const CommitQueue&) = delete;
 
-  // Queues a write. Writes run in the order of the calls; any thread may call this.
-  void Submit(Write write, Done done);
-  // Queues a write that nobody waits for: it goes into the next commit that there is anyway, or
-  // into one of its own at the end.
-  void SubmitLazily(Write write);
+  // Largest number of bytes that the writes of one commit have together. A larger write goes alone
+  // among large ones, and never twice in a row while others wait.
+  static constexpr int64_t kMaxBytes = 4 << 20;
+
+  // Queues a write of so many bytes. The writes of a lane run in the order of the calls; any thread
+  // may call this.
+  void Submit(Write write, Done done, const std::string& lane = "", int64_t bytes = 0);
+  // Queues a write that nobody waits for: once the writes before it in its lane are done, it goes
+  // into the next commit that there is anyway, or into one of its own at the end.
+  void SubmitLazily(Write write, const std::string& lane = "");
   // Waits until lazy writes submitted so far are on disk, or could not be written.
   void Flush();
   // Submits a write and waits for its outcome.
-  absl::Status Run(Write write);
+  absl::Status Run(Write write, const std::string& lane = "");
 
  private:
   struct Item {
     Write write;
     Done done;
+    int64_t bytes = 0;
   };
 
   void Serve();
   std::vector<Item> Take();
+  // The following are called with the mutex held.
+  void TakeTurns(std::vector<Item>& items, bool large);
+  void TakeLazy(std::vector<Item>& items);
   void Commit(std::vector<Item> items);
   absl::Status WriteAll(const std::vector<Item>& items, std::vector<absl::Status>& outcomes);
 
@@ -67,8 +80,10 @@ class CommitQueue {
   const OnCommit on_commit_;
   std::mutex mutex_;
   std::condition_variable submitted_;
-  std::deque<Item> queue_;
-  std::vector<Item> lazy_;
+  std::map<std::string, std::deque<Item>> lanes_;    // those with writes
+  std::deque<std::string> turns_;                    // the lanes, the next one first
+  bool large_before_ = false;                        // whether the last commit had a large write
+  std::vector<std::pair<std::string, Write>> lazy_;  // with their lanes
   bool ending_ = false;
   std::jthread thread_;
 };

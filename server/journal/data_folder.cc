@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr char kJournal[] = "journal.db";
 constexpr char kLock[] = "lock";
+constexpr char kSeals[] = "seals";
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
 // The bits of a mode by which the group and all others may read, write or enter.
@@ -31,9 +32,11 @@ constexpr mode_t kPermissions = 07777;
 
 std::string ErrnoText() { return std::strerror(errno); }
 
-// Returns whether a file is the journal's own: its lock, SQLite's file, or one that SQLite puts
-// beside it.
-bool IsOwn(const std::string& name) { return name == kLock || absl::StartsWith(name, kJournal); }
+// Returns whether a file is the journal's own: its lock, its seals, SQLite's file, or one that
+// SQLite puts beside it.
+bool IsOwn(const std::string& name) {
+  return name == kLock || name == kSeals || absl::StartsWith(name, kJournal);
+}
 
 // Returns the permissions of a file or folder.
 absl::StatusOr<mode_t> ModeOf(const std::string& path) {
@@ -94,7 +97,7 @@ absl::Status MakeFolderPrivate(const std::string& folder) {
 
 // Makes the files private that an earlier version, which left their mode to the umask, has made.
 absl::Status MakeFilesPrivate(const std::string& folder) {
-  for (const char* name : {kLock, kJournal, "journal.db-wal", "journal.db-shm"}) {
+  for (const char* name : {kLock, kSeals, kJournal, "journal.db-wal", "journal.db-shm"}) {
     const std::string file = absl::StrCat(folder, "/", name);
     std::error_code ignored;
     if (!fs::exists(file, ignored)) continue;
@@ -143,7 +146,9 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Take(const std::string& 
 }
 
 DataFolder::DataFolder(const std::string& folder, int lock)
-    : journal_file_(absl::StrCat(folder, "/", kJournal)), lock_(lock) {}
+    : journal_file_(absl::StrCat(folder, "/", kJournal)),
+      seals_file_(absl::StrCat(folder, "/", kSeals)),
+      lock_(lock) {}
 
 DataFolder::~DataFolder() { close(lock_); }
 

@@ -28,11 +28,14 @@ class DataFolder {
   // Returns the path of the journal's file. SQLite gives the files that it puts beside it the same
   // mode.
   const std::string& journal_file() const { return journal_file_; }
+  // Returns the path of the file of seals (SessionSeals).
+  const std::string& seals_file() const { return seals_file_; }
 
  private:
   DataFolder(const std::string& folder, int lock);
 
   const std::string journal_file_;
+  const std::string seals_file_;
   const int lock_;  // descriptor of the locked file
 };
 

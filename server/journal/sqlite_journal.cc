@@ -8,76 +8,15 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/journal/seal_check.h"
+#include "server/journal/session_digest.h"
 #include "server/journal/sqlite_schema.h"
+#include "server/journal/sqlite_writes.h"
 
 namespace polyest::internal {
 namespace {
 
-// Number of pages in the write-ahead log from which on they are copied into the file.
-constexpr int kCheckpointPages = 4'000;
 constexpr int64_t kPageBytes = 4'096;
-// Largest number of batches of a deleted session that one commit removes.
-constexpr int64_t kRemovedBatches = 256;
-
-absl::Status NotThere() { return absl::NotFoundError("the journal has no such session"); }
-
-absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
-  SqliteQuery query(database,
-                    "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE ?2 = 1 + "
-                    "(SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
-                    "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
-  query.Bind(entry.session)
-      .Bind(entry.place.sequence)
-      .BindBlob(entry.measurements)
-      .BindBlob(entry.digest)
-      .Bind(entry.place.samples)
-      .Bind(entry.place.rows)
-      .Bind(static_cast<int64_t>(entry.place.last_row.run))
-      .Bind(entry.place.last_row.time_s);
-  POLYEST_RETURN_IF_ERROR(query.Run());
-  if (database.changes() > 0) return absl::OkStatus();
-  SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
-  session.Bind(entry.session);
-  POLYEST_ASSIGN_OR_RETURN(const bool there, session.Step());
-  if (!there) return NotThere();
-  return absl::FailedPreconditionError(
-      absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
-}
-
-absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,
-                             const JournalSnapshot& snapshot) {
-  SqliteQuery query(database,
-                    "INSERT OR REPLACE INTO snapshot SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
-                    "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?2)");
-  query.Bind(session).Bind(snapshot.sequence).Bind(snapshot.rows).BindBlob(snapshot.state);
-  return query.Run();
-}
-
-absl::Status InsertHistoryPoint(SqliteDatabase& database, int64_t session,
-                                const JournalHistoryPoint& point, int64_t stride) {
-  SqliteQuery insert(database,
-                     "INSERT OR REPLACE INTO history SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
-                     "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?3)");
-  insert.Bind(session).Bind(point.ordinal).Bind(point.sequence).BindBlob(point.point);
-  POLYEST_RETURN_IF_ERROR(insert.Run());
-  if (stride == 1) return absl::OkStatus();
-  SqliteQuery thin(database, "DELETE FROM history WHERE session = ? AND ordinal % ? <> 0");
-  thin.Bind(session).Bind(stride);
-  return thin.Run();
-}
-
-absl::Status RunFor(SqliteDatabase& database, const char* sql, int64_t session) {
-  SqliteQuery query(database, sql);
-  query.Bind(session);
-  return query.Run();
-}
-
-// Deletes the sessions that were never shown: those of imports that did not come to their end.
-absl::Status DeleteHidden(SqliteDatabase& database) {
-  return database.Execute(
-      "BEGIN IMMEDIATE; INSERT INTO deleted SELECT number FROM session WHERE hidden = 1;"
-      "DELETE FROM session WHERE hidden = 1; COMMIT");
-}
 
 absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
@@ -130,17 +69,25 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   if (!writer.ok()) return named(writer.status());
   const absl::Status prepared = SetUpWriter(**writer, options.max_mb);
   if (!prepared.ok()) return named(prepared);
+  POLYEST_ASSIGN_OR_RETURN(auto seals, SessionSeals::Open(folder->seals_file()));
+  auto found = CheckSeals(**writer, *seals);
+  if (!found.ok()) return named(found.status());
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
-  return std::unique_ptr<SqliteJournal>(new SqliteJournal(
-      std::move(folder), *std::move(writer), *std::move(maintainer), options.on_commit));
+  return std::unique_ptr<SqliteJournal>(new SqliteJournal(std::move(folder), *std::move(writer),
+                                                          *std::move(maintainer), std::move(seals),
+                                                          *std::move(found), options.on_commit));
 }
 
 SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
                              std::unique_ptr<SqliteDatabase> writer,
                              std::unique_ptr<SqliteDatabase> maintainer,
+                             std::unique_ptr<SessionSeals> seals, std::vector<std::string> damage,
                              CommitQueue::OnCommit on_commit)
-    : folder_(std::move(folder)), maintainer_(std::move(maintainer)) {
+    : folder_(std::move(folder)),
+      damage_(std::move(damage)),
+      maintainer_(std::move(maintainer)),
+      seals_(std::move(seals)) {
   // This hook takes the place of SQLite's own checkpoint, which would delay the commit that it
   // follows.
   sqlite3_wal_hook(
@@ -152,7 +99,12 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
         return SQLITE_OK;
       },
       this);
-  queue_ = std::make_unique<CommitQueue>(std::move(writer), std::move(on_commit));
+  const auto seal = [this, on_commit = std::move(on_commit)](const CommitReport& commit) {
+    SealCommit(commit.outcome.ok());
+    if (on_commit) on_commit(commit);
+  };
+  ReadTenants(*writer);
+  queue_ = std::make_unique<CommitQueue>(std::move(writer), seal);
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 
@@ -160,6 +112,11 @@ SqliteJournal::~SqliteJournal() {
   maintenance_thread_.request_stop();
   maintenance_thread_.join();
   queue_ = nullptr;
+}
+
+void SqliteJournal::ReadTenants(SqliteDatabase& database) {
+  SqliteQuery query(database, "SELECT number, tenant FROM session");
+  while (query.Step().value_or(false)) tenants_[query.Integer(0)] = query.Bytes(1);
 }
 
 absl::Status SqliteJournal::CheckWritable() {
@@ -171,31 +128,41 @@ absl::Status SqliteJournal::CheckWritable() {
   });
 }
 
+// Seals what a commit has kept, on the writer's thread and before anybody hears of it.
+void SqliteJournal::SealCommit(bool kept) {
+  if (kept) {
+    for (const auto& [session, seal] : unsealed_) {
+      if (seal) {
+        seals_->Put(*seal);
+      } else {
+        seals_->Remove(session);
+      }
+    }
+  }
+  unsealed_.clear();
+}
+
 absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   SqliteQuery query(
       *database,
-      "SELECT number, tenant, name, created_s, created_ns, coalesce(sequence, 0), "
-      "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "
-      "coalesce(place_time_s, 0), reorder_window_s FROM session LEFT JOIN batch ON batch.session "
-      "= number AND sequence = (SELECT max(sequence) FROM batch WHERE session = number) "
-      "WHERE hidden = 0 ORDER BY tenant, name");
+      "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, "
+      "session.digest, coalesce(sequence, 0), coalesce(place_samples, 0), coalesce(place_rows, 0), "
+      "coalesce(place_run, 0), coalesce(place_time_s, 0) FROM session LEFT JOIN batch ON "
+      "batch.session = number AND sequence = (SELECT max(sequence) FROM batch WHERE session = "
+      "number) ORDER BY tenant, name");
   std::vector<SessionHead> heads;
   while (true) {
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return heads;
-    SessionHead& head = heads.emplace_back();
-    head.number = query.Integer(0);
-    head.tenant = query.Bytes(1);
-    head.name = query.Bytes(2);
-    head.create_time.set_seconds(query.Integer(3));
-    head.create_time.set_nanos(static_cast<int32_t>(query.Integer(4)));
-    head.place.sequence = query.Integer(5);
-    head.place.samples = query.Integer(6);
-    head.place.rows = query.Integer(7);
-    head.place.last_row = {static_cast<int>(query.Integer(8)), query.Real(9)};
-    head.reorder_window_s = query.Real(10);
+    POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
+    if (!more) return heads;
+    SessionRow row = ReadSessionRow(query);
+    if (row.hidden && !row.damaged) continue;
+    SessionHead& head = heads.emplace_back(std::move(row.head));
+    head.place.sequence = query.Integer(9);
+    head.place.samples = query.Integer(10);
+    head.place.rows = query.Integer(11);
+    head.place.last_row = {static_cast<int>(query.Integer(12)), query.Real(13)};
   }
 }
 
@@ -216,27 +183,48 @@ absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1:
         .Bind(head.reorder_window_s);
     POLYEST_RETURN_IF_ERROR(query.Run());
     number = database.last_insert_rowid();
-    return absl::OkStatus();
+    SessionHead created = head;
+    created.number = number;
+    unsealed_[number] = Seal::At(number, SealLabel(head.tenant, head.name),
+                                 SessionDigest(created, /*hidden=*/false, bytes), 0);
+    return WriteSessionDigest(database, number);
   };
   POLYEST_RETURN_IF_ERROR(queue_->Run(insert));
+  const std::lock_guard lock(tenants_mutex_);
+  tenants_[number] = head.tenant;
   return number;
+}
+
+std::string SqliteJournal::LaneOf(int64_t session) const {
+  const std::lock_guard lock(tenants_mutex_);
+  const auto tenant = tenants_.find(session);
+  // No tenant has the lane without a name, in which sessions are created and deleted.
+  return tenant == tenants_.end() ? "" : "tenant " + tenant->second;
 }
 
 absl::Status SqliteJournal::Show(int64_t session) {
   return queue_->Run([=](SqliteDatabase& database) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(
-        RunFor(database, "UPDATE session SET hidden = 0 WHERE number = ?", session));
-    return database.changes() > 0 ? absl::OkStatus() : NotThere();
+        RunForSession(database, "UPDATE session SET hidden = 0 WHERE number = ?", session));
+    if (database.changes() == 0) return NoSuchSession();
+    return WriteSessionDigest(database, session);
   });
 }
 
 absl::Status SqliteJournal::Delete(int64_t session) {
-  const absl::Status deleted = queue_->Run([=](SqliteDatabase& database) -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM session WHERE number = ?", session));
-    if (database.changes() == 0) return NotThere();
-    return RunFor(database, "INSERT INTO deleted VALUES (?)", session);
-  });
+  const absl::Status deleted =
+      queue_->Run([this, session](SqliteDatabase& database) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(
+            RunForSession(database, "DELETE FROM session WHERE number = ?", session));
+        if (database.changes() == 0) return NoSuchSession();
+        unsealed_[session] = std::nullopt;
+        return RunForSession(database, "INSERT INTO deleted VALUES (?)", session);
+      });
   if (deleted.ok()) {
+    {
+      const std::lock_guard lock(tenants_mutex_);
+      tenants_.erase(session);
+    }
     const std::lock_guard lock(maintenance_mutex_);
     deleted_ = true;
     maintenance_.notify_one();
@@ -245,50 +233,71 @@ absl::Status SqliteJournal::Delete(int64_t session) {
 }
 
 void SqliteJournal::Append(JournalEntry entry, Done done) {
+  const std::string lane = LaneOf(entry.session);
+  const auto bytes = static_cast<int64_t>(entry.measurements.size());
   queue_->Submit(
-      [entry = std::move(entry)](SqliteDatabase& database) { return InsertBatch(database, entry); },
-      std::move(done));
+      [this, entry = std::move(entry)](SqliteDatabase& database) -> absl::Status {
+        POLYEST_RETURN_IF_ERROR(InsertBatch(database, entry));
+        auto& seal = unsealed_[entry.session];
+        if (!seal) seal = seals_->Of(entry.session);
+        if (!seal) seal = Seal::At(entry.session, "", "", entry.place.sequence - 1);
+        seal->Add(entry.place.sequence, entry.digest);
+        return absl::OkStatus();
+      },
+      std::move(done), lane, bytes);
 }
 
 void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {
+  const auto bytes = static_cast<int64_t>(snapshot.state.size());
   queue_->Submit(
       [session, snapshot = std::move(snapshot)](SqliteDatabase& database) {
         return ReplaceSnapshot(database, session, snapshot);
       },
-      [](const absl::Status&) {});
+      [](const absl::Status&) {}, LaneOf(session), bytes);
 }
 
 void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point, int64_t stride) {
-  queue_->SubmitLazily([session, point = std::move(point), stride](SqliteDatabase& database) {
-    return InsertHistoryPoint(database, session, point, stride);
-  });
+  queue_->SubmitLazily(
+      [session, point = std::move(point), stride](SqliteDatabase& database) {
+        return InsertHistoryPoint(database, session, point, stride);
+      },
+      LaneOf(session));
 }
 
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database, "SELECT problem FROM session WHERE number = ?");
+  SqliteQuery query(*database,
+                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
+                    "problem, digest FROM session WHERE number = ?");
   query.Bind(session);
-  POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-  if (!row) return NotThere();
+  POLYEST_ASSIGN_OR_RETURN(const bool there, query.Step());
+  if (!there) return NoSuchSession();
+  const SessionRow row = ReadSessionRow(query);
   v1::Problem problem;
-  if (problem.ParseFromString(query.Bytes(0))) return problem;
-  return absl::DataLossError("the session's problem cannot be read from the journal");
+  if (!row.damaged && problem.ParseFromString(row.problem)) return problem;
+  return absl::DataLossError(
+      absl::StrFormat("%s is damaged in the journal: its name, its window or its problem is not "
+                      "what was stored",
+                      row.head.name));
 }
 
 absl::Status SqliteJournal::ReadBatches(
     int64_t session, int64_t after,
     const std::function<absl::Status(const JournalBatch&)>& take) const {
+  // The seal is looked up first, so that the statement sees its batches.
+  const std::optional<Seal> seal = after == 0 ? seals_->Of(session) : std::nullopt;
+  Seal read = Seal::At(session, "", "", seal ? seal->from : 0);
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   // One statement looks for the session and for its batches, because the session may be deleted and
   // its batches removed between two. Without batches it gives one row, which has no sequence.
   SqliteQuery query(*database,
-                    "SELECT sequence, measurements, digest FROM session LEFT JOIN batch ON "
+                    "SELECT sequence, measurements, batch.digest FROM session LEFT JOIN batch ON "
                     "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
   query.Bind(session).Bind(after);
   POLYEST_ASSIGN_OR_RETURN(bool row, query.Step());
-  if (!row) return NotThere();
+  if (!row) return NoSuchSession();
   JournalBatch batch;
   batch.sequence = after;
   while (row && query.Integer(0) > 0) {
@@ -296,9 +305,15 @@ absl::Status SqliteJournal::ReadBatches(
     const bool whole = query.Integer(0) == batch.sequence + 1 && query.Bytes(2) == Digest(bytes) &&
                        batch.measurements.ParseFromString(bytes);
     ++batch.sequence;
+    if (seal && batch.sequence > seal->from) read.Add(batch.sequence, query.Bytes(2));
     if (!whole) {
       return absl::DataLossError(absl::StrFormat(
           "batch %d of the session is damaged or missing in the journal", batch.sequence));
+    }
+    if (seal && batch.sequence == seal->sequence && read.chain != seal->chain) {
+      return absl::DataLossError(
+          absl::StrFormat("batches %d to %d of the session are not those that were acknowledged",
+                          seal->from + 1, seal->sequence));
     }
     POLYEST_RETURN_IF_ERROR(take(batch));
     POLYEST_ASSIGN_OR_RETURN(row, query.Step());
@@ -339,62 +354,6 @@ absl::StatusOr<std::vector<JournalHistoryPoint>> SqliteJournal::ReadHistory(int6
     if (!row) return history;
     history.push_back({query.Integer(0), query.Integer(1), query.Bytes(2)});
   }
-}
-
-void SqliteJournal::WakeMaintenance() {
-  const std::lock_guard lock(maintenance_mutex_);
-  maintenance_.notify_one();
-}
-
-void SqliteJournal::Maintain(std::stop_token stop) {
-  bool removing = true;
-  while (!stop.stop_requested()) {
-    {
-      std::unique_lock lock(maintenance_mutex_);
-      if (!removing) {
-        maintenance_.wait(lock, stop,
-                          [this] { return log_pages_ >= kCheckpointPages || deleted_; });
-      }
-      removing = std::exchange(deleted_, false) || removing;
-    }
-    if (log_pages_ >= kCheckpointPages) Checkpoint();
-    // If the disk fails, what is left is removed after the journal is opened again.
-    if (removing) removing = RemoveSomeDeleted().value_or(false);
-  }
-}
-
-// Copies the write-ahead log into the file. The first pass copies most of it while another thread
-// goes on writing batches, so that they do not wait. The second one holds up the writer and copies
-// the rest, because the log could otherwise grow without end.
-void SqliteJournal::Checkpoint() {
-  for (const int mode : {SQLITE_CHECKPOINT_PASSIVE, SQLITE_CHECKPOINT_TRUNCATE}) {
-    sqlite3_wal_checkpoint_v2(maintainer_->handle(), nullptr, mode, nullptr, nullptr);
-  }
-  log_pages_ = 0;
-}
-
-// Removes some batches of a deleted session. Returns whether there may be more to remove.
-absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
-  int64_t session = 0;
-  {
-    SqliteQuery query(*maintainer_, "SELECT session FROM deleted LIMIT 1");
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return false;
-    session = query.Integer(0);
-  }
-  const auto remove = [=](SqliteDatabase& database) -> absl::Status {
-    SqliteQuery query(database,
-                      "DELETE FROM batch WHERE rowid IN (SELECT rowid FROM batch WHERE session = ? "
-                      "LIMIT ?)");
-    query.Bind(session).Bind(kRemovedBatches);
-    POLYEST_RETURN_IF_ERROR(query.Run());
-    if (database.changes() > 0) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM snapshot WHERE session = ?", session));
-    POLYEST_RETURN_IF_ERROR(RunFor(database, "DELETE FROM history WHERE session = ?", session));
-    return RunFor(database, "DELETE FROM deleted WHERE session = ?", session);
-  };
-  POLYEST_RETURN_IF_ERROR(queue_->Run(remove));
-  return true;
 }
 
 }  // namespace polyest::internal

@@ -4,8 +4,10 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "server/journal/commit_queue.h"
 #include "server/journal/data_folder.h"
 #include "server/journal/session_journal.h"
+#include "server/journal/session_seals.h"
 
 namespace polyest::internal {
 
@@ -34,6 +37,9 @@ class SqliteJournal final : public SessionJournal {
   // Writes everything appended, then ends.
   ~SqliteJournal() override;
 
+  // Returns what Open has found to be damaged or missing, a sentence each.
+  const std::vector<std::string>& damage() const { return damage_; }
+
   bool durable() const override { return true; }
   absl::Status CheckWritable() override;
   absl::StatusOr<std::vector<SessionHead>> Heads() const override;
@@ -53,25 +59,41 @@ class SqliteJournal final : public SessionJournal {
   absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const override;
 
  private:
+  // Number of pages in the write-ahead log from which on they are copied into the file.
+  static constexpr int kCheckpointPages = 4'000;
+
   // Borrows a connection to read with, and gives it back when destroyed.
   class Reader;
 
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
-                std::unique_ptr<SqliteDatabase> maintainer, CommitQueue::OnCommit on_commit);
+                std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
+                std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+  void SealCommit(bool kept);
+  void ReadTenants(SqliteDatabase& database);
+  // Returns the lane of the commit queue in which a session is written: its tenant's.
+  std::string LaneOf(int64_t session) const;
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
   void WakeMaintenance();
 
   const std::unique_ptr<DataFolder> folder_;
+  const std::vector<std::string> damage_;
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
+
+  mutable std::mutex tenants_mutex_;
+  std::map<int64_t, std::string> tenants_;  // of the sessions
 
   std::unique_ptr<SqliteDatabase> maintainer_;  // connection of the maintenance thread
   std::mutex maintenance_mutex_;
   std::condition_variable_any maintenance_;
   std::atomic<int> log_pages_ = 0;  // pages in the write-ahead log
   bool deleted_ = true;             // whether there may be batches of deleted sessions
+
+  const std::unique_ptr<SessionSeals> seals_;
+  // Seals of the commit under way, null for deleted sessions. Used by the writing thread only.
+  std::map<int64_t, std::optional<Seal>> unsealed_;
 
   std::unique_ptr<CommitQueue> queue_;
   std::jthread maintenance_thread_;

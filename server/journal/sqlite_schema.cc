@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "core/common/status.h"
+#include "server/journal/session_digest.h"
 
 namespace polyest::internal {
 namespace {
@@ -53,7 +54,10 @@ constexpr const char* kMigrations[] = {
          point BLOB NOT NULL,
          PRIMARY KEY (session, ordinal)) WITHOUT ROWID;)",
     "ALTER TABLE session ADD COLUMN reorder_window_s REAL NOT NULL DEFAULT 0;",
+    // The digest of the session's row (session_digest.h).
+    "ALTER TABLE session ADD COLUMN digest BLOB;",
 };
+constexpr int64_t kVersionWithDigests = 5;
 
 absl::StatusOr<int64_t> CheckOwn(SqliteDatabase& database) {
   POLYEST_ASSIGN_OR_RETURN(const int64_t application, database.Number("PRAGMA application_id"));
@@ -74,6 +78,9 @@ absl::StatusOr<int64_t> CheckOwn(SqliteDatabase& database) {
 
 absl::Status Migrate(SqliteDatabase& database, int64_t from, int to) {
   for (int64_t i = from; i < to; ++i) POLYEST_RETURN_IF_ERROR(database.Execute(kMigrations[i]));
+  if (from < kVersionWithDigests && to >= kVersionWithDigests) {
+    POLYEST_RETURN_IF_ERROR(WriteAllSessionDigests(database));
+  }
   return database.Execute(
       absl::StrCat("PRAGMA application_id = ", kApplicationId, "; PRAGMA user_version = ", to));
 }

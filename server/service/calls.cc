@@ -51,12 +51,13 @@ Job JobOfSession(std::shared_ptr<Session> session, SessionWork work) {
 
 grpc::ServerUnaryReactor* StartCall(
     const ServiceContext& context, grpc::CallbackServerContext* call, Method method,
+    const google::protobuf::Message* answer,
     const std::function<absl::StatusOr<Job>(const Caller&)>& make_job) {
   const auto caller = context.access.Authorize(*call, method);
   if (!caller.ok()) return FinishAtOnce(call, caller.status());
   auto job = make_job(*caller);
   if (!job.ok()) return FinishAtOnce(call, job.status());
-  return UnaryCall::Start(context, call, job->submit, std::move(job->work));
+  return UnaryCall::Start(context, caller->tenant, call, answer, job->submit, std::move(job->work));
 }
 
 }  // namespace polyest::internal

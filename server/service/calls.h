@@ -38,10 +38,11 @@ Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, Caller
 // that the work may have seen.
 Job JobOfSession(std::shared_ptr<Session> session, SessionWork work);
 
-// Starts a unary call with the job that is made for its caller. A caller who may not call the
-// method is refused before anything else.
+// Starts a unary call with the job that is made for its caller and fills `answer`. A caller who may
+// not call the method is refused before anything else.
 grpc::ServerUnaryReactor* StartCall(
     const ServiceContext& context, grpc::CallbackServerContext* call, Method method,
+    const google::protobuf::Message* answer,
     const std::function<absl::StatusOr<Job>(const Caller&)>& make_job);
 
 }  // namespace polyest::internal

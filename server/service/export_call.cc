@@ -113,7 +113,7 @@ ExportCall::ExportCall(ServiceContext& context, const grpc::CallbackServerContex
     : flow_(std::make_shared<ExportFlow>(context)) {
   absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ExportSession");
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, admitted->tenant, flow_);
     if (ticket.ok()) {
       ticket_ = *std::move(ticket);
     } else {

@@ -16,6 +16,9 @@ void ImportFlow::OnStart(ImportReactor* reactor, const absl::StatusOr<Caller>& a
   if (admitted.ok()) {
     import_ = std::make_unique<SessionImport>(context_.sessions, admitted->tenant);
     lane_ = absl::StrCat(admitted->tenant, "/calls");
+    timer_.Start(context_.first_message, [flow = weak_from_this()] {
+      if (const auto present = flow.lock()) present->OnFirstMessageDue();
+    });
   } else {
     End(admitted.status());
   }
@@ -26,6 +29,7 @@ void ImportFlow::OnRead(bool ok) {
   const std::lock_guard lock(mutex_);
   reading_ = false;
   half_closed_ = !ok;
+  if (!std::exchange(any_, true)) timer_.Stop();
   if (!end_ && !finished_) {
     working_ = true;
     const absl::Status accepted =
@@ -35,6 +39,12 @@ void ImportFlow::OnRead(bool ok) {
       End(accepted);
     }
   }
+  Advance();
+}
+
+void ImportFlow::OnFirstMessageDue() {
+  const std::lock_guard lock(mutex_);
+  if (!any_) End(SaidNothing());
   Advance();
 }
 
@@ -107,7 +117,7 @@ ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContex
     : flow_(std::make_shared<ImportFlow>(context, response)) {
   absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ImportSession");
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, admitted->tenant, flow_);
     if (ticket.ok()) {
       ticket_ = *std::move(ticket);
     } else {

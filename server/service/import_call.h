@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 
+#include "server/service/first_message_timer.h"
 #include "server/service/service_context.h"
 #include "server/sessions/session_import.h"
 
@@ -26,6 +27,8 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
   void OnRead(bool ok);
   void OnCancelled();
   void OnDone();
+  // Ends the import if nothing has come.
+  void OnFirstMessageDue();
   void Drain() override;
 
  private:
@@ -46,6 +49,8 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
 
   std::mutex mutex_;
   ImportReactor* reactor_ = nullptr;
+  FirstMessageTimer timer_;
+  bool any_ = false;  // whether there has been a message or the end
   bool reading_ = false;
   bool working_ = false;
   bool half_closed_ = false;

@@ -30,7 +30,19 @@ absl::StatusOr<Caller> MeasurementFlow::Authorize() const {
 void MeasurementFlow::OnStart(MeasurementReactor* reactor, const absl::Status& admitted) {
   std::lock_guard lock(mutex_);
   reactor_ = reactor;
-  if (!admitted.ok()) End(admitted);
+  if (admitted.ok()) {
+    timer_.Start(context_.first_message, [flow = weak_from_this()] {
+      if (const auto present = flow.lock()) present->OnFirstMessageDue();
+    });
+  } else {
+    End(admitted);
+  }
+  Advance();
+}
+
+void MeasurementFlow::OnFirstMessageDue() {
+  std::lock_guard lock(mutex_);
+  if (session_ == nullptr) End(SaidNothing());
   Advance();
 }
 
@@ -52,6 +64,7 @@ void MeasurementFlow::Accept(v1::StreamMeasurementsRequest request) {
   const absl::StatusOr<Caller> caller = Authorize();
   if (!caller.ok()) return End(caller.status());
   if (const absl::Status attached = Attach(*caller, request); !attached.ok()) return End(attached);
+  held_bytes_ += static_cast<int64_t>(request.ByteSizeLong());
   inbox_.push_back(std::move(request));
 }
 
@@ -71,6 +84,7 @@ absl::Status MeasurementFlow::Attach(const Caller& caller,
   POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));
   losses_ = session->losses();
   session_ = std::move(session);
+  timer_.Stop();
   return absl::OkStatus();
 }
 
@@ -133,7 +147,7 @@ void MeasurementFlow::Advance() {
   StartLoading();
   StartTaking();
   StartComputing();
-  if (!reading_ && !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox && HasRoom()) {
+  if (!reading_ && MayRead()) {
     reading_ = true;
     reactor_->StartRead(&reading_into_);
   }
@@ -142,6 +156,11 @@ void MeasurementFlow::Advance() {
 
 bool MeasurementFlow::HasRoom() const {
   return outbox_.size() < kOutbox && uncomputed_.size() < kMaxUncomputed;
+}
+
+bool MeasurementFlow::MayRead() const {
+  return !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox &&
+         held_bytes_ < context_.held_bytes && HasRoom();
 }
 
 bool MeasurementFlow::AllTaken() const {
@@ -161,22 +180,21 @@ void MeasurementFlow::StartLoading() {
 void MeasurementFlow::StartTaking() {
   if (end_ || stage_ != Stage::kReady || taking_ || inbox_.empty() || !HasRoom()) return;
   taking_ = true;
-  const absl::Status accepted =
-      context_.intake.Submit(session_->tenant(), [flow = shared_from_this()] { flow->Take(); });
-  if (accepted.ok()) return;
-  taking_ = false;
-  End(accepted);
+  // An open stream has one task here and one on the strand, and does not end because the queues are
+  // full.
+  context_.intake
+      .Submit(
+          session_->tenant(), [flow = shared_from_this()] { flow->Take(); }, Admission::kAlways)
+      .IgnoreError();
 }
 
 void MeasurementFlow::StartComputing() {
   if (end_ || computing_ || outbox_.size() >= kOutbox) return;
   if (uncomputed_.empty() && !AllTaken()) return;
   computing_ = true;
-  const absl::Status accepted =
-      session_->strand().Submit([flow = shared_from_this()] { flow->Compute(); });
-  if (accepted.ok()) return;
-  computing_ = false;
-  End(accepted);
+  session_->strand()
+      .Submit([flow = shared_from_this()] { flow->Compute(); }, Admission::kAlways)
+      .IgnoreError();
 }
 
 void MeasurementFlow::FinishIfIdle() {
@@ -217,7 +235,13 @@ void MeasurementFlow::Take() {
     };
     const absl::Status answered = Guarded(answer);
     lock.lock();
-    if (uncomputed) uncomputed_.push_back(*uncomputed);
+    const auto bytes = static_cast<int64_t>(request.ByteSizeLong());
+    if (uncomputed) {
+      uncomputed->bytes = bytes;
+      uncomputed_.push_back(*uncomputed);
+    } else {
+      held_bytes_ -= bytes;
+    }
     if (!answered.ok()) End(answered);
     Advance();
   }
@@ -236,7 +260,8 @@ absl::StatusOr<std::optional<MeasurementFlow::Uncomputed>> MeasurementFlow::Answ
   POLYEST_ASSIGN_OR_RETURN(*response.mutable_acknowledgement(),
                            session_->Add(request.sequence(), request.measurements(), losses_));
   Send(std::move(response), request.sequence());
-  return Uncomputed{request.sequence(), schedule_.Due(EstimateSchedule::Clock::now())};
+  return Uncomputed{.sequence = request.sequence(),
+                    .estimate = schedule_.Due(EstimateSchedule::Clock::now())};
 }
 
 // Returns what is computed in one turn: the batches up to the next estimate, which must not depend
@@ -259,6 +284,7 @@ void MeasurementFlow::Compute() {
   const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
   lock.lock();
   if (!computed.ok()) End(computed);
+  for (const Uncomputed& one : turn) held_bytes_ -= one.bytes;
   computing_ = false;
   if (last) End(at_end);
   Advance();
@@ -308,9 +334,10 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
 
 MeasurementStream::MeasurementStream(ServiceContext& context, grpc::CallbackServerContext& call)
     : flow_(std::make_shared<MeasurementFlow>(context, call)) {
-  absl::Status admitted = flow_->Authorize().status();
+  const absl::StatusOr<Caller> caller = flow_->Authorize();
+  absl::Status admitted = caller.status();
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, caller->tenant, flow_);
     admitted = ticket.status();
     if (admitted.ok()) ticket_ = *std::move(ticket);
   }

@@ -23,6 +23,7 @@
 #include "polyest/v1/session_service.pb.h"
 #include "server/service/call_stop.h"
 #include "server/service/estimate_schedule.h"
+#include "server/service/first_message_timer.h"
 #include "server/service/service_context.h"
 
 namespace polyest::internal {
@@ -47,6 +48,8 @@ class MeasurementFlow final : public SessionObserver,
   void OnWritten(bool ok);
   void OnCancelled();
   void OnDone();
+  // Ends the stream if it has named no session.
+  void OnFirstMessageDue();
 
   // Ends the stream NOT_FOUND, because the session was deleted.
   void OnClosed() override;
@@ -71,6 +74,7 @@ class MeasurementFlow final : public SessionObserver,
   struct Uncomputed {
     int64_t sequence = 0;
     bool estimate = false;  // whether one is due after it
+    int64_t bytes = 0;
   };
   // A response, and the batch that must be kept before it is sent.
   struct Answered {
@@ -91,6 +95,7 @@ class MeasurementFlow final : public SessionObserver,
   void StartComputing();
   void FinishIfIdle();
   bool HasRoom() const;
+  bool MayRead() const;
   // Returns whether nothing is left to be taken and nothing will come.
   bool AllTaken() const;
   std::vector<Uncomputed> NextTurn();
@@ -114,6 +119,7 @@ class MeasurementFlow final : public SessionObserver,
   std::stop_source stop_source_;
   const CallStop stop_;
   EstimateSchedule schedule_;  // used while batches are taken
+  FirstMessageTimer timer_;
 
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
@@ -122,6 +128,7 @@ class MeasurementFlow final : public SessionObserver,
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;
+  int64_t held_bytes_ = 0;      // of the messages in the inbox and of batches not yet computed
   std::list<Answered> outbox_;  // the first one is being written or is the next
   int64_t kept_ = 0;
   Stage stage_ = Stage::kNone;

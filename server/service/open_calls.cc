@@ -2,9 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
+#include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
 
 namespace polyest::internal {
@@ -21,16 +24,36 @@ absl::Status ShuttingDown() {
                 {.reason = kShuttingDown, .retry_delay = kRetryDelay});
 }
 
+absl::Status OpenCalls::CheckRoom(Kind kind, const std::string& tenant) const {
+  const auto full = [](const std::string& why) {
+    return Refuse(absl::StatusCode::kResourceExhausted, why,
+                  {.reason = kBusy, .retry_delay = kRetryDelay});
+  };
+  const auto share = shares_.find(tenant);
+  const auto place = static_cast<size_t>(kind);
+  if (kind == Kind::kUnary) {
+    if (share == shares_.end() || share->second.answer_bytes < kMaxUnreadBytes) {
+      return absl::OkStatus();
+    }
+    return full(absl::StrCat("the tenant's clients have left answers of ",
+                             share->second.answer_bytes >> 20, " MiB unread; read them first"));
+  }
+  if (open_[place] >= kMaxStreams) {
+    return full(absl::StrCat("the daemon serves at most ", kMaxStreams, " streams at a time"));
+  }
+  if (share != shares_.end() && share->second.open[place] >= kMaxStreamsOfTenant) {
+    return full(absl::StrCat("the daemon serves at most ", kMaxStreamsOfTenant,
+                             " streams of a tenant at a time"));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
-    Kind kind, std::weak_ptr<Drainable> stream) {
+    Kind kind, const std::string& tenant, std::weak_ptr<Drainable> stream) {
   std::lock_guard lock(mutex_);
   if (draining_) return ShuttingDown();
+  POLYEST_RETURN_IF_ERROR(CheckRoom(kind, tenant));
   if (kind != Kind::kUnary) {
-    if (open(kind) >= kMaxStreams) {
-      return Refuse(absl::StatusCode::kResourceExhausted,
-                    absl::StrCat("the daemon serves at most ", kMaxStreams, " streams at a time"),
-                    {.reason = kBusy, .retry_delay = kRetryDelay});
-    }
     auto& streams = streams_[static_cast<int>(kind)];
     // Streams that ended are removed when they outnumber the others.
     if (streams.size() > 2 * static_cast<size_t>(open(kind)) + 8) {
@@ -39,13 +62,27 @@ absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
     streams.push_back(std::move(stream));
   }
   ++open(kind);
-  return std::make_unique<Ticket>(*this, kind);
+  ++shares_[tenant].open[static_cast<int>(kind)];
+  return std::make_unique<Ticket>(*this, kind, tenant);
 }
 
-void OpenCalls::Leave(Kind kind) {
+void OpenCalls::Leave(const Ticket& ticket) {
   std::lock_guard lock(mutex_);
-  --open(kind);
+  --open(ticket.kind_);
+  const auto share = shares_.find(ticket.tenant_);
+  --share->second.open[static_cast<int>(ticket.kind_)];
+  share->second.answer_bytes -= ticket.answer_bytes_;
+  const auto& left = share->second.open;
+  if (std::all_of(std::begin(left), std::end(left), [](int open) { return open == 0; })) {
+    shares_.erase(share);
+  }
   left_.notify_all();
+}
+
+void OpenCalls::Ticket::HoldAnswer(int64_t bytes) {
+  const std::lock_guard lock(calls_.mutex_);
+  answer_bytes_ = bytes;
+  calls_.shares_[tenant_].answer_bytes += bytes;
 }
 
 int OpenCalls::Count(Kind kind) const {

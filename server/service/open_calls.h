@@ -1,14 +1,19 @@
 #pragma once
 
-// Keeps track of the open calls, so that the daemon can end them in order: first it refuses new
-// ones, then the writers get their last estimates and end, then the watchers.
+// Keeps track of the open calls: no tenant takes the places or the memory of all, and the daemon
+// can end them in order: first it refuses new ones, then the writers get their last estimates and
+// end, then the watchers.
 
 #include <absl/status/statusor.h>
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace polyest::internal {
@@ -27,19 +32,30 @@ class OpenCalls {
   // Keeps a call open as long as it exists.
   class Ticket {
    public:
-    Ticket(OpenCalls& calls, Kind kind) : calls_(calls), kind_(kind) {}
-    ~Ticket() { calls_.Leave(kind_); }
+    Ticket(OpenCalls& calls, Kind kind, std::string tenant)
+        : calls_(calls), kind_(kind), tenant_(std::move(tenant)) {}
+    ~Ticket() { calls_.Leave(*this); }
     Ticket(const Ticket&) = delete;
     Ticket& operator=(const Ticket&) = delete;
 
+    // Counts the bytes of an answer until the call leaves, which is when the client has read it.
+    // Must be called at most once.
+    void HoldAnswer(int64_t bytes);
+
    private:
+    friend class OpenCalls;
+
     OpenCalls& calls_;
     const Kind kind_;
+    const std::string tenant_;
+    int64_t answer_bytes_ = 0;
   };
 
-  // Lets a call in. UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED while kMaxStreams
-  // streams of the kind are open.
-  absl::StatusOr<std::unique_ptr<Ticket>> Enter(Kind kind, std::weak_ptr<Drainable> stream = {});
+  // Lets a call of a tenant in. UNAVAILABLE once the daemon shuts down; RESOURCE_EXHAUSTED while
+  // kMaxStreams streams of the kind are open, or kMaxStreamsOfTenant of the tenant's, and for a
+  // unary call while the tenant leaves answers of kMaxUnreadBytes unread.
+  absl::StatusOr<std::unique_ptr<Ticket>> Enter(Kind kind, const std::string& tenant,
+                                                std::weak_ptr<Drainable> stream = {});
 
   // Refuses new calls from here on, asks the streams to end and waits until all calls have left, or
   // until the deadline.
@@ -49,11 +65,21 @@ class OpenCalls {
   int Count(Kind kind) const;
 
   static constexpr int kMaxStreams = 10'000;
+  static constexpr int kMaxStreamsOfTenant = kMaxStreams / 2;
+  static constexpr int64_t kMaxUnreadBytes = 256 << 20;
 
  private:
   static constexpr int kKinds = 3;
 
-  void Leave(Kind kind);
+  // What is open of a tenant.
+  struct Share {
+    int open[kKinds] = {};
+    int64_t answer_bytes = 0;
+  };
+
+  void Leave(const Ticket& ticket);
+  // Returns why there is no room for a call. Called with the mutex held.
+  absl::Status CheckRoom(Kind kind, const std::string& tenant) const;
   void DrainKind(Kind kind);
   int& open(Kind kind) { return open_[static_cast<int>(kind)]; }
 
@@ -61,6 +87,7 @@ class OpenCalls {
   std::condition_variable left_;
   bool draining_ = false;
   int open_[kKinds] = {};
+  std::map<std::string, Share> shares_;  // of the tenants with open calls
   std::vector<std::weak_ptr<Drainable>> streams_[kKinds];
 };
 

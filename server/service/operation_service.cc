@@ -106,7 +106,7 @@ class OperationService final : public v1::OperationService::CallbackService {
   // Starts a call whose answer needs no computation.
   template <typename Response, typename Answer>
   Unary* Soon(Context* call, Method method, Response* response, const Answer& answer) {
-    return StartCall(context_, call, method, [&](const Caller& caller) {
+    return StartCall(context_, call, method, response, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, [=](const Caller& known, const Stop&) {
         return Deliver(absl::StatusOr<Response>(answer(known)), response);
       });

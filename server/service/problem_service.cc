@@ -16,7 +16,7 @@ class ProblemService final : public v1::ProblemService::CallbackService {
 
   Unary* CheckProblem(Context* call, const v1::CheckProblemRequest* request,
                       v1::CheckProblemResponse* response) override {
-    return StartCall(context_, call, "CheckProblem", [=, this](const Caller& caller) {
+    return StartCall(context_, call, "CheckProblem", response, [=, this](const Caller& caller) {
       return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
         const SessionServices& services = context_.sessions.services();
         const absl::Status room = services.memory.Check();
@@ -30,7 +30,7 @@ class ProblemService final : public v1::ProblemService::CallbackService {
 
   Unary* GetProblemSchema(Context* call, const v1::GetProblemSchemaRequest*,
                           v1::GetProblemSchemaResponse* response) override {
-    return StartCall(context_, call, "GetProblemSchema", [=, this](const Caller& caller) {
+    return StartCall(context_, call, "GetProblemSchema", response, [=, this](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, [=](const Caller&, const Stop&) {
         response->set_json_schema(kProblemSchema);
         return absl::OkStatus();

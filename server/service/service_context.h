@@ -3,6 +3,7 @@
 #include <google/protobuf/timestamp.pb.h>
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <stop_token>
 
@@ -29,6 +30,11 @@ struct ServiceContext {
   // Returns the time of day, to be shown only.
   std::function<google::protobuf::Timestamp()> wall_clock;
   std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  // Longest time until the first message of a stream, which names its session.
+  std::chrono::milliseconds first_message = std::chrono::seconds(10);
+  // Bytes of the batches of a stream that wait, to be taken or to be computed, from which on no
+  // further message of it is read.
+  int64_t held_bytes = 32 << 20;
 };
 
 }  // namespace polyest::internal

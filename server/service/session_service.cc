@@ -64,7 +64,7 @@ class SessionService final : public v1::SessionService::CallbackService {
                      v1::Estimate* response) override;
   Unary* GetHistory(Context* call, const v1::GetHistoryRequest* request,
                     v1::GetHistoryResponse* response) override {
-    return OnStrand(call, "GetHistory", request->session(),
+    return OnStrand(call, "GetHistory", response, request->session(),
                     [=](const std::shared_ptr<Session>& session, const Stop&) -> absl::Status {
                       POLYEST_ASSIGN_OR_RETURN(*response->mutable_history(), session->History());
                       return absl::OkStatus();
@@ -81,16 +81,19 @@ class SessionService final : public v1::SessionService::CallbackService {
 
  private:
   // Starts a call that is soon done.
-  Unary* ForCaller(Context* call, Method method, CallerWork work) {
-    return StartCall(context_, call, method, [&](const Caller& caller) {
+  Unary* ForCaller(Context* call, Method method, const google::protobuf::Message* answer,
+                   CallerWork work) {
+    return StartCall(context_, call, method, answer, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, std::move(work));
     });
   }
-  Unary* OnStrand(Context* call, Method method, const std::string& session, SessionWork work) {
-    return StartCall(context_, call, method, [&](const Caller& caller) -> absl::StatusOr<Job> {
-      POLYEST_ASSIGN_OR_RETURN(auto found, FindSession(context_, caller, "session", session));
-      return JobOfSession(std::move(found), std::move(work));
-    });
+  Unary* OnStrand(Context* call, Method method, const google::protobuf::Message* answer,
+                  const std::string& session, SessionWork work) {
+    return StartCall(
+        context_, call, method, answer, [&](const Caller& caller) -> absl::StatusOr<Job> {
+          POLYEST_ASSIGN_OR_RETURN(auto found, FindSession(context_, caller, "session", session));
+          return JobOfSession(std::move(found), std::move(work));
+        });
   }
 
   ServiceContext context_;
@@ -99,7 +102,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::Session* response) {
-  return ForCaller(call, "CreateSession",
+  return ForCaller(call, "CreateSession", response,
                    [=, this](const Caller& caller, const Stop&) -> absl::Status {
                      const v1::Problem& problem = request->session().problem();
                      POLYEST_ASSIGN_OR_RETURN(
@@ -116,7 +119,7 @@ SessionService::Unary* SessionService::GetSession(Context* call,
                                                   const v1::GetSessionRequest* request,
                                                   v1::Session* response) {
   return ForCaller(
-      call, "GetSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+      call, "GetSession", response, [=, this](const Caller& caller, const Stop&) -> absl::Status {
         POLYEST_ASSIGN_OR_RETURN(const auto session,
                                  FindSession(context_, caller, "name", request->name()));
         *response = session->Describe();
@@ -136,9 +139,10 @@ SessionService::Unary* SessionService::ListSessions(Context* call,
 
 SessionService::Unary* SessionService::DeleteSession(Context* call,
                                                      const v1::DeleteSessionRequest* request,
-                                                     google::protobuf::Empty*) {
+                                                     google::protobuf::Empty* response) {
   return ForCaller(
-      call, "DeleteSession", [=, this](const Caller& caller, const Stop&) -> absl::Status {
+      call, "DeleteSession", response,
+      [=, this](const Caller& caller, const Stop&) -> absl::Status {
         POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
         return context_.sessions.Delete(caller.tenant, request->name());
       });
@@ -148,7 +152,7 @@ SessionService::Unary* SessionService::AddMeasurements(Context* call,
                                                        const v1::AddMeasurementsRequest* request,
                                                        v1::AddMeasurementsResponse* response) {
   return OnStrand(
-      call, "AddMeasurements", request->session(),
+      call, "AddMeasurements", response, request->session(),
       [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
         POLYEST_RETURN_IF_ERROR(session->Load(stop));
         POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
@@ -162,7 +166,7 @@ SessionService::Unary* SessionService::AddMeasurements(Context* call,
 SessionService::Unary* SessionService::GetEstimate(Context* call,
                                                    const v1::GetEstimateRequest* request,
                                                    v1::Estimate* response) {
-  return OnStrand(call, "GetEstimate", request->session(),
+  return OnStrand(call, "GetEstimate", response, request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
                     POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate,
                                              session->CurrentEstimate(stop));

@@ -204,9 +204,10 @@ void WatchFlow::OnDone() {
 SessionWatch::SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
                            const v1::WatchSessionRequest& request)
     : flow_(std::make_shared<WatchFlow>(context, call)) {
-  absl::Status admitted = flow_->Authorize().status();
+  const absl::StatusOr<Caller> caller = flow_->Authorize();
+  absl::Status admitted = caller.status();
   if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, flow_);
+    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, caller->tenant, flow_);
     admitted = ticket.status();
     if (admitted.ok()) ticket_ = *std::move(ticket);
   }

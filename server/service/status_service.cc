@@ -13,7 +13,7 @@ class StatusService final : public v1::StatusService::CallbackService {
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* call,
                                       const v1::GetStatusRequest*,
                                       v1::DaemonStatus* response) override {
-    return StartCall(context_, call, "GetStatus", [=, this](const Caller& caller) {
+    return StartCall(context_, call, "GetStatus", response, [=, this](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, [=, this](const Caller& known, const Stop&) {
         *response = DescribeDaemon(context_, known.tenant);
         return absl::OkStatus();

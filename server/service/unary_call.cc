@@ -7,14 +7,16 @@
 
 namespace polyest::internal {
 
-grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service,
+grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service, const std::string& tenant,
                                            grpc::CallbackServerContext* context,
+                                           const google::protobuf::Message* answer,
                                            const Submit& submit, Work work) {
-  auto ticket = service.calls.Enter(OpenCalls::Kind::kUnary);
+  auto ticket = service.calls.Enter(OpenCalls::Kind::kUnary, tenant);
   if (!ticket.ok()) return FinishAtOnce(context, ticket.status());
   auto* call = new UnaryCall;
   call->ticket_ = *std::move(ticket);
   call->state_->reactor = call;
+  call->state_->answer = answer;
   auto run = [state = call->state_, work = std::move(work),
               call_stop =
                   CallStop(*context, call->state_->stop.get_token(), service.max_computing)] {
@@ -34,6 +36,9 @@ grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service,
 void UnaryCall::Finish(State& state, const absl::Status& status) {
   const std::lock_guard lock(state.mutex);
   if (std::exchange(state.finished, true)) return;
+  if (status.ok()) {
+    state.reactor->ticket_->HoldAnswer(static_cast<int64_t>(state.answer->ByteSizeLong()));
+  }
   state.reactor->grpc::ServerUnaryReactor::Finish(ToGrpc(status));
 }
 

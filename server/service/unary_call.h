@@ -3,12 +3,14 @@
 // Runs the work of a unary call on the executor or on a session's strand.
 
 #include <absl/status/statusor.h>
+#include <google/protobuf/message.h>
 #include <grpcpp/support/server_callback.h>
 
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <utility>
 
 #include "polyest/stop.h"
@@ -28,10 +30,12 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
 
-  // Starts a call whose work is handed to `submit`. Refuses it once the daemon shuts down.
-  static grpc::ServerUnaryReactor* Start(const ServiceContext& service,
-                                         grpc::CallbackServerContext* context, const Submit& submit,
-                                         Work work);
+  // Starts a call of a tenant whose work is handed to `submit` and fills `answer`, which gRPC owns.
+  // Refuses it once the daemon shuts down, and as OpenCalls::Enter does.
+  static grpc::ServerUnaryReactor* Start(const ServiceContext& service, const std::string& tenant,
+                                         grpc::CallbackServerContext* context,
+                                         const google::protobuf::Message* answer,
+                                         const Submit& submit, Work work);
 
   void OnCancel() override;
   void OnDone() override;
@@ -41,6 +45,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   struct State {
     std::mutex mutex;
     UnaryCall* reactor = nullptr;
+    const google::protobuf::Message* answer = nullptr;
     bool finished = false;
     std::stop_source stop;
   };

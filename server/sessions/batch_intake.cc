@@ -27,6 +27,13 @@ double BatchIntake::measured_s() const {
   return measured_s_;
 }
 
+int64_t BatchIntake::waiting_rows() const {
+  const std::lock_guard lock(mutex_);
+  int64_t rows = 0;
+  for (const TakenBatch& batch : waiting_) rows += static_cast<int64_t>(batch.samples.rows());
+  return rows;
+}
+
 absl::Status BatchIntake::Take(const v1::Measurements& batch, const ProblemLimits& limits,
                                const Record& record) {
   POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch, *problem_.problem().model));

@@ -44,6 +44,9 @@ class BatchIntake {
   SessionPlace place() const;
   double measured_s() const;
 
+  // Returns the number of rows that have not been handed on yet.
+  int64_t waiting_rows() const;
+
   // Records a batch elsewhere, too; gets the place of the session after it.
   using Record = std::function<absl::Status(const SessionPlace&)>;
   // Checks the next batch and takes all of it or nothing, also when memory is short; cheap. Refuses

@@ -10,9 +10,10 @@
 
 namespace polyest::internal {
 
-JournalStore::JournalStore(const ResolvedProblem& problem, double reorder_window_s)
+JournalStore::JournalStore(const ResolvedProblem& problem, double reorder_window_s, RunCuts cuts)
     : problem_(problem),
       reorder_window_s_(reorder_window_s),
+      cuts_(std::move(cuts)),
       position_(SampleChecks(problem).position()) {
   open_.before = position_;
 }
@@ -135,8 +136,9 @@ absl::Status JournalStore::ReadBatch(const JournalBatch& batch, std::optional<Ro
     if (!step.ok()) return absl::DataLossError(step.status().message());
     samples = std::move(step->released);
     reorder->Accept(*std::move(step));
-    if (RowReorder::IsNothing(samples)) return absl::OkStatus();
   }
+  samples = cuts_.Keep(std::move(samples));
+  if (RowReorder::IsNothing(samples)) return absl::OkStatus();
   const auto checked = checks.Check(samples);
   if (!checked.ok()) return absl::DataLossError(checked.status().message());
   AppendRows(*checked, 0, static_cast<int64_t>(checked->rows.size()), read);

@@ -22,6 +22,7 @@
 #include "polyest/samples.h"
 #include "server/journal/session_journal.h"
 #include "server/sessions/row_reorder.h"
+#include "server/sessions/run_cuts.h"
 
 namespace polyest::internal {
 
@@ -32,7 +33,9 @@ class JournalStore final : public SampleStore {
   static constexpr int64_t kSegmentRows = 4096;
 
   // `problem` must outlive the store. `reorder_window_s` is the session's, as of BatchIntake.
-  explicit JournalStore(const ResolvedProblem& problem, double reorder_window_s = 0);
+  // `cuts` leave out rows that the journal has.
+  explicit JournalStore(const ResolvedProblem& problem, double reorder_window_s = 0,
+                        RunCuts cuts = {});
 
   // Says where the batches are kept: those of session `number` of `journal`, which must outlive the
   // store.
@@ -44,7 +47,7 @@ class JournalStore final : public SampleStore {
   int64_t rows() const override { return position_.rows; }
   // Each call is one batch: the first is batch 1, the next one batch 2, and so on.
   absl::Status Append(const RowBlock& batch) override;
-  // Goes on to the next batch without appending rows: all of its rows are held back.
+  // Goes on to the next batch without appending rows: all of its rows are held back or left out.
   void PassOver();
   // Says, before the next batch is appended or passed over, what RowReorder::held_from is after it.
   // Not needed if rows come in time order.
@@ -81,6 +84,7 @@ class JournalStore final : public SampleStore {
 
   const ResolvedProblem& problem_;
   const double reorder_window_s_;
+  const RunCuts cuts_;
   const SessionJournal* journal_ = nullptr;
   int64_t number_ = 0;
 

@@ -1,9 +1,12 @@
 #include "server/sessions/loaded_session.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <limits>
 #include <optional>
 #include <utility>
 
+#include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/estimator/estimator_access.h"
 #include "proto/wire/convert/estimate.h"
@@ -14,32 +17,55 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem p
                                                                    const ModelLibrary& models,
                                                                    const ProblemLimits& limits,
                                                                    double reorder_window_s) {
-  POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ToProblem(problem, models, limits));
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved, ToProblem(problem, models, limits));
   std::unique_ptr<LoadedSession> loaded(
       new LoadedSession(std::move(problem), resolved, reorder_window_s));
-  EstimatorOptions options;
-  options.store = loaded->store_;
-  options.snapshot = [session = loaded.get()](EstimatorSnapshot snapshot) {
-    if (session->save_) session->save_(std::move(snapshot));
-  };
-  POLYEST_ASSIGN_OR_RETURN(loaded->estimator_,
-                           EstimatorAccess::Make(std::move(resolved), std::move(options)));
+  POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin({}));
   return loaded;
 }
 
+LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved,
+                             double reorder_window_s)
+    : problem_(std::move(problem)),
+      reorder_window_s_(reorder_window_s),
+      intake_(resolved, reorder_window_s) {}
+
+absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts) {
+  Computed computed;
+  computed.store = std::make_shared<JournalStore>(intake_.problem(), reorder_window_s_, cuts);
+  computed.cuts = std::move(cuts);
+  if (journal_ != nullptr) computed.store->ReadFrom(*journal_, number_);
+  EstimatorOptions options;
+  options.store = computed.store;
+  options.snapshot = [this](EstimatorSnapshot snapshot) {
+    if (save_) save_(std::move(snapshot));
+  };
+  POLYEST_ASSIGN_OR_RETURN(computed.estimator,
+                           EstimatorAccess::Make(intake_.problem(), std::move(options)));
+  return computed;
+}
+
+void LoadedSession::ReadFrom(const SessionJournal& journal, int64_t session) {
+  journal_ = &journal;
+  number_ = session;
+  computed_.store->ReadFrom(journal, session);
+}
+
 void LoadedSession::Attach(SessionJournal& journal, int64_t session) {
-  store_->ReadFrom(journal, session);
-  save_ = [this, &journal, session](EstimatorSnapshot snapshot) {
-    journal.SaveSnapshot(session, {sequence_, snapshot.rows, std::move(snapshot.state)});
+  ReadFrom(journal, session);
+  save_ = [this, &journal](EstimatorSnapshot snapshot) {
+    std::string state = computed_.cuts.Prepend(std::move(snapshot.state));
+    journal.SaveSnapshot(number_, {computed_.sequence, snapshot.rows, std::move(state)});
   };
 }
 
-// Restores the estimator from the journal's snapshot, if there is a usable one. A snapshot only
-// saves time, so all errors are ignored.
-void LoadedSession::Restore(const SessionJournal& journal, int64_t session) {
-  auto snapshot = journal.ReadSnapshot(session);
-  if (!snapshot.ok() || !snapshot->has_value()) return;
-  estimator_->Restore({(*snapshot)->rows, std::move((*snapshot)->state)}).IgnoreError();
+std::pair<RunCuts, EstimatorSnapshot> LoadedSession::Snapshot() const {
+  auto saved = journal_->ReadSnapshot(number_);
+  if (!saved.ok() || !saved->has_value()) return {};
+  EstimatorSnapshot snapshot{(*saved)->rows, std::move((*saved)->state)};
+  absl::StatusOr<RunCuts> cuts = RunCuts::Split(snapshot.state);
+  if (!cuts.ok()) return {};
+  return {*std::move(cuts), std::move(snapshot)};
 }
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const SessionJournal& journal,
@@ -47,64 +73,134 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
                                                                    const SessionPlace& place,
                                                                    const ModelLibrary& models,
                                                                    const Stop& stop) {
-  const int64_t session = head.number;
-  POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(session));
+  POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(head.number));
   POLYEST_ASSIGN_OR_RETURN(auto loaded,
                            Make(std::move(problem), models, {}, head.reorder_window_s));
-  loaded->store_->ReadFrom(journal, session);
+  loaded->ReadFrom(journal, head.number);
+  auto [cuts, snapshot] = loaded->Snapshot();
+  const bool any_cut = !cuts.empty();
+  if (any_cut) {
+    POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin(std::move(cuts)));
+  }
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(loaded->intake_.Take(batch.measurements));
-    POLYEST_RETURN_IF_ERROR(loaded->GiveUpTo(batch.sequence));
-    loaded->Release(batch.sequence);
-    return absl::OkStatus();
+    return loaded->Store(batch.sequence);
   };
-  POLYEST_RETURN_IF_ERROR(journal.ReadBatches(session, 0, append));
+  POLYEST_RETURN_IF_ERROR(journal.ReadBatches(head.number, 0, append));
   const SessionPlace reached = loaded->intake_.place();
   if (reached.sequence != place.sequence || reached.rows != place.rows) {
     return absl::DataLossError("the last batches of the session are missing in the journal");
   }
-  loaded->Restore(journal, session);
+  // A snapshot only saves time, so one that cannot be used is ignored, and so are its cuts, which
+  // may be those of another version.
+  const bool restored =
+      !snapshot.state.empty() && loaded->computed_.estimator->Restore(snapshot).ok();
+  if (any_cut && !restored) POLYEST_RETURN_IF_ERROR(loaded->BeginAnew({}, stop));
   return loaded;
 }
 
-LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved,
-                             double reorder_window_s)
-    : problem_(std::move(problem)),
-      intake_(resolved, reorder_window_s),
-      store_(std::make_shared<JournalStore>(intake_.problem(), reorder_window_s)) {}
+absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(Computed anew, Begin(std::move(cuts)));
+  BatchIntake intake(intake_.problem(), reorder_window_s_);
+  const absl::Status enough = absl::OutOfRangeError("the batches have been read");
+  const auto give = [&](const JournalBatch& batch) -> absl::Status {
+    if (batch.sequence > computed_.sequence) return enough;
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements));
+    POLYEST_RETURN_IF_ERROR(Give(*intake.Next(batch.sequence), anew));
+    anew.store->Release(batch.sequence);
+    return absl::OkStatus();
+  };
+  const absl::Status read = journal_->ReadBatches(number_, 0, give);
+  if (!read.ok() && read != enough) return read;
+  if (anew.sequence != computed_.sequence) {
+    return absl::DataLossError("the last batches of the session are missing in the journal");
+  }
+  computed_ = std::move(anew);
+  latest_ = nullptr;
+  return absl::OkStatus();
+}
+
+absl::Status LoadedSession::Store(int64_t sequence) {
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+  Release(sequence);
+  return absl::OkStatus();
+}
 
 absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
-  return estimator_->Process(stop);
+  return computed_.estimator->Process(stop);
+}
+
+// Where the numerics fail twice after the same number of rows, the cause is not the row that
+// follows but what is computed after the one before it.
+absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop& stop) {
+  const int64_t processed = computed_.estimator->rows_processed();
+  const bool at_next = processed < computed_.store->rows() && processed != failed_rows_;
+  const int64_t failed = at_next ? processed : processed - 1;
+  if (failed < 0) return reason;
+  RowBlock block;
+  POLYEST_RETURN_IF_ERROR(computed_.store->Read(failed, 1, block));
+  RunCuts cuts = computed_.cuts;
+  cuts.Add(block.rows.front(), failed == 0, reason.message());
+  POLYEST_RETURN_IF_ERROR(BeginAnew(std::move(cuts), stop));
+  failed_rows_ = processed;
+  // The snapshot, which only saves time, is of rows before the failure.
+  const EstimatorSnapshot snapshot = Snapshot().second;
+  if (!snapshot.state.empty()) computed_.estimator->Restore(snapshot).IgnoreError();
+  return absl::OkStatus();
 }
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {
   POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max()));
-  return work(*estimator_, sequence_);
+  return work(*computed_.estimator, computed_.sequence);
 }
 
 absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
   while (const std::optional<TakenBatch> batch = intake_.Next(sequence)) {
-    store_->SetHeldFrom(batch->held_from);
-    if (RowReorder::IsNothing(batch->samples)) {
-      store_->PassOver();
-    } else {
-      POLYEST_RETURN_IF_ERROR(estimator_->Append(batch->samples));
-    }
-    sequence_ = batch->place.sequence;
-    measured_s_ = batch->measured_s;
+    POLYEST_RETURN_IF_ERROR(Give(*batch, computed_));
   }
   return absl::OkStatus();
 }
 
+absl::Status LoadedSession::Give(const TakenBatch& batch, Computed& computed) {
+  computed.store->SetHeldFrom(batch.held_from);
+  const Samples samples = computed.cuts.Keep(batch.samples);
+  if (RowReorder::IsNothing(samples)) {
+    computed.store->PassOver();
+  } else {
+    POLYEST_RETURN_IF_ERROR(computed.estimator->Append(samples));
+  }
+  computed.sequence = batch.place.sequence;
+  computed.measured_s = batch.measured_s;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<SharedEstimate> LoadedSession::CurrentEstimate(const Stop& stop) {
-  if (latest_ != nullptr && latest_->sequence() == sequence_) return latest_;
-  POLYEST_ASSIGN_OR_RETURN(const Estimate estimate, estimator_->CurrentEstimate(stop));
-  auto latest = std::make_shared<v1::Estimate>(ToProto(estimate));
-  latest->set_sequence(sequence_);
+  if (latest_ != nullptr && latest_->sequence() == computed_.sequence) return latest_;
+  absl::StatusOr<Estimate> estimate = computed_.estimator->CurrentEstimate(stop);
+  if (absl::IsFailedPrecondition(estimate.status())) {
+    estimate = PriorEstimate(estimate.status(), stop);
+  }
+  POLYEST_RETURN_IF_ERROR(estimate.status());
+  if (!computed_.cuts.empty()) estimate->diagnostics.push_back(computed_.cuts.Describe());
+  auto latest = std::make_shared<v1::Estimate>(ToProto(*estimate));
+  latest->set_sequence(computed_.sequence);
   latest_ = std::move(latest);
   return latest_;
+}
+
+// Returns what is known without any sample, for a posterior that is not found.
+absl::StatusOr<Estimate> LoadedSession::PriorEstimate(const absl::Status& reason,
+                                                      const Stop& stop) const {
+  POLYEST_ASSIGN_OR_RETURN(const auto prior, EstimatorAccess::Make(intake_.problem(), {}));
+  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, prior->CurrentEstimate(stop));
+  estimate.diagnostics.push_back(
+      {DiagnosticCode::kNotConverged,
+       absl::StrCat("no posterior was found, and these are the numbers of the prior: ",
+                    reason.message())});
+  return estimate;
 }
 
 }  // namespace polyest::internal

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "core/fmu/model_library.h"
 #include "polyest/estimator.h"
@@ -19,6 +20,7 @@
 #include "server/journal/session_journal.h"
 #include "server/sessions/batch_intake.h"
 #include "server/sessions/journal_store.h"
+#include "server/sessions/run_cuts.h"
 #include "server/sessions/session_observer.h"
 
 namespace polyest::internal {
@@ -45,7 +47,7 @@ class LoadedSession {
   // reads rows that are no longer in memory from it. The journal must outlive this.
   void Attach(SessionJournal& journal, int64_t session);
   // Lets go of the rows of batches up to `sequence`, which the journal must keep.
-  void Release(int64_t sequence) { store_->Release(sequence); }
+  void Release(int64_t sequence) { computed_.store->Release(sequence); }
 
   const v1::Problem& problem() const { return problem_; }
   // Returns the intake, which takes batches before the estimator gets them.
@@ -55,13 +57,25 @@ class LoadedSession {
   // The following are for one thread at a time.
 
   // Returns the seconds of measurements that the estimator has, over all runs.
-  double measured_s() const { return measured_s_; }
+  double measured_s() const { return computed_.measured_s; }
   // Returns the number of the last batch that the estimator has.
-  int64_t sequence() const { return sequence_; }
+  int64_t sequence() const { return computed_.sequence; }
+  // Gives the estimator the batches up to `sequence`, which the journal must keep, without
+  // processing them, and lets go of their rows.
+  absl::Status Store(int64_t sequence);
+  // Returns the number of rows in memory.
+  int64_t rows_in_memory() const {
+    return intake_.waiting_rows() + computed_.store->rows_in_memory();
+  }
   // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes
-  // them.
+  // them. FAILED_PRECONDITION when the model cannot be computed at a row; EndFailedRun then lets
+  // the session go on.
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
+  // Leaves out the row at which ProcessUpTo has failed, for this reason, and the rest of its run.
+  // The journal must keep all batches that the estimator has. Waits for the disk.
+  absl::Status EndFailedRun(const absl::Status& reason, const Stop& stop);
   // Returns the estimate from everything processed. Computes it only once for the same last batch.
+  // If rows were left out, or if no posterior is found, a diagnostic says so.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
   // Gives the estimator every batch taken, without processing it, and calls `work` with the
   // estimator and the number of the last batch. Returns what `work` returns.
@@ -69,17 +83,36 @@ class LoadedSession {
   absl::Status WithEstimator(const Work& work);
 
  private:
+  // What is computed of the batches that have been given to the estimator.
+  struct Computed {
+    RunCuts cuts;
+    std::shared_ptr<JournalStore> store;  // the estimator's; refers to the intake's problem
+    std::unique_ptr<Estimator> estimator;
+    int64_t sequence = 0;
+    double measured_s = 0;
+  };
+
   LoadedSession(v1::Problem problem, const ResolvedProblem& resolved, double reorder_window_s);
-  void Restore(const SessionJournal& journal, int64_t session);
+  void ReadFrom(const SessionJournal& journal, int64_t session);
+  // Makes an estimator without batches that will leave out these rows.
+  absl::StatusOr<Computed> Begin(RunCuts cuts);
+  // Gives a new estimator the batches that the present one has, from the journal, without the rows
+  // that `cuts` leave out.
+  absl::Status BeginAnew(RunCuts cuts, const Stop& stop);
+  // Takes the journal's snapshot and the cuts before it; nothing if it has none that is readable.
+  std::pair<RunCuts, EstimatorSnapshot> Snapshot() const;
   absl::Status GiveUpTo(int64_t sequence);
+  static absl::Status Give(const TakenBatch& batch, Computed& computed);
+  absl::StatusOr<Estimate> PriorEstimate(const absl::Status& reason, const Stop& stop) const;
 
   const v1::Problem problem_;
+  const double reorder_window_s_;
   BatchIntake intake_;
-  const std::shared_ptr<JournalStore> store_;  // the estimator's; refers to the intake's problem
-  std::unique_ptr<Estimator> estimator_;
+  Computed computed_;
+  const SessionJournal* journal_ = nullptr;  // null until Load or Attach
+  int64_t number_ = 0;                       // of the session in the journal
   std::function<void(EstimatorSnapshot)> save_;
-  int64_t sequence_ = 0;
-  double measured_s_ = 0;
+  int64_t failed_rows_ = -1;  // rows processed when EndFailedRun was called last
   SharedEstimate latest_;
 };
 

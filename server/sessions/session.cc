@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <future>
 #include <limits>
 #include <utility>
 
@@ -203,7 +204,26 @@ absl::Status Session::Process(const Stop& stop) {
 absl::Status Session::ProcessUpTo(int64_t sequence, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
   const Computing computing(*this, *loaded);
-  return loaded->ProcessUpTo(sequence, stop);
+  return ProcessIn(*loaded, sequence, stop);
+}
+
+absl::Status Session::ProcessIn(LoadedSession& loaded, int64_t sequence, const Stop& stop) {
+  while (true) {
+    const absl::Status processed = loaded.ProcessUpTo(sequence, stop);
+    if (!absl::IsFailedPrecondition(processed)) return processed;
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    POLYEST_RETURN_IF_ERROR(AwaitKept(loaded));
+    POLYEST_RETURN_IF_ERROR(loaded.EndFailedRun(processed, stop));
+    Log(spdlog::level::warn, "run ended, because the model could not be computed",
+        {{"session", name()}, {"tenant", tenant()}});
+  }
+}
+
+absl::Status Session::AwaitKept(const LoadedSession& loaded) {
+  std::promise<absl::Status> kept;
+  WhenKept(loaded.sequence(), Present().losses,
+           [&](const absl::Status& status) { kept.set_value(status); });
+  return kept.get_future().get();
 }
 
 absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {
@@ -259,6 +279,7 @@ void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration durati
 absl::Status Session::WithEstimator(const LoadedSession::Work& work, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
   const Computing computing(*this, *loaded);
+  POLYEST_RETURN_IF_ERROR(ProcessIn(*loaded, std::numeric_limits<int64_t>::max(), stop));
   return loaded->WithEstimator(work);
 }
 

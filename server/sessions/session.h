@@ -120,7 +120,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Loads the estimator, which stays in memory at least as long as there is a writer.
   absl::Status Load(const Stop& stop) { return Loaded(stop).status(); }
-  // Process everything added, or everything added up to batch `sequence`.
+  // Process everything added, or everything added up to batch `sequence`. Where the model cannot be
+  // computed, the run ends (RunCuts), and a diagnostic of every further estimate says so.
   absl::Status Process(const Stop& stop);
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
   // Returns the estimate from everything processed. It may be shown once WhenKept reports its last
@@ -130,8 +131,9 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
   // Returns the history of the estimates. Loads nothing but the history.
   absl::StatusOr<v1::EstimateHistory> History();
-  // Calls `work` with the estimator, which has everything added and may have yet to process it, and
-  // with the number of the last batch added. Returns what `work` returns.
+  // Processes everything added and calls `work` with the estimator, which has everything added and
+  // may have yet to process the latest, and with the number of the last batch added. Returns what
+  // `work` returns.
   absl::Status WithEstimator(const LoadedSession::Work& work, const Stop& stop);
   // Passes on to `observer` the present estimate, if there are samples, and every new one from here
   // on. NOT_FOUND when the session is closed.
@@ -162,6 +164,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // Appends a batch to the journal. Once it is kept, counts its rows, its values and its seconds of
   // measurements.
   void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
+  absl::Status ProcessIn(LoadedSession& loaded, int64_t sequence, const Stop& stop);
+  // Waits until the journal keeps what the estimator has.
+  absl::Status AwaitKept(const LoadedSession& loaded);
   InMemory Present() const;
   void Replace(InMemory in_memory);
   absl::Status LoadHistory();

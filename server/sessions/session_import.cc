@@ -65,6 +65,7 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
                            LoadedSession::Make(problem, services.models, services.limits.problem,
                                                head_.reorder_window_s));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
+  loaded->Attach(services.journal, head_.number);
   loaded_ = std::move(loaded);
   return absl::OkStatus();
 }
@@ -80,6 +81,7 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
                                         batch.sequence(), next, promised_));
   }
   const SessionServices& services = registry_.services();
+  POLYEST_RETURN_IF_ERROR(services.memory.Check());
   BatchIntake& intake = loaded_->intake();
   POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, intake.place(), batch.measurements()));
   POLYEST_RETURN_IF_ERROR(
@@ -93,7 +95,8 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   std::promise<absl::Status> kept;
   services.journal.Append(std::move(entry),
                           [&](const absl::Status& status) { kept.set_value(status); });
-  return kept.get_future().get();
+  POLYEST_RETURN_IF_ERROR(kept.get_future().get());
+  return loaded_->Store(next);
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {

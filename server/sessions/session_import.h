@@ -21,13 +21,17 @@ class SessionImport {
   SessionImport& operator=(const SessionImport&) = delete;
 
   // Takes the head, then batch after batch; waits for the journal. INVALID_ARGUMENT for a record
-  // that does not follow the one before; other errors are those of SessionRegistry::Create and of a
-  // batch that is streamed. Must not be called again after an error.
+  // that does not follow the one before, RESOURCE_EXHAUSTED while memory is short; other errors are
+  // those of SessionRegistry::Create and of a batch that is streamed. Must not be called again
+  // after an error.
   absl::Status Take(const v1::ImportSessionRequest& request);
   // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
   // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
   // RESOURCE_EXHAUSTED when the last place has been.
   absl::StatusOr<std::shared_ptr<Session>> Finish();
+  // Returns the number of the session's rows that are in memory: some thousands at most, because
+  // the journal has them.
+  int64_t rows_in_memory() const { return loaded_ == nullptr ? 0 : loaded_->rows_in_memory(); }
 
  private:
   absl::Status Begin(const std::string& id, const v1::SessionRecord::Head& head);

@@ -2,6 +2,7 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
@@ -10,9 +11,11 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "server/telemetry/log_limit.h"
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"
 
@@ -24,6 +27,10 @@ using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerRpcInfo;
 
 constexpr char kPrefix[] = "/polyest.v1.";
+// Lines that the log gets of calls of a tenant that ended with one code other than OK: at once, and
+// each second.
+constexpr int kRefusalBurst = 50;
+constexpr double kRefusalsASecond = 5;
 
 std::string CodeName(const grpc::Status& status) {
   // Both libraries number the codes alike.
@@ -81,8 +88,13 @@ bool MayTellReason(grpc::StatusCode code) {
 
 class CallInterceptor final : public grpc::experimental::Interceptor {
  public:
-  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const CallerOf& caller_of)
-      : call_(call), metrics_(metrics), caller_of_(caller_of), method_(MethodName(call.method())) {}
+  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const CallerOf& caller_of,
+                  LogLimit& refusals)
+      : call_(call),
+        metrics_(metrics),
+        caller_of_(caller_of),
+        refusals_(refusals),
+        method_(MethodName(call.method())) {}
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
@@ -130,6 +142,12 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
     const auto level = LevelOf(status.error_code(), changes_sessions);
     if (!IsLogged(level)) return;
     const LoggedCaller caller = caller_of_(*call_.server_context());
+    std::optional<int64_t> suppressed = 0;
+    if (!status.ok()) {
+      // Strangers share one limit, and so do the callers of each tenant.
+      suppressed = refusals_.Admit(absl::StrCat(CodeName(status), " ", caller.tenant));
+    }
+    if (!suppressed) return;
     Log(level, "call",
         {{"request", id_},
          {"method", method_},
@@ -139,12 +157,14 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
          {"peer", call_.server_context()->peer()},
          {"code", CodeName(status)},
          {"duration_s", absl::StrFormat("%.6f", duration.count())},
-         {"reason", MayTellReason(status.error_code()) ? status.error_message() : ""}});
+         {"reason", MayTellReason(status.error_code()) ? status.error_message() : ""},
+         {"suppressed", *suppressed > 0 ? absl::StrCat(*suppressed) : ""}});
   }
 
   ServerRpcInfo& call_;
   Metrics& metrics_;
   const CallerOf& caller_of_;
+  LogLimit& refusals_;
   const std::string method_;
   const bool one_response_ = call_.type() == ServerRpcInfo::Type::UNARY ||
                              call_.type() == ServerRpcInfo::Type::CLIENT_STREAMING;
@@ -161,12 +181,13 @@ class CallInterceptors final : public grpc::experimental::ServerInterceptorFacto
   // Returns null for calls of health and reflection, whose messages are of other kinds.
   grpc::experimental::Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     if (!absl::StartsWith(call->method(), kPrefix)) return nullptr;
-    return new CallInterceptor(*call, metrics_, caller_of_);
+    return new CallInterceptor(*call, metrics_, caller_of_, refusals_);
   }
 
  private:
   Metrics& metrics_;
   const CallerOf caller_of_;
+  LogLimit refusals_{kRefusalBurst, kRefusalsASecond};
 };
 
 }  // namespace

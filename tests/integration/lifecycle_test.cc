@@ -92,6 +92,35 @@ TEST_F(LifecycleTest, GivesEveryStreamItsLastEstimateBeforeItEnds) {
   EXPECT_EQ(daemon_.Wait(), 0) << daemon_.Errors();
 }
 
+class NoDrainTest : public DaemonTest {
+ protected:
+  NoDrainTest() : DaemonTest({"--drain-timeout-s", "0", "--threads", "1"}) {}
+};
+
+// Order 61 in two unknowns is 1953 terms and 19,530 points, whose factorization looks at nothing.
+TEST_F(NoDrainTest, EndsWithoutAComputationThatDoesNotLookAtItsStop) {
+  v1::StartComputationRequest request;
+  v1::Experiment& experiment = *request.mutable_estimate()->mutable_subject()->mutable_experiment();
+  *experiment.mutable_problem() = Oscillator();
+  experiment.mutable_problem()->mutable_expansion()->set_order(61);
+  experiment.mutable_problem()->mutable_expansion()->set_points_per_term(10);
+  *experiment.mutable_measurements() = OscillatorRows(0, 1);
+  grpc::ClientContext starting;
+  v1::Operation operation;
+  const grpc::Status started = operations_->StartComputation(&starting, request, &operation);
+  ASSERT_TRUE(started.ok()) << started.error_message();
+  v1::GetOperationRequest get;
+  get.set_name(operation.name());
+  while (operation.state() == v1::Operation::QUEUED) {
+    grpc::ClientContext getting;
+    ASSERT_TRUE(operations_->GetOperation(&getting, get, &operation).ok());
+  }
+  ASSERT_EQ(operation.state(), v1::Operation::RUNNING);
+  daemon_.Signal(SIGTERM);
+  EXPECT_EQ(daemon_.Wait(), 0);
+  EXPECT_THAT(daemon_.Errors(), HasSubstr("stopped without computations"));
+}
+
 TEST_F(LifecycleTest, EndsOnAnInterruptToo) {
   daemon_.Signal(SIGINT);
   EXPECT_EQ(daemon_.Wait(), 0);

@@ -59,6 +59,18 @@ TEST_F(LogTest, HasALineForACallWithItsRequestId) {
   EXPECT_THAT(Field(line, "time"), ::testing::MatchesRegex("....-..-..T..:..:..\\.......Z"));
 }
 
+// Fifty lines at once and five a second: a minute would have to pass before these were all logged.
+TEST_F(LogTest, HasFewLinesOfManyRefusals) {
+  constexpr int kCalls = 400;
+  for (int i = 0; i < kCalls; ++i) Get("sessions/none", "refused");
+  int lines = 0;
+  for (const auto& line : JsonLines(daemon_.Errors())) lines += Field(line, "request") == "refused";
+  EXPECT_GE(lines, 50);
+  EXPECT_LT(lines, kCalls);
+  Get("sessions/rig/none", "another");  // another code has lines of its own
+  EXPECT_EQ(Field(LineOf("another"), "code"), "INVALID_ARGUMENT");
+}
+
 TEST_F(LogTest, GivesARequestAnIdWhereItHasNoneThatIsSane) {
   for (const std::string& bad : {std::string("two words"), std::string(65, 'a')}) {
     const std::string id = Get("sessions/none", bad);

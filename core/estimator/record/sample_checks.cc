@@ -18,6 +18,10 @@ namespace {
 // indicates a wrong unit or a wrong noise, and its square would drown all other samples in rounding
 // errors.
 constexpr double kMaxSignalToNoise = 1e9;
+// The least positive time and the largest one, s. Times outside come from damaged files and from
+// time stamps in other units, such as nanoseconds since 1970, and no solver could reach them.
+constexpr double kMinTimeS = 1e-30;
+constexpr double kMaxTimeS = 1e12;
 
 // Returns an error that names the place by row and column, as the user knows it. `field` is
 // relative to the samples.
@@ -286,6 +290,11 @@ absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const 
   }
   if (!std::isfinite(time_s) || time_s < 0) {
     return Refusal({"time_s", row}, "row %d, column t: %g must be a finite time ≥ 0", row, time_s);
+  }
+  if ((time_s > 0 && time_s < kMinTimeS) || time_s > kMaxTimeS) {
+    return Refusal({"time_s", row},
+                   "row %d, column t: %g must be 0 or a time from %g to %g s; check its unit", row,
+                   time_s, kMinTimeS, kMaxTimeS);
   }
   return absl::OkStatus();
 }

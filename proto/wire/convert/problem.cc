@@ -12,6 +12,7 @@
 #include "core/model/equations/equation_model.h"
 #include "polyest/catalogue.h"
 #include "proto/wire/convert/annotate.h"
+#include "proto/wire/convert/list_lengths.h"
 #include "proto/wire/convert/problem_columns.h"
 #include "proto/wire/convert/uncertain_parameter.h"
 #include "proto/wire/convert/wire_fields.h"
@@ -338,6 +339,7 @@ std::shared_ptr<const Model> FindModelOf(const v1::Problem& problem, const Model
 }
 
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {
+  POLYEST_RETURN_IF_ERROR(CheckListLengths(given));
   Refusals refusals;
   Problem problem = Convert(given, models, refusals);
   if (!refusals.empty()) return WireFields(refusals.front());
@@ -345,6 +347,9 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelL
 }
 
 std::vector<absl::Status> CheckProblem(const v1::Problem& given, const ModelLibrary& models) {
+  if (absl::Status too_long = CheckListLengths(given); !too_long.ok()) {
+    return {std::move(too_long)};
+  }
   Refusals refusals;
   Problem problem = Convert(given, models, refusals);
   const bool has_model = problem.model != nullptr;

@@ -69,6 +69,30 @@ TEST(Executor, RefusesMoreThanItsCapacityAndTakesMoreLater) {
   EXPECT_TRUE(executor.Submit(kLane, [] {}).ok());
 }
 
+TEST(Executor, RefusesNoTaskOfWorkThatHasBegun) {
+  std::latch go_on(1), ran(2);
+  Executor executor(OneLane(1, 1));
+  ASSERT_TRUE(executor.Submit(kLane, [&] { go_on.wait(); }).ok());
+  EXPECT_FALSE(executor.Submit(kLane, [] {}).ok());
+  const auto count = [&] { ran.count_down(); };
+  EXPECT_TRUE(executor.Submit(kLane, count, Admission::kAlways).ok());
+  EXPECT_TRUE(std::make_shared<Strand>(executor, kLane)->Submit(count, Admission::kAlways).ok());
+  EXPECT_EQ(executor.accepted(), 3);
+  EXPECT_FALSE(executor.Submit(kLane, [] {}).ok());
+  go_on.count_down();
+  ran.wait();
+}
+
+TEST(Executor, SaysWhetherItHasBecomeIdle) {
+  std::latch go_on(1);
+  Executor executor(OneLane(1, 2));
+  EXPECT_TRUE(executor.AwaitIdle(std::chrono::steady_clock::now()));
+  ASSERT_TRUE(executor.Submit(kLane, [&] { go_on.wait(); }).ok());
+  EXPECT_FALSE(executor.AwaitIdle(std::chrono::steady_clock::now()));
+  go_on.count_down();
+  EXPECT_TRUE(executor.AwaitIdle(std::chrono::steady_clock::now() + std::chrono::hours(1)));
+}
+
 TEST(Executor, RunsTasksAtTheSameTimeOnItsThreads) {
   std::latch both(2);  // opens only when two tasks run at once
   Executor executor(OneLane(2, 2));

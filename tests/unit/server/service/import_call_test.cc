@@ -113,6 +113,18 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   import->OnDone();
 }
 
+TEST_F(ImportCallTest, EndsWhereNothingComes) {
+  ServiceContext context = Context();
+  context.first_message = std::chrono::milliseconds(0);
+  auto* const import = new ImportCall(context, call_, &imported_);
+  Reader reader(*import);
+  std::promise<grpc::StatusCode> finished;
+  reader.on_finish = [&](const grpc::Status& status) { finished.set_value(status.error_code()); };
+  EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  import->OnDone();
+  EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWriter), 0);
+}
+
 TEST_F(ImportCallTest, OccupiesNothingForAStranger) {
   const TestFolder folder;
   const NewToken token = *MakeTokenFor("anna:chassis:admin");

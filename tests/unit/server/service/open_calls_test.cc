@@ -32,8 +32,8 @@ TEST(OpenCalls, EndsWritersBeforeWatchers) {
     order += "watcher ";
     watching.reset();
   });
-  watching = *calls.Enter(Kind::kWatcher, watcher);
-  writing = *calls.Enter(Kind::kWriter, writer);
+  watching = *calls.Enter(Kind::kWatcher, "t", watcher);
+  writing = *calls.Enter(Kind::kWriter, "t", writer);
   calls.Drain(Later());
   EXPECT_EQ(order, "writer watcher ");
 }
@@ -42,13 +42,13 @@ TEST(OpenCalls, RefusesNewCallsWhenDraining) {
   OpenCalls calls;
   calls.Drain(Later());
   for (const Kind kind : {Kind::kUnary, Kind::kWriter, Kind::kWatcher}) {
-    EXPECT_EQ(calls.Enter(kind).status().code(), absl::StatusCode::kUnavailable);
+    EXPECT_EQ(calls.Enter(kind, "t").status().code(), absl::StatusCode::kUnavailable);
   }
 }
 
 TEST(OpenCalls, DoesNotWaitBeyondTheDeadline) {
   OpenCalls calls;
-  const auto stays = *calls.Enter(Kind::kUnary);
+  const auto stays = *calls.Enter(Kind::kUnary, "t");
   calls.Drain(std::chrono::steady_clock::now());
 }
 
@@ -57,11 +57,45 @@ TEST(OpenCalls, ForgetsStreamsThatEnded) {
   int drained = 0;
   for (int i = 0; i < 100; ++i) {
     auto stream = std::make_shared<Stream>([&] { ++drained; });
-    auto ticket = calls.Enter(Kind::kWriter, stream);
+    auto ticket = calls.Enter(Kind::kWriter, "t", stream);
     ASSERT_TRUE(ticket.ok());
   }
   calls.Drain(Later());
   EXPECT_EQ(drained, 0);
+}
+
+TEST(OpenCalls, LeaveHalfOfThePlacesToOtherTenants) {
+  OpenCalls calls;
+  std::vector<std::unique_ptr<OpenCalls::Ticket>> tickets;
+  for (int i = 0; i < OpenCalls::kMaxStreamsOfTenant; ++i) {
+    tickets.push_back(*calls.Enter(Kind::kWatcher, "t"));
+  }
+  const absl::Status refused = calls.Enter(Kind::kWatcher, "t").status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused.message(), "the daemon serves at most 5000 streams of a tenant at a time");
+  EXPECT_TRUE(calls.Enter(Kind::kWriter, "t").ok());
+  for (int i = 0; i < OpenCalls::kMaxStreams - OpenCalls::kMaxStreamsOfTenant; ++i) {
+    tickets.push_back(*calls.Enter(Kind::kWatcher, "other"));
+  }
+  EXPECT_EQ(calls.Enter(Kind::kWatcher, "third").status().message(),
+            "the daemon serves at most 10000 streams at a time");
+  tickets.clear();
+  EXPECT_TRUE(calls.Enter(Kind::kWatcher, "t").ok());
+}
+
+TEST(OpenCalls, RefuseATenantThatLeavesItsAnswersUnread) {
+  OpenCalls calls;
+  auto large = *calls.Enter(Kind::kUnary, "t");
+  const auto small = *calls.Enter(Kind::kUnary, "t");
+  small->HoldAnswer(1);
+  large->HoldAnswer(OpenCalls::kMaxUnreadBytes - 1);
+  const absl::Status refused = calls.Enter(Kind::kUnary, "t").status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused.message(),
+            "the tenant's clients have left answers of 256 MiB unread; read them first");
+  EXPECT_TRUE(calls.Enter(Kind::kUnary, "other").ok());
+  large = nullptr;
+  EXPECT_TRUE(calls.Enter(Kind::kUnary, "t").ok());
 }
 
 }  // namespace

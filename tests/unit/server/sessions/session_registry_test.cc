@@ -5,6 +5,9 @@
 #include <google/protobuf/util/message_differencer.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
 #include "proto/wire/refusal/refusal.h"
 #include "server/digest/digest.h"
 #include "server/sessions/session_import.h"
@@ -138,6 +141,70 @@ TEST_F(SessionRegistryTest, HoldsNoMoreThanItsLimitHoweverManyImportsBeganBefore
   EXPECT_EQ(RefusalOf(second.Finish().status())->limit, "--max-sessions");
   EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a"));
   EXPECT_EQ(journal_.Heads()->size(), 1u);
+  ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
+  EXPECT_TRUE(StatusOfCreate("b").ok());
+}
+
+TEST_F(SessionRegistryTest, HoldsFewRowsOfAnImportInMemoryAndNoneBeyondTheLimitOfMemory) {
+  v1::ImportSessionRequest head = ImportOf("a");
+  head.mutable_record()->mutable_head()->set_batch_count(20);
+  SessionImport import(*registry_, "t");
+  ASSERT_TRUE(import.Take(head).ok());
+  v1::ImportSessionRequest request;
+  v1::SessionRecord::Batch& batch = *request.mutable_record()->mutable_batch();
+  int row = 0;
+  for (int sequence = 1; sequence <= 20; ++sequence) {
+    batch.set_sequence(sequence);
+    batch.clear_measurements();
+    auto& x = *batch.mutable_measurements()->add_channels();
+    x.set_name("x");
+    for (int k = 0; k < 2000; ++k) {
+      batch.mutable_measurements()->add_time_s(1e-3 * ++row);
+      x.add_values(0);
+    }
+    if (sequence == 20) {
+      resident_bytes_ = int64_t{2} << 20;
+      EXPECT_EQ(RefusalOf(import.Take(request))->limit, "--max-memory-mb");
+    } else {
+      ASSERT_TRUE(import.Take(request).ok());
+    }
+    EXPECT_LE(import.rows_in_memory(), 3 * (JournalStore::kSegmentRows + 2000));
+  }
+}
+
+// Whoever was told that a session exists finds it, and so does the next daemon, whatever others do
+// with its name at the same time.
+TEST_F(SessionRegistryTest, AgreesWithTheJournalHoweverCreationsImportsAndDeletionsMeet) {
+  limits_.sessions = limits_.sessions_per_tenant = 1;
+  Open();
+  std::atomic<int> balance = 0;
+  const auto meet = [&](int seed) {
+    for (int k = 0; k < 60; ++k) {
+      switch ((k + seed) % 3) {
+        case 0:
+          balance += StatusOfCreate("a").ok() ? 1 : 0;
+          break;
+        case 1: {
+          SessionImport import(*registry_, "t");
+          balance += import.Take(ImportOf("a")).ok() && import.Finish().ok() ? 1 : 0;
+          break;
+        }
+        default:
+          balance -= registry_->Delete("t", "sessions/a").ok() ? 1 : 0;
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> threads;
+    for (int seed = 0; seed < 4; ++seed) threads.emplace_back(meet, seed);
+  }
+  EXPECT_EQ(NamesAfter("", 9).size(), static_cast<size_t>(balance));
+  EXPECT_EQ(journal_.Heads()->size(), static_cast<size_t>(balance));
+  const bool remade = StatusOfCreate("a").ok();
+  EXPECT_EQ(remade, balance == 0);
+  EXPECT_TRUE(Add(*registry_->Get("t", "sessions/a"), 1, Rows({0.1})).ok());
+  // The count of sessions is right, too.
+  EXPECT_EQ(RefusalOf(StatusOfCreate("b"))->limit, "--max-sessions");
   ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
   EXPECT_TRUE(StatusOfCreate("b").ok());
 }

@@ -30,6 +30,31 @@ v1::Problem TwoUnknowns() {
 
 TEST(ProblemLimits, AreThoseOfTheCoreByDefault) { EXPECT_EQ(Exceeded(TwoUnknowns(), {}), ""); }
 
+// The names of a problem beyond its model's are looked up and reported one by one.
+TEST(ProblemLimits, BoundTheNumberOfNames) {
+  v1::Problem problem = TwoUnknowns();
+  problem.clear_fixed();
+  for (int i = 0; i < 10'001; ++i) (*problem.mutable_fixed())[absl::StrCat("n", i)] = 1;
+  const absl::Status refused = ToProblem(problem, {}).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(refused.message(), "fixed: 10001 entries are more than there may be, 10000");
+  EXPECT_THAT(CheckProblem(problem, {}), testing::ElementsAre(refused));
+  problem = TwoUnknowns();
+  auto& parameters = *problem.mutable_model()->mutable_equations()->mutable_parameters();
+  for (int i = 0; i < 10'001; ++i) parameters[absl::StrCat("n", i)] = 1;
+  EXPECT_THAT(std::string(ToProblem(problem, {}).status().message()),
+              testing::StartsWith("model.equations.parameters: 10001 entries"));
+  // Tables of numbers may be longer.
+  problem = TwoUnknowns();
+  auto& input = *problem.add_inputs();
+  input.set_name("force");
+  for (int i = 0; i < 10'001; ++i) {
+    input.mutable_table()->add_time_s(0.1 * i);
+    input.mutable_table()->add_value(0);
+  }
+  EXPECT_TRUE(ToProblem(problem, {}).ok());
+}
+
 TEST(ProblemLimits, BoundParameters) {
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.parameters = 2}), "");
   EXPECT_EQ(Exceeded(TwoUnknowns(), {.parameters = 1}), "--max-parameters");

@@ -188,6 +188,21 @@ TEST_F(SampleChecksTest, RefuseTimesThatAreNone) {
   }
 }
 
+TEST_F(SampleChecksTest, RefuseTimesThatNoSolverCouldReach) {
+  for (const double time_s : {5e-324, 1e-31, 1.8e15, 1e308}) {
+    Samples samples = ThreeRows();
+    samples.time_s =
+        time_s < 1 ? std::vector<double>{0, time_s, 1} : std::vector<double>{0, time_s, 1.5e308};
+    EXPECT_THAT(Refusal(samples), HasSubstr("must be 0 or a time from 1e-30 to 1e+12 s"));
+    samples.time_s[2] = samples.time_s[1];
+    EXPECT_THAT(std::string(checks_.CheckInAnyOrder(samples).message()),
+                HasSubstr("must be 0 or a time from 1e-30 to 1e+12 s"));
+  }
+  Samples samples = ThreeRows();
+  samples.time_s = {0, 1e-30, 1e12};
+  EXPECT_TRUE(checks_.Check(samples).ok());
+}
+
 TEST_F(SampleChecksTest, RefuseTimesThatDoNotIncrease) {
   for (const double time_s : {1.0, 0.5}) {
     Samples samples = ThreeRows();

@@ -1,0 +1,96 @@
+// The maintenance of the journal's file, on a thread of its own (sqlite_journal.h).
+
+#include <sqlite3.h>
+
+#include <utility>
+#include <vector>
+
+#include "core/common/status.h"
+#include "server/journal/sqlite_journal.h"
+#include "server/journal/sqlite_writes.h"
+
+namespace polyest::internal {
+namespace {
+
+// Largest number of batches of a deleted session, and of their bytes, that one commit removes.
+constexpr int64_t kRemovedBatches = 256;
+constexpr int64_t kRemovedBytes = 16 << 20;
+
+// Removes some batches of a session. Returns false when it has none left.
+absl::StatusOr<bool> RemoveSomeBatches(SqliteDatabase& database, int64_t session) {
+  std::vector<int64_t> batches;
+  {
+    SqliteQuery query(database,
+                      "SELECT rowid, length(measurements) FROM batch WHERE session = ? LIMIT ?");
+    query.Bind(session).Bind(kRemovedBatches);
+    for (int64_t bytes = 0; bytes < kRemovedBytes; bytes += query.Integer(1)) {
+      POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
+      if (!row) break;
+      batches.push_back(query.Integer(0));
+    }
+  }
+  for (const int64_t batch : batches) {
+    POLYEST_RETURN_IF_ERROR(RunForSession(database, "DELETE FROM batch WHERE rowid = ?", batch));
+  }
+  return !batches.empty();
+}
+
+}  // namespace
+
+void SqliteJournal::WakeMaintenance() {
+  const std::lock_guard lock(maintenance_mutex_);
+  maintenance_.notify_one();
+}
+
+void SqliteJournal::Maintain(std::stop_token stop) {
+  bool removing = true;
+  while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(maintenance_mutex_);
+      if (!removing) {
+        maintenance_.wait(lock, stop,
+                          [this] { return log_pages_ >= kCheckpointPages || deleted_; });
+      }
+      removing = std::exchange(deleted_, false) || removing;
+    }
+    if (log_pages_ >= kCheckpointPages) Checkpoint();
+    // If the disk fails, what is left is removed after the journal is opened again.
+    if (removing) removing = RemoveSomeDeleted().value_or(false);
+  }
+}
+
+// Copies the write-ahead log into the file. The first pass copies most of it while another thread
+// goes on writing batches, so that they do not wait. The second one holds up the writer and copies
+// the rest, because the log could otherwise grow without end.
+void SqliteJournal::Checkpoint() {
+  for (const int mode : {SQLITE_CHECKPOINT_PASSIVE, SQLITE_CHECKPOINT_TRUNCATE}) {
+    sqlite3_wal_checkpoint_v2(maintainer_->handle(), nullptr, mode, nullptr, nullptr);
+  }
+  log_pages_ = 0;
+}
+
+// Removes some batches of a deleted session. Returns whether there may be more to remove.
+absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
+  // A seal that came back after a power failure would tell of a session that is missing.
+  seals_->Sync();
+  int64_t session = 0;
+  {
+    SqliteQuery query(*maintainer_, "SELECT session FROM deleted LIMIT 1");
+    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
+    if (!row) return false;
+    session = query.Integer(0);
+  }
+  const auto remove = [=](SqliteDatabase& database) -> absl::Status {
+    POLYEST_ASSIGN_OR_RETURN(const bool removed, RemoveSomeBatches(database, session));
+    if (removed) return absl::OkStatus();
+    POLYEST_RETURN_IF_ERROR(
+        RunForSession(database, "DELETE FROM snapshot WHERE session = ?", session));
+    POLYEST_RETURN_IF_ERROR(
+        RunForSession(database, "DELETE FROM history WHERE session = ?", session));
+    return RunForSession(database, "DELETE FROM deleted WHERE session = ?", session);
+  };
+  POLYEST_RETURN_IF_ERROR(queue_->Run(remove));
+  return true;
+}
+
+}  // namespace polyest::internal

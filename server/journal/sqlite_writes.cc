@@ -1,0 +1,62 @@
+#include "server/journal/sqlite_writes.h"
+
+#include <absl/strings/str_format.h>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+
+absl::Status NoSuchSession() { return absl::NotFoundError("the journal has no such session"); }
+
+absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t session) {
+  SqliteQuery query(database, sql);
+  query.Bind(session);
+  return query.Run();
+}
+
+absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
+  SqliteQuery query(database,
+                    "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE ?2 = 1 + "
+                    "(SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
+                    "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
+  query.Bind(entry.session)
+      .Bind(entry.place.sequence)
+      .BindBlob(entry.measurements)
+      .BindBlob(entry.digest)
+      .Bind(entry.place.samples)
+      .Bind(entry.place.rows)
+      .Bind(static_cast<int64_t>(entry.place.last_row.run))
+      .Bind(entry.place.last_row.time_s);
+  POLYEST_RETURN_IF_ERROR(query.Run());
+  if (database.changes() > 0) return absl::OkStatus();
+  SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
+  session.Bind(entry.session);
+  POLYEST_ASSIGN_OR_RETURN(const bool there, session.Step());
+  if (!there) return NoSuchSession();
+  return absl::FailedPreconditionError(
+      absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
+}
+
+absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,
+                             const JournalSnapshot& snapshot) {
+  SqliteQuery query(database,
+                    "INSERT OR REPLACE INTO snapshot SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
+                    "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?2)");
+  query.Bind(session).Bind(snapshot.sequence).Bind(snapshot.rows).BindBlob(snapshot.state);
+  return query.Run();
+}
+
+absl::Status InsertHistoryPoint(SqliteDatabase& database, int64_t session,
+                                const JournalHistoryPoint& point, int64_t stride) {
+  SqliteQuery insert(database,
+                     "INSERT OR REPLACE INTO history SELECT ?1, ?2, ?3, ?4 WHERE EXISTS "
+                     "(SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?3)");
+  insert.Bind(session).Bind(point.ordinal).Bind(point.sequence).BindBlob(point.point);
+  POLYEST_RETURN_IF_ERROR(insert.Run());
+  if (stride == 1) return absl::OkStatus();
+  SqliteQuery thin(database, "DELETE FROM history WHERE session = ? AND ordinal % ? <> 0");
+  thin.Bind(session).Bind(stride);
+  return thin.Run();
+}
+
+}  // namespace polyest::internal

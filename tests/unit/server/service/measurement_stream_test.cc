@@ -1,0 +1,149 @@
+#include "server/service/measurement_stream.h"
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <latch>
+#include <semaphore>
+#include <thread>
+
+#include "tests/testing/faulty_journal.h"
+#include "tests/testing/problem_json.h"
+
+namespace polyest::internal {
+namespace {
+
+using Request = v1::StreamMeasurementsRequest;
+using Response = v1::StreamMeasurementsResponse;
+
+// Plays gRPC's side of a stream. Answers are read at once.
+class Peer final : public grpc::ServerCallbackReaderWriter<Request, Response> {
+ public:
+  explicit Peer(MeasurementStream& stream) : stream_(stream) { BindReactor(&stream); }
+
+  // Waits until the stream asks for a message, and gives it this one.
+  void Give(const Request& request) {
+    asked_.acquire();
+    *request_ = request;
+    stream_.OnReadDone(true);
+  }
+  // Returns whether the stream asks for a message now.
+  bool Asks() {
+    if (!asked_.try_acquire()) return false;
+    asked_.release();
+    return true;
+  }
+  grpc::StatusCode AwaitEnd() { return finished_.get_future().get(); }
+
+  void SendInitialMetadata() override {}
+  void Read(Request* request) override {
+    request_ = request;
+    asked_.release();
+  }
+  void Write(const Response*, grpc::WriteOptions) override {
+    EXPECT_TRUE(writing_.Submit("", [this] { stream_.OnWriteDone(true); }).ok());
+  }
+  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
+  void Finish(grpc::Status status) override { finished_.set_value(status.error_code()); }
+
+ private:
+  grpc::internal::ServerReactor* reactor() override { return &stream_; }
+  void CallOnDone() override {}
+
+  MeasurementStream& stream_;
+  Request* request_ = nullptr;
+  std::counting_semaphore<> asked_{0};
+  std::promise<grpc::StatusCode> finished_;
+  Executor writing_{{.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
+};
+
+class MeasurementStreamTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const SessionServices services{.executor = executor_, .journal = journal_, .models = models_};
+    sessions_ =
+        SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
+    access_ = AccessControl::Open({}).value();
+    ASSERT_TRUE(
+        sessions_->Create(access_->Authorize(call_, "GetStatus")->tenant, "a", SmallProblem())
+            .ok());
+  }
+  ServiceContext Context() {
+    return {.executor = executor_,
+            .intake = intake_,
+            .sessions = *sessions_,
+            .calls = calls_,
+            .access = *access_,
+            .stop = {},
+            .models = models_,
+            .max_computing = std::chrono::seconds(60),
+            .wall_clock = {}};
+  }
+  static Request Batch(int64_t sequence) {
+    Request request;
+    request.set_session("sessions/a");
+    request.set_sequence(sequence);
+    request.mutable_estimates()->set_only_last(true);
+    request.mutable_measurements()->add_time_s(0.1 * static_cast<double>(sequence));
+    auto& x = *request.mutable_measurements()->add_channels();
+    x.set_name("x");
+    x.add_values(0.1);
+    return request;
+  }
+
+  FaultyJournal journal_;
+  ModelLibrary models_;
+  OpenCalls calls_;
+  std::unique_ptr<AccessControl> access_;
+  grpc::CallbackServerContext call_;
+  std::unique_ptr<SessionRegistry> sessions_;
+  const ExecutorOptions one_thread_{
+      .threads_per_lane = 1, .threads = 1, .capacity = 1, .capacity_per_lane = 1};
+  // The executors are destroyed first, so that they finish their tasks while the rest still exists.
+  Executor executor_{one_thread_};
+  Executor intake_{one_thread_};
+};
+
+TEST_F(MeasurementStreamTest, EndsWhereNoSessionIsNamedInTime) {
+  ServiceContext context = Context();
+  context.first_message = std::chrono::milliseconds(0);
+  auto* const stream = new MeasurementStream(context, call_);
+  Peer peer(*stream);
+  EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  stream->OnDone();
+  EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWriter), 0);
+}
+
+TEST_F(MeasurementStreamTest, ReadsNoMoreWhileTooManyBytesWaitToBeComputed) {
+  ServiceContext context = Context();
+  context.held_bytes = static_cast<int64_t>(Batch(1).ByteSizeLong()) + 1;
+  auto* const stream = new MeasurementStream(context, call_);
+  Peer peer(*stream);
+  Request hello;
+  hello.set_session("sessions/a");
+  peer.Give(hello);
+  const auto session = sessions_->All().front();
+  std::latch blocked(1), go_on(1);
+  // The hello has loaded the session by the time that this task runs.
+  while (!session->strand()
+              .Submit([&] {
+                blocked.count_down();
+                go_on.wait();
+              })
+              .ok()) {
+    std::this_thread::yield();
+  }
+  blocked.wait();
+  peer.Give(Batch(1));
+  peer.Give(Batch(2));
+  while (session->taken().sequence < 2) std::this_thread::yield();
+  EXPECT_FALSE(peer.Asks());
+  go_on.count_down();  // the queue of the executor was full, and the stream goes on all the same
+  peer.Give(Batch(3));
+  stream->OnCancel();
+  EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
+  stream->OnDone();
+}
+
+}  // namespace
+}  // namespace polyest::internal
