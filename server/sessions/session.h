@@ -64,14 +64,17 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Returns all fields but the problem.
   v1::Session Describe() const;
-  // Read the problem and the batches from the journal, as SessionJournal does. They wait for the
-  // disk.
+  // Read the problem, the batches and the history from the journal, as SessionJournal does. They
+  // wait for the disk.
   absl::StatusOr<v1::Problem> ReadProblem() const {
     return services_.journal.ReadProblem(number());
   }
   absl::Status ReadBatches(int64_t after,
                            const std::function<absl::Status(const JournalBatch&)>& take) const {
     return services_.journal.ReadBatches(number(), after, take);
+  }
+  absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory() const {
+    return services_.journal.ReadHistory(number());
   }
   // Returns the place of the session after the last batch acknowledged.
   SessionPlace place() const { return ledger_.kept(); }

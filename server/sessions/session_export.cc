@@ -28,6 +28,21 @@ v1::SessionRecord SessionExport::Head(const v1::Problem& problem) const {
   return record;
 }
 
+absl::Status SessionExport::AddHistory(std::vector<v1::SessionRecord>& records) const {
+  POLYEST_ASSIGN_OR_RETURN(const auto history, session_->ReadHistory());
+  for (const JournalHistoryPoint& point : history) {
+    v1::SessionRecord record;
+    record.mutable_past_estimate()->set_ordinal(point.ordinal);
+    // One that cannot be read, or is of a later batch than those exported, is left out.
+    if (point.sequence > described_.last_sequence() ||
+        !record.mutable_past_estimate()->mutable_estimate()->ParseFromString(point.point)) {
+      continue;
+    }
+    records.push_back(std::move(record));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<v1::SessionRecord>> SessionExport::Next() {
   std::vector<v1::SessionRecord> records;
   if (!std::exchange(begun_, true)) {
@@ -47,6 +62,8 @@ absl::StatusOr<std::vector<v1::SessionRecord>> SessionExport::Next() {
         return absl::OkStatus();
       });
   if (!read.ok() && read != full) return read;
+  const bool complete = given_ == described_.last_sequence();
+  if (complete && !std::exchange(ended_, true)) POLYEST_RETURN_IF_ERROR(AddHistory(records));
   return records;
 }
 

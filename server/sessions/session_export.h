@@ -22,10 +22,12 @@ class SessionExport {
 
  private:
   v1::SessionRecord Head(const v1::Problem& problem) const;
+  // Adds the history of the estimates.
+  absl::Status AddHistory(std::vector<v1::SessionRecord>& records) const;
 
   const std::shared_ptr<const Session> session_;
   const v1::Session described_;
-  bool begun_ = false;
+  bool begun_ = false, ended_ = false;
   int64_t given_ = 0;  // number of batches returned so far
 };
 

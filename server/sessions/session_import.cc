@@ -9,9 +9,17 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/sessions/estimate_history.h"
 #include "server/sessions/row_limits.h"
 
 namespace polyest::internal {
+namespace {
+
+// Of estimates of a thousand a second, those of 30,000 years.
+constexpr int64_t kMaxOrdinal = int64_t{1} << 50;
+constexpr size_t kMaxPastEstimateBytes = size_t{1} << 16;
+
+}  // namespace
 
 SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : registry_(registry) {
   head_.tenant = std::move(tenant);
@@ -29,10 +37,12 @@ absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
       return Begin(request.session_id(), request.record().head());
     case v1::SessionRecord::kBatch:
       return Append(request.record().batch());
+    case v1::SessionRecord::kPastEstimate:
+      return Remember(request.record().past_estimate());
     case v1::SessionRecord::RECORD_NOT_SET:
       break;
   }
-  return InvalidField("record", "must be a head or a batch");
+  return InvalidField("record", "must be a head, a batch or a past estimate");
 }
 
 absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head) {
@@ -99,11 +109,44 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   return loaded_->Store(next);
 }
 
+absl::Status SessionImport::Remember(const v1::SessionRecord::PastEstimate& past) {
+  const int64_t sequence = past.estimate().sequence();
+  if (loaded_ == nullptr || loaded_->intake().place().sequence < promised_) {
+    return InvalidField("record.pastEstimate", "must follow the head and all batches");
+  }
+  if (std::ssize(history_) == EstimateHistory::kMaxPoints) {
+    return InvalidField("record.pastEstimate",
+                        absl::StrFormat("there are more than %d", EstimateHistory::kMaxPoints));
+  }
+  if (past.ByteSizeLong() > kMaxPastEstimateBytes) {
+    return InvalidField("record.pastEstimate",
+                        absl::StrFormat("%d bytes are more than there may be, %d",
+                                        past.ByteSizeLong(), kMaxPastEstimateBytes));
+  }
+  const bool first = history_.empty();
+  if (past.ordinal() <= (first ? -1 : history_.back().ordinal) || past.ordinal() > kMaxOrdinal) {
+    return InvalidField("record.pastEstimate.ordinal",
+                        absl::StrFormat("%d must be greater than that before, from 0 to %d",
+                                        past.ordinal(), kMaxOrdinal));
+  }
+  if (sequence <= (first ? -1 : history_.back().sequence) || sequence > promised_) {
+    return InvalidField(
+        "record.pastEstimate.estimate.sequence",
+        absl::StrFormat("%d must be greater than that before and at most %d", sequence, promised_));
+  }
+  history_.push_back({past.ordinal(), sequence, past.estimate().SerializeAsString()});
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
   const int64_t batches = loaded_ == nullptr ? 0 : loaded_->intake().place().sequence;
   if (loaded_ == nullptr || batches < promised_) {
     return InvalidField("record", absl::StrFormat("the session breaks off after batch %d of %d",
                                                   batches, promised_));
+  }
+  // All ordinals are multiples of the stride with which they were kept, whatever it was.
+  for (JournalHistoryPoint& point : history_) {
+    registry_.services().journal.SaveHistoryPoint(head_.number, std::move(point), /*stride=*/1);
   }
   const absl::Status shown = registry_.services().journal.Show(head_.number);
   if (absl::IsAlreadyExists(shown)) {

@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/sessions/session_registry.h"
 
@@ -20,10 +21,10 @@ class SessionImport {
   SessionImport(const SessionImport&) = delete;
   SessionImport& operator=(const SessionImport&) = delete;
 
-  // Takes the head, then batch after batch; waits for the journal. INVALID_ARGUMENT for a record
-  // that does not follow the one before, RESOURCE_EXHAUSTED while memory is short; other errors are
-  // those of SessionRegistry::Create and of a batch that is streamed. Must not be called again
-  // after an error.
+  // Takes the head, then batch after batch, then the history; waits for the journal.
+  // INVALID_ARGUMENT for a record that does not follow the one before, RESOURCE_EXHAUSTED while
+  // memory is short; other errors are those of SessionRegistry::Create and of a batch that is
+  // streamed. Must not be called again after an error.
   absl::Status Take(const v1::ImportSessionRequest& request);
   // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
   // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
@@ -36,11 +37,13 @@ class SessionImport {
  private:
   absl::Status Begin(const std::string& id, const v1::SessionRecord::Head& head);
   absl::Status Append(const v1::SessionRecord::Batch& batch);
+  absl::Status Remember(const v1::SessionRecord::PastEstimate& past);
 
   SessionRegistry& registry_;
   SessionHead head_;
   int64_t promised_ = 0;  // number of batches that the head promises
   std::unique_ptr<LoadedSession> loaded_;
+  std::vector<JournalHistoryPoint> history_;
 };
 
 }  // namespace polyest::internal

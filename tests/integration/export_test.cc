@@ -1,5 +1,7 @@
 #include <google/protobuf/util/message_differencer.h>
 
+#include <functional>
+
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest::internal {
@@ -44,11 +46,22 @@ class ExportTest : public DaemonTest {
     EXPECT_TRUE(status.ok()) << status.error_message();
     return response;
   }
+  v1::EstimateHistory History(const std::string& session) {
+    grpc::ClientContext context;
+    v1::GetHistoryRequest request;
+    request.set_session(session);
+    v1::GetHistoryResponse response;
+    const grpc::Status status = sessions_->GetHistory(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.history();
+  }
   // Returns an exported session of three batches.
   std::vector<v1::SessionRecord> Exported() {
     EXPECT_TRUE(Create("rig").ok());
     for (const int batch : {1, 2, 3}) {
       EXPECT_TRUE(Add("sessions/rig", batch, OscillatorRows(10 * (batch - 1), 10 * batch)).ok());
+      // Past estimates are kept with the commit of the next batch, or later.
+      Estimate("sessions/rig");
     }
     std::vector<v1::SessionRecord> records;
     const grpc::Status status = Export("sessions/rig", records);
@@ -59,7 +72,7 @@ class ExportTest : public DaemonTest {
 
 TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   const auto records = Exported();
-  ASSERT_EQ(records.size(), 4u);
+  ASSERT_GE(records.size(), 4u);
   EXPECT_EQ(records[0].head().batch_count(), 3);
   v1::Problem problem;
   ASSERT_TRUE(problem.ParseFromString(records[0].head().problem()));
@@ -104,7 +117,9 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
                 {records[0], records[1], records[2], records[3], records[3]},
                 "3 must be 4, and the head promises 3 batches"},
            Case{"a bad batch", {records[0], records[1], bad}, "times must increase"},
-           Case{"an empty record", {v1::SessionRecord()}, "must be a head or a batch"},
+           Case{"an empty record",
+                {v1::SessionRecord()},
+                "must be a head, a batch or a past estimate"},
        }) {
     const grpc::Status status = Import("copy", one.records);
     EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << one.what;
@@ -112,6 +127,46 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
     EXPECT_EQ(Delete("sessions/copy").error_code(), grpc::StatusCode::NOT_FOUND) << one.what;
   }
   EXPECT_TRUE(Import("copy", records).ok());
+}
+
+TEST_F(ExportTest, BringsTheHistoryAlong) {
+  const auto records = Exported();
+  ASSERT_GE(records.size(), 6u);  // the head, three batches, two past estimates
+  ASSERT_TRUE(Import("copy", records).ok());
+  const v1::EstimateHistory was = History("sessions/rig"), is = History("sessions/copy");
+  ASSERT_GE(is.points_size(), 2);
+  ASSERT_LE(is.points_size(), was.points_size());
+  for (int i = 0; i < is.points_size(); ++i) {
+    EXPECT_EQ(is.points(i).SerializeAsString(), was.points(i).SerializeAsString());
+  }
+  // It goes on.
+  ASSERT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
+  EXPECT_EQ(Estimate("sessions/copy").samples(), 40);
+  EXPECT_EQ(History("sessions/copy").points().rbegin()->sequence(), 4);
+}
+
+TEST_F(ExportTest, RefusesAHistoryThatIsNone) {
+  auto records = Exported();
+  ASSERT_GE(records.size(), 6u);
+  const auto refusal = [&](const std::function<void(v1::SessionRecord::PastEstimate&)>& change) {
+    std::vector<v1::SessionRecord> changed = records;
+    change(*changed[5].mutable_past_estimate());
+    const grpc::Status status = Import("copy", changed);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    return status.error_message();
+  };
+  EXPECT_THAT(refusal([](auto& past) { past.set_ordinal(0); }), HasSubstr("greater than that"));
+  EXPECT_THAT(refusal([](auto& past) { past.set_ordinal(int64_t{1} << 60); }),
+              HasSubstr("pastEstimate.ordinal"));
+  EXPECT_THAT(refusal([](auto& past) { past.mutable_estimate()->set_sequence(4); }),
+              HasSubstr("4 must be greater than that before and at most 3"));
+  EXPECT_THAT(refusal([](auto& past) {
+                past.mutable_estimate()->add_parameters()->set_name(std::string(70'000, 'k'));
+              }),
+              HasSubstr("bytes are more than there may be, 65536"));
+  std::swap(records[3], records[4]);
+  EXPECT_THAT(Import("copy", records).error_message(),
+              HasSubstr("must follow the head and all batches"));
 }
 
 class FewRowsTest : public ExportTest {
