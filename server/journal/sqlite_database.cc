@@ -12,8 +12,6 @@
 namespace polyest::internal {
 namespace {
 
-// Longest wait for a lock that another connection of this process holds for a moment.
-constexpr int kBusyTimeoutMs = 10'000;
 // Time after which somebody may have made room on a full disk.
 constexpr std::chrono::seconds kFullDiskDelay{1};
 

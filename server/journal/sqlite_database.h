@@ -23,6 +23,9 @@ namespace polyest::internal {
 // was tried.
 absl::Status FromSqlite(int code, std::string_view doing);
 
+// Longest wait of a connection for a lock that another one of this process holds for a moment.
+inline constexpr int kBusyTimeoutMs = 10'000;
+
 // Owns one connection, for use by one thread at a time.
 class SqliteDatabase {
  public:

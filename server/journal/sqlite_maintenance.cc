@@ -15,6 +15,10 @@ namespace {
 // Largest number of batches of a deleted session, and of their bytes, that one commit removes.
 constexpr int64_t kRemovedBatches = 256;
 constexpr int64_t kRemovedBytes = 16 << 20;
+// Pages of the write-ahead log that the writer may wait for, and those beyond which it must,
+// because the log could otherwise grow without end.
+constexpr int kShortRest = 256;
+constexpr int kLongLog = 100'000;
 
 // Removes some batches of a session. Returns false when it has none left.
 absl::StatusOr<bool> RemoveSomeBatches(SqliteDatabase& database, int64_t session) {
@@ -59,12 +63,19 @@ void SqliteJournal::Maintain(std::stop_token stop) {
   }
 }
 
-// Copies the write-ahead log into the file. The first pass copies most of it while another thread
-// goes on writing batches, so that they do not wait. The second one holds up the writer and copies
-// the rest, because the log could otherwise grow without end.
+// Copies the write-ahead log into the file. The first pass copies what is there while another
+// thread goes on writing batches, so that they do not wait. The second one holds up the writer,
+// copies the rest and makes the log short. It is tried only where the rest is small, or the log has
+// become long, and gives up at once where somebody still reads from the log: the writer would have
+// to wait for them. The next commit then leads here again.
 void SqliteJournal::Checkpoint() {
-  for (const int mode : {SQLITE_CHECKPOINT_PASSIVE, SQLITE_CHECKPOINT_TRUNCATE}) {
-    sqlite3_wal_checkpoint_v2(maintainer_->handle(), nullptr, mode, nullptr, nullptr);
+  sqlite3* const handle = maintainer_->handle();
+  int pages = 0, copied = 0;
+  sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, &pages, &copied);
+  if (pages - copied < kShortRest || pages > kLongLog) {
+    sqlite3_busy_timeout(handle, 0);
+    sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+    sqlite3_busy_timeout(handle, kBusyTimeoutMs);
   }
   log_pages_ = 0;
 }
