@@ -176,7 +176,8 @@ class FewRowsTest : public ExportTest {
 
 TEST_F(FewRowsTest, AreTheLimitOfAnImportToo) {
   auto records = Exported();
-  ASSERT_EQ(records.size(), 4u);
+  ASSERT_GE(records.size(), 4u);
+  records.resize(4);  // without past estimates
   records[0].mutable_head()->set_batch_count(4);
   v1::SessionRecord::Batch& more = *records.emplace_back().mutable_batch();
   more.set_sequence(4);
