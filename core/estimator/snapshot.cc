@@ -175,9 +175,16 @@ void load(Archive& archive, EndedRuns& ended) {
 }
 
 template <class Archive>
+void serialize(Archive& archive, SettlementMemory& memory) {
+  OrderInVain& tried = memory.order;
+  archive(memory.costs, tried.order, tried.error, tried.centre, tried.axes, tried.rows,
+          tried.noise_variance);
+}
+
+template <class Archive>
 void serialize(Archive& archive, ComponentState& component) {
   archive(component.runs, component.ended_runs, component.relative_tolerance, component.expansion,
-          component.particles, component.weight, component.room);
+          component.particles, component.memory, component.weight, component.room);
   Flag(archive, component.bisected);
   archive(component.taken, component.windows_from, component.window_end, component.edges_row,
           component.ahead_row, component.patient_until, component.whole_until,

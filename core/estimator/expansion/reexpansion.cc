@@ -21,6 +21,10 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 // larger error does not follow the model, and its ripples would be mistaken for pieces of the
 // posterior.
 constexpr double kMaxErrorOfRaised = 0.05;
+// The error of an order of which no expansion can be made.
+constexpr double kMostError = std::numeric_limits<double>::max();
+// In at most so many dimensions the particles of an earlier settlement stand for new ones.
+constexpr int kMaxDimensionToTrust = 3;
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
@@ -34,6 +38,8 @@ class Settler {
 
   absl::StatusOr<Settlement> Run() {
     result_.particles = request_.guesses;
+    result_.memory = request_.memory;
+    if (IsInVain()) return std::move(result_);
     bool may_move = true;
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
@@ -45,6 +51,7 @@ class Settler {
         POLYEST_ASSIGN_OR_RETURN(const bool moved,
                                  Move(WidenedRegion(design, particles_.etas, leaning), present()));
         if (!moved) break;
+        result_.memory.costs.resize(0);  // the particles end at the edge
         continue;
       }
       if (!may_move) break;
@@ -75,15 +82,43 @@ class Settler {
     return truncation;
   }
 
+  // Whether the particles of the last settlement say that this one would leave all as it is. In
+  // more dimensions, where no elements are bisected, drawing them again is the only search for
+  // pieces of the posterior that they overlooked.
+  bool IsInVain() const {
+    if (request_.problem->dimension() > kMaxDimensionToTrust) return false;
+    const ExpansionDesign& design = present_.design();
+    if (MayRaiseOrder(TrustedRegion(design))) return false;
+    Cost cost = present_.MakeCost(request_.problem->problem().regularization);
+    cost.set_power(LikelihoodPower(present_, cost));
+    const Matrix etas = Reweighted(request_.guesses, request_.memory.costs, cost, design);
+    return etas.rows() > 0 && LeaningAxes(design, request_.problem->prior(), etas).empty() &&
+           !Pays(RegionOfParticles(design.region.ManyToGerm(etas)));
+  }
+
+  // Whether a higher order is allowed and may follow the model over the region.
+  bool MayRaiseOrder(const Region& region) const {
+    return request_.may_raise_order &&
+           NextTruncation(options(), request_.problem->dimension(), present()) &&
+           !IsRaisingInVain(request_.memory.order, kMaxErrorOfRaised, region, request_.rows,
+                            present_.noise());
+  }
+
   // Raises the order to the first one that follows the model; the present order stays if none does.
   absl::Status RaiseOrder(const Region& region) {
-    if (!request_.may_raise_order) return absl::OkStatus();
+    if (!MayRaiseOrder(region)) return absl::OkStatus();
+    OrderInVain tried;
     auto next = NextTruncation(options(), request_.problem->dimension(), present());
     for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
       POLYEST_ASSIGN_OR_RETURN(const bool raised, Move(region, *next));
+      const double error = raised ? ErrorOf(*result_.expansion) : kMostError;
+      if (error <= kMaxErrorOfRaised) return absl::OkStatus();
+      if (tried.order == 0 || error < tried.error) {
+        tried = TriedInVain(next->order, error, region, request_.rows, present_.noise());
+      }
       if (!raised) break;
-      if (ErrorOf(*result_.expansion) <= kMaxErrorOfRaised) return absl::OkStatus();
     }
+    result_.memory.order = std::move(tried);
     if (!result_.expansion) return absl::OkStatus();
     result_.propagated_rows += result_.expansion->propagated_rows();
     result_.expansion.reset();
@@ -113,6 +148,7 @@ class Settler {
     if (!particles.ok()) return particles.status();
     particles_ = *std::move(particles);
     result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
+    result_.memory.costs = particles_.costs;
     return true;
   }
 
@@ -135,6 +171,7 @@ class Settler {
     for (Eigen::Index i = 0; i < found.points.rows() && row >= 2 * each; ++i) {
       row -= each;
       result_.particles.middleRows(row, each).rowwise() = found.points.row(i);
+      result_.memory.costs.resize(0);  // these are no draws
     }
     return absl::OkStatus();
   }

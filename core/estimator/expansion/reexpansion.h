@@ -10,6 +10,7 @@
 // first at minima that the model confirms and the sampler overlooked (overlooked_minima.h). This
 // repeats until neither is needed. If moving gains nothing, an expansion of automatic order stays
 // in place and tries higher orders; it takes the first one that follows the model there, if any.
+// What the previous settlements tried in vain is not tried again (settlement_memory.h).
 // Each move lowers the order by one. Where the record is long and the present expansion is accurate
 // the sums are carried over instead of propagating the record, with the order as it is
 // (carry_over.h). The region is derived from particles and never from a minimum
@@ -21,14 +22,16 @@
 #include <memory>
 
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/settlement_memory.h"
 
 namespace polyest::internal {
 
 struct SettleRequest {
   const ResolvedProblem* problem = nullptr;
   const SampleStore* store = nullptr;
-  int64_t rows = 0;  // rows of the store that the expansion has absorbed
-  Matrix guesses;    // particles of the previous settlement, germ coordinates (may be empty)
+  int64_t rows = 0;         // rows of the store that the expansion has absorbed
+  Matrix guesses;           // particles of the previous settlement, germ coordinates (may be empty)
+  SettlementMemory memory;  // what the previous settlements have left
   uint64_t seed = 1;
   int threads = 1;
   bool may_raise_order = true;  // has an effect only if the order is automatic
@@ -38,6 +41,7 @@ struct SettleRequest {
 struct Settlement {
   std::unique_ptr<RegionalExpansion> expansion;  // null if the present one stays
   Matrix particles;                              // particles of the posterior, germ coordinates
+  SettlementMemory memory;
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // by all expansions but the returned one
 };

@@ -23,12 +23,28 @@ bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, 
          beginning.noise.size() == beginning.rows.size() * m;
 }
 
+bool IsMemoryFor(const ResolvedProblem& problem, const SettlementMemory& memory,
+                 const Matrix& particles) {
+  if (memory.costs.size() > 0 &&
+      (memory.costs.size() != particles.rows() || !memory.costs.allFinite())) {
+    return false;
+  }
+  const OrderInVain& tried = memory.order;
+  const auto n = static_cast<Eigen::Index>(problem.dimension());
+  return tried.order == 0 ||
+         (tried.order > 0 && tried.rows >= 0 && std::isfinite(tried.error) &&
+          tried.centre.size() == n && tried.centre.allFinite() && tried.axes.rows() == n &&
+          tried.axes.cols() == n && tried.axes.allFinite() &&
+          tried.noise_variance.size() == problem.channels() &&
+          (tried.noise_variance.array() > 0).all());
+}
+
 bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
   return state.taken > 0 && problem.first_row() <= state.taken && state.windows_from >= 0 &&
          state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
-         state.weight >= 0 && state.weight <= 1 && state.room >= 1 &&
-         IsSummaryFor(problem, state.summary, state.taken);
+         IsMemoryFor(problem, state.memory, state.particles) && state.weight >= 0 &&
+         state.weight <= 1 && state.room >= 1 && IsSummaryFor(problem, state.summary, state.taken);
 }
 
 // Whether the ended runs have the windows that they must have.
@@ -82,6 +98,7 @@ ComponentState MixtureComponent::State() const {
   state.relative_tolerance = problem_.problem().integration.relative_tolerance;
   state.expansion = expansion_->State();
   state.particles = particles_;
+  state.memory = memory_;
   state.weight = weight_;
   state.room = room_;
   state.bisected = bisected_;
@@ -113,6 +130,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
                            RegionalExpansion::FromState(
                                component->problem_, std::move(state.expansion), *store, threads));
   component->particles_ = std::move(state.particles);
+  component->memory_ = std::move(state.memory);
   component->weight_ = state.weight;
   component->room_ = state.room;
   component->bisected_ = state.bisected;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/estimator/expansion/expansion_state.h"
+#include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
@@ -17,6 +18,7 @@ struct ComponentState {
   double relative_tolerance = 0;  // of the problem's integrators; it follows the noise
   ExpansionState expansion;
   Matrix particles;
+  SettlementMemory memory;
   double weight = 1;
   int room = 1;
   bool bisected = false;

@@ -133,6 +133,7 @@ absl::Status MixtureComponent::ReplayAs(ResolvedProblem problem, ExpansionDesign
   }
   Adopt(*std::move(replayed));
   particles_ = std::move(particles);
+  memory_ = {};
   windows_from_ = patient_until_ = taken_;
   window_end_ = taken_ + 2;
   return absl::OkStatus();
@@ -320,15 +321,17 @@ absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_o
   request.store = store_;
   request.rows = taken_;
   request.guesses = particles_;
+  request.memory = memory_;
   request.seed = 1000 * (settlements_ + 1);
   request.threads = threads_;
   POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
                            polyest::internal::Settle(*expansion_, request, stop));
   ++settlements_;
   particles_ = std::move(settlement.particles);
-  if (!settlement.expansion) return false;
+  memory_ = std::move(settlement.memory);
   abandoned_rows_ += settlement.propagated_rows;
   reexpansions_ += settlement.reexpansions;
+  if (!settlement.expansion) return false;
   Adopt(std::move(settlement.expansion));
   return true;
 }

@@ -13,6 +13,7 @@
 
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/run_elimination.h"
+#include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/posterior/assessment.h"
 #include "core/estimator/posterior/posterior_pieces.h"
 #include "core/estimator/record/record_summary.h"
@@ -154,6 +155,7 @@ class MixtureComponent {
   std::unique_ptr<RegionalExpansion> expansion_;
   bool broken_ = false;        // whether a stop left the expansion between two rows
   Matrix particles_;           // of the last settlement, germ coordinates
+  SettlementMemory memory_;    // and what they and earlier ones have found
   std::vector<Piece> pieces_;  // those to divide into
   bool contracts_ = false;     // whether the last row was too coarse and not dealt with yet
   bool halves_ = false;        // whether the pieces are the halves of a bisection

@@ -13,6 +13,7 @@
 #include "core/model/equations/equation_model.h"
 #include "tests/testing/records.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
+#include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal {
 namespace {
@@ -92,6 +93,18 @@ TEST(Snapshot, HoldsSumsThatWereCarriedOver) {
   const Estimate &first = outcome.estimates[2], &last = outcome.estimates.back();
   EXPECT_GT(last.expansion.reexpansions, first.expansion.reexpansions + 1);
   EXPECT_LT(last.expansion.trajectories, 1.5 * first.expansion.trajectories);
+}
+
+// No affordable order follows the model. Which ones have been tried, and of what posterior the
+// particles are, decides what is tried later.
+TEST(Snapshot, HoldsWhatWasTriedInVain) {
+  std::vector<UncertainParameter> parameters;
+  for (const char* name : {"a", "b", "c", "d"}) {
+    parameters.push_back(*UncertainParameter::Uniform(name, -1, 1));
+  }
+  const Problem problem = TextProblem("sin(40*a) + 0*(b + c + d)", parameters, 0.2);
+  const auto constant = [](double) { return 0.5; };
+  ExpectSameBitsThroughRestarts(problem, Record("y", constant, 0.02, 80), 40);
 }
 
 TEST(Snapshot, ChangesNoAnswer) {
