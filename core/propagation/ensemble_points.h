@@ -18,4 +18,13 @@ Matrix StatesOf(const EnsembleState& ensemble);
 // states (points × states).
 EnsembleState WithStates(const EnsembleState& ensemble, const ConstMatrixRef& states);
 
+// Returns the Gaussians of an ensemble of filters of a model with n = `states` states (> 0),
+// members × (n + n (n + 1)/2): the means, then the factors as GaussianStates keeps them.
+Matrix GaussiansOf(const EnsembleState& filters, Eigen::Index states);
+
+// Returns the state of an ensemble of filters of the same model over the same run, with other
+// members that have these Gaussians (as GaussiansOf returns them).
+EnsembleState WithGaussians(const EnsembleState& filters, Eigen::Index states,
+                            const ConstMatrixRef& gaussians);
+
 }  // namespace polyest::internal

@@ -70,6 +70,23 @@ void FilterBank::TakeStatesOf(const FilterBank& other) {
   blocks_.CollectFailures();
 }
 
+void FilterBank::StartBackward() {
+  for (const auto& block : blocks_.blocks()) block->StartBackward();
+}
+
+absl::Status FilterBank::Mark(double time_s, const Stop& stop) {
+  return blocks_.ForEach([&](FilterBlock& block) { return block.Mark(time_s, stop); });
+}
+
+void FilterBank::FinishBackward() {
+  for (const auto& block : blocks_.blocks()) block->FinishBackward();
+}
+
+void FilterBank::ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations) {
+  for (const auto& block : blocks_.blocks()) block->ReadMarked(mark, time_s, means, deviations);
+  blocks_.CollectFailures();
+}
+
 void FilterBank::ReadStates(Matrix& means, Matrix& deviations) const {
   means.resize(members(), specification_.process_noise.cols());
   deviations.resizeLike(means);

@@ -29,6 +29,7 @@ class FilterBank {
   FilterBank(EnsembleSpecification specification, const InputSignals* inputs);
 
   int members() const { return static_cast<int>(specification_.parameters.rows()); }
+  Eigen::Index outputs() const { return std::ssize(specification_.outputs); }
 
   // As FilterBlock::Advance, for all members: innovations and log variances are members × (m ·
   // times).
@@ -38,6 +39,11 @@ class FilterBank {
   // As FilterBlock::PredictOutputs and TakeStatesOf, for all members.
   absl::Status Predict(double time_s, MatrixRef means, MatrixRef deviations, const Stop& stop);
   void TakeStatesOf(const FilterBank& other);
+  // As those of FilterBlock, for all members.
+  void StartBackward();
+  absl::Status Mark(double time_s, const Stop& stop);
+  void FinishBackward();
+  void ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations);
 
   // Writes the means and the standard deviations of the states at the time reached, as the samples
   // up to there tell them (members × states each).

@@ -110,13 +110,19 @@ absl::Status FilterBlock::Predict(double time_s, const Stop& stop) {
     const double from_s = time_s_;
     const double to_s = part + 1 == parts ? time_s : start_s + interval_s * (part + 1) / parts;
     const double step_s = to_s - from_s;
-    gaussians_.Diffuse(spectral_densities_, step_s / 6);
+    Diffuse(step_s / 6);
     POLYEST_RETURN_IF_ERROR(MoveTo(from_s + step_s / 2, stop));
-    gaussians_.Diffuse(spectral_densities_, 4 * step_s / 6);
+    Diffuse(4 * step_s / 6);
     POLYEST_RETURN_IF_ERROR(MoveTo(to_s, stop));
-    gaussians_.Diffuse(spectral_densities_, step_s / 6);
+    Diffuse(step_s / 6);
   }
   return absl::OkStatus();
+}
+
+void FilterBlock::Diffuse(double duration_s) {
+  if (backward_) factor_before_ = gaussians_.factor();
+  gaussians_.Diffuse(spectral_densities_, duration_s);
+  if (backward_) backward_->AddNoise(factor_before_, gaussians_.factor());
 }
 
 absl::Status FilterBlock::MoveTo(double time_s, const Stop& stop) {
@@ -125,6 +131,7 @@ absl::Status FilterBlock::MoveTo(double time_s, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const Eigen::ArrayXXd* const states, block_.Move(time_s, stop));
   NoteFailures();
   gaussians_.Collect(*states);
+  if (backward_) backward_->AddMotion(*states, gaussians_.factor());
   time_s_ = time_s;
   return absl::OkStatus();
 }
@@ -200,6 +207,11 @@ void FilterBlock::SelectOutput(int channel) {
 absl::Status FilterBlock::PredictOutputs(double time_s, MatrixRef means, MatrixRef deviations,
                                          const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Predict(time_s, stop));
+  WriteOutputs(means, deviations);
+  return absl::OkStatus();
+}
+
+void FilterBlock::WriteOutputs(MatrixRef means, MatrixRef deviations) {
   ReadOutputs();
   const int members = member_count();
   const auto points = outputs_.size() / members;
@@ -216,7 +228,23 @@ absl::Status FilterBlock::PredictOutputs(double time_s, MatrixRef means, MatrixR
     means.row(first_member_ + i).setConstant(std::numeric_limits<double>::quiet_NaN());
     deviations.row(first_member_ + i).setConstant(std::numeric_limits<double>::quiet_NaN());
   }
+}
+
+void FilterBlock::StartBackward() {
+  backward_ = std::make_unique<BackwardPass>(gaussians_.members(), gaussians_.states());
+}
+
+absl::Status FilterBlock::Mark(double time_s, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(Predict(time_s, stop));
+  backward_->Mark(gaussians_);
   return absl::OkStatus();
+}
+
+void FilterBlock::ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations) {
+  gaussians_.mean() = backward_->marked(mark).mean;
+  gaussians_.factor() = backward_->marked(mark).factor;
+  block_.SetTime(time_s);
+  WriteOutputs(means, deviations);
 }
 
 void FilterBlock::TakeStatesOf(const FilterBlock& other) {
@@ -243,8 +271,12 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
     SelectOutput(channel);
     noise_variance_.setConstant(sigma * sigma);
     if (noise_factors_.size() > 0) noise_variance_ *= noise_factors_.col(channel).square();
+    if (backward_) factor_before_ = gaussians_.factor();
     gaussians_.Update(outputs_, samples.values(channel, sample), noise_variance_, innovation_,
                       variance_);
+    if (backward_) {
+      backward_->AddSample(outputs_, innovation_, variance_, factor_before_, gaussians_.factor());
+    }
     // Roots and logarithms of a vector may differ in the last bit from those of a number, so they
     // are taken in memory of one alignment.
     innovation_ /= variance_.sqrt();

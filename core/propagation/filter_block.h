@@ -24,10 +24,12 @@
 
 #include <absl/status/status.h>
 
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "core/common/types.h"
+#include "core/propagation/backward_pass.h"
 #include "core/propagation/gaussian_states.h"
 #include "core/propagation/trajectory_block.h"
 #include "core/propagation/trajectory_ensemble.h"
@@ -71,6 +73,15 @@ class FilterBlock {
   // Takes the states of a block of the same members, model and inputs at the same time.
   void TakeStatesOf(const FilterBlock& other);
 
+  // For what all samples tell of an instant (backward_pass.h). StartBackward is called at t = 0;
+  // Mark predicts to the instant `time_s` ≥ the time reached and marks it; after FinishBackward the
+  // outputs at the i-th mark are read as PredictOutputs writes them. The filters go no further
+  // then.
+  void StartBackward();
+  absl::Status Mark(double time_s, const Stop& stop);
+  void FinishBackward() { backward_->Finish(); }
+  void ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations);
+
   // Returns the members' failures, in the order in which they failed; points are numbers of
   // members.
   const std::vector<PointFailure>& failures() const { return failures_; }
@@ -88,11 +99,13 @@ class FilterBlock {
   EnsembleState::OfBlock OfPoints(const EnsembleState::OfBlock& state) const;
   absl::Status Predict(double time_s, const Stop& stop);
   absl::Status MoveTo(double time_s, const Stop& stop);
+  void Diffuse(double duration_s);
   int Parts(double interval_s);
   double FastestRate(double interval_s);
   void Differentiate(double interval_s);
   std::vector<int> PointsOf(int member) const;
   void ReadOutputs();
+  void WriteOutputs(MatrixRef means, MatrixRef deviations);
   void SelectOutput(int channel);
   void Update(const FilterSamples& samples, Eigen::Index sample, int channel, MatrixRef innovations,
               MatrixRef log_variances);
@@ -112,7 +125,9 @@ class FilterBlock {
   Matrix jacobian_, square_;                      // n × n
   const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
   Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;
-  std::vector<bool> alive_;  // by member
+  std::unique_ptr<BackwardPass> backward_;  // null unless StartBackward was called
+  Eigen::ArrayXXd factor_before_;           // of the stage that is added to it
+  std::vector<bool> alive_;                 // by member
   size_t failures_seen_ = 0;
   std::vector<PointFailure> failures_;
 };

@@ -31,9 +31,14 @@ class GaussianStates {
   Eigen::Index states() const { return mean_.cols(); }
   Eigen::ArrayXXd& mean() { return mean_; }              // members × n
   const Eigen::ArrayXXd& mean() const { return mean_; }  // members × n
-  // Members × n (n + 1)/2: L_ij, i ≥ j, is in column j n − j (j − 1)/2 + i − j.
+  // Members × n (n + 1)/2: L_ij, i ≥ j, is in column FactorColumn(n, i, j).
   Eigen::ArrayXXd& factor() { return factor_; }
   const Eigen::ArrayXXd& factor() const { return factor_; }
+
+  // Returns the column of a factor that has L_ij, i ≥ j, of n states.
+  static Eigen::Index FactorColumn(Eigen::Index n, Eigen::Index i, Eigen::Index j) {
+    return j * n - j * (j - 1) / 2 + i - j;
+  }
 
   // Returns the standard deviations of the states (members × n).
   Eigen::ArrayXXd Deviations() const;
@@ -54,11 +59,8 @@ class GaussianStates {
               Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance);
 
  private:
-  Eigen::Index Column(Eigen::Index i, Eigen::Index j) const {
-    return j * states() - j * (j - 1) / 2 + i - j;
-  }
-  auto L(Eigen::Index i, Eigen::Index j) { return factor_.col(Column(i, j)); }
-  auto L(Eigen::Index i, Eigen::Index j) const { return factor_.col(Column(i, j)); }
+  auto L(Eigen::Index i, Eigen::Index j) { return factor_.col(FactorColumn(states(), i, j)); }
+  auto L(Eigen::Index i, Eigen::Index j) const { return factor_.col(FactorColumn(states(), i, j)); }
   // Column of the vectors' memory with component i of vector `vector`.
   Eigen::Index Component(Eigen::Index i, Eigen::Index vector) const {
     return vector * states() + i;

@@ -210,6 +210,11 @@ void TrajectoryBlock::SetStates(const Eigen::ArrayXXd& states) {
   FailRowsBeyond(states_, time_s_, "a state");
 }
 
+void TrajectoryBlock::SetTime(double time_s) {
+  integrator_.reset();
+  time_s_ = time_s;
+}
+
 const Eigen::ArrayXXd& TrajectoryBlock::OutputsOfStates() {
   model_->Outputs(time_s_, states_, parameters_, inputs_.At(time_s_), model_outputs_);
   SelectOutputs();

@@ -49,6 +49,8 @@ class TrajectoryBlock final : public BlockSystem {
   // For a filter (filter_block.h), which changes the states itself. Replaces the states of all rows
   // at the present time (rows × states); a row that carries another point takes that point's.
   void SetStates(const Eigen::ArrayXXd& states);
+  // Sets the present time, at which the inputs must be known. The states must be set next.
+  void SetTime(double time_s);
   // Returns the outputs that are read (rows × outputs), of the states set last. A point without
   // finite outputs fails.
   const Eigen::ArrayXXd& OutputsOfStates();

@@ -9,11 +9,20 @@
 namespace polyest::internal {
 namespace {
 
+Eigen::Index StateCount(const ResolvedProblem& problem) {
+  return std::ssize(problem.model()->description().states);
+}
+
 // Makes the state of an expansion over the new region after the rows of the state kept.
 class Substitution {
  public:
-  Substitution(const RegionalExpansion& present, const ExpansionState& kept, int controls)
-      : present_(present), kept_(kept), before_(present.design()), controls_(controls) {}
+  Substitution(const ResolvedProblem& problem, const RegionalExpansion& present,
+               const ExpansionState& kept, int controls)
+      : problem_(problem),
+        present_(present),
+        kept_(kept),
+        before_(present.design()),
+        controls_(controls) {}
 
   // Finds T, δ and the terms at the new points. Fails if a collocation matrix cannot be factored.
   absl::Status Prepare(const ExpansionDesign& design) {
@@ -32,6 +41,7 @@ class Substitution {
     design.basis->Evaluate(design.reference, new_reference);
     shift_ = transfer_.transpose() * new_reference - reference;
     design.basis->EvaluateMany(points, new_phi_);
+    new_reference_ = new_reference;
     new_phi_.rowwise() -= new_reference.transpose();
     return absl::OkStatus();
   }
@@ -67,18 +77,32 @@ class Substitution {
     absorbed.check_valid.assign(static_cast<size_t>(checks), true);
     absorbed.check_chi_squared.resize(checks, channels());
     absorbed.point_chi_squared.resize(points, channels());
+    if (problem_.uses_filters()) absorbed.point_log_variance.setZero(points);
     for (Eigen::Index c = 0; c < channels(); ++c) {
       ChannelSums& sums = absorbed.sums[static_cast<size_t>(c)];
       sums.samples = sums.samples.Substituted(transfer_, shift_);
       sums.differences = sums.differences.Substituted(transfer_, shift_);
+      Vector chi_squared(new_phi_.rows());
       for (Eigen::Index i = 0; i < new_phi_.rows(); ++i) {
-        const double chi_squared = sums.samples.ChiSquared(new_phi_.row(i).transpose());
-        (i < points ? absorbed.point_chi_squared(i, c)
-                    : absorbed.check_chi_squared(i - points, c)) = chi_squared;
+        chi_squared[i] = sums.samples.ChiSquared(new_phi_.row(i).transpose());
       }
+      if (problem_.uses_filters()) {
+        const Vector log_variances = SubstituteLogVariances(sums);
+        absorbed.point_log_variance += log_variances.head(points);
+        chi_squared += 2 * log_variances;
+      }
+      absorbed.point_chi_squared.col(c) = chi_squared.head(points);
+      absorbed.check_chi_squared.col(c) = chi_squared.tail(checks);
     }
     SetControlScores(absorbed);
     return absorbed;
+  }
+
+  // Replaces the terms of ½ Σ log(S/σ²) = lᵀφ by l′ = T l and returns its values at the new points.
+  Vector SubstituteLogVariances(ChannelSums& sums) const {
+    sums.log_variance = (transfer_ * sums.log_variance).eval();
+    sums.log_variance_at_reference = sums.log_variance.dot(new_reference_);
+    return ((new_phi_ * sums.log_variance).array() + sums.log_variance_at_reference).matrix();
   }
 
   // A control trajectory belongs to a check point. What the error of integration does changes
@@ -121,16 +145,21 @@ class Substitution {
       moved.output = outputs.col(0);
     }
     if (!kept_.ensemble) return absl::OkStatus();
-    const Matrix own = StatesOf(*kept_.ensemble);
+    const Matrix own = InterpolableStates(problem_, *kept_.ensemble);
     Matrix states(old_points() + old_controls(), own.cols());
     states.topRows(own.rows()) = own;
-    if (kept_.controls) states.bottomRows(old_controls()) = StatesOf(*kept_.controls);
+    if (kept_.controls) {
+      states.bottomRows(old_controls()) = InterpolableStates(problem_, *kept_.controls);
+    }
     POLYEST_ASSIGN_OR_RETURN(const Matrix moved, AtNewPoints(states));
-    state.ensemble = WithStates(*kept_.ensemble, moved.topRows(phi_.rows()));
-    if (controls_ > 0) state.controls = WithStates(*kept_.controls, moved.bottomRows(controls_));
+    state.ensemble = WithInterpolated(problem_, *kept_.ensemble, moved.topRows(phi_.rows()));
+    if (controls_ > 0) {
+      state.controls = WithInterpolated(problem_, *kept_.controls, moved.bottomRows(controls_));
+    }
     return absl::OkStatus();
   }
 
+  const ResolvedProblem& problem_;
   const RegionalExpansion& present_;
   const ExpansionState& kept_;
   const ExpansionDesign& before_;
@@ -138,10 +167,21 @@ class Substitution {
   Eigen::Index first_check_ = 0;  // its row among the new points
   Matrix transfer_;               // T, S′ × S
   Vector shift_;                  // δ, S
+  Vector new_reference_;          // φ′_0, S′
   Matrix phi_, new_phi_;  // φ and φ′ − φ′_0 at the new points, (Q′ + C′) × S and × S′
 };
 
 }  // namespace
+
+Matrix InterpolableStates(const ResolvedProblem& problem, const EnsembleState& ensemble) {
+  return problem.uses_filters() ? GaussiansOf(ensemble, StateCount(problem)) : StatesOf(ensemble);
+}
+
+EnsembleState WithInterpolated(const ResolvedProblem& problem, const EnsembleState& ensemble,
+                               const ConstMatrixRef& values) {
+  return problem.uses_filters() ? WithGaussians(ensemble, StateCount(problem), values)
+                                : WithStates(ensemble, values);
+}
 
 absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
                                             const RegionalExpansion& present,
@@ -154,7 +194,7 @@ absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
   if (fresh->controls() > 0 && kept.absorbed.control_scores.cols() == 0) {
     return absl::FailedPreconditionError("there are no control trajectories");
   }
-  Substitution substitution(present, kept, fresh->controls());
+  Substitution substitution(problem, present, kept, fresh->controls());
   POLYEST_RETURN_IF_ERROR(substitution.Prepare(design));
   return substitution.StateOn(design, error);
 }

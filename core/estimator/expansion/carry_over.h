@@ -24,11 +24,15 @@
 // at all samples so far, together with what earlier moves have left, is limited to
 // kMaxCarriedShift, and remains part of the expansion's own error.
 //
+// Where the likelihood is that of prediction errors, the sums of the log variances l become T l,
+// and the states that are interpolated are the filters' means and the factors of their covariances.
+// The innovations and their log variances forget them, so that the rate above is an upper bound.
+//
 // Not carried over: hyperbolic truncation, and less than the present order, under which the map is
 // not exact; records with runs that have been eliminated; trajectories that failed; noise whose
-// time constant is being learned, because its likelihood is linearized; filters; states with
-// switches that have modes of their own; and, inside a run, states of which too few rows have been
-// propagated since to judge them.
+// time constant is being learned, because its likelihood is linearized; states with switches that
+// have modes of their own; and, inside a run, states of which too few rows have been propagated
+// since to judge them.
 
 #include <absl/status/statusor.h>
 

@@ -1,4 +1,5 @@
-// What an expansion takes over from the runs that have ended (problem/ended_runs.h).
+// What an expansion takes over from the runs that have ended, and what it hands on
+// (problem/ended_runs.h).
 
 #include <cmath>
 
@@ -73,6 +74,16 @@ void RegionalExpansion::TakeEndedRuns() {
   }
   AddCounts(*ended, ratio, absorbed_);
   remainder_ = transfer * ended->remainder;
+}
+
+void RegionalExpansion::AddCountsTo(EndedRuns& ended) const {
+  ended.samples += absorbed_.samples;
+  ended.discount += absorbed_.discount;
+  ended.own_error += absorbed_.own_error;
+  ended.log_noise += absorbed_.log_noise;
+  ended.log_variance += absorbed_.log_variance;
+  ended.largest = ended.largest.cwiseMax(absorbed_.largest);
+  for (size_t c = 0; c < ended.outliers.size(); ++c) ended.outliers[c] += absorbed_.outliers[c];
 }
 
 }  // namespace polyest::internal

@@ -142,6 +142,8 @@ class RegionalExpansion {
   const std::shared_ptr<const ExpansionState>& kept_state() const { return kept_state_; }
   // Ends the run absorbed so far. No more rows are absorbed then.
   void EndRun() { EndRunOfSums(); }
+  // Adds what counts along with the sums to that of the ended runs.
+  void AddCountsTo(EndedRuns& ended) const;
 
   const ExpansionDesign& design() const { return design_; }
   const LearnedNoise& noise() const { return noise_; }

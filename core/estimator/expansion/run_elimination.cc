@@ -30,15 +30,6 @@ constexpr double kMaxOwnError = 1e-4;
 // Ratio of a score's standard deviation to that for which the region was chosen.
 constexpr double kLeastScoreRatio = 0.6, kMostScoreRatio = 1.25;
 
-void AddCountsTo(EndedRuns& ended, const AbsorbedRows& absorbed) {
-  ended.samples += absorbed.samples;
-  ended.discount += absorbed.discount;
-  ended.own_error += absorbed.own_error;
-  ended.log_noise += absorbed.log_noise;
-  ended.log_variance += absorbed.log_variance;
-  ended.largest = ended.largest.cwiseMax(absorbed.largest);
-}
-
 // One run, expanded about a path.
 class Elimination {
  public:
@@ -76,6 +67,7 @@ class Elimination {
   Vector SpentDegrees() const;
   Matrix BoxOfOwn() const;
   Matrix AlongPath(CollocationMatrix& matrix) const;
+  std::vector<ChannelSums> AddSumsTo(EndedRuns& ended, const Matrix& transfer) const;
   Vector Remainder(const Cost& cost, const RunMarginal& marginal,
                    const std::vector<ChannelSums>& sums, const Matrix& terms) const;
 
@@ -330,6 +322,24 @@ Matrix Elimination::AlongPath(CollocationMatrix& matrix) const {
   return along;
 }
 
+// Adds the run's sums in the terms of the shared germs and returns them.
+std::vector<ChannelSums> Elimination::AddSumsTo(EndedRuns& ended, const Matrix& transfer) const {
+  const ExpansionDesign& design = expansion_->design();
+  Vector reference(design.basis->size());
+  design.basis->Evaluate(design.reference, reference);
+  const Vector shift = transfer.transpose() * TermsAtCentre(ended) - reference;
+  std::vector<ChannelSums> sums = expansion_->sums();
+  const Vector spent = SpentDegrees();
+  for (size_t c = 0; c < sums.size(); ++c) {
+    sums[c].samples = sums[c].samples.Substituted(transfer, shift);
+    sums[c].differences = sums[c].differences.Substituted(transfer, shift);
+    ended.sums[c].samples.Add(sums[c].samples);
+    ended.sums[c].differences.Add(sums[c].differences);
+    ended.sums[c].spent += spent[static_cast<Eigen::Index>(c)];
+  }
+  return sums;
+}
+
 absl::Status Elimination::AddTo(const RunPath& path, EndedRuns& ended) const {
   const ExpansionDesign& design = expansion_->design();
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
@@ -339,21 +349,7 @@ absl::Status Elimination::AddTo(const RunPath& path, EndedRuns& ended) const {
   Matrix transfer(ended.basis->size(), phi.cols());
   Vector residual(phi.cols());
   matrix.Solve(phi, transfer, residual);
-  Vector reference(design.basis->size());
-  design.basis->Evaluate(design.reference, reference);
-  const Vector shift = transfer.transpose() * TermsAtCentre(ended) - reference;
-  const AbsorbedRows& absorbed = expansion_->absorbed();
-  std::vector<ChannelSums> sums = absorbed.sums;
-  const Vector spent = SpentDegrees();
-  for (size_t c = 0; c < sums.size(); ++c) {
-    const auto channel = static_cast<Eigen::Index>(c);
-    sums[c].samples = absorbed.sums[c].samples.Substituted(transfer, shift);
-    sums[c].differences = absorbed.sums[c].differences.Substituted(transfer, shift);
-    ended.sums[c].samples.Add(sums[c].samples);
-    ended.sums[c].differences.Add(sums[c].differences);
-    ended.sums[c].spent += spent[channel];
-    ended.outliers[c] += absorbed.outliers[c];
-  }
+  const std::vector<ChannelSums> sums = AddSumsTo(ended, transfer);
   const Cost cost = OwnCost();
   const RunMarginal marginal(cost, OwnDirections());
   const Matrix values = Remainder(cost, marginal, sums, matrix.matrix());
@@ -364,7 +360,7 @@ absl::Status Elimination::AddTo(const RunPath& path, EndedRuns& ended) const {
   Vector ignored(1);
   matrix.Solve(values, coefficients, ignored);
   ended.remainder += coefficients.col(0);
-  AddCountsTo(ended, absorbed);
+  expansion_->AddCountsTo(ended);
   if (!score_) {
     ended.windows.EndRow(SumsWithRemainder(problem_.problem().measured, ended), run_, start_s_,
                          end_s_);

@@ -21,6 +21,7 @@
 #include "core/estimator/posterior/model_evidence.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/noise_marginal.h"
+#include "core/estimator/posterior/population_shift.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
 
@@ -57,12 +58,7 @@ class Assessment {
     if (request_.effort.evidence) {
       log_evidence = LogModelEvidence(problem_, *request_.expansion, cost, posterior_, eta);
     }
-    findings_.problem = &problem_;
-    findings_.expansion = request_.expansion;
-    findings_.record = request_.record;
-    findings_.map_xi = design_.region.ToGerm(eta);
-    findings_.converged = minima.front().converged;
-    findings_.minimizer_reason = minima.front().reason;
+    NoteMinimum(minima.front(), eta);
     NoteOtherMinima(cost, minima);
     Summarize(cost, eta);
     POLYEST_ASSIGN_OR_RETURN(
@@ -70,8 +66,9 @@ class Assessment {
                                           request_.effort, stop, posterior_));
     Correct(cost);
     filtered_ = DrawFiltered(problem_, *request_.expansion, posterior_);
-    findings_.shift = std::hypot(findings_.shift, findings_.integration_shift);
-    NotePopulation();
+    findings_.population_shift = PopulationShift(problem_, posterior_);
+    findings_.shift =
+        std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
     fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
@@ -87,6 +84,15 @@ class Assessment {
   }
 
  private:
+  void NoteMinimum(const Minimum& minimum, const Vector& eta) {
+    findings_.problem = &problem_;
+    findings_.expansion = request_.expansion;
+    findings_.record = request_.record;
+    findings_.map_xi = design_.region.ToGerm(eta);
+    findings_.converged = minimum.converged;
+    findings_.minimizer_reason = minimum.reason;
+  }
+
   absl::Status SetRegularization(const Stop& stop) {
     regularization_ = problem_.problem().regularization;
     if (request_.regularization) {
@@ -152,19 +158,6 @@ class Assessment {
     findings_.leans =
         findings_.leans ||
         !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
-  }
-
-  // What is left out of a population is linear over its posterior: it shifts every mean by as many
-  // standard deviations as it has itself, times its correlation with the parameter. An error of the
-  // outputs shifts by no more than itself in units of the noise.
-  void NotePopulation() {
-    if (!problem_.population() || problem_.ended_runs() == nullptr) return;
-    const Matrix shared = posterior_.Germs(prior_)(Eigen::all, problem_.SharedParameters());
-    const EndedRuns& ended = *problem_.ended_runs();
-    findings_.population_shift =
-        std::hypot(WeightedStandardDeviation(shared * ended.left_out, posterior_.weights),
-                   std::sqrt(ended.unresolved));
-    findings_.shift = std::hypot(findings_.shift, findings_.population_shift);
   }
 
   void Summarize(const Cost& cost, const Vector& eta) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 
 #include "core/chaos/gauss_rule.h"
 #include "core/chaos/germ.h"
@@ -10,10 +10,12 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kNodes = 7;        // of the rule that integrates over each normal distribution
-constexpr int kBisections = 60;  // to find a quantile
-constexpr double kFarthest =
-    6;  // standard deviations from a mean, beyond which nothing is looked for
+constexpr int kNodes = 7;      // of the rule that integrates over each normal distribution
+constexpr int kMaxSteps = 60;  // to find a quantile
+// Standard deviations from a mean, beyond which nothing is looked for.
+constexpr double kFarthest = 6;
+// Error of a quantile, in the width of the mixture.
+constexpr double kQuantileError = 1e-10;
 
 // Returns the draws' normal scores of a parameter.
 Vector NormalScores(const UncertainParameter& parameter, const Vector& thetas) {
@@ -30,25 +32,40 @@ Vector NormalScores(const UncertainParameter& parameter, const Vector& thetas) {
 struct Mixture {
   Vector mean, deviation, weights;
 
-  double ProbabilityBelow(double x) const {
-    double below = 0;
+  struct Below {
+    double probability = 0, density = 0;
+  };
+  Below At(double x) const {
+    Below below;
     for (Eigen::Index i = 0; i < mean.size(); ++i) {
       const double distance = x - mean[i];
-      below += weights[i] * (deviation[i] > 0
-                                 ? 0.5 * std::erfc(-distance / (deviation[i] * std::sqrt(2.0)))
-                                 : (distance >= 0 ? 1.0 : 0.0));
+      if (!(deviation[i] > 0)) {
+        below.probability += distance >= 0 ? weights[i] : 0;
+        continue;
+      }
+      const double score = distance / deviation[i];
+      below.probability += weights[i] * 0.5 * std::erfc(-score / std::numbers::sqrt2);
+      below.density += weights[i] * std::exp(-0.5 * score * score) / deviation[i];
     }
+    below.density *= 0.5 * std::numbers::inv_sqrtpi * std::numbers::sqrt2;
     return below;
   }
 
+  // Newton's method, by bisection where a step would leave the bracket.
   double Quantile(double probability) const {
     double lower = (mean - kFarthest * deviation).minCoeff();
     double upper = (mean + kFarthest * deviation).maxCoeff();
-    for (int step = 0; step < kBisections; ++step) {
-      const double middle = lower + 0.5 * (upper - lower);
-      (ProbabilityBelow(middle) < probability ? lower : upper) = middle;
+    const double error = kQuantileError * (upper - lower);
+    double x = lower + 0.5 * (upper - lower);
+    for (int step = 0; step < kMaxSteps && upper - lower > error; ++step) {
+      const Below below = At(x);
+      (below.probability < probability ? lower : upper) = x;
+      const double next = x - (below.probability - probability) / below.density;
+      const bool inside = next > lower && next < upper;  // not if the density is 0
+      if (inside && std::abs(next - x) <= error) return next;
+      x = inside ? next : lower + 0.5 * (upper - lower);
     }
-    return lower + 0.5 * (upper - lower);
+    return x;
   }
 };
 

@@ -2,7 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <cmath>
+#include <atomic>
+#include <cstdint>
+#include <vector>
 
 #include "core/chaos/germ.h"
 #include "core/common/check.h"
@@ -13,14 +15,50 @@ std::string DriftName(const std::string& parameter) { return absl::StrCat(parame
 
 double Drifted(const UncertainParameter& parameter, double theta, double departure) {
   if (departure == 0) return theta;
-  const double xi = parameter.ToGerm(theta);
-  if (parameter.germ.family == GermFamily::kNormal) return parameter.ToParameter(xi + departure);
   const Germ germ(parameter.germ);
-  return parameter.ToParameter(germ.OfNormalScore(germ.NormalScore(xi) + departure));
+  const double score = germ.NormalScore(parameter.ToGerm(theta));
+  return parameter.ToParameter(germ.OfNormalScore(score + departure));
 }
 
+namespace {
+
+// The normal scores of a parameter's values, which a trajectory needs again and again. The values
+// tell whether they are still those of the same block of trajectories.
+class ScoreMemory {
+ public:
+  const Eigen::ArrayXd& ScoresOf(const UncertainParameter& prior, const Eigen::ArrayXd& thetas) {
+    const Germ germ(prior.germ);
+    if (thetas.size() != thetas_.size() || (thetas != thetas_).any()) {
+      thetas_ = thetas;
+      scores_ =
+          thetas.unaryExpr([&](double theta) { return germ.NormalScore(prior.ToGerm(theta)); });
+    }
+    return scores_;
+  }
+
+ private:
+  Eigen::ArrayXd thetas_, scores_;
+};
+
+int64_t NextNumber() {
+  static std::atomic<int64_t> number = 0;
+  return ++number;
+}
+
+// Returns the thread's memory for each walk of the model with this number.
+std::vector<ScoreMemory>& MemoryOf(int64_t model, size_t walks) {
+  thread_local int64_t present = 0;
+  thread_local std::vector<ScoreMemory> memory;
+  if (present != model) memory.assign(walks, {});
+  present = model;
+  return memory;
+}
+
+}  // namespace
+
 DriftingModel::DriftingModel(const Problem& problem)
-    : owner_(problem.model),
+    : number_(NextNumber()),
+      owner_(problem.model),
       model_(dynamic_cast<const StateSpaceModel*>(owner_.get())),
       description_(owner_->description()) {
   POLYEST_CHECK(model_ != nullptr);
@@ -82,8 +120,11 @@ const Eigen::ArrayXXd& DriftingModel::Present(const ConstBlock& states,
     } else if (prior.germ.family == GermFamily::kNormal) {
       theta *= (prior.scale * departure).exp();
     } else {
+      const Germ germ(prior.germ);
+      const Eigen::ArrayXd& scores = MemoryOf(number_, walks_.size())[j].ScoresOf(prior, theta);
       for (Eigen::Index row = 0; row < theta.size(); ++row) {
-        theta[row] = Drifted(prior, theta[row], departure[row]);
+        if (departure[row] == 0) continue;
+        theta[row] = prior.ToParameter(germ.OfNormalScore(scores[row] + departure[row]));
       }
     }
   }

@@ -11,6 +11,7 @@
 // is θ_j + s_j g_j. What θ_j(t) is can be read as an output of the parameter's name, behind the
 // model's own outputs, unless one of these has that name.
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -54,6 +55,7 @@ class DriftingModel : public StateSpaceModel {
   // Returns the parameters at those states, in memory of the thread's own.
   const Eigen::ArrayXXd& Present(const ConstBlock& states, const ConstBlock& parameters) const;
 
+  const int64_t number_;  // of the model in this process
   std::shared_ptr<const Model> owner_;
   const StateSpaceModel* model_;
   std::vector<Walk> walks_;

@@ -237,7 +237,12 @@ std::vector<absl::Status> CheckFilters(const Problem& problem) {
   }
   add(CheckModel(problem));
   for (size_t i = 0; i < problem.uncertain.size(); ++i) {
-    if (problem.uncertain[i].per_run) add(InvalidField({"uncertain", i, "per_run"}, kRefusal));
+    const UncertainParameter& parameter = problem.uncertain[i];
+    if (parameter.population) add(InvalidField({"uncertain", i, "population"}, kRefusal));
+    if (parameter.per_run && parameter.drift) {
+      add(InvalidField({"uncertain", i, "per_run"},
+                       "is not available for a parameter that drifts"));
+    }
   }
   for (size_t i = 0; i < problem.measured.size(); ++i) {
     add(CheckSensor(i, problem.measured[i]));

@@ -17,7 +17,8 @@ namespace polyest::internal {
 
 int ResolvedProblem::max_runs() const {
   const auto given = static_cast<int>(problem_.uncertain.size());
-  const bool eliminates = problem_.expansion.adaptive && parameters_per_run_ < given;
+  const bool eliminates =
+      problem_.expansion.adaptive && parameters_per_run_ < given && !uses_filters();
   return eliminates ? std::numeric_limits<int>::max() : max_joint_runs();
 }
 

@@ -17,13 +17,13 @@ constexpr int64_t kRowsAtOnce = 64;
 }  // namespace
 
 RecordTrajectories::RecordTrajectories(const ResolvedProblem& problem, const SampleStore& store,
-                                       Matrix thetas, std::vector<int> outputs, double horizon_s,
-                                       int threads)
+                                       Matrix thetas, std::vector<int> outputs,
+                                       FilterUse filter_use, int threads)
     : problem_(problem),
       store_(store),
       thetas_(std::move(thetas)),
       outputs_(std::move(outputs)),
-      horizon_s_(horizon_s),
+      filter_use_(std::move(filter_use)),
       threads_(threads),
       failed_(static_cast<size_t>(thetas_.rows()), false) {}
 
@@ -77,10 +77,17 @@ void RecordTrajectories::StartRun(int run, int64_t first_row) {
   run_ = run;
   propagator_.reset();
   filters_.reset();
+  smoothers_.reset();
   inputs_ = std::make_unique<RunInputs>(problem_, &store_, run, first_row);
   if (problem_.uses_filters()) {
-    filters_ = std::make_unique<RunFilters>(problem_, thetas_, outputs_, &inputs_->signals(),
-                                            horizon_s_, threads_);
+    const InputSignals* const signals = &inputs_->signals();
+    if (filter_use_.smooth) {
+      smoothers_ =
+          std::make_unique<RunSmoothers>(problem_, thetas_, outputs_, run, signals, threads_);
+    } else {
+      filters_ = std::make_unique<RunFilters>(problem_, thetas_, outputs_, run, signals,
+                                              filter_use_.horizon_s, threads_);
+    }
     return;
   }
   propagator_ = std::make_unique<EnsemblePropagator>(
@@ -104,10 +111,16 @@ absl::Status RecordTrajectories::FinishRun(Visit visit, const Stop& stop) {
   }
   POLYEST_RETURN_IF_ERROR(VisitAll(instants, visit, stop));
   if (run_ < 0) return absl::OkStatus();
-  for (const PointFailure& failure : filters_ ? filters_->failures() : propagator_->failures()) {
+  if (smoothers_) POLYEST_RETURN_IF_ERROR(VisitMarked(visit, stop));
+  for (const PointFailure& failure : RunFailures()) {
     failed_[static_cast<size_t>(failure.point)] = true;
   }
   return absl::OkStatus();
+}
+
+const std::vector<PointFailure>& RecordTrajectories::RunFailures() const {
+  if (smoothers_) return smoothers_->failures();
+  return filters_ ? filters_->failures() : propagator_->failures();
 }
 
 // Visits rows [first, first + count) of the block, which are of the present run, and the times
@@ -138,6 +151,7 @@ absl::Status RecordTrajectories::Advance(const RowBlock& block, int first, int c
 absl::Status RecordTrajectories::VisitAll(std::span<const TrajectoryInstant> instants, Visit visit,
                                           const Stop& stop) {
   if (filters_) return FilterAll(instants, visit, stop);
+  if (smoothers_) return MarkAll(instants, stop);
   const auto width = std::ssize(outputs_);
   for (size_t begin = 0; begin < instants.size(); begin += kRowsAtOnce) {
     const auto part =
@@ -162,6 +176,34 @@ absl::Status RecordTrajectories::FilterAll(std::span<const TrajectoryInstant> in
     POLYEST_RETURN_IF_ERROR(visit(instant, means, deviations));
     filters_->Take(instant.place.time_s, instant.samples, instant.noise);
   }
+  return absl::OkStatus();
+}
+
+absl::Status RecordTrajectories::MarkAll(std::span<const TrajectoryInstant> instants,
+                                         const Stop& stop) {
+  for (const TrajectoryInstant& instant : instants) {
+    if (instant.row < 0 || filter_use_.visits(instant.row)) {
+      POLYEST_RETURN_IF_ERROR(smoothers_->Mark(instant.place.time_s, stop));
+      marked_.push_back({{instant.place, instant.row, {}, {}},
+                         {instant.samples.begin(), instant.samples.end()},
+                         {instant.noise.begin(), instant.noise.end()}});
+    }
+    if (instant.row >= 0) smoothers_->Take(instant.place.time_s, instant.samples, instant.noise);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RecordTrajectories::VisitMarked(Visit visit, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(smoothers_->Finish(stop));
+  Matrix means(thetas_.rows(), std::ssize(outputs_)), deviations = means;
+  for (size_t i = 0; i < marked_.size(); ++i) {
+    TrajectoryInstant instant = marked_[i].instant;
+    instant.samples = marked_[i].samples;
+    instant.noise = marked_[i].noise;
+    smoothers_->Read(i, means, deviations);
+    POLYEST_RETURN_IF_ERROR(visit(instant, means, deviations));
+  }
+  marked_.clear();
   return absl::OkStatus();
 }
 

@@ -6,6 +6,7 @@
 #include <absl/functional/function_ref.h>
 #include <absl/status/status.h>
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/run_filters.h"
 #include "core/estimator/record/run_inputs.h"
+#include "core/estimator/record/run_smoothers.h"
 #include "core/propagation/ensemble_propagator.h"
 #include "polyest/samples.h"
 #include "polyest/stop.h"
@@ -28,6 +30,16 @@ struct TrajectoryInstant {
   std::span<const double> noise;  // standard deviations of their noise
 };
 
+// How filters are used, if there are any.
+struct FilterUse {
+  double horizon_s = 0;  // as that of RunFilters
+  // Whether outputs are told from all samples of their run, also those after them (RunSmoothers).
+  // Of the rows only those are visited then for which `visits` returns true, and each run's at its
+  // end.
+  bool smooth = false;
+  std::function<bool(int64_t row)> visits;
+};
+
 class RecordTrajectories {
  public:
   // Receives the outputs at an instant, trajectories × outputs; NaN from a trajectory's failure on.
@@ -37,10 +49,9 @@ class RecordTrajectories {
       const TrajectoryInstant&, const ConstMatrixRef& outputs, const ConstMatrixRef& deviations)>;
 
   // `thetas`: one trajectory for each row, trajectories × n. `outputs`: columns of the model's
-  // outputs. `horizon_s`: of filters (run_filters.h). `problem` and `store` must outlive the
-  // trajectories.
+  // outputs. `problem` and `store` must outlive the trajectories.
   RecordTrajectories(const ResolvedProblem& problem, const SampleStore& store, Matrix thetas,
-                     std::vector<int> outputs, double horizon_s, int threads);
+                     std::vector<int> outputs, FilterUse filter_use, int threads);
 
   // Integrates over the first `rows` ≥ 1 rows, and visits every row and every time of `times`, in
   // time order. Returns InvalidArgument that names the element if `times` is not in time order,
@@ -60,19 +71,30 @@ class RecordTrajectories {
   absl::Status VisitAll(std::span<const TrajectoryInstant> instants, Visit visit, const Stop& stop);
   absl::Status FilterAll(std::span<const TrajectoryInstant> instants, Visit visit,
                          const Stop& stop);
+  absl::Status MarkAll(std::span<const TrajectoryInstant> instants, const Stop& stop);
+  absl::Status VisitMarked(Visit visit, const Stop& stop);
+  const std::vector<PointFailure>& RunFailures() const;
+
+  // An instant to be visited at the end of its run.
+  struct Marked {
+    TrajectoryInstant instant;  // without samples
+    std::vector<double> samples, noise;
+  };
 
   const ResolvedProblem& problem_;
   const SampleStore& store_;
   Matrix thetas_;
   std::vector<int> outputs_;
-  double horizon_s_;
+  FilterUse filter_use_;
   int threads_;
 
   int run_ = -1;
   std::unique_ptr<RunInputs> inputs_;               // of the present run
-  std::unique_ptr<EnsemblePropagator> propagator_;  // one of these two
+  std::unique_ptr<EnsemblePropagator> propagator_;  // one of these three
   std::unique_ptr<RunFilters> filters_;
-  std::vector<bool> failed_;  // by trajectory
+  std::unique_ptr<RunSmoothers> smoothers_;
+  std::vector<Marked> marked_;  // of the present run
+  std::vector<bool> failed_;    // by trajectory
   std::span<const SampleRow> times_;
   size_t next_time_ = 0;  // the first of `times_` not visited yet
 };

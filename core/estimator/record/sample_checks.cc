@@ -285,7 +285,7 @@ absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const 
         {"run", row},
         "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
         "runs would have too many of them; they are eliminated only from an adaptive expansion "
-        "and if the runs share a parameter",
+        "of output errors and if the runs share a parameter",
         row, run, max_runs_);
   }
   if (!std::isfinite(time_s) || time_s < 0) {

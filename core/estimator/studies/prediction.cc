@@ -16,188 +16,53 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/prior_expansion.h"
 #include "core/estimator/problem/settable_quantities.h"
-#include "core/estimator/studies/prediction_score.h"
+#include "core/estimator/studies/prediction_builder.h"
 
 namespace polyest::internal {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr Eigen::Index kLeastDraws = 2;
-
-// Returns the measured output that reads the model's output `column`; −1 if none does.
-int ChannelOf(const ResolvedProblem& problem, int column) {
-  const auto found = std::find(problem.outputs().begin(), problem.outputs().end(), column);
-  return found == problem.outputs().end() ? -1
-                                          : static_cast<int>(found - problem.outputs().begin());
-}
-
-// Predicts one output at the times of an answer, and scores it on the record.
-class OutputPrediction {
- public:
-  OutputPrediction(const PredictionSubject& subject, const PredictionOptions& options, int column,
-                   int64_t times)
-      : options_(options), channel_(ChannelOf(*subject.problem, column)) {
-    const Quantity& quantity =
-        subject.problem->model()->description().outputs[static_cast<size_t>(column)];
-    result_.output = quantity.name;
-    result_.unit = quantity.unit;
-    const auto probabilities = std::ssize(options.probabilities);
-    result_.mean.resize(times);
-    result_.std_dev.resize(times);
-    result_.quantiles.resize(times, probabilities);
-    if (channel_ < 0) return;
-    result_.measured.setConstant(times, kNone);
-    result_.residual.setConstant(times, kNone);
-    noise_ = subject.noise[static_cast<size_t>(channel_)];
-    model_ = subject.problem->problem().measured[static_cast<size_t>(channel_)].noise;
-    kernel_ = model_.outliers == OutlierHandling::kStudentT ? NoiseKernel::kStudentT
-                                                            : NoiseKernel::kNormal;
-    if (noise_.scale <= 0) return;
-    const int draws = static_cast<int>(subject.thetas.rows());
-    factors_ = noise_.degrees_of_freedom > 0 ? ScaleFactors(noise_.degrees_of_freedom, draws)
-                                             : Vector(Vector::Ones(draws));
-    UseUncertainNoise(subject);
-    sums_.emplace(options.lags);
-    result_.sample_std_dev.resize(times);
-    result_.sample_quantiles.resize(times, probabilities);
-    result_.standardized_residual.setConstant(times, kNone);
-  }
-
-  // `values`: of all draws that can be integrated to here, `alive` their indices, with the standard
-  // deviations of filters (0 without). `place`: in the answer; −1 if the time is not returned.
-  void Add(const TrajectoryInstant& instant, const ConstVectorRef& values,
-           const ConstVectorRef& deviations, const std::vector<Eigen::Index>& alive,
-           Eigen::Index place) {
-    if (instant.row >= 0 && instant.place.run != run_) {
-      run_ = instant.place.run;
-      if (sums_) sums_->EndRun();
-    }
-    const double mean = values.mean();
-    if (place >= 0) Describe(values, deviations, mean, place);
-    if (channel_ < 0) return;
-    const double z = instant.row >= 0 ? instant.samples[static_cast<size_t>(channel_)] : kNone;
-    if (!std::isnan(z)) noise_.largest = std::max(noise_.largest, std::abs(z));
-    if (place >= 0) {
-      result_.measured[place] = z;
-      result_.residual[place] = z - mean;
-    }
-    const double sigma = noise_.scale * model_.StandardDeviation(mean, noise_.largest);
-    if (!sums_ || (std::isnan(z) && place < 0)) return;
-    if (sigma <= 0) {
-      if (place >= 0) DescribeExactSample(place);
-      return;
-    }
-    const Vector scales =
-        (deviations.cwiseAbs2() + (sigma * factors_(alive)).cwiseAbs2()).cwiseSqrt();
-    AddSample(PredictiveDensity(kernel_, values, scales), z, z - mean, place);
-  }
-
-  PredictedOutput Take() {
-    if (sums_) result_.score = sums_->Score();
-    return std::move(result_);
-  }
-
- private:
-  // Takes the noise at each draw where it is an uncertain parameter.
-  void UseUncertainNoise(const PredictionSubject& subject) {
-    const std::vector<std::string> names = subject.problem->prior().Names();
-    const auto found = std::ranges::find(names, NoiseName(result_.output));
-    if (found != names.end()) {
-      factors_ = subject.thetas.col(found - names.begin()) / model_.absolute;
-    }
-  }
-
-  void Describe(const ConstVectorRef& values, const ConstVectorRef& deviations, double mean,
-                Eigen::Index place) {
-    result_.mean[place] = mean;
-    if (deviations.minCoeff() > 0) {
-      return DescribeMixture(PredictiveDensity(NoiseKernel::kNormal, values, deviations), place);
-    }
-    result_.std_dev[place] =
-        std::sqrt((values.array() - mean).square().sum() / static_cast<double>(values.size() - 1));
-    Vector sorted = values;
-    std::sort(sorted.begin(), sorted.end());
-    for (size_t i = 0; i < options_.probabilities.size(); ++i) {
-      result_.quantiles(place, static_cast<Eigen::Index>(i)) =
-          QuantileOfSamples(sorted, options_.probabilities[i]);
-    }
-  }
-
-  void DescribeMixture(const PredictiveDensity& density, Eigen::Index place) {
-    result_.std_dev[place] = density.StandardDeviation();
-    for (size_t i = 0; i < options_.probabilities.size(); ++i) {
-      result_.quantiles(place, static_cast<Eigen::Index>(i)) =
-          density.Quantile(options_.probabilities[i]);
-    }
-  }
-
-  // Relative noise before any signal: a sample of 0 is exact and says nothing.
-  void DescribeExactSample(Eigen::Index place) {
-    result_.sample_std_dev[place] = result_.std_dev[place];
-    result_.standardized_residual[place] = 0;
-    result_.sample_quantiles.row(place) = result_.quantiles.row(place);
-  }
-
-  void AddSample(const PredictiveDensity& density, double z, double residual, Eigen::Index place) {
-    const double spread = density.StandardDeviation();
-    if (place >= 0) {
-      result_.sample_std_dev[place] = spread;
-      for (size_t i = 0; i < options_.probabilities.size(); ++i) {
-        result_.sample_quantiles(place, static_cast<Eigen::Index>(i)) =
-            density.Quantile(options_.probabilities[i]);
-      }
-      result_.standardized_residual[place] = residual / spread;
-    }
-    if (std::isnan(z)) return;
-    sums_->Add({residual, residual / spread, density.LogDensity(z), density.Cumulative(z)});
-  }
-
-  const PredictionOptions& options_;
-  int channel_;
-  PredictedNoise noise_;
-  NoiseModel model_;
-  NoiseKernel kernel_ = NoiseKernel::kNormal;
-  Vector factors_;  // of the noise's scale, by draw
-  int run_ = -1;
-  std::optional<ScoreSums> sums_;
-  PredictedOutput result_;
-};
-
-// Selects the rows of an answer: at most `most` of `rows`, evenly spaced.
-class RowSelection {
- public:
-  RowSelection(int64_t rows, int64_t most) : rows_(rows), most_(std::min(rows, most)) {}
-  int64_t size() const { return most_; }
-  // Returns the place of a row in the answer; −1 if it is left out.
-  int64_t PlaceOf(int64_t row) const {
-    const int64_t place = row * most_ / rows_;
-    return row == 0 || place != (row - 1) * most_ / rows_ ? place : -1;
-  }
-
- private:
-  int64_t rows_, most_;
-};
-
-std::vector<Eigen::Index> Alive(const ConstMatrixRef& outputs) {
-  std::vector<Eigen::Index> alive;
-  for (Eigen::Index d = 0; d < outputs.rows(); ++d) {
-    if (outputs.row(d).allFinite()) alive.push_back(d);
-  }
-  return alive;
-}
-
-absl::Status TooFewTrajectories(const TrajectoryInstant& instant, size_t alive,
-                                Eigen::Index draws) {
-  return absl::FailedPreconditionError(absl::StrFormat(
-      "only %d of %d trajectories at draws of the posterior could be integrated to t = %g s of run "
-      "%d",
-      alive, draws, instant.place.time_s, instant.place.run));
-}
 
 // Returns the number of numbers that each output has at each time.
 int64_t NumbersPerTime(const PredictionOptions& options) {
   constexpr int64_t kPlain = 6;  // mean, standard deviations, sample, residuals
   return kPlain + 2 * std::ssize(options.probabilities);
+}
+
+absl::Status ValidateForecast(const PredictionOptions& options, const ResolvedProblem& problem) {
+  const double forecast_s = options.forecast_s;
+  if (!std::isfinite(forecast_s) || forecast_s < 0) {
+    return InvalidField("forecast_s", absl::StrFormat("%g must be a finite time ≥ 0", forecast_s));
+  }
+  if (forecast_s == 0) return absl::OkStatus();
+  if (!options.times.empty()) {
+    return InvalidField("forecast_s", "cannot be combined with times of their own");
+  }
+  if (problem.streamed_inputs().empty()) return absl::OkStatus();
+  return InvalidField("forecast_s",
+                      absl::StrFormat("%g needs inputs that are known in advance, and one is "
+                                      "streamed",
+                                      forecast_s));
+}
+
+// Returns the times after the record's last row to predict at.
+absl::StatusOr<std::vector<SampleRow>> ForecastTimes(const PredictionSubject& subject,
+                                                     const PredictionOptions& options) {
+  std::vector<SampleRow> times;
+  if (subject.rows == 0) return times;
+  RowBlock last;
+  POLYEST_RETURN_IF_ERROR(subject.store->Read(subject.rows - 1, 1, last));
+  const SampleRow& row = last.rows.front();
+  const double step_s = options.forecast_s / static_cast<double>(options.max_rows);
+  for (int64_t i = 1; i <= options.max_rows; ++i) {
+    const double time_s = row.time_s + static_cast<double>(i) * step_s;
+    // A step may be below the resolution of the time.
+    if (time_s > (times.empty() ? row.time_s : times.back().time_s)) {
+      times.push_back({row.run, time_s});
+    }
+  }
+  if (!times.empty()) return times;
+  return InvalidField("forecast_s",
+                      absl::StrFormat("%g is too small beside the time of the last row, %g s",
+                                      options.forecast_s, row.time_s));
 }
 
 }  // namespace
@@ -221,6 +86,13 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
                         absl::StrFormat("%g needs likelihood PREDICTION_ERROR; a perfect model is "
                                         "predicted from its parameters alone, at any time",
                                         options.horizon_s));
+  }
+  POLYEST_RETURN_IF_ERROR(ValidateForecast(options, problem));
+  if (options.smoothed && (options.horizon_s > 0 || !problem.uses_filters())) {
+    return InvalidField("smoothed", options.horizon_s > 0
+                                        ? "true leaves no sample out, unlike horizon_s"
+                                        : "true needs likelihood PREDICTION_ERROR; a perfect model "
+                                          "is predicted from all samples anyway");
   }
   POLYEST_RETURN_IF_ERROR(CheckRange("lags", options.lags, 0, kMaxPredictionLags));
   POLYEST_RETURN_IF_ERROR(CheckRange("times", std::ssize(options.times), 0, kMaxPredictionRows));
@@ -315,44 +187,89 @@ Matrix EquallyWeightedThetas(const PosteriorDraws& draws, const Prior& prior, in
   return thetas;
 }
 
+namespace {
+
+// Numbers that the smoothers of one batch of draws keep; 64 MB.
+constexpr int64_t kNumbersOfBatch = 8'000'000;
+
+// Returns how many draws are smoothed together: each keeps matrices of all states at each instant.
+Eigen::Index DrawsOfBatch(const ResolvedProblem& problem, int64_t instants) {
+  const int64_t n = std::ssize(problem.model()->description().states);
+  return std::max<int64_t>(1, kNumbersOfBatch / (instants * (3 * n * n + 3 * n)));
+}
+
+// What smoothers of all draws tell of an instant.
+struct SmoothedInstant {
+  TrajectoryInstant instant;
+  std::vector<double> samples;
+  Matrix means, deviations;  // draws × outputs
+};
+
+// Smooths batch by batch. A batch visits the same instants as the others.
+absl::StatusOr<Prediction> PredictSmoothed(const PredictionSubject& subject,
+                                           const PredictionOptions& options,
+                                           const std::vector<int>& columns, int threads,
+                                           const Stop& stop) {
+  PredictionBuilder builder(subject, options, columns);
+  const Eigen::Index draws = subject.thetas.rows();
+  const int64_t most =
+      options.times.empty() ? std::min(subject.rows, options.max_rows) : std::ssize(options.times);
+  const Eigen::Index batch = DrawsOfBatch(*subject.problem, std::max<int64_t>(1, most));
+  const FilterUse use{
+      .horizon_s = 0, .smooth = true, .visits = [&](int64_t row) { return builder.Returns(row); }};
+  std::vector<SmoothedInstant> instants;
+  int failed = 0;
+  for (Eigen::Index first = 0; first < draws; first += batch) {
+    const Eigen::Index count = std::min(batch, draws - first);
+    size_t next = 0;
+    const auto visit = [&](const TrajectoryInstant& instant, const ConstMatrixRef& means,
+                           const ConstMatrixRef& deviations) {
+      if (first == 0) {
+        instants.push_back({instant,
+                            {instant.samples.begin(), instant.samples.end()},
+                            Matrix(draws, means.cols()),
+                            Matrix(draws, means.cols())});
+      }
+      instants[next].means.middleRows(first, count) = means;
+      instants[next++].deviations.middleRows(first, count) = deviations;
+      return absl::OkStatus();
+    };
+    RecordTrajectories trajectories(*subject.problem, *subject.store,
+                                    subject.thetas.middleRows(first, count), columns, use, threads);
+    POLYEST_RETURN_IF_ERROR(trajectories.Run(subject.rows, options.times, visit, stop));
+    failed += trajectories.failed();
+  }
+  for (SmoothedInstant& smoothed : instants) {
+    smoothed.instant.samples = smoothed.samples;
+    POLYEST_RETURN_IF_ERROR(builder.Add(smoothed.instant, smoothed.means, smoothed.deviations));
+  }
+  return builder.Take(failed);
+}
+
+}  // namespace
+
 absl::StatusOr<Prediction> Predict(const PredictionSubject& subject,
                                    const PredictionOptions& options, int threads,
                                    const Stop& stop) {
+  if (options.forecast_s > 0) {
+    PredictionOptions at_times = options;
+    at_times.forecast_s = 0;
+    POLYEST_ASSIGN_OR_RETURN(at_times.times, ForecastTimes(subject, options));
+    return Predict(subject, at_times, threads, stop);
+  }
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns,
                            ChooseOutputs(*subject.problem, options.outputs));
-  const RowSelection selection(subject.rows, options.max_rows);
-  const bool by_rows = options.times.empty();
-  const int64_t times = by_rows ? selection.size() : std::ssize(options.times);
-  std::vector<OutputPrediction> outputs;
-  for (const int column : columns) outputs.emplace_back(subject, options, column, times);
-  Prediction prediction;
-  prediction.draws = static_cast<int>(subject.thetas.rows());
-  prediction.record_rows = subject.rows;
+  if (options.smoothed) return PredictSmoothed(subject, options, columns, threads, stop);
+  PredictionBuilder builder(subject, options, columns);
   RecordTrajectories trajectories(*subject.problem, *subject.store, subject.thetas, columns,
-                                  options.horizon_s, threads);
+                                  {.horizon_s = options.horizon_s, .smooth = false, .visits = {}},
+                                  threads);
   const auto visit = [&](const TrajectoryInstant& instant, const ConstMatrixRef& values,
-                         const ConstMatrixRef& deviations) -> absl::Status {
-    const std::vector<Eigen::Index> alive = Alive(values);
-    if (std::ssize(alive) < std::max(kLeastDraws, values.rows() / 2)) {
-      return TooFewTrajectories(instant, alive.size(), values.rows());
-    }
-    const bool asked = instant.row < 0;
-    Eigen::Index place = -1;
-    if (asked || by_rows)
-      place = asked ? std::ssize(prediction.rows) : selection.PlaceOf(instant.row);
-    if (place >= 0) prediction.rows.push_back(instant.place);
-    for (size_t i = 0; i < outputs.size(); ++i) {
-      const auto column = static_cast<Eigen::Index>(i);
-      const Vector spread = deviations.size() > 0 ? Vector(deviations(alive, column))
-                                                  : Vector(Vector::Zero(std::ssize(alive)));
-      outputs[i].Add(instant, values(alive, column), spread, alive, place);
-    }
-    return absl::OkStatus();
+                         const ConstMatrixRef& deviations) {
+    return builder.Add(instant, values, deviations);
   };
   POLYEST_RETURN_IF_ERROR(trajectories.Run(subject.rows, options.times, visit, stop));
-  for (OutputPrediction& output : outputs) prediction.outputs.push_back(output.Take());
-  prediction.failed = trajectories.failed();
-  return prediction;
+  return builder.Take(trajectories.failed());
 }
 
 }  // namespace polyest::internal

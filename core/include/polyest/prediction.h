@@ -44,11 +44,19 @@ struct PredictionOptions {
   // Times to predict at instead of the record's rows: in time order, in runs of the record, and
   // with streamed inputs not after the run's last row.
   std::vector<SampleRow> times;
+  // If > 0, `max_rows` evenly spaced times after the last row of the record, up to so many seconds
+  // later, instead of the record's rows; ≥ 0. Not with `times`, nor where an input is streamed,
+  // since nobody knows it yet.
+  double forecast_s = 0;
   // Of filters: the record is divided into windows of this length in s (each to the last row within
   // it of the row that it begins after), and no sample is used within its own window, so that rows
   // are forecasts up to this time ahead; ≥ 0, 0 for output errors. 0: each row is predicted from
   // all rows before it.
   double horizon_s = 0;
+  // Of filters: whether the outputs at each time are told from all samples of its run. The samples
+  // there are among them, so nothing is said of new samples, and nothing is scored. Not with
+  // `horizon_s`, nor for output errors, whose predictions are of all samples anyway.
+  bool smoothed = false;
   int lags = 50;  // of the residuals' autocorrelation, ≥ 0
   // Another record of the same problem to predict, whose samples did not enter the estimate. Its
   // runs' own parameters are drawn from the prior.
@@ -76,7 +84,7 @@ struct PredictedOutput {
   Vector std_dev;      // of the output
   Matrix quantiles;    // of the output, times × probabilities
   // The rest is empty for outputs that are not measured, and also, except for `measured` and
-  // `residual`, while noise of unknown size has not been estimated.
+  // `residual`, if smoothed or while noise of unknown size has not been estimated.
   Vector sample_std_dev;         // of a new sample
   Matrix sample_quantiles;       // of a new sample, times × probabilities
   Vector measured;               // the samples; NaN where there is none

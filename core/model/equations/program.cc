@@ -25,16 +25,23 @@ Scratch& ThreadScratch(size_t slots, Eigen::Index registers) {
 void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Block results) const {
   const Eigen::Index rows = results.rows();
   POLYEST_CHECK(rows % kLanes == 0);
-  Scratch& scratch =
-      ThreadScratch(first_register_ + static_cast<size_t>(registers_), registers_ * kRows);
+  // A kernel writes kLanes values at least.
+  const Eigen::Index values_of_time = std::ssize(of_time_) * kLanes;
+  Scratch& scratch = ThreadScratch(first_register_ + static_cast<size_t>(registers_),
+                                   values_of_time + registers_ * kRows);
   double** const slots = scratch.slots.data();
   slots[0] = &time_s;
   // Kernels only read the slots of operands, so the cast is safe: see Kernel.
   double* const constants = const_cast<double*>(constants_.data());
   for (size_t i = 0; i < constants_.size(); ++i) slots[1 + i] = constants + i;
-  for (int i = 0; i < registers_; ++i) {
-    slots[first_register_ + static_cast<size_t>(i)] = scratch.registers.data() + i * kRows;
+  double* const registers = scratch.registers.data();
+  for (size_t i = 0; i < of_time_.size(); ++i) {
+    slots[of_time_[i].result] = registers + static_cast<Eigen::Index>(i) * kLanes;
   }
+  for (int i = 0; i < registers_; ++i) {
+    slots[first_register_ + static_cast<size_t>(i)] = registers + values_of_time + i * kRows;
+  }
+  for (const Instruction& instruction : of_time_) instruction.kernel(instruction, slots, kLanes);
   for (const Eigen::Index column : zero_) results.col(column).setZero();
   for (Eigen::Index row = 0; row < rows; row += kRows) {
     for (const Load& load : loads_) {

@@ -3,10 +3,10 @@
 // Expressions compiled into a sequence of instructions without branches. Each instruction processes
 // up to kRows rows at once, which makes the cost of its dispatch small.
 //
-// Subexpressions that several expressions share are computed once. An intermediate value occupies a
-// register of kRows rows for as long as it is needed. A product that is only added or subtracted
-// once is fused with that sum into one instruction. The first run in a thread may allocate memory;
-// later runs do not.
+// Subexpressions that several expressions share are computed once, and those of the time alone once
+// for all rows. An intermediate value occupies a register of kRows rows for as long as it is
+// needed. A product that is only added or subtracted once is fused with that sum into one
+// instruction. The first run in a thread may allocate memory; later runs do not.
 
 #include <span>
 #include <vector>
@@ -40,7 +40,9 @@ class Program {
   void Run(double time_s, std::span<const ConstBlock* const> blocks, Block results) const;
 
   Eigen::Index results() const { return first_register_ - first_result_; }
+  // Instructions for each chunk of rows, and those for all rows together.
   int instructions() const { return static_cast<int>(instructions_.size()); }
+  int instructions_of_time() const { return static_cast<int>(of_time_.size()); }
   int registers() const { return registers_; }
 
  private:
@@ -51,12 +53,13 @@ class Program {
     VariablePlace place;
   };
 
+  std::vector<Instruction> of_time_;  // each has a slot of one value of its own
   std::vector<Instruction> instructions_;
   std::vector<Load> loads_;
   std::vector<double> constants_;
   std::vector<Eigen::Index> zero_;  // columns of the results that are always 0
-  // Order of the slots: the time, the constants, the loads, the columns of the results, the
-  // registers.
+  // Order of the slots: the time, the constants, the results of of_time_, the loads, the columns of
+  // the results, the registers.
   std::uint32_t first_result_ = 0;
   std::uint32_t first_register_ = 0;
   int registers_ = 0;

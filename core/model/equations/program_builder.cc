@@ -18,6 +18,7 @@ struct Step {
   int uses = 0;       // number of steps and roots that read it
   int last_use = -1;  // position of the last instruction that reads it
   bool needed = false;
+  bool of_time = false;  // whether all that it depends on is the time
   std::uint32_t slot = kNowhere;
 };
 
@@ -33,6 +34,7 @@ class ProgramBuilder {
     CountUses();
     Fuse();
     for (const NodeId root : roots_) Order(root);
+    FindThoseOfTime();
     PlaceOperands();
     PlaceResults();
     Emit();
@@ -41,18 +43,23 @@ class ProgramBuilder {
 
  private:
   Step& step(NodeId id) { return steps_[static_cast<size_t>(id)]; }
+  const Step& step(NodeId id) const { return steps_[static_cast<size_t>(id)]; }
   bool IsLeaf(NodeId id) const { return Operands(graph_.node(id).operation) == 0; }
 
   void CountUses();
   void Fuse();
   bool Draw(NodeId sum, Operation operation, NodeId product, NodeId other);
   void Order(NodeId root);
+  void FindThoseOfTime();
   void PlaceOperands();
   void PlaceLeaf(NodeId id);
   void PlaceResults();
   void Emit();
   void EmitStep(NodeId id, int position);
-  bool IsUniform(std::uint32_t slot) const { return slot < 1 + program_.constants_.size(); }
+  Instruction InstructionOf(NodeId id) const;
+  bool IsUniform(std::uint32_t slot) const {
+    return slot < 1 + program_.constants_.size() + static_cast<size_t>(of_time_);
+  }
 
   const Graph& graph_;
   const std::vector<NodeId>& roots_;
@@ -60,6 +67,7 @@ class ProgramBuilder {
   const std::vector<Lookup>& tables_;
   std::vector<Step> steps_;
   std::vector<NodeId> order_;  // the nodes to compute, operands first
+  int of_time_ = 0;            // number of steps of the time alone
   std::vector<std::uint32_t> free_registers_;
   Program program_;
 };
@@ -131,6 +139,22 @@ void ProgramBuilder::Order(NodeId root) {
   }
 }
 
+void ProgramBuilder::FindThoseOfTime() {
+  const auto depends_on_time_only = [this](NodeId id) {
+    const Node& node = graph_.node(id);
+    if (node.operation == Operation::kConstant) return true;
+    if (node.operation != Operation::kVariable) return step(id).of_time;
+    return places_[static_cast<size_t>(node.index)].block == VariablePlace::kTime;
+  };
+  for (const NodeId id : order_) {
+    Step& current = step(id);
+    current.of_time = std::ranges::all_of(current.operands, [&](NodeId operand) {
+      return operand < 0 || depends_on_time_only(operand);
+    });
+    if (current.of_time) ++of_time_;
+  }
+}
+
 void ProgramBuilder::PlaceLeaf(NodeId id) {
   const Node& node = graph_.node(id);
   if (step(id).slot != kNowhere) return;
@@ -148,8 +172,8 @@ void ProgramBuilder::PlaceLeaf(NodeId id) {
   step(id).slot = static_cast<std::uint32_t>(program_.loads_.size() - 1);
 }
 
-// Places the constants first, because the slots of the loads begin where those of the constants
-// end.
+// Places the constants first, because the slots of the steps of the time alone and then those of
+// the loads begin where those of the constants end.
 void ProgramBuilder::PlaceOperands() {
   std::vector<NodeId> leaves;
   for (const NodeId id : order_) {
@@ -163,7 +187,10 @@ void ProgramBuilder::PlaceOperands() {
   for (const NodeId id : leaves) {
     if (graph_.IsConstant(id)) PlaceLeaf(id);
   }
-  const auto first_load = 1 + static_cast<std::uint32_t>(program_.constants_.size());
+  auto first_load = 1 + static_cast<std::uint32_t>(program_.constants_.size());
+  for (const NodeId id : order_) {
+    if (step(id).of_time) step(id).slot = first_load++;
+  }
   for (const NodeId id : leaves) {
     if (graph_.IsConstant(id) || step(id).slot != kNowhere) continue;
     const size_t loads = program_.loads_.size();
@@ -190,16 +217,32 @@ void ProgramBuilder::PlaceResults() {
   }
 }
 
-void ProgramBuilder::EmitStep(NodeId id, int position) {
-  Step& current = step(id);
+// Returns the instruction that computes a node whose operands and result have slots.
+Instruction ProgramBuilder::InstructionOf(NodeId id) const {
+  const Step& current = step(id);
   Instruction instruction{};
   bool uniform[3] = {true, true, true};
   for (int i = 0; i < 3; ++i) {
     // A missing operand is replaced by the first one.
     const NodeId operand = current.operands[current.operands[i] < 0 ? 0 : i];
+    instruction.operands[i] = step(operand).slot;
+    uniform[i] = IsUniform(step(operand).slot);
+  }
+  instruction.result = current.slot;
+  instruction.kernel = SelectKernel(current.operation, uniform[0], uniform[1], uniform[2]);
+  if (IsLookup(current.operation)) {
+    instruction.lookup = &tables_[static_cast<size_t>(graph_.node(id).index)];
+  }
+  return instruction;
+}
+
+// Frees the registers of operands that are not read any more, and gives the node one if it has no
+// slot yet.
+void ProgramBuilder::EmitStep(NodeId id, int position) {
+  Step& current = step(id);
+  for (const NodeId operand : current.operands) {
+    if (operand < 0) continue;
     Step& source = step(operand);
-    instruction.operands[i] = source.slot;
-    uniform[i] = IsUniform(source.slot);
     if (source.last_use == position && source.slot >= program_.first_register_) {
       free_registers_.push_back(source.slot);
       source.last_use = -1;  // frees the register only once
@@ -213,17 +256,17 @@ void ProgramBuilder::EmitStep(NodeId id, int position) {
     current.slot = free_registers_.back();
     free_registers_.pop_back();
   }
-  instruction.result = current.slot;
-  instruction.kernel = SelectKernel(current.operation, uniform[0], uniform[1], uniform[2]);
-  if (IsLookup(current.operation)) {
-    instruction.lookup = &tables_[static_cast<size_t>(graph_.node(id).index)];
-  }
-  program_.instructions_.push_back(instruction);
+  program_.instructions_.push_back(InstructionOf(id));
 }
 
 void ProgramBuilder::Emit() {
   for (size_t position = 0; position < order_.size(); ++position) {
-    EmitStep(order_[position], static_cast<int>(position));
+    const NodeId id = order_[position];
+    if (step(id).of_time) {
+      program_.of_time_.push_back(InstructionOf(id));
+    } else {
+      EmitStep(id, static_cast<int>(position));
+    }
   }
   for (size_t i = 0; i < roots_.size(); ++i) {
     const std::uint32_t column = program_.first_result_ + static_cast<std::uint32_t>(i);
