@@ -1,5 +1,7 @@
 #include "proto/wire/convert/estimate.h"
 
+#include <algorithm>
+
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -176,6 +178,18 @@ v1::EstimateHistory::Point ToHistoryPoint(const v1::Estimate& estimate) {
     added.set_lower95(parameter.lower95());
     added.set_upper95(parameter.upper95());
     added.set_verdict(parameter.verdict());
+  }
+  for (const v1::FilteredQuantity& quantity : estimate.filtered()) {
+    const bool is_parameter = std::ranges::any_of(
+        estimate.parameters(), [&](const auto& one) { return one.name() == quantity.name(); });
+    if (!is_parameter) continue;  // a state
+    v1::EstimateHistory::Parameter& added = *point.add_drifting();
+    added.set_name(quantity.name());
+    added.set_unit(quantity.unit());
+    added.set_mean(quantity.mean());
+    added.set_std_dev(quantity.std_dev());
+    added.set_lower95(quantity.lower95());
+    added.set_upper95(quantity.upper95());
   }
   return point;
 }

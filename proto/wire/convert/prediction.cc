@@ -60,6 +60,8 @@ absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& 
     options.times.push_back({time.run(), time.time_s()});
   }
   options.horizon_s = request.horizon_s();
+  options.smoothed = request.smoothed();
+  options.forecast_s = request.forecast_s();
   if (request.lag_count() != 0) options.lags = request.lag_count();
   if (request.has_record()) {
     absl::StatusOr<Samples> record = ToSamples(request.record(), model);

@@ -12,4 +12,7 @@ namespace polyest::internal {
 // so that the parser refuses it.
 std::string WithoutAutomaticOrder(absl::string_view json);
 
+// Returns the text of a request, in which problems may be anywhere, with all those words replaced.
+std::string WithoutAutomaticOrders(absl::string_view json);
+
 }  // namespace polyest::internal
