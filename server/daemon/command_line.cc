@@ -9,6 +9,8 @@
 #include "core/common/status.h"
 #include "proto/wire/transport/loopback.h"
 #include "server/daemon/configuration.h"
+#include "server/daemon/web_options.h"
+#include "server/journal/journal_check.h"
 #include "server/security/exposure.h"
 #include "server/security/token_table.h"
 
@@ -59,6 +61,16 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
                  "sessions, those that come back, and requests without one are refused; 0: none")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
+  app.add_option("--max-connections", daemon.max_connections,
+                 "Connections that are open at a time; 0: 10000, or fewer if the limit of "
+                 "descriptors (ulimit -n) is low")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
+      ->capture_default_str();
+  app.add_option("--max-connections-per-peer", daemon.max_connections_per_peer,
+                 "Connections of one address, or of one /64 network of IPv6, that are open at a "
+                 "time; 0: half of all")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
+      ->capture_default_str();
   app.add_option("--max-compute-s", daemon.max_computing_s,
                  "Seconds that one request, or one batch of a stream, may be computed")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
@@ -77,6 +89,10 @@ void AddOperations(CLI::App& app, CommandLine& command_line, std::string& metric
                  "text, or json: one object a line, with the fields beside the message")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
+  app.add_option("--audit-log", command_line.daemon.audit_log,
+                 "File to which is appended, one JSON object a line, who has created, deleted, "
+                 "imported, exported or backed up sessions and who was not let in; opened again on "
+                 "SIGHUP and when it was renamed. By default there is none");
   app.add_option_function<int>(
          "--drain-timeout-s",
          [&](int seconds) { command_line.daemon.drain_timeout = std::chrono::seconds(seconds); },
@@ -124,6 +140,21 @@ CommandLine PrintNewToken(const std::string& words) {
   return Done(std::cout ? 0 : 1);
 }
 
+// Prints what a file made by `polyest backup` has, or what is wrong with it.
+CommandLine PrintBackupCheck(const std::string& file) {
+  const auto contents = CheckJournalFile(file);
+  if (!contents.ok()) {
+    std::cerr << "polyestd: --check-backup: " << contents.status().message() << std::endl;
+    return Done(1);
+  }
+  std::cout << file << ": " << contents->sessions << " sessions, " << contents->batches
+            << " batches" << std::endl;
+  for (const std::string& damage : contents->damage) {
+    std::cerr << "polyestd: --check-backup: " << damage << std::endl;
+  }
+  return Done(contents->damage.empty() ? 0 : 1);
+}
+
 void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::string& new_token) {
   CLI::Option* const certificate = app.add_option(
       "--tls-certificate", daemon.tls.certificate,
@@ -137,7 +168,10 @@ void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::stri
       ->needs(certificate);
   app.add_option("--tokens", daemon.token_file,
                  "File of the tokens that get in, one a line: NAME TENANT ROLE SHA256; ROLE is "
-                 "reader, writer or admin");
+                 "reader, writer, admin or operator");
+  app.add_flag("--behind-edge", daemon.behind_edge,
+               "Believe what callers on loopback say of their clients, in the headers "
+               "x-forwarded-for and x-client-certificate-name: they are the edge. Needs --tokens");
   app.add_flag("--insecure", insecure, "Listen beyond loopback without TLS and authentication");
   app.add_option("--new-token", new_token,
                  "Make a token for NAME:TENANT:ROLE and end: the secret on stdout, its line for "
@@ -169,6 +203,8 @@ struct Texts {
   std::string durability = "disk";
   std::string metrics;
   std::string new_token;
+  WebTexts web;
+  std::string backup;
   bool insecure = false;
 };
 
@@ -210,6 +246,12 @@ absl::Status Apply(const Texts& texts, DaemonOptions& daemon) {
     }
   }
   POLYEST_RETURN_IF_ERROR(Listen(texts.listen, texts.insecure, daemon));
+  POLYEST_RETURN_IF_ERROR(ApplyWebOptions(texts.web, texts.insecure, daemon));
+  if (daemon.behind_edge && daemon.token_file.empty() && !texts.insecure) {
+    return absl::FailedPreconditionError(
+        "--behind-edge: the edge passes strangers on, which needs --tokens; --insecure does "
+        "without, where the edge asks for client certificates");
+  }
   if (texts.metrics.empty()) return absl::OkStatus();
   POLYEST_ASSIGN_OR_RETURN(daemon.metrics, MetricsAddress(texts.metrics, texts.insecure));
   return absl::OkStatus();
@@ -229,9 +271,13 @@ CommandLine ParseCommandLine(int argc, char** argv) {
       ->check(CLI::Range(1, 2047))
       ->capture_default_str();
   AddSecurity(app, daemon, texts.insecure, texts.new_token);
+  AddWebOptions(app, texts.web);
   AddOperations(app, command_line, texts.metrics);
+  app.add_option("--check-backup", texts.backup,
+                 "Verify a file that `polyest backup` has written, or the journal of a daemon that "
+                 "does not run, and end: with status 0 if all of it is whole");
   app.set_version_flag("--version", "polyestd " POLYEST_VERSION);
-  AddConfiguration(app, {"--new-token"});
+  AddConfiguration(app, {"--new-token", "--check-backup"});
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
@@ -240,6 +286,7 @@ CommandLine ParseCommandLine(int argc, char** argv) {
     return Refuse(DescribeError(app, error, argc, argv));
   }
   if (!texts.new_token.empty()) return PrintNewToken(texts.new_token);
+  if (!texts.backup.empty()) return PrintBackupCheck(texts.backup);
   const std::string wrong_variable = CheckEnvironment(app, environ);
   if (!wrong_variable.empty()) return Refuse(wrong_variable);
   const absl::Status applied = Apply(texts, daemon);

@@ -1,5 +1,6 @@
 #include "server/daemon/daemon.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 #include <grpc/support/time.h>
@@ -8,6 +9,7 @@
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <future>
@@ -18,6 +20,7 @@
 #include "core/common/status.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
+#include "server/security/in_process_caller.h"
 #include "server/service/services.h"
 #include "server/telemetry/call_interceptor.h"
 #include "server/telemetry/process_info.h"
@@ -48,10 +51,11 @@ constexpr int kIntakeThreads = 4;
 // Time between two looks at the files of tokens and certificates. A change is acted on when a
 // second look finds that it has settled.
 constexpr std::chrono::seconds kWatchInterval{1};
-// Stands in the place of the port of an address that is not listened on.
-constexpr int kNotListening = -1;
+// Longest time until a new connection has ended its handshakes, TLS's and HTTP/2's.
+constexpr int kHandshakeTimeoutMs = 20'000;
 // Longest time that the last bytes of ended calls may take.
 constexpr int kFlushTimeS = 1;
+constexpr std::chrono::seconds kFlushTime{kFlushTimeS};
 // Longest time after the drain for which calls that were cancelled may still compute.
 constexpr std::chrono::seconds kGiveUp{3};
 
@@ -139,12 +143,32 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
     models = ModelLibrary(*std::move(fmus));
   }
   std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models)));
+  if (!options.audit_log.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(daemon->audit_, AuditLog::Open(options.audit_log, Now));
+  }
   POLYEST_RETURN_IF_ERROR(daemon->OpenJournal());
   POLYEST_RETURN_IF_ERROR(daemon->Secure());
   POLYEST_RETURN_IF_ERROR(daemon->OpenSessions());
+  const int64_t descriptors = RaiseDescriptorLimit();
+  daemon->listener_ = std::make_unique<Listener>(Listener::Options{
+      .limits =
+          LimitConnections(descriptors, options.max_connections, options.max_connections_per_peer),
+      .descriptors = descriptors});
   POLYEST_RETURN_IF_ERROR(daemon->TellMetrics());
+  POLYEST_RETURN_IF_ERROR(daemon->OpenWeb());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
+}
+
+void Daemon::WarnOfReadableSecrets() const {
+  for (const std::string& file : {options_.token_file, options_.tls.key}) {
+    struct stat status {};
+    if (file.empty() || stat(file.c_str(), &status) != 0 || (status.st_mode & S_IRWXO) == 0) {
+      continue;
+    }
+    spdlog::warn("{} is open to all users of this machine (mode {:04o}); chmod 0640 it", file,
+                 static_cast<unsigned>(status.st_mode & 07777));
+  }
 }
 
 absl::Status Daemon::Secure() {
@@ -154,7 +178,7 @@ absl::Status Daemon::Secure() {
     if (!file.empty()) files.push_back(file);
   }
   FileChanges changes(files);
-  AccessOptions access{options_.token_file, !options_.tls.client_ca.empty()};
+  AccessOptions access{options_.token_file, !options_.tls.client_ca.empty(), options_.behind_edge};
   POLYEST_ASSIGN_OR_RETURN(access_, AccessControl::Open(std::move(access)));
   if (!options_.tls.certificate.empty()) {
     POLYEST_ASSIGN_OR_RETURN(tls_, ServerTls::Open(options_.tls));
@@ -162,12 +186,19 @@ absl::Status Daemon::Secure() {
   if (!files.empty()) {
     watch_ = std::make_unique<FileWatch>(std::move(changes), kWatchInterval, [this] { Reload(); });
   }
+  WarnOfReadableSecrets();
   return absl::OkStatus();
 }
 
 void Daemon::Reload() {
   const std::lock_guard lock(reloading_);
-  const auto report = [](const char* what, const absl::Status& status) {
+  WarnOfReadableSecrets();
+  if (audit_ != nullptr) audit_->Reopen();
+  const auto report = [this](const char* what, const absl::Status& status) {
+    if (audit_ != nullptr) {
+      audit_->Add(absl::StrCat(what, " read again"),
+                  {{"code", absl::StatusCodeToString(status.code())}});
+    }
     if (status.ok()) {
       spdlog::info("{} read again", what);
     } else {
@@ -176,6 +207,7 @@ void Daemon::Reload() {
   };
   if (!options_.token_file.empty()) report("tokens", access_->Reload());
   if (tls_ != nullptr) report("certificates", tls_->Reload());
+  if (tls_ != nullptr && web_ != nullptr) report("certificates of --web", web_->ReloadTls());
 }
 
 // Returns how much memory gRPC may have for what clients send, before anybody knows whose it is.
@@ -185,44 +217,75 @@ int64_t Daemon::BufferBytes() const {
   return std::max(least, mb) << 20;
 }
 
+// Takes the HTTP port, but answers nobody yet.
+absl::Status Daemon::OpenWeb() {
+  if (!options_.web) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(
+      web_, WebPort::Open({.host = options_.web->host,
+                           .port = options_.web->port,
+                           .names = options_.web_hosts,
+                           .tls = options_.tls,
+                           .max_message_mb = options_.max_message_mb,
+                           .body_memory_bytes = BufferBytes(),
+                           .knows =
+                               [this](auto authorization, auto certificate) {
+                                 return access_
+                                     ->Authorize({std::move(authorization), std::move(certificate)},
+                                                 "GetStatus")
+                                     .ok();
+                               },
+                           .count = [this](int status) { metrics_.CountWebRequest(status); }}));
+  web_address_ = options_.web;
+  web_address_->port = web_->port();
+  return absl::OkStatus();
+}
+
 absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   const auto credentials =
       tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials();
-  std::vector<int> ports(addresses_.size(), kNotListening);
-  for (size_t i = 0; i < addresses_.size(); ++i) {
-    builder.AddListeningPort(addresses_[i].ToString(), credentials, &ports[i]);
+  for (ListenAddress& address : addresses_) {
+    POLYEST_RETURN_IF_ERROR(listener_->Listen(address));
   }
-  // If ports could be shared, a second daemon on the same port would silently take half of the
-  // connections.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  listener_->Serve(builder, credentials);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
   builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
   SetKeepalive(builder);
   builder.SetResourceQuota(
       grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
   for (const auto& service : services_) builder.RegisterService(service.get());
-  ObserveCalls(builder, metrics_, [this](const grpc::ServerContextBase& call) {
+  ObserveCalls(builder, metrics_, audit_.get(), [this](const grpc::ServerContextBase& call) {
     const auto caller = access_->Authorize(call, "GetStatus");
-    return caller.ok() ? LoggedCaller{caller->tenant, caller->name} : LoggedCaller();
+    LoggedCaller logged{.peer = access_->PeerOf(call)};
+    if (caller.ok()) {
+      logged.tenant = caller->tenant;
+      logged.name = caller->name;
+      logged.role = RoleName(caller->role);
+    }
+    return logged;
   });
   server_ = builder.BuildAndStart();
-  if (server_ == nullptr) {
-    // gRPC takes the addresses in their order, up to the first that it cannot listen on.
-    const auto failed = std::find(ports.begin(), ports.end(), kNotListening) - ports.begin();
-    return absl::UnavailableError(absl::StrFormat(
-        "cannot listen on %s: the port is in use or the address is not this machine's",
-        addresses_.at(std::min<size_t>(failed, addresses_.size() - 1)).ToString()));
-  }
-  for (size_t i = 0; i < addresses_.size(); ++i) addresses_[i].port = ports[i];
+  if (server_ == nullptr) return absl::InternalError("gRPC's server cannot be started");
   self_check_ = std::make_unique<SelfCheck>(*server_);
+  ServeWeb();
   for (const google::protobuf::ServiceDescriptor* const service : Services()) {
     server_->GetHealthCheckService()->SetServingStatus(service->full_name(), true);
   }
+  listener_->Start();
   readiness_.Start(server_->GetHealthCheckService(), Described());
+  if (audit_ != nullptr) audit_->Add("started", Described());
   return absl::OkStatus();
+}
+
+// Answers those who call over HTTP.
+void Daemon::ServeWeb() {
+  if (web_ == nullptr) return;
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);  // an answer is as large as it is
+  web_->Serve(server_->InProcessChannel(arguments));
 }
 
 LogFields Daemon::Described() const {
@@ -232,13 +295,16 @@ LogFields Daemon::Described() const {
                                      text->append(address.ToString());
                                    })},
           {"metrics", metrics_address_ ? metrics_address_->ToString() : ""},
-          {"tls", tls_ == nullptr ? "no" : "yes"}};
+          {"web", web_address_ ? web_address_->ToString() : ""},
+          {"tls", tls_ == nullptr ? "no" : "yes"},
+          {"connections", absl::StrCat("at most ", listener_->limits().total, ", ",
+                                       listener_->limits().per_peer, " of a peer")}};
 }
 
 absl::Status Daemon::TellMetrics() {
   if (!options_.metrics) return absl::OkStatus();
-  const auto gauges = std::make_shared<DaemonGauges>(*sessions_, executor_, calls_,
-                                                     options_.data_dir, readiness_.ready());
+  const auto gauges = std::make_shared<DaemonGauges>(
+      *sessions_, executor_, calls_, options_.data_dir, readiness_.ready(), *listener_);
   POLYEST_ASSIGN_OR_RETURN(
       metrics_endpoint_,
       MetricsEndpoint::Start(options_.metrics->ToString(), {metrics_.collectable(), gauges}));
@@ -247,16 +313,27 @@ absl::Status Daemon::TellMetrics() {
   return absl::OkStatus();
 }
 
+bool Daemon::IsAlive(std::chrono::milliseconds timeout) {
+  // Over TLS a call from within would need a certificate; there, the connection is what is tried.
+  const bool alive =
+      self_check_->Answers(timeout / 2) && listener_->Dial(timeout / 2, /*http2=*/tls_ == nullptr);
+  server_->GetHealthCheckService()->SetServingStatus("", alive);
+  return alive;
+}
+
 bool Daemon::Stop() {
   if (server_ == nullptr || closing_.joinable()) return true;
   readiness_.Drain();
+  if (audit_ != nullptr) audit_->Add("stopping", {});
   server_->GetHealthCheckService()->SetServingStatus(false);
   calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
   stop_.request_stop();
+  if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + kFlushTime);
   // gRPC waits for every call, also for those that do not look at their stop.
   std::promise<void> closed;
   const std::future<void> is_closed = closed.get_future();
   closing_ = std::jthread([this, closed = std::move(closed)]() mutable {
+    listener_->Stop();
     server_->Shutdown(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
                                    gpr_time_from_seconds(kFlushTimeS, GPR_TIMESPAN)));
     server_->Wait();
@@ -270,6 +347,7 @@ bool Daemon::Stop() {
 Daemon::~Daemon() {
   Stop();
   if (closing_.joinable()) closing_.join();
+  web_ = nullptr;
   self_check_ = nullptr;
   server_ = nullptr;
   metrics_endpoint_ = nullptr;

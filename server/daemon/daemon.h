@@ -18,6 +18,7 @@
 #include "core/fmu/model_library.h"
 #include "server/daemon/daemon_gauges.h"
 #include "server/daemon/listen_address.h"
+#include "server/daemon/listener.h"
 #include "server/daemon/readiness.h"
 #include "server/daemon/self_check.h"
 #include "server/execution/executor.h"
@@ -27,9 +28,11 @@
 #include "server/service/open_calls.h"
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
+#include "server/telemetry/audit_log.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
 #include "server/telemetry/structured_log.h"
+#include "server/web/web_port.h"
 
 namespace polyest::internal {
 
@@ -46,9 +49,16 @@ struct DaemonOptions {
   int64_t max_computing_s = 3'600;  // computing time of one call, or of one batch of a stream
   std::string fmu_dir{};            // folder of the FMUs that problems may name; empty: none
   std::chrono::seconds drain_timeout{10};
-  std::string token_file{};                // empty: no tokens are asked for
-  TlsFiles tls{};                          // without a certificate: no TLS
+  std::string token_file{};  // empty: no tokens are asked for
+  TlsFiles tls{};            // without a certificate: no TLS
+  bool behind_edge = false;  // callers on loopback are an edge (AccessOptions)
+  // Connections that are open at a time, in all and of one peer; 0: as LimitConnections says.
+  int64_t max_connections = 0;
+  int64_t max_connections_per_peer = 0;
+  std::string audit_log{};                 // file of the audit log; empty: none
   std::optional<ListenAddress> metrics{};  // address of the metrics' endpoint; none: no endpoint
+  std::optional<ListenAddress> web{};      // address of the HTTP port; none: no such port
+  std::vector<std::string> web_hosts{};    // other names by which HTTP clients may call the daemon
 };
 
 class Daemon {
@@ -64,13 +74,19 @@ class Daemon {
   const std::vector<ListenAddress>& addresses() const { return addresses_; }
   // Returns the address of its metrics, if there is one, with the port chosen.
   const std::optional<ListenAddress>& metrics_address() const { return metrics_address_; }
+  // Returns the address of its HTTP port, if there is one, with the port chosen.
+  const std::optional<ListenAddress>& web_address() const { return web_address_; }
+  // Returns whether its ports are encrypted.
+  bool encrypts() const { return tls_ != nullptr; }
 
   // Reads the tokens and the certificates again, as happens by itself when their files change. If
   // they cannot be used, logs that and keeps the old ones.
   void Reload();
 
-  // Returns whether it answers calls. Must not be called by two threads at once, nor during Stop.
-  bool IsAlive(std::chrono::milliseconds timeout) const { return self_check_->Answers(timeout); }
+  // Returns whether it accepts connections at its addresses and answers calls, and sets the state
+  // of its health service "" accordingly. Must not be called by two threads at once, nor during
+  // Stop.
+  bool IsAlive(std::chrono::milliseconds timeout);
 
   // Refuses new work, lets each stream send its last estimate and end UNAVAILABLE, then closes the
   // sockets. Calls that have not ended within the drain time-out are cancelled. Returns false if
@@ -82,7 +98,11 @@ class Daemon {
   Daemon(const DaemonOptions& options, ModelLibrary models);
   absl::Status OpenJournal();
   absl::Status OpenSessions();
+  // Logs which of the files that hold secrets others may read.
+  void WarnOfReadableSecrets() const;
   absl::Status Secure();
+  absl::Status OpenWeb();
+  void ServeWeb();
   absl::Status Listen();
   int64_t BufferBytes() const;
   absl::Status TellMetrics();
@@ -98,6 +118,7 @@ class Daemon {
   std::stop_source stop_;
   OpenCalls calls_;
   Metrics metrics_;
+  std::unique_ptr<AuditLog> audit_;  // null without one
   Readiness readiness_;
   // The following members are declared in the order in which they need each other: the executors
   // finish their tasks, which use the journal, before the journal is destroyed.
@@ -107,7 +128,10 @@ class Daemon {
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
+  std::unique_ptr<Listener> listener_;
   std::unique_ptr<grpc::Server> server_;
+  std::optional<ListenAddress> web_address_;
+  std::unique_ptr<WebPort> web_;
   std::jthread closing_;  // closes the server during Stop
   std::unique_ptr<SelfCheck> self_check_;
   std::unique_ptr<FileWatch> watch_;  // null without files to watch

@@ -43,6 +43,13 @@ std::vector<prometheus::MetricFamily> DaemonGauges::Collect() const {
       executor_.waiting());
   Add(families, "process_resident_memory_bytes", "Resident memory of the process.",
       static_cast<double>(ResidentMemoryBytes()));
+  Add(families, "polyest_connections", "Open connections of clients.",
+      static_cast<double>(listener_.open()));
+  Add(families, "polyest_refused_connections",
+      "Connections refused since the start, because too many were open.",
+      static_cast<double>(listener_.refused()));
+  Add(families, "process_open_fds", "Descriptors that the process has open.",
+      static_cast<double>(OpenDescriptors()));
   if (!data_dir_.empty()) CollectDisk(families);
   return families;
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "server/daemon/listener.h"
 #include "server/execution/executor.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
@@ -20,12 +21,13 @@ class DaemonGauges final : public prometheus::Collectable {
   // Refers to objects that must outlive it. `data_dir` is the journal's folder; empty when the
   // journal is not on disk.
   DaemonGauges(const SessionRegistry& sessions, const Executor& executor, const OpenCalls& calls,
-               std::string data_dir, const std::atomic<bool>& ready)
+               std::string data_dir, const std::atomic<bool>& ready, Listener& listener)
       : sessions_(sessions),
         executor_(executor),
         calls_(calls),
         data_dir_(std::move(data_dir)),
-        ready_(ready) {}
+        ready_(ready),
+        listener_(listener) {}
 
   std::vector<prometheus::MetricFamily> Collect() const override;
 
@@ -38,6 +40,7 @@ class DaemonGauges final : public prometheus::Collectable {
   const OpenCalls& calls_;
   const std::string data_dir_;
   const std::atomic<bool>& ready_;
+  Listener& listener_;
 };
 
 }  // namespace polyest::internal

@@ -47,6 +47,10 @@ void Announce(const polyest::internal::Daemon& daemon) {
   if (const auto& metrics = daemon.metrics_address()) {
     std::printf("metrics on %s\n", metrics->ToString().c_str());
   }
+  if (const auto& web = daemon.web_address()) {
+    std::printf("web page on %s://%s/\n", daemon.encrypts() ? "https" : "http",
+                web->ToString().c_str());
+  }
   std::fflush(stdout);
   polyest::internal::ReportReady("listening on " + addresses);
 }

@@ -15,6 +15,8 @@ namespace {
 // Number of reports within the manager's time-out, so that two in a row may come late before it
 // acts.
 constexpr int kReportsPerTimeout = 3;
+// Time between two checks where no manager asks for reports.
+constexpr std::chrono::milliseconds kOwnInterval = std::chrono::seconds(10);
 
 // Returns the time-out that the manager asks for; zero without a watchdog.
 std::chrono::microseconds WatchdogTimeout() {
@@ -36,19 +38,22 @@ void ReportStopping() { Report("STOPPING=1\nSTATUS=draining"); }
 
 Watchdog::Watchdog(IsAlive is_alive) : is_alive_(std::move(is_alive)) {
   const auto timeout = std::chrono::duration_cast<std::chrono::milliseconds>(WatchdogTimeout());
-  if (timeout.count() == 0) return;
-  const auto interval = std::max(timeout / kReportsPerTimeout, std::chrono::milliseconds(1));
-  thread_ = std::jthread([this, interval](std::stop_token stop) { Run(stop, interval); });
+  const bool reports = timeout.count() > 0;
+  const auto interval =
+      reports ? std::max(timeout / kReportsPerTimeout, std::chrono::milliseconds(1)) : kOwnInterval;
+  thread_ = std::jthread(
+      [this, interval, reports](std::stop_token stop) { Run(stop, interval, reports); });
 }
 
-void Watchdog::Run(std::stop_token stop, std::chrono::milliseconds interval) const {
+void Watchdog::Run(std::stop_token stop, std::chrono::milliseconds interval, bool reports) const {
   std::mutex mutex;
   std::condition_variable_any stopped;
   while (!stop.stop_requested()) {
-    if (is_alive_(interval)) {
+    if (!is_alive_(interval)) {
+      spdlog::warn("the daemon does not answer itself{}",
+                   reports ? ": the service manager's watchdog is not fed" : "");
+    } else if (reports) {
       Report("WATCHDOG=1");
-    } else {
-      spdlog::warn("the daemon does not answer itself: the service manager's watchdog is not fed");
     }
     std::unique_lock lock(mutex);
     stopped.wait_for(lock, stop, interval, [] { return false; });

@@ -17,9 +17,10 @@ void ReportReady(const std::string& status);
 // and its watchdog sleeps.
 void ReportStopping();
 
-// Feeds the manager's watchdog as long as the daemon is alive; the manager kills a daemon that is
-// not, and starts it again, after WatchdogSec. Runs a thread of its own, and none when no watchdog
-// is asked for.
+// Checks again and again whether the daemon is alive, from a thread of its own: three times in
+// WatchdogSec, or every 10 s when the manager asks for no watchdog. Feeds the manager's watchdog as
+// long as the daemon is; the manager kills a daemon that is not, and starts it again, after
+// WatchdogSec.
 class Watchdog {
  public:
   // Returns whether the daemon works; answers within the given time.
@@ -32,7 +33,7 @@ class Watchdog {
   ~Watchdog() = default;
 
  private:
-  void Run(std::stop_token stop, std::chrono::milliseconds interval) const;
+  void Run(std::stop_token stop, std::chrono::milliseconds interval, bool reports) const;
 
   const IsAlive is_alive_;
   std::jthread thread_;

@@ -19,6 +19,8 @@ Sha256Digest Sha256(std::string_view bytes);
 std::string Digest(std::string_view bytes);
 
 // Returns bytes that are the same for equal messages, in this and any later run of the program.
+// Leaves out fields that this version does not know, wherever they are: they mean nothing here, and
+// nobody counts what they hold.
 std::string DeterministicBytes(const google::protobuf::Message& message);
 
 }  // namespace polyest::internal

@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 constexpr char kJournal[] = "journal.db";
 constexpr char kLock[] = "lock";
 constexpr char kSeals[] = "seals";
+constexpr char kBackup[] = "backup.db";
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
 // The bits of a mode by which the group and all others may read, write or enter.
@@ -32,10 +33,11 @@ constexpr mode_t kPermissions = 07777;
 
 std::string ErrnoText() { return std::strerror(errno); }
 
-// Returns whether a file is the journal's own: its lock, its seals, SQLite's file, or one that
-// SQLite puts beside it.
+// Returns whether a file is the journal's own: its lock, its seals, SQLite's file or a backup of
+// it, or one that SQLite puts beside these.
 bool IsOwn(const std::string& name) {
-  return name == kLock || name == kSeals || absl::StartsWith(name, kJournal);
+  return name == kLock || name == kSeals || absl::StartsWith(name, kJournal) ||
+         absl::StartsWith(name, kBackup);
 }
 
 // Returns the permissions of a file or folder.
@@ -119,6 +121,13 @@ absl::Status MakeJournalFile(const std::string& file) {
   return absl::OkStatus();
 }
 
+// Removes what a backup has left that was being made when the daemon was killed.
+void RemoveBackup(const std::string& file) {
+  for (const char* const suffix : {"", "-journal", "-wal", "-shm"}) {
+    unlink((file + suffix).c_str());
+  }
+}
+
 // Locks the folder for this process and returns the descriptor of the locked file.
 absl::StatusOr<int> Lock(const std::string& folder) {
   const std::string file = absl::StrCat(folder, "/", kLock);
@@ -140,16 +149,31 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Take(const std::string& 
   POLYEST_RETURN_IF_ERROR(MakeFolderPrivate(folder));
   POLYEST_ASSIGN_OR_RETURN(const int lock, Lock(folder));
   std::unique_ptr<DataFolder> taken(new DataFolder(folder, lock));
+  RemoveBackup(taken->backup_file());
   POLYEST_RETURN_IF_ERROR(MakeFilesPrivate(folder));
   POLYEST_RETURN_IF_ERROR(MakeJournalFile(taken->journal_file()));
+  POLYEST_RETURN_IF_ERROR(taken->LockJournal());
   return taken;
 }
 
 DataFolder::DataFolder(const std::string& folder, int lock)
     : journal_file_(absl::StrCat(folder, "/", kJournal)),
       seals_file_(absl::StrCat(folder, "/", kSeals)),
+      backup_file_(absl::StrCat(folder, "/", kBackup)),
       lock_(lock) {}
 
-DataFolder::~DataFolder() { close(lock_); }
+absl::Status DataFolder::LockJournal() {
+  journal_lock_ = open(journal_file_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (journal_lock_ >= 0 && flock(journal_lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "another daemon uses %s, though not the lock beside it; stop it first", journal_file_));
+  }
+  return absl::OkStatus();
+}
+
+DataFolder::~DataFolder() {
+  if (journal_lock_ >= 0) close(journal_lock_);
+  close(lock_);
+}
 
 }  // namespace polyest::internal

@@ -28,15 +28,22 @@ class DataFolder {
   // Returns the path of the journal's file. SQLite gives the files that it puts beside it the same
   // mode.
   const std::string& journal_file() const { return journal_file_; }
+  // Returns the path of a backup that is being made.
+  const std::string& backup_file() const { return backup_file_; }
   // Returns the path of the file of seals (SessionSeals).
   const std::string& seals_file() const { return seals_file_; }
 
  private:
   DataFolder(const std::string& folder, int lock);
+  // Locks the journal's file, too, because anybody may remove the lock's file, which then locks
+  // nothing.
+  absl::Status LockJournal();
 
   const std::string journal_file_;
   const std::string seals_file_;
-  const int lock_;  // descriptor of the locked file
+  const std::string backup_file_;
+  const int lock_;         // descriptor of the locked file
+  int journal_lock_ = -1;  // and of the journal's. Once it is closed, SQLite's locks are gone
 };
 
 }  // namespace polyest::internal

@@ -14,13 +14,16 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "polyest/samples.h"
+#include "polyest/stop.h"
 #include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
+#include "server/journal/journal_backup.h"
 
 namespace polyest::internal {
 
@@ -88,6 +91,10 @@ class SessionJournal {
   // Checks that the journal can be written: writes something and removes it again. Waits for the
   // disk.
   virtual absl::Status CheckWritable() { return absl::OkStatus(); }
+  // Copies everything kept until now into a file, verifies the copy and returns it. Holds up no
+  // write. FAILED_PRECONDITION when the journal is in memory; RESOURCE_EXHAUSTED when there is no
+  // room for the copy, or as long as another one exists; the errors of `stop`.
+  virtual absl::StatusOr<std::unique_ptr<JournalBackup>> BackUp(const Stop& stop);
 
   // Returns all sessions that are not hidden, in the order of tenants and names.
   virtual absl::StatusOr<std::vector<SessionHead>> Heads() const = 0;

@@ -31,6 +31,8 @@ class SqliteDatabase {
  public:
   // Opens a file; makes it if there is none.
   static absl::StatusOr<std::unique_ptr<SqliteDatabase>> Open(const std::string& file);
+  // Opens a file that nobody writes to; never changes it.
+  static absl::StatusOr<std::unique_ptr<SqliteDatabase>> OpenToRead(const std::string& file);
   ~SqliteDatabase();
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
@@ -47,6 +49,8 @@ class SqliteDatabase {
  private:
   friend class SqliteQuery;
 
+  // `flags` are those of SQLite.
+  static absl::StatusOr<std::unique_ptr<SqliteDatabase>> Open(const std::string& file, int flags);
   explicit SqliteDatabase(sqlite3* database) : database_(database) {}
   // Returns the statement for `sql`, which is prepared once for each text. The text must outlive
   // the connection.

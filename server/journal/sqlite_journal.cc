@@ -8,6 +8,7 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/journal/journal_check.h"
 #include "server/journal/seal_check.h"
 #include "server/journal/session_digest.h"
 #include "server/journal/sqlite_schema.h"
@@ -70,6 +71,8 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   const absl::Status prepared = SetUpWriter(**writer, options.max_mb);
   if (!prepared.ok()) return named(prepared);
   POLYEST_ASSIGN_OR_RETURN(auto seals, SessionSeals::Open(folder->seals_file()));
+  const absl::Status restored = RestoreBackupSeals(**writer, *seals);
+  if (!restored.ok()) return named(restored);
   auto found = CheckSeals(**writer, *seals);
   if (!found.ok()) return named(found.status());
   auto maintainer = SqliteDatabase::Open(file);

@@ -42,6 +42,7 @@ class SqliteJournal final : public SessionJournal {
 
   bool durable() const override { return true; }
   absl::Status CheckWritable() override;
+  absl::StatusOr<std::unique_ptr<JournalBackup>> BackUp(const Stop& stop) override;
   absl::StatusOr<std::vector<SessionHead>> Heads() const override;
   absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
                                  bool hidden) override;
@@ -68,6 +69,9 @@ class SqliteJournal final : public SessionJournal {
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
                 std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
                 std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+  absl::StatusOr<std::vector<Seal>> BeginSnapshot(SqliteDatabase& source);
+  // Copies the journal into a file that is open as `descriptor`, and verifies the copy.
+  absl::StatusOr<JournalContents> CopyTo(const std::string& file, int descriptor, const Stop& stop);
   void SealCommit(bool kept);
   void ReadTenants(SqliteDatabase& database);
   // Returns the lane of the commit queue in which a session is written: its tenant's.
@@ -94,6 +98,9 @@ class SqliteJournal final : public SessionJournal {
   const std::unique_ptr<SessionSeals> seals_;
   // Seals of the commit under way, null for deleted sessions. Used by the writing thread only.
   std::map<int64_t, std::optional<Seal>> unsealed_;
+
+  // Whether there is a backup. Backups may outlive the journal.
+  const std::shared_ptr<std::atomic<bool>> backing_up_ = std::make_shared<std::atomic<bool>>(false);
 
   std::unique_ptr<CommitQueue> queue_;
   std::jthread maintenance_thread_;

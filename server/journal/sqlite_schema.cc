@@ -89,6 +89,16 @@ absl::Status Migrate(SqliteDatabase& database, int64_t from, int to) {
 
 int JournalSchemaVersion() { return static_cast<int>(std::size(kMigrations)); }
 
+absl::Status CheckJournalVersion(SqliteDatabase& database) {
+  POLYEST_ASSIGN_OR_RETURN(const int64_t version, CheckOwn(database));
+  if (version == JournalSchemaVersion()) return absl::OkStatus();
+  if (version == 0) return absl::FailedPreconditionError("is empty");
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "has the format %d of an earlier version of polyest; a daemon that opens it makes it format "
+      "%d",
+      version, JournalSchemaVersion()));
+}
+
 absl::Status PrepareSchema(SqliteDatabase& database, int version) {
   POLYEST_ASSIGN_OR_RETURN(const int64_t present, CheckOwn(database));
   if (present >= version) return absl::OkStatus();

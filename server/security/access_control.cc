@@ -11,18 +11,25 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "server/security/in_process_caller.h"
+#include "server/security/peer.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr absl::string_view kScheme = "Bearer ";
 
-Identification IdentificationOf(const grpc::ServerContextBase& call) {
+Identification IdentificationOf(const grpc::ServerContextBase& call, bool behind_edge) {
   Identification identification;
   const auto& metadata = call.client_metadata();
   if (metadata.count("authorization") == 1) {
     const grpc::string_ref value = metadata.find("authorization")->second;
     identification.authorization.emplace(value.data(), value.size());
+  }
+  const std::string web_certificate = WebCertificateOf(call);
+  if (!web_certificate.empty()) identification.certificate_name = web_certificate;
+  if (behind_edge && IsFromEdge(call)) {
+    identification.certificate_name = EdgeHeader(call, kCertificateNameKey);
   }
   const auto transport = call.auth_context();
   if (transport != nullptr) {
@@ -68,7 +75,7 @@ absl::StatusOr<Caller> AccessControl::Identify(const Identification& identificat
   const auto known = tokens();
   if (known == nullptr) {
     Caller caller;
-    if (options_.client_certificates) {
+    if (options_.client_certificates || identification.certificate_name) {
       caller.name = identification.certificate_name.value_or("unnamed");
     }
     return caller;
@@ -96,7 +103,13 @@ absl::StatusOr<Caller> AccessControl::Authorize(const Identification& identifica
 
 absl::StatusOr<Caller> AccessControl::Authorize(const grpc::ServerContextBase& call,
                                                 Method method) const {
-  return Authorize(IdentificationOf(call), method);
+  return Authorize(IdentificationOf(call, options_.behind_edge), method);
+}
+
+std::string AccessControl::PeerOf(const grpc::ServerContextBase& call) const {
+  const std::optional<std::string> forwarded =
+      options_.behind_edge && IsFromEdge(call) ? EdgeHeader(call, kForwardedForKey) : std::nullopt;
+  return forwarded ? absl::StrCat("edge:", *forwarded) : polyest::internal::PeerOf(call);
 }
 
 }  // namespace polyest::internal

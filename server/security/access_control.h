@@ -20,6 +20,7 @@ namespace polyest::internal {
 struct AccessOptions {
   std::string token_file{};          // empty: no tokens are asked for
   bool client_certificates = false;  // the transport lets in only clients that have one
+  bool behind_edge = false;          // callers on loopback are an edge that says who calls (peer.h)
 };
 
 // Holds what a call says about its caller.
@@ -36,9 +37,13 @@ class AccessControl {
 
   // Returns the caller. UNAUTHENTICATED without a known token, where tokens are asked for;
   // PERMISSION_DENIED when the caller's role may not call the method. With client certificates
-  // alone, their holders are admins of the tenant "default"; without authentication everybody is.
+  // alone, their holders are operators in the tenant "default"; without authentication everybody
+  // is.
   absl::StatusOr<Caller> Authorize(const grpc::ServerContextBase& call, Method method) const;
   absl::StatusOr<Caller> Authorize(const Identification& identification, Method method) const;
+
+  // Returns where a call comes from, as the edge says if there is one.
+  std::string PeerOf(const grpc::ServerContextBase& call) const;
 
   // Reads the tokens again; keeps the old ones if that fails.
   absl::Status Reload();

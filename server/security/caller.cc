@@ -14,12 +14,14 @@ std::string RoleName(Role role) {
       return "writer";
     case Role::kAdmin:
       return "admin";
+    case Role::kOperator:
+      return "operator";
   }
   return "";
 }
 
 std::optional<Role> ParseRole(absl::string_view name) {
-  for (const Role role : {Role::kReader, Role::kWriter, Role::kAdmin}) {
+  for (const Role role : {Role::kReader, Role::kWriter, Role::kAdmin, Role::kOperator}) {
     if (name == RoleName(role)) return role;
   }
   return std::nullopt;

@@ -9,10 +9,11 @@
 
 namespace polyest::internal {
 
-// Each role may do what those before it may.
-enum class Role { kReader, kWriter, kAdmin };
+// Each role may do what those before it may. The first three are roles in the caller's tenant; an
+// operator also has what concerns the sessions of all tenants.
+enum class Role { kReader, kWriter, kAdmin, kOperator };
 
-// Returns "reader", "writer" or "admin".
+// Returns "reader", "writer", "admin" or "operator".
 std::string RoleName(Role role);
 // Returns the role of this name; nothing for any other word.
 std::optional<Role> ParseRole(absl::string_view name);
@@ -20,7 +21,7 @@ std::optional<Role> ParseRole(absl::string_view name);
 // Describes a caller. The defaults hold for everybody where there is no authentication.
 struct Caller {
   std::string tenant = "default";  // sees its own sessions only
-  Role role = Role::kAdmin;
+  Role role = Role::kOperator;
   std::string name = "anonymous";  // for logs
 };
 

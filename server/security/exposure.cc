@@ -16,7 +16,7 @@ absl::Status CheckExposure(const Exposure& exposure) {
   if (!exposure.authentication) {
     absl::StrAppend(&missing, missing.empty() ? "" : ", and ", authentication);
   }
-  return absl::FailedPreconditionError(absl::StrCat("--listen: ", exposure.host,
+  return absl::FailedPreconditionError(absl::StrCat(exposure.option, ": ", exposure.host,
                                                     " is beyond loopback, which needs ", missing,
                                                     "; --insecure does without"));
 }

@@ -11,8 +11,9 @@ namespace polyest::internal {
 struct Exposure {
   std::string host;  // to listen on
   bool tls = false;
-  bool authentication = false;  // by tokens or certificates
-  bool insecure = false;        // whether the user wants to do without (--insecure)
+  bool authentication = false;      // by tokens or certificates
+  bool insecure = false;            // whether the user wants to do without (--insecure)
+  const char* option = "--listen";  // that names the host
 };
 
 // Refuses with FAILED_PRECONDITION, naming what is missing, a host beyond loopback without both TLS

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <set>
 
+#include "polyest/v1/backup_service.pb.h"
 #include "polyest/v1/model_service.pb.h"
 #include "polyest/v1/operation_service.pb.h"
 #include "polyest/v1/problem_service.pb.h"
@@ -18,6 +19,7 @@ ServiceDescriptors Services() {
           v1::CreateSessionRequest::descriptor()->file()->service(0),
           v1::ComputeEstimateRequest::descriptor()->file()->service(0),
           v1::StartComputationRequest::descriptor()->file()->service(0),
+          v1::DownloadBackupRequest::descriptor()->file()->service(0),
           v1::GetStatusRequest::descriptor()->file()->service(0)};
 }
 

@@ -53,6 +53,7 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"CancelOperation", Role::kReader},
     {"DeleteOperation", Role::kReader},
     {"GetStatus", Role::kReader},
+    {"DownloadBackup", Role::kOperator},
 };
 
 // Returns the entry of a method; null when there is none.

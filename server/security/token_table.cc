@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kWordRule[] =
     "must be 1 to 64 letters, digits, '.', '-' and '_', the first a letter or a digit";
-constexpr char kRoleRule[] = "the role must be reader, writer or admin";
+constexpr char kRoleRule[] = "the role must be reader, writer, admin or operator";
 
 absl::StatusOr<Caller> ParseCaller(absl::string_view name, absl::string_view tenant,
                                    absl::string_view role_name) {

@@ -4,8 +4,9 @@ namespace polyest::internal {
 
 std::vector<std::unique_ptr<grpc::Service>> MakeServices(const ServiceContext& context) {
   std::vector<std::unique_ptr<grpc::Service>> services;
-  for (const auto make : {MakeModelService, MakeProblemService, MakeSessionService,
-                          MakeStudyService, MakeOperationService, MakeStatusService}) {
+  for (const auto make :
+       {MakeModelService, MakeProblemService, MakeSessionService, MakeStudyService,
+        MakeOperationService, MakeBackupService, MakeStatusService}) {
     services.push_back(make(context));
   }
   return services;

@@ -18,6 +18,7 @@ std::unique_ptr<grpc::Service> MakeStudyService(const ServiceContext& context);
 // Makes the service that keeps the operations. Its destructor cancels those under way and waits for
 // their ends.
 std::unique_ptr<grpc::Service> MakeOperationService(const ServiceContext& context);
+std::unique_ptr<grpc::Service> MakeBackupService(const ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeStatusService(const ServiceContext& context);
 
 // Makes all services. They must be destroyed before what the context refers to.

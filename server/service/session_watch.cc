@@ -28,6 +28,7 @@ v1::PredictRequest ToPredictRequest(const PredictionPolicy& policy) {
   *request.mutable_outputs() = policy.outputs();
   request.set_draw_count(policy.draw_count() == 0 ? kDraws : policy.draw_count());
   request.set_max_row_count(policy.max_row_count() == 0 ? kRows : policy.max_row_count());
+  request.set_forecast_s(policy.forecast_s());
   return request;
 }
 
@@ -38,11 +39,14 @@ std::chrono::duration<double> IntervalOf(const PredictionPolicy& policy) {
 }
 
 absl::Status CheckPolicy(const PredictionPolicy& policy) {
-  constexpr double kLongest = 86'400;
-  const double interval_s = policy.min_interval_s();
-  if (interval_s >= 0 && interval_s <= kLongest) return absl::OkStatus();
-  return InvalidField(FieldPath{"prediction", "minIntervalS"},
-                      absl::StrFormat("%g must be from 0 to %g", interval_s, kLongest));
+  static constexpr double kLongest = 86'400;
+  const auto check = [](const char* field, double value_s) -> absl::Status {
+    if (value_s >= 0 && value_s <= kLongest) return absl::OkStatus();
+    return InvalidField(FieldPath{"prediction", field},
+                        absl::StrFormat("%g must be from 0 to %g", value_s, kLongest));
+  };
+  POLYEST_RETURN_IF_ERROR(check("minIntervalS", policy.min_interval_s()));
+  return check("forecastS", policy.forecast_s());
 }
 
 }  // namespace

@@ -70,6 +70,7 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   if (!problem.ParseFromString(head.problem())) {
     return InvalidField("record.head.problem", "must be a serialized Problem");
   }
+  problem.clear_schema();
   const SessionServices& services = registry_.services();
   POLYEST_ASSIGN_OR_RETURN(auto loaded,
                            LoadedSession::Make(problem, services.models, services.limits.problem,

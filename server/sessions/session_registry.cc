@@ -73,7 +73,10 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
       auto loaded,
       LoadedSession::Make(problem, services_.models, services_.limits.problem, reorder_window_s));
   head.create_time = clock_();
-  const auto number = services_.journal.Create(head, problem, /*hidden=*/false);
+  // The address of the schema is for editors, and may be of any length.
+  v1::Problem kept = problem;
+  kept.clear_schema();
+  const auto number = services_.journal.Create(head, kept, /*hidden=*/false);
   if (absl::IsAlreadyExists(number.status())) {
     return absl::AlreadyExistsError(
         absl::StrFormat("there is a session \"%s\" already", head.name));

@@ -86,15 +86,26 @@ bool MayTellReason(grpc::StatusCode code) {
          code == grpc::StatusCode::UNAUTHENTICATED || code == grpc::StatusCode::PERMISSION_DENIED;
 }
 
+// Returns whether the audit log has a call.
+bool IsAudited(absl::string_view method, grpc::StatusCode code) {
+  return code == grpc::StatusCode::UNAUTHENTICATED || code == grpc::StatusCode::PERMISSION_DENIED ||
+         method == "CreateSession" || method == "DeleteSession" || method == "ImportSession" ||
+         method == "ExportSession" || method == "DownloadBackup";
+}
+
+// What all calls of a server share.
+struct Observers {
+  Metrics& metrics;
+  AuditLog* audit;  // null without one
+  const CallerOf caller_of;
+  LogLimit refusals{kRefusalBurst, kRefusalsASecond};
+  LogLimit audited_refusals{kRefusalBurst, kRefusalsASecond};
+};
+
 class CallInterceptor final : public grpc::experimental::Interceptor {
  public:
-  CallInterceptor(ServerRpcInfo& call, Metrics& metrics, const CallerOf& caller_of,
-                  LogLimit& refusals)
-      : call_(call),
-        metrics_(metrics),
-        caller_of_(caller_of),
-        refusals_(refusals),
-        method_(MethodName(call.method())) {}
+  CallInterceptor(ServerRpcInfo& call, Observers& observers)
+      : call_(call), observers_(observers), method_(MethodName(call.method())) {}
 
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
@@ -136,35 +147,55 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
   void OnEnd(const grpc::Status& status) {
     const std::chrono::duration<double> duration = Clock::now() - begin_;
     const bool unary = call_.type() == ServerRpcInfo::Type::UNARY;
-    metrics_.Count(Metrics::Call{method_, CodeName(status), unary, duration.count()});
+    observers_.metrics.Count(Metrics::Call{method_, CodeName(status), unary, duration.count()});
     const bool changes_sessions =
         method_ == "CreateSession" || method_ == "DeleteSession" || method_ == "ImportSession";
     const auto level = LevelOf(status.error_code(), changes_sessions);
+    const bool audited = observers_.audit != nullptr && IsAudited(method_, status.error_code());
+    if (!audited && !IsLogged(level)) return;
+    const LoggedCaller caller = observers_.caller_of(*call_.server_context());
+    if (audited) Audit(status, caller);
     if (!IsLogged(level)) return;
-    const LoggedCaller caller = caller_of_(*call_.server_context());
-    std::optional<int64_t> suppressed = 0;
-    if (!status.ok()) {
-      // Strangers share one limit, and so do the callers of each tenant.
-      suppressed = refusals_.Admit(absl::StrCat(CodeName(status), " ", caller.tenant));
-    }
+    const auto suppressed = Admit(observers_.refusals, status, caller);
     if (!suppressed) return;
-    Log(level, "call",
-        {{"request", id_},
-         {"method", method_},
-         {"session", session_},
-         {"tenant", caller.tenant},
-         {"caller", caller.name},
-         {"peer", call_.server_context()->peer()},
-         {"code", CodeName(status)},
-         {"duration_s", absl::StrFormat("%.6f", duration.count())},
-         {"reason", MayTellReason(status.error_code()) ? status.error_message() : ""},
-         {"suppressed", *suppressed > 0 ? absl::StrCat(*suppressed) : ""}});
+    LogFields fields = Described(status, caller);
+    fields.emplace_back("duration_s", absl::StrFormat("%.6f", duration.count()));
+    fields.emplace_back("reason", MayTellReason(status.error_code()) ? status.error_message() : "");
+    fields.emplace_back("suppressed", *suppressed);
+    Log(level, "call", fields);
+  }
+
+  // Returns whether a line about a call may be written, and if so, how many were not before; empty
+  // for none. Strangers share one limit, and so do the callers of each tenant.
+  static std::optional<std::string> Admit(LogLimit& limit, const grpc::Status& status,
+                                          const LoggedCaller& caller) {
+    if (status.ok()) return "";
+    const auto suppressed = limit.Admit(absl::StrCat(CodeName(status), " ", caller.tenant));
+    if (!suppressed) return std::nullopt;
+    return *suppressed > 0 ? absl::StrCat(*suppressed) : "";
+  }
+
+  LogFields Described(const grpc::Status& status, const LoggedCaller& caller) const {
+    return {{"request", id_},          {"method", method_},     {"session", session_},
+            {"tenant", caller.tenant}, {"caller", caller.name}, {"peer", caller.peer},
+            {"code", CodeName(status)}};
+  }
+
+  void Audit(const grpc::Status& status, const LoggedCaller& caller) const {
+    const auto suppressed = Admit(observers_.audited_refusals, status, caller);
+    if (!suppressed) return;
+    LogFields fields = Described(status, caller);
+    fields.emplace_back("role", caller.role);
+    // The reasons of these two speak of the caller's role only.
+    const bool refused = status.error_code() == grpc::StatusCode::UNAUTHENTICATED ||
+                         status.error_code() == grpc::StatusCode::PERMISSION_DENIED;
+    fields.emplace_back("reason", refused ? status.error_message() : "");
+    fields.emplace_back("suppressed", *suppressed);
+    observers_.audit->Add("call", fields);
   }
 
   ServerRpcInfo& call_;
-  Metrics& metrics_;
-  const CallerOf& caller_of_;
-  LogLimit& refusals_;
+  Observers& observers_;
   const std::string method_;
   const bool one_response_ = call_.type() == ServerRpcInfo::Type::UNARY ||
                              call_.type() == ServerRpcInfo::Type::CLIENT_STREAMING;
@@ -175,26 +206,25 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
 
 class CallInterceptors final : public grpc::experimental::ServerInterceptorFactoryInterface {
  public:
-  CallInterceptors(Metrics& metrics, CallerOf caller_of)
-      : metrics_(metrics), caller_of_(std::move(caller_of)) {}
+  CallInterceptors(Metrics& metrics, AuditLog* audit, CallerOf caller_of)
+      : observers_{.metrics = metrics, .audit = audit, .caller_of = std::move(caller_of)} {}
 
   // Returns null for calls of health and reflection, whose messages are of other kinds.
   grpc::experimental::Interceptor* CreateServerInterceptor(ServerRpcInfo* call) override {
     if (!absl::StartsWith(call->method(), kPrefix)) return nullptr;
-    return new CallInterceptor(*call, metrics_, caller_of_, refusals_);
+    return new CallInterceptor(*call, observers_);
   }
 
  private:
-  Metrics& metrics_;
-  const CallerOf caller_of_;
-  LogLimit refusals_{kRefusalBurst, kRefusalsASecond};
+  Observers observers_;
 };
 
 }  // namespace
 
-void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, CallerOf caller_of) {
+void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, AuditLog* audit,
+                  CallerOf caller_of) {
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> creators;
-  creators.push_back(std::make_unique<CallInterceptors>(metrics, std::move(caller_of)));
+  creators.push_back(std::make_unique<CallInterceptors>(metrics, audit, std::move(caller_of)));
   builder.experimental().SetInterceptorCreators(std::move(creators));
 }
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <string>
 
+#include "server/telemetry/audit_log.h"
 #include "server/telemetry/metrics.h"
 
 namespace polyest::internal {
@@ -17,11 +18,15 @@ namespace polyest::internal {
 struct LoggedCaller {
   std::string tenant{};
   std::string name{};  // of the token, or of the client's certificate
+  std::string role{};
+  std::string peer{};  // also where it is not let in
 };
 using CallerOf = std::function<LoggedCaller(const grpc::ServerContextBase&)>;
 
-// Makes the server observe its calls. Must be called before the server is built; `metrics` must
-// outlive the server.
-void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, CallerOf caller_of);
+// Makes the server observe its calls. Must be called before the server is built; `metrics` and
+// `audit`, which may be null, must outlive the server. The audit log gets the calls that create,
+// delete, import or export sessions or back them up, and those of callers who are not let in.
+void ObserveCalls(grpc::ServerBuilder& builder, Metrics& metrics, AuditLog* audit,
+                  CallerOf caller_of);
 
 }  // namespace polyest::internal

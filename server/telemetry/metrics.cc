@@ -55,6 +55,7 @@ struct Metrics::Families {
   Histogram& commit;
   Histogram& commit_writes;
   Counter& commit_failures;
+  Family<Counter>& web_requests;
 };
 
 Metrics::Families::Families(Registry& registry)
@@ -96,7 +97,9 @@ Metrics::Families::Families(Registry& registry)
                         .Add({}, kWrites)),
       commit_failures(MakeCounter(registry, "polyest_journal_commit_failures_total",
                                   "Commits of the journal that failed.")
-                          .Add({})) {
+                          .Add({})),
+      web_requests(MakeCounter(registry, "polyest_web_requests_total",
+                               "Requests answered by the HTTP port, by status.")) {
   // The series exist from the start, because a rate over a series that begins with its first
   // refusal would miss that one.
   for (const char* code : kRefusals) refusals.Add({{"code", code}});
@@ -113,6 +116,10 @@ Metrics::Metrics(const std::string& version)
 }
 
 Metrics::~Metrics() = default;
+
+void Metrics::CountWebRequest(int status) {
+  Increment(families_->web_requests.Add({{"code", std::to_string(status)}}), 1);
+}
 
 std::shared_ptr<prometheus::Collectable> Metrics::collectable() const { return registry_; }
 

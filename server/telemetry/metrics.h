@@ -58,6 +58,9 @@ class Metrics {
   };
   void Count(const Commit& commit);
 
+  // Counts an answer of the HTTP port, of whatever kind, by its status.
+  void CountWebRequest(int status);
+
   // Returns what Prometheus scrapes.
   std::shared_ptr<prometheus::Collectable> collectable() const;
 

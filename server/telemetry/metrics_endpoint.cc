@@ -8,12 +8,23 @@
 #include <utility>
 
 namespace polyest::internal {
+namespace {
+
+constexpr char kThreads[] = "8";
+constexpr char kRequestTimeoutMs[] = "1000";
+constexpr char kKeepAliveMs[] = "500";
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
                                                                         Collectables collectables) {
   // The library reports a port in use by an exception only.
   try {
-    auto exposer = std::make_unique<prometheus::Exposer>(address, /*num_threads=*/1);
+    // Each connection has a thread for as long as it is open. One whose client says nothing is
+    // closed soon, so that scrapes find a thread.
+    auto exposer = std::make_unique<prometheus::Exposer>(std::vector<std::string>{
+        "listening_ports", address, "num_threads", kThreads, "request_timeout_ms",
+        kRequestTimeoutMs, "keep_alive_timeout_ms", kKeepAliveMs});
     return std::unique_ptr<MetricsEndpoint>(
         new MetricsEndpoint(std::move(exposer), std::move(collectables)));
   } catch (const std::exception&) {

@@ -2,7 +2,10 @@
 
 #include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <system_error>
 
 namespace polyest::internal {
 
@@ -16,6 +19,14 @@ int64_t ResidentMemoryBytes() {
   int64_t resident = 0;
   if (!(statm >> all >> resident)) return 0;
   return resident * sysconf(_SC_PAGESIZE);
+}
+
+int64_t OpenDescriptors() {
+  std::error_code error;
+  std::filesystem::directory_iterator entries("/proc/self/fd", error);
+  if (error) return 0;
+  // One of them is the iterator's own.
+  return std::distance(begin(entries), end(entries)) - 1;
 }
 
 }  // namespace polyest::internal

@@ -1,0 +1,152 @@
+#pragma once
+
+// Sends records to a client as fast as it takes them: those that a function returns, piece by
+// piece.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <deque>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "polyest/stop.h"
+#include "server/execution/executor.h"
+#include "server/service/guarded.h"
+#include "server/service/open_calls.h"
+#include "server/service/status_mapping.h"
+
+namespace polyest::internal {
+
+// Holds the state of one call. It outlives its reactor, because the executor may still hold it.
+template <typename Record>
+class RecordFlow final : public Drainable, public std::enable_shared_from_this<RecordFlow<Record>> {
+ public:
+  using Reactor = grpc::ServerWriteReactor<Record>;
+  // Returns the next records; none at the end. Runs on the executor, once at a time.
+  using Next = std::function<absl::StatusOr<std::vector<Record>>(const Stop&)>;
+
+  explicit RecordFlow(Executor& executor) : executor_(executor) {}
+
+  // Begins to send what `next` returns, in a lane of the executor, or ends the call at once.
+  void OnStart(Reactor* reactor, std::string lane, absl::StatusOr<Next> next) {
+    const std::lock_guard lock(mutex_);
+    reactor_ = reactor;
+    lane_ = std::move(lane);
+    absl::Status begun = next.status();
+    if (begun.ok()) {
+      next_ = *std::move(next);
+      begun = StartReading();
+    }
+    if (!begun.ok()) End(begun);
+    Advance();
+  }
+
+  void OnWritten(bool ok) {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    records_.pop_front();
+    if (!ok) {
+      End(absl::CancelledError("the client does not read any more"));
+      records_.clear();
+    }
+    Advance();
+  }
+
+  void OnCancelled() {
+    const std::lock_guard lock(mutex_);
+    End(absl::CancelledError("the call was cancelled"));
+    Advance();
+  }
+
+  void OnDone() {
+    const std::lock_guard lock(mutex_);
+    reactor_ = nullptr;
+  }
+
+  void Drain() override {
+    const std::lock_guard lock(mutex_);
+    End(ShuttingDown());
+    Advance();
+  }
+
+ private:
+  // The following are called with the mutex held.
+
+  absl::Status StartReading() {
+    reading_ = true;
+    const absl::Status accepted =
+        executor_.Submit(lane_, [flow = this->shared_from_this()] { flow->Read(); });
+    if (!accepted.ok()) reading_ = false;
+    return accepted;
+  }
+
+  // Sets how the call ends. After an error, records that wait are dropped; the one being written
+  // belongs to gRPC until OnWritten. An end in good order writes the rest first.
+  void End(const absl::Status& status) {
+    if (!end_) end_ = status;
+    if (status.ok()) return;
+    stop_.request_stop();
+    while (records_.size() > (writing_ ? 1 : 0)) records_.pop_back();
+  }
+
+  void Advance() {
+    if (finished_ || reactor_ == nullptr || writing_ || reading_) return;
+    if (!records_.empty()) {
+      writing_ = true;
+      reactor_->StartWrite(&records_.front());
+      return;
+    }
+    if (!end_) {
+      const absl::Status accepted = StartReading();
+      if (accepted.ok()) return;
+      End(accepted);
+    }
+    finished_ = true;
+    next_ = nullptr;
+    reactor_->Finish(ToGrpc(*end_));
+  }
+
+  // Reads the next records; runs on the executor, without the mutex.
+  void Read() {
+    absl::StatusOr<std::vector<Record>> next;
+    const absl::Status read = Guarded([&] {
+      next = next_(Stop(stop_.get_token()));
+      return next.status();
+    });
+    const std::lock_guard lock(mutex_);
+    reading_ = false;
+    if (!read.ok()) {
+      End(read);
+    } else if (next->empty()) {
+      End(absl::OkStatus());
+    } else if (!end_) {
+      records_.insert(records_.end(), std::make_move_iterator(next->begin()),
+                      std::make_move_iterator(next->end()));
+    }
+    Advance();
+  }
+
+  Executor& executor_;
+  std::string lane_;
+  Next next_;
+  std::stop_source stop_;
+
+  std::mutex mutex_;
+  Reactor* reactor_ = nullptr;
+  std::deque<Record> records_;  // the first one is being written or is the next
+  bool reading_ = false;
+  bool writing_ = false;
+  bool finished_ = false;
+  std::optional<absl::Status> end_;  // how the call ends, once no more records are read
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,236 @@
+#include "server/web/gateway.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "proto/wire/refusal/refusal.h"
+#include "server/service/status_mapping.h"
+#include "server/telemetry/request_id.h"
+#include "server/telemetry/structured_log.h"
+#include "server/web/call_metadata.h"
+#include "server/web/transcode.h"
+#include "server/web/web_answers.h"
+
+namespace polyest::internal {
+namespace {
+
+using grpc::StatusCode;
+using Clock = WebCall::Clock;
+
+constexpr char kJson[] = "application/json";
+constexpr char kEvents[] = "text/event-stream";
+constexpr size_t kLargeRequest = size_t{1} << 20;
+// Time that a stream has to fail under the status of HTTP rather than by an event.
+constexpr std::chrono::milliseconds kFirstEvent{500};
+// Longest time of a call without a limit of its own; its client is watched all the time.
+constexpr std::chrono::hours kForever{24 * 365};
+
+bool IsJson(absl::string_view content_type) {
+  const absl::string_view type = content_type.substr(0, content_type.find(';'));
+  return absl::EqualsIgnoreCase(absl::StripAsciiWhitespace(type), kJson);
+}
+
+// Returns what to do instead of a call whose client sends a stream, which HTTP/1.1 cannot.
+std::string Instead(const std::string& method) {
+  if (method == "ImportSession") {
+    return "ImportSession takes a stream, which needs gRPC: use polyest import";
+  }
+  return absl::StrCat(method, " takes a stream, which needs gRPC: send batches by AddMeasurements");
+}
+
+std::string Event(absl::string_view name, absl::string_view data) {
+  return absl::StrCat("event: ", name, "\ndata: ", data, "\n\n");
+}
+
+}  // namespace
+
+Gateway::Gateway(std::shared_ptr<grpc::Channel> channel, MethodTable methods, HostCheck hosts,
+                 Options options)
+    : channel_(std::move(channel)),
+      methods_(std::move(methods)),
+      hosts_(std::move(hosts)),
+      options_(std::move(options)) {}
+
+HttpAnswer Gateway::Refusal(int status, std::string_view why) const {
+  const auto code = [&] {
+    switch (status) {
+      case 404:
+        return StatusCode::NOT_FOUND;
+      case 405:
+      case 501:
+        return StatusCode::UNIMPLEMENTED;
+      case 408:
+        return StatusCode::DEADLINE_EXCEEDED;
+      case 413:
+      case 429:
+        return StatusCode::RESOURCE_EXHAUSTED;
+      case 500:
+        return StatusCode::INTERNAL;
+      default:
+        return StatusCode::INVALID_ARGUMENT;
+    }
+  };
+  return Secured(ErrorAnswer(status, code(), why));
+}
+
+std::optional<HttpAnswer> Gateway::AnswerHead(const HttpRequest& request) const {
+  const absl::Status host = hosts_.Check(request);
+  if (!host.ok()) {
+    LogRefusal(request, host);
+    return Secured(ErrorAnswer(ToRpcStatus(host)));
+  }
+  const WebMethod* const method = methods_.Find(request.path);
+  const bool reads = request.method == "GET" || request.method == "HEAD";
+  if (method == nullptr) {
+    if (request.path.starts_with("/v1/")) {
+      return Refusal(404, "there is no such method; the path is /v1/Service/Method");
+    }
+    if (reads) return std::nullopt;
+    HttpAnswer refusal = Refusal(405, "files can only be read");
+    refusal.headers.emplace_back("Allow", "GET, HEAD");
+    return refusal;
+  }
+  if (request.method != "POST") {
+    HttpAnswer refusal = Refusal(405, "methods are called by POST");
+    refusal.headers.emplace_back("Allow", "POST");
+    return refusal;
+  }
+  if (!IsJson(request.Header("Content-Type").value_or(""))) {
+    return Refusal(415, "the request needs Content-Type: application/json");
+  }
+  if (method->method->client_streaming()) {
+    return Refusal(501, Instead(method->method->name()));
+  }
+  // The call without its body is refused, logged and counted as any call of theirs.
+  if (!options_.knows(request)) return Secured(AnswerCall(*method, request, ""));
+  return std::nullopt;
+}
+
+void Gateway::LogRefusal(const HttpRequest& request, const absl::Status& refusal) const {
+  const std::optional<int64_t> suppressed = refusals_.Admit("");
+  if (!suppressed) return;
+  Log(spdlog::level::warn, "refused over HTTP",
+      {{"peer", request.peer},
+       {"reason", std::string(refusal.message())},
+       {"suppressed", *suppressed > 0 ? absl::StrCat(*suppressed) : ""}});
+}
+
+HttpAnswer Gateway::Answer(const HttpRequest& request, const std::string& body) const {
+  const WebMethod* const method = methods_.Find(request.path);
+  return Secured(method == nullptr ? FileAnswer(options_.files, request.path)
+                                   : AnswerCall(*method, request, body));
+}
+
+HttpAnswer Gateway::AnswerCall(const WebMethod& method, const HttpRequest& request,
+                               const std::string& body) const {
+  WebCall::Request call{.method = method.rpc_path};
+  const absl::Status set = SetMetadata(request, call);
+  if (!set.ok()) return ErrorAnswer(ToRpcStatus(set));
+  std::optional<HttpAnswer> refusal = Read(method, request, body, call.message);
+  if (refusal) return *std::move(refusal);
+  if (!method.method->server_streaming()) {
+    WebCall once(channel_, call);
+    return AnswerOnce(once, method, request);
+  }
+  Place place = TakePlace();
+  if (place == nullptr) {
+    return ErrorAnswer(
+        ToRpcStatus(Refuse(absl::StatusCode::kResourceExhausted,
+                           absl::StrCat("the daemon serves at most ", options_.streams,
+                                        " streams over HTTP at a time"),
+                           {.reason = kBusy, .retry_delay = std::chrono::seconds(1)})));
+  }
+  return AnswerEvents(std::make_shared<WebCall>(channel_, call), method, request, std::move(place));
+}
+
+std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpRequest& request,
+                                        const std::string& body, std::string& message) const {
+  Turns::Turn turn;
+  if (body.size() > kLargeRequest) {
+    const std::string host = request.peer.substr(0, request.peer.rfind(':'));
+    turn = large_requests_.Take(request.Header("Authorization").value_or(host));
+  }
+  const rpc::Status read = FromJsonText(body, *method.method->input_type(), message);
+  if (read.code() != StatusCode::OK) return ErrorAnswer(read);
+  if (message.size() <= options_.message_bytes) return std::nullopt;
+  message = {};
+  return ErrorAnswer(413, StatusCode::RESOURCE_EXHAUSTED,
+                     absl::StrCat("the message has more than ", options_.message_bytes >> 20,
+                                  " MiB (--max-message-mb)"));
+}
+
+HttpAnswer Gateway::AnswerOnce(WebCall& call, const WebMethod& method,
+                               const HttpRequest& request) const {
+  const Clock::time_point deadline = Clock::now() + kForever;
+  std::string message;
+  WebCall::Event event = call.Await(request.client, deadline);
+  if (event == WebCall::Event::kMessage) {
+    message = call.TakeMessage();
+    event = call.Await(request.client, deadline);
+  }
+  if (event != WebCall::Event::kEnd) {
+    return ErrorAnswer(499, StatusCode::CANCELLED, "the client has closed the connection");
+  }
+  HttpAnswer answer{.content_type = kJson};
+  if (call.status().ok()) {
+    answer.body = ToJsonText(message, *method.method->output_type());
+  } else {
+    answer = ErrorAnswer(ToRpcStatus(call.status()));
+  }
+  if (const std::string id = call.request_id(); !id.empty()) {
+    answer.headers.emplace_back(kRequestIdKey, id);
+  }
+  return answer;
+}
+
+HttpAnswer Gateway::AnswerEvents(std::shared_ptr<WebCall> call, const WebMethod& method,
+                                 const HttpRequest& request, Place place) const {
+  const WebCall::Event event = call->Await(request.client, Clock::now() + kFirstEvent);
+  if (event == WebCall::Event::kEnd && !call->status().ok()) {
+    return ErrorAnswer(ToRpcStatus(call->status()));
+  }
+  HttpAnswer answer{.content_type = kEvents};
+  answer.events = [this, call = std::move(call), event, &method, client = request.client,
+                   place = std::move(place)](const HttpAnswer::Send& send) {
+    SendEvents(*call, event, method, client, send);
+  };
+  return answer;
+}
+
+void Gateway::SendEvents(WebCall& call, WebCall::Event event, const WebMethod& method, int client,
+                         const HttpAnswer::Send& send) const {
+  bool sent = true;
+  while (sent) {
+    switch (event) {
+      case WebCall::Event::kMessage: {
+        const JsonCache::Text json =
+            json_.ToJson(call.TakeMessage(), *method.method->output_type());
+        sent = send(absl::StrCat("data: ", *json, "\n\n"));
+        break;
+      }
+      case WebCall::Event::kTimeout:
+        sent = send(": alive\n\n");
+        break;
+      case WebCall::Event::kEnd:
+        send(call.status().ok() ? Event("end", "{}")
+                                : Event("error", ErrorAnswer(ToRpcStatus(call.status())).body));
+        return;
+      case WebCall::Event::kClientGone:
+        return;
+    }
+    if (sent) event = call.Await(client, Clock::now() + options_.alive);
+  }
+}
+
+Gateway::Place Gateway::TakePlace() const {
+  if (++streams_ > options_.streams) {
+    --streams_;
+    return nullptr;
+  }
+  return {this, [](const Gateway* gateway) { --gateway->streams_; }};
+}
+
+}  // namespace polyest::internal

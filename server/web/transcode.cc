@@ -1,0 +1,94 @@
+#include "server/web/transcode.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/util/json_util.h>
+#include <google/protobuf/util/type_resolver_util.h>
+
+#include <memory>
+#include <vector>
+
+#include "core/common/check.h"
+#include "proto/wire/json/json_error.h"
+#include "proto/wire/json/json_format.h"
+#include "proto/wire/json/unknown_fields.h"
+#include "proto/wire/transport/automatic_order.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr char kPrefix[] = "type.googleapis.com";
+// No more unknown fields than these are named.
+constexpr size_t kMaxNamed = 10;
+// Longest text in which all unknown fields are looked for, which takes many times its size.
+constexpr size_t kMaxSearched = size_t{1} << 20;
+
+google::protobuf::util::TypeResolver& Types() {
+  static google::protobuf::util::TypeResolver* const types =
+      google::protobuf::util::NewTypeResolverForDescriptorPool(
+          kPrefix, google::protobuf::DescriptorPool::generated_pool());
+  return *types;
+}
+
+rpc::Status Invalid(const std::string& message) {
+  rpc::Status status;
+  status.set_code(grpc::StatusCode::INVALID_ARGUMENT);
+  status.set_message(message);
+  return status;
+}
+
+rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
+  rpc::BadRequest details;
+  std::string message;
+  for (size_t i = 0; i < std::min(fields.size(), kMaxNamed); ++i) {
+    std::string sentence = "unknown field";
+    if (!fields[i].suggestion.empty()) absl::StrAppend(&sentence, "; ", fields[i].suggestion);
+    auto& violation = *details.add_field_violations();
+    violation.set_field(fields[i].path);
+    violation.set_description(sentence);
+    absl::StrAppend(&message, i == 0 ? "" : ", ", fields[i].path, ": ", sentence);
+  }
+  rpc::Status status = Invalid(message);
+  auto& any = *status.add_details();
+  any.set_type_url("type.googleapis.com/google.rpc.BadRequest");
+  details.SerializeToString(any.mutable_value());
+  return status;
+}
+
+}  // namespace
+
+rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descriptor& type,
+                         std::string& bytes) {
+  if (absl::StripAsciiWhitespace(json).empty()) return {};
+  google::protobuf::util::JsonParseOptions options;
+  options.ignore_unknown_fields = false;
+  const auto read = google::protobuf::util::JsonToBinaryString(
+      &Types(), absl::StrCat(kPrefix, "/", type.full_name()), WithoutAutomaticOrders(json), &bytes,
+      options);
+  if (read.ok()) return {};
+  std::vector<UnknownField> unknown;
+  if (json.size() <= kMaxSearched) unknown = FindUnknownFields(json, type);
+  if (!unknown.empty()) return UnknownFields(unknown);
+  const JsonError error = DescribeJsonError(json, {read.message().data(), read.message().size()});
+  if (error.line == 0) return Invalid(error.what);
+  return Invalid(absl::StrCat("line ", error.line, " of the body: ", error.what));
+}
+
+std::string ToJsonText(const std::string& bytes, const google::protobuf::Descriptor& type) {
+  const google::protobuf::Message* const prototype =
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&type);
+  const std::unique_ptr<google::protobuf::Message> message(prototype->New());
+  POLYEST_CHECK(message->ParseFromString(bytes));
+  return ToJson(*message, /*several_lines=*/false);
+}
+
+rpc::Status ToRpcStatus(const grpc::Status& status) {
+  rpc::Status detailed;
+  if (!detailed.ParseFromString(status.error_details())) detailed.Clear();
+  detailed.set_code(status.error_code());
+  detailed.set_message(status.error_message());
+  return detailed;
+}
+
+}  // namespace polyest::internal

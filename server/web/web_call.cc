@@ -1,0 +1,166 @@
+#include "server/web/web_call.h"
+
+#include <grpc/support/time.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/support/client_callback.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+
+#include "core/common/check.h"
+#include "server/telemetry/request_id.h"
+
+namespace polyest::internal {
+
+// Receives what happens to the call on gRPC's threads. A hold keeps gRPC from ending the call while
+// the next read may be started from another thread.
+class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
+ public:
+  Reactor(const std::shared_ptr<grpc::Channel>& channel, const Request& request)
+      : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), stub_(channel) {
+    POLYEST_CHECK(event_ >= 0);
+    for (const auto& [key, value] : request.metadata) context_.AddMetadata(key, value);
+    if (request.timeout) {
+      context_.set_deadline(
+          gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                       gpr_time_from_micros(request.timeout->count(), GPR_TIMESPAN)));
+    }
+    const grpc::Slice slice(request.message);
+    request_ = grpc::ByteBuffer(&slice, 1);
+    stub_.PrepareBidiStreamingCall(&context_, request.method, grpc::StubOptions(), this);
+    AddHold();
+    StartWriteLast(&request_, grpc::WriteOptions());
+    StartCall();
+  }
+  ~Reactor() override { close(event_); }
+
+  int event() const { return event_; }
+
+  void OnReadDone(bool ok) override {
+    bool release = false;
+    {
+      const std::lock_guard lock(mutex_);
+      reading_ = false;
+      has_message_ = ok && !closing_;
+      if (!has_message_) release = std::exchange(held_, false);
+      Signal();
+    }
+    if (release) RemoveHold();
+  }
+
+  void OnDone(const grpc::Status& status) override {
+    const std::lock_guard lock(mutex_);
+    status_ = status;
+    done_ = true;
+    Signal();
+    ended_.notify_all();
+  }
+
+  // Returns what has happened, if anything, and otherwise asks for the next message.
+  std::optional<Event> Look() {
+    bool read = false;
+    {
+      const std::lock_guard lock(mutex_);
+      uint64_t count = 0;
+      (void)!::read(event_, &count, sizeof(count));
+      if (has_message_) return Event::kMessage;
+      if (done_) return Event::kEnd;
+      if (held_ && !reading_) read = reading_ = true;
+    }
+    if (read) StartRead(&response_);
+    return std::nullopt;
+  }
+
+  std::string TakeMessage() {
+    const std::lock_guard lock(mutex_);
+    has_message_ = false;
+    std::vector<grpc::Slice> slices;
+    POLYEST_CHECK(response_.Dump(&slices).ok());
+    std::string message;
+    message.reserve(response_.Length());
+    for (const grpc::Slice& slice : slices) {
+      message.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+    }
+    response_.Clear();
+    return message;
+  }
+
+  void Close() {
+    context_.TryCancel();
+    bool release = false;
+    {
+      const std::lock_guard lock(mutex_);
+      closing_ = true;
+      if (!reading_) release = std::exchange(held_, false);
+    }
+    if (release) RemoveHold();
+    std::unique_lock lock(mutex_);
+    ended_.wait(lock, [this] { return done_; });
+  }
+
+  const grpc::Status& status() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+  }
+
+  std::string RequestId() const {
+    const auto& metadata = context_.GetServerInitialMetadata();
+    const auto found = metadata.find(kRequestIdKey);
+    return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
+  }
+
+ private:
+  // Wakes the thread that waits; called with the mutex held.
+  void Signal() const {
+    const uint64_t one = 1;
+    (void)!write(event_, &one, sizeof(one));
+  }
+
+  const int event_;
+  grpc::GenericStub stub_;
+  grpc::ClientContext context_;
+  grpc::ByteBuffer request_;
+  grpc::ByteBuffer response_;  // belongs to gRPC while reading_ is set
+  mutable std::mutex mutex_;
+  std::condition_variable ended_;
+  bool reading_ = false;
+  bool has_message_ = false;
+  bool held_ = true;
+  bool closing_ = false;
+  bool done_ = false;
+  grpc::Status status_;
+};
+
+WebCall::WebCall(const std::shared_ptr<grpc::Channel>& channel, const Request& request)
+    : reactor_(std::make_unique<Reactor>(channel, request)) {}
+
+WebCall::~WebCall() { reactor_->Close(); }
+
+WebCall::Event WebCall::Await(int client, Clock::time_point deadline) {
+  while (true) {
+    if (const std::optional<Event> event = reactor_->Look()) return *event;
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    if (left <= 0) return Event::kTimeout;
+    pollfd waiting[] = {{reactor_->event(), POLLIN, 0}, {client, POLLRDHUP, 0}};
+    const int happened = poll(waiting, 2, static_cast<int>(std::min<int64_t>(left, 60'000)));
+    POLYEST_CHECK(happened >= 0 || errno == EINTR);
+    if (happened > 0 && (waiting[1].revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0) {
+      return Event::kClientGone;
+    }
+  }
+}
+
+std::string WebCall::TakeMessage() { return reactor_->TakeMessage(); }
+
+const grpc::Status& WebCall::status() const { return reactor_->status(); }
+
+std::string WebCall::request_id() const { return reactor_->RequestId(); }
+
+}  // namespace polyest::internal

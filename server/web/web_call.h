@@ -1,0 +1,61 @@
+#pragma once
+
+// Calls a method of the daemon's own gRPC server on behalf of an HTTP client, and waits for its
+// messages and for the client at the same time.
+
+#include <grpcpp/channel.h>
+#include <grpcpp/support/status.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace polyest::internal {
+
+// Is used by one thread. A method of any kind can be called whose client sends one message.
+class WebCall {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  struct Request {
+    std::string method;  // "/polyest.v1.SessionService/GetSession"
+    std::vector<std::pair<std::string, std::string>> metadata{};
+    std::optional<std::chrono::microseconds> timeout{};  // none: as long as it takes
+    std::string message{};                               // serialized
+  };
+  enum class Event {
+    kMessage,     // a message has come
+    kEnd,         // the call has ended, and all its messages have been taken
+    kClientGone,  // the client has closed its connection
+    kTimeout,     // nothing has happened
+  };
+
+  // Starts the call. `channel` leads into the server.
+  WebCall(const std::shared_ptr<grpc::Channel>& channel, const Request& request);
+  // Cancels the call if it has not ended.
+  ~WebCall();
+  WebCall(const WebCall&) = delete;
+  WebCall& operator=(const WebCall&) = delete;
+
+  // Waits for what happens next, at most until `deadline`. The next message is asked for only here,
+  // so that a server does not send more than the client takes. `client` is the client's socket.
+  Event Await(int client, Clock::time_point deadline);
+
+  // Returns the message that has come, serialized, and forgets it.
+  std::string TakeMessage();
+  // Returns how the call has ended. To be called after kEnd.
+  const grpc::Status& status() const;
+  // Returns the id of the request that the server has chosen; empty if it sent none. To be called
+  // after kEnd.
+  std::string request_id() const;
+
+ private:
+  class Reactor;
+
+  const std::unique_ptr<Reactor> reactor_;
+};
+
+}  // namespace polyest::internal

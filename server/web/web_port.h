@@ -1,0 +1,58 @@
+#pragma once
+
+// The HTTP port of the daemon, from its address to its end.
+
+#include <absl/status/statusor.h>
+#include <grpcpp/channel.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/security/tls_material.h"
+#include "server/web/gateway.h"
+#include "server/web/web_server.h"
+
+namespace polyest::internal {
+
+class WebPort {
+ public:
+  struct Options {
+    std::string host;                  // IPv6 in brackets
+    int port = 0;                      // 0: any free one
+    std::vector<std::string> names{};  // other hosts by which clients may call it
+    TlsFiles tls{};                    // without a certificate: no encryption
+    int max_message_mb = 64;
+    int64_t body_memory_bytes = int64_t{256} << 20;  // of all requests together
+    // Returns whether the daemon knows a caller, from the header Authorization and the common name
+    // of a certificate, either of which may be missing.
+    std::function<bool(std::optional<std::string>, std::optional<std::string>)> knows;
+    std::function<void(int)> count = [](int) {};  // counts an answer by its status
+  };
+
+  // Takes the port. UNAVAILABLE when it cannot be listened on; errors of ReadTlsMaterial.
+  static absl::StatusOr<std::unique_ptr<WebPort>> Open(const Options& options);
+
+  int port() const { return server_->port(); }
+  // Begins to answer. `channel` leads into the daemon's own server, which must outlive the port, or
+  // Stop.
+  void Serve(std::shared_ptr<grpc::Channel> channel);
+  // Reads the certificates again; keeps the old ones if that fails.
+  absl::Status ReloadTls();
+  // Takes no more requests, waits for the answers under way until `deadline`, and closes all
+  // connections.
+  void Stop(std::chrono::steady_clock::time_point deadline) { server_->Stop(deadline); }
+
+ private:
+  WebPort(Options options, std::unique_ptr<WebServer> server)
+      : options_(std::move(options)), server_(std::move(server)) {}
+
+  const Options options_;
+  std::unique_ptr<Gateway> gateway_;
+  const std::unique_ptr<WebServer> server_;  // goes first, because its threads use the gateway
+};
+
+}  // namespace polyest::internal

@@ -1,0 +1,108 @@
+#include "server/web/web_server.h"
+
+#include <sys/socket.h>
+
+#include <iterator>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr std::string_view kFull =
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n"
+    "Connection: close\r\nContent-Length: 73\r\n\r\n"
+    R"({"code":8,"message":"too many connections; try again later","details":[]})";
+
+// Says that there is no room, as far as that is possible without waiting. What the client has sent
+// is read, because the answer would be lost otherwise.
+void RefuseConnection(int descriptor) {
+  (void)!send(descriptor, kFull.data(), kFull.size(), MSG_NOSIGNAL);
+  shutdown(descriptor, SHUT_WR);
+  char bytes[16'384];
+  (void)!recv(descriptor, bytes, sizeof(bytes), 0);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<WebServer>> WebServer::Open(const Options& options) {
+  POLYEST_ASSIGN_OR_RETURN(auto socket, ListeningSocket::Open(options.host, options.port));
+  return std::unique_ptr<WebServer>(new WebServer(options, std::move(socket)));
+}
+
+WebServer::WebServer(const Options& options, std::unique_ptr<ListeningSocket> socket)
+    : options_(options), socket_(std::move(socket)), memory_(options.body_memory_bytes) {}
+
+WebServer::~WebServer() { Stop(std::chrono::steady_clock::now()); }
+
+void WebServer::UseTls(std::shared_ptr<SSL_CTX> tls) {
+  const std::lock_guard lock(mutex_);
+  tls_.swap(tls);
+}
+
+void WebServer::Serve(const HttpHandler& handler) {
+  accepting_ = std::thread([this, &handler] { AcceptAll(handler); });
+}
+
+void WebServer::AcceptAll(const HttpHandler& handler) {
+  for (int descriptor = socket_->Accept(); descriptor >= 0; descriptor = socket_->Accept()) {
+    Reap();
+    Take(descriptor, handler);
+  }
+}
+
+void WebServer::Take(int descriptor, const HttpHandler& handler) {
+  const std::lock_guard lock(mutex_);
+  open_.emplace_back(descriptor, tls_);
+  const auto connection = std::prev(open_.end());
+  const auto host = hosts_.try_emplace(connection->host, 0).first;
+  if (static_cast<int>(open_.size()) <= options_.connections &&
+      host->second < options_.connections_of_host) {
+    // The system may not have another thread.
+    try {
+      connection->thread = std::thread([this, connection, &handler] { Run(connection, handler); });
+      ++host->second;
+      return;
+    } catch (const std::system_error&) {
+    }
+  }
+  if (tls_ == nullptr) RefuseConnection(descriptor);
+  if (host->second == 0) hosts_.erase(host);
+  open_.erase(connection);
+}
+
+void WebServer::Run(Connections::iterator connection, const HttpHandler& handler) {
+  ServeConnection(*connection->socket, socket_->stop_descriptor(), options_.http, memory_, handler);
+  const std::lock_guard lock(mutex_);
+  connection->socket.reset();
+  const auto host = hosts_.find(connection->host);
+  if (--host->second == 0) hosts_.erase(host);
+  over_.splice(over_.end(), open_, connection);
+  ended_.notify_all();
+}
+
+void WebServer::Reap() {
+  Connections over;
+  {
+    const std::lock_guard lock(mutex_);
+    over.swap(over_);
+  }
+  for (Connection& connection : over) connection.thread.join();
+}
+
+void WebServer::Stop(std::chrono::steady_clock::time_point deadline) {
+  socket_->Stop();
+  if (accepting_.joinable()) accepting_.join();
+  {
+    std::unique_lock lock(mutex_);
+    ended_.wait_until(lock, deadline, [this] { return open_.empty(); });
+    for (const Connection& connection : open_) connection.socket->Shutdown();
+    ended_.wait(lock, [this] { return open_.empty(); });
+  }
+  Reap();
+}
+
+}  // namespace polyest::internal
