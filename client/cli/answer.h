@@ -9,9 +9,9 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/plot/plot_file.h"
 #include "core/common/status.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 

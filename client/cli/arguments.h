@@ -156,6 +156,8 @@ struct FitArguments {
   int draws = 0;                      // 0: the default
   int64_t rows = 0;                   // 0: the default
   double horizon_s = 0;               // of forecasts by filters
+  bool smoothed = false;              // whether filters use all samples of the run
+  double forecast_s = 0;              // beyond the last row, in place of the rows
   std::string plot_file;              // empty: none
   Format format = Format::kTable;
 };
@@ -231,6 +233,11 @@ struct WatchArguments {
   Format format = Format::kTable;
 };
 
+struct BackupArguments {
+  Place place;
+  std::string output_file;
+};
+
 struct TopArguments {
   Place place;
   bool once = false;
@@ -243,7 +250,7 @@ using Command =
                  SensitivityArguments, DesignArguments, PosteriorArguments, FitArguments,
                  CompareArguments, ReportArguments, ProfileArguments, RegularizationArguments,
                  ExplainArguments, ExportArguments, ImportArguments, DeleteArguments, ListArguments,
-                 WatchArguments, TopArguments, PaperOptions>;
+                 WatchArguments, TopArguments, BackupArguments, PaperOptions>;
 
 struct CommandLine {
   Command command;

@@ -9,7 +9,6 @@
 #include "client/cli/commands.h"
 #include "client/cli/data_input.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/screen.h"
 #include "client/cli/text_table.h"
@@ -22,6 +21,7 @@
 #include "proto/wire/check/problem_summary.h"
 #include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/problem.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 namespace {

@@ -62,6 +62,26 @@ void AddPosterior(CommandRegistry& registry) {
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
 
+// Adds the options that say from which samples, and where, the outputs are predicted.
+void AddTimesOfFit(CLI::App& command, FitArguments& arguments) {
+  command
+      .add_option(
+          "--horizon", arguments.horizon_s,
+          "With process noise or drift: use no sample of the last S seconds, in windows of\n"
+          "that length (default 0: predict each row from all rows before it)")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e9));
+  command.add_flag(
+      "--smoothed", arguments.smoothed,
+      "With process noise or drift: what all samples say of each row, those after it, too;\n"
+      "shows what parameters that drift have been");
+  command
+      .add_option("--forecast", arguments.forecast_s,
+                  "Predict so many seconds beyond the last row, in place of the rows")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e9));
+}
+
 void AddFit(CommandRegistry& registry) {
   const auto arguments = std::make_shared<FitArguments>();
   CLI::App& command = registry.Add(
@@ -89,13 +109,7 @@ void AddFit(CommandRegistry& registry) {
       ->check(CLI::Range(2, 10'000));
   command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
       ->check(CLI::Range(1, 1'000'000));
-  command
-      .add_option(
-          "--horizon", arguments->horizon_s,
-          "With process noise or drift: use no sample of the last S seconds, in windows of\n"
-          "that length (default 0: predict each row from all rows before it)")
-      ->type_name("S")
-      ->check(CLI::Range(0.0, 1e9));
+  AddTimesOfFit(command, *arguments);
   AddPlot(command, arguments->plot_file, "the fit");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }

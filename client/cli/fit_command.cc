@@ -2,6 +2,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "client/cli/answer.h"
@@ -39,6 +40,8 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   request.set_draw_count(arguments.draws);
   request.set_max_row_count(arguments.rows);
   request.set_horizon_s(arguments.horizon_s);
+  request.set_smoothed(arguments.smoothed);
+  request.set_forecast_s(arguments.forecast_s);
   auto response = MakeBackend(arguments.place)->Predict(request);
   if (!response.ok()) return InInput(response.status(), arguments);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
@@ -52,7 +55,8 @@ std::string FormatAutocorrelation(const v1::PredictResponse::Score& score) {
   return absl::StrJoin(values, ", ");
 }
 
-void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
+// Says how the outputs agree with the samples.
+void PrintScores(const v1::PredictResponse& prediction, std::ostream& out) {
   TextTable table({"output", "samples", "rms residual", "unit", "within 95 %", "log score",
                    "autocorrelation 1, 2, 3"});
   for (const Output& output : prediction.outputs()) {
@@ -67,6 +71,28 @@ void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
                   FormatAutocorrelation(score)});
   }
   table.Print(out);
+}
+
+// Says where outputs without scores begin, how far they go and where they end.
+void PrintCourses(const v1::PredictResponse& prediction, std::ostream& out) {
+  TextTable table({"output", "first ± sd", "least", "greatest", "last ± sd", "unit"});
+  for (const Output& output : prediction.outputs()) {
+    if (output.mean().empty()) continue;
+    const auto [least, greatest] = std::ranges::minmax(output.mean());
+    const auto at = [&](int k) { return FormatUncertain(output.mean(k), output.std_dev(k)); };
+    table.AddRow({output.output(), at(0), FormatNumber(least), FormatNumber(greatest),
+                  at(output.mean_size() - 1), UnitText(output.unit())});
+  }
+  table.Print(out);
+}
+
+void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
+  const bool scored = std::ranges::any_of(prediction.outputs(), &Output::has_score);
+  if (scored) PrintScores(prediction, out);
+  const auto has_samples = [](const Output& output) { return !output.measured_rows().empty(); };
+  const bool forecasts = std::ranges::none_of(prediction.outputs(), has_samples);
+  if (scored && forecasts) out << '\n';
+  if (!scored || forecasts) PrintCourses(prediction, out);
   out << absl::StrFormat("\n%d rows; %d trajectories of the model at draws of the posterior%s\n",
                          prediction.row_count(), prediction.draw_count(),
                          prediction.failed_draw_count() == 0

@@ -137,10 +137,16 @@ Plot MakePlot(const v1::PredictResponse& prediction) {
   plot.description =
       "Measured samples against the model's prediction with its bands, the residuals over time and "
       "their autocorrelation, a row for each output";
-  plot.columns = 3;
-  plot.column_widths = {640, 420, 320};
+  const bool scored = std::ranges::any_of(prediction.outputs(), &Output::has_score);
+  plot.columns = scored ? 3 : 1;
+  plot.column_widths = scored ? std::vector<double>{640, 420, 320} : std::vector<double>{960};
+  if (!scored) {
+    plot.title = "From all samples";
+    plot.description = "Outputs and parameters over time with their bands, from all samples";
+  }
   for (const Output& output : prediction.outputs()) {
     plot.panels.emplace_back(FitPanel(prediction, output));
+    if (!scored) continue;
     if (output.standardized_residual().empty()) {
       plot.panels.insert(plot.panels.end(), 2, EmptyPanel());
       continue;

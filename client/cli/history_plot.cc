@@ -43,10 +43,15 @@ std::pair<double, double> VerticalRange(const BandSeries& band) {
   return {std::max(least, lower - width), std::min(largest, upper + width)};
 }
 
-LinePanel ParameterPanel(const v1::EstimateHistory& history, const std::string& name,
+using Parameter = v1::EstimateHistory::Parameter;
+
+// The values of a point that a panel shows: `parameters` or `drifting`.
+using Values =
+    const google::protobuf::RepeatedPtrField<Parameter>& (v1::EstimateHistory::Point::*)() const;
+
+LinePanel ParameterPanel(const v1::EstimateHistory& history, Values values, const std::string& name,
                          const std::string& unit, bool over_time) {
   LinePanel panel;
-  panel.title = name;
   panel.x_label = over_time ? "t (s)" : "samples";
   panel.y_label = NameWithUnit(name, unit);
   BandSeries band{"95 % interval", kBlue, {}, {}, {}};
@@ -55,9 +60,8 @@ LinePanel ParameterPanel(const v1::EstimateHistory& history, const std::string& 
     const double x = over_time ? point.time_s() : static_cast<double>(point.sample_count());
     band.x.push_back(x);
     mean.x.push_back(x);
-    const auto found = std::find_if(point.parameters().begin(), point.parameters().end(),
-                                    [&](const auto& one) { return one.name() == name; });
-    const bool known = found != point.parameters().end();
+    const auto found = std::ranges::find((point.*values)(), name, &Parameter::name);
+    const bool known = found != (point.*values)().end();
     band.lower.push_back(known ? found->lower95() : kGap);
     band.upper.push_back(known ? found->upper95() : kGap);
     mean.y.push_back(known ? found->mean() : kGap);
@@ -75,15 +79,21 @@ Plot MakePlot(const v1::EstimateHistory& history) {
   plot.title = "How the estimate came about";
   plot.description = "Each parameter's estimate and 95 % interval while measurements came in";
   const bool over_time = TimesIncrease(history);
-  std::vector<std::string> names;
-  for (const v1::EstimateHistory::Point& point : history.points()) {
-    for (const v1::EstimateHistory::Parameter& parameter : point.parameters()) {
-      if (std::find(names.begin(), names.end(), parameter.name()) != names.end()) continue;
-      names.push_back(parameter.name());
-      plot.panels.emplace_back(
-          ParameterPanel(history, parameter.name(), parameter.unit(), over_time));
+  const auto add = [&](Values values, const std::string& when) {
+    std::vector<std::string> names;
+    for (const v1::EstimateHistory::Point& point : history.points()) {
+      for (const Parameter& parameter : (point.*values)()) {
+        if (std::ranges::find(names, parameter.name()) != names.end()) continue;
+        names.push_back(parameter.name());
+        LinePanel panel =
+            ParameterPanel(history, values, parameter.name(), parameter.unit(), over_time);
+        panel.title = absl::StrCat(parameter.name(), when);
+        plot.panels.emplace_back(std::move(panel));
+      }
     }
-  }
+  };
+  add(&v1::EstimateHistory::Point::parameters, "");
+  add(&v1::EstimateHistory::Point::drifting, " at the time");
   return plot;
 }
 

@@ -3,8 +3,8 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/json_format.h"
 #include "client/cli/session_list.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 

@@ -18,6 +18,24 @@ namespace {
 constexpr int kHistoryPoints = 50;
 constexpr int kDensityBins = 60;
 
+// Asks for the measured outputs as they were predicted, and for what drifts as all samples tell it.
+absl::Status Predict(const v1::Subject& subject, Backend& backend, ReportContent& content) {
+  v1::PredictRequest predict;
+  *predict.mutable_subject() = subject;
+  for (const v1::MeasuredOutput& measured : content.problem.measured()) {
+    predict.add_outputs(measured.output());
+  }
+  POLYEST_ASSIGN_OR_RETURN(content.prediction, backend.Predict(predict));
+  predict.clear_outputs();
+  predict.set_smoothed(true);
+  for (const v1::UncertainParameter& parameter : content.problem.uncertain()) {
+    if (parameter.has_drift()) predict.add_outputs(parameter.name());
+  }
+  if (predict.outputs().empty()) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(content.drift, backend.Predict(predict));
+  return absl::OkStatus();
+}
+
 // Computes what the report shows.
 absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent& content) {
   v1::ComputeEstimateRequest estimate;
@@ -27,9 +45,7 @@ absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent
                            backend.ComputeEstimate(estimate));
   content.estimate = std::move(*estimated.mutable_estimate());
   content.history = std::move(*estimated.mutable_history());
-  v1::PredictRequest predict;
-  *predict.mutable_subject() = subject;
-  POLYEST_ASSIGN_OR_RETURN(content.prediction, backend.Predict(predict));
+  POLYEST_RETURN_IF_ERROR(Predict(subject, backend, content));
   v1::ComputePosteriorRequest posterior;
   *posterior.mutable_subject() = subject;
   posterior.set_all_joints(true);

@@ -12,11 +12,11 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/fit_plot.h"
 #include "client/cli/history_plot.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/study_plots.h"
 #include "client/plot/svg_plot.h"
 #include "client/plot/svg_writer.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 namespace {
@@ -160,6 +160,11 @@ std::string ReportPage(const ReportContent& content) {
   add("Parameters", Parameters(content.estimate));
   add("Warnings", Warnings(content.estimate));
   add("Model and measurements", Image(MakePlot(content.prediction)) + Scores(content.prediction));
+  if (content.drift.outputs_size() > 0) {
+    add("Parameters that drift",
+        absl::StrCat("<p>Their values over time, as all samples of the run tell them.</p>\n",
+                     Image(MakePlot(content.drift))));
+  }
   if (content.history.points_size() > 1) {
     add("How the estimate came about", Image(MakePlot(content.history)));
   }

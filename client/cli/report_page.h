@@ -20,6 +20,7 @@ struct ReportContent {
   v1::Estimate estimate;
   v1::EstimateHistory history;
   v1::PredictResponse prediction;
+  v1::PredictResponse drift;  // of the parameters that drift, smoothed; no outputs if none does
   v1::ComputePosteriorResponse posterior;
 };
 

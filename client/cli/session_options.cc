@@ -106,6 +106,22 @@ void AddDelete(CommandRegistry& registry) {
   AddServer(command, arguments->place)->required();
 }
 
+void AddBackup(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<BackupArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "backup",
+       .summary = "Back up all sessions of a daemon into a file, while it works",
+       .examples = {"backup --server rig:50051 -o monday.db"},
+       .notes =
+           "Needs the role operator. Everything that was acknowledged before the command began\n"
+           "is in the file, which the daemon has verified; a damaged journal is backed up as it\n"
+           "is, and the exit status is 1. `polyestd --check-backup FILE` verifies a backup;\n"
+           "the runbook says how to restore it."},
+      arguments);
+  AddServer(command, arguments->place)->required();
+  command.add_option("-o,--output", arguments->output_file, "The file to write")->required();
+}
+
 }  // namespace
 
 void AddSessionCommands(CommandRegistry& registry) {
@@ -137,6 +153,7 @@ void AddDaemonCommands(CommandRegistry& registry) {
   command.add_option("--interval", arguments->interval_s, "Refresh interval, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
+  AddBackup(registry);
 }
 
 }  // namespace polyest::internal

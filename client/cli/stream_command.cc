@@ -18,7 +18,6 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/progress_line.h"
 #include "client/cli/stream_progress.h"
@@ -27,6 +26,7 @@
 #include "polyest/client.h"
 #include "polyest/data_file.h"
 #include "polyest/measurement_stream.h"
+#include "proto/wire/json/json_format.h"
 #include "proto/wire/refusal/refusal.h"
 
 namespace polyest::internal {

@@ -11,8 +11,8 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
-#include "client/cli/json_format.h"
 #include "client/cli/progress_line.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 namespace {

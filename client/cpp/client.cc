@@ -82,6 +82,7 @@ Client::Client(const std::string& server, ClientOptions options)
   studies_ = v1::StudyService::NewStub(channel);
   operations_ = v1::OperationService::NewStub(channel);
   statuses_ = v1::StatusService::NewStub(channel);
+  backups_ = v1::BackupService::NewStub(channel);
 }
 
 void Client::Prepare(grpc::ClientContext& call) const {
@@ -253,6 +254,24 @@ absl::Status Client::ExportSession(
   v1::SessionRecord record;
   while (reader->Read(&record)) {
     const absl::Status taken = take(record);
+    if (taken.ok()) continue;
+    context.TryCancel();
+    reader->Finish();
+    return taken;
+  }
+  return StatusOf(reader->Finish());
+}
+
+absl::Status Client::DownloadBackup(
+    const v1::DownloadBackupRequest& request,
+    const std::function<absl::Status(const v1::DownloadBackupResponse&)>& take) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
+  grpc::ClientContext context;
+  Prepare(context);
+  const auto reader = backups_->DownloadBackup(&context, request);
+  v1::DownloadBackupResponse part;
+  while (reader->Read(&part)) {
+    const absl::Status taken = take(part);
     if (taken.ok()) continue;
     context.TryCancel();
     reader->Finish();

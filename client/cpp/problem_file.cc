@@ -2,22 +2,19 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/ascii.h>
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <absl/strings/str_replace.h>
-#include <absl/strings/strip.h>
 #include <google/protobuf/util/json_util.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <vector>
 
 #include "client/cpp/file_kind.h"
-#include "client/cpp/unknown_fields.h"
 #include "core/common/status.h"
+#include "proto/wire/json/json_error.h"
+#include "proto/wire/json/unknown_fields.h"
 #include "proto/wire/transport/automatic_order.h"
 
 namespace polyest {
@@ -28,43 +25,10 @@ namespace {
 
 constexpr size_t kMaxFileBytes = size_t{16} << 20;
 
-// Returns the line of a syntax error, or 0 when it is not known. The parser's message has three
-// parts: the error, the text around it, and a caret under the position. The line is known if that
-// text occurs only once.
-int64_t LineOf(absl::string_view json, absl::string_view message) {
-  const size_t first = message.find('\n');
-  const size_t last = message.rfind('\n');
-  if (first == absl::string_view::npos || last == first) return 0;
-  const absl::string_view around = message.substr(first + 1, last - first - 1);
-  const size_t start = around.empty() ? json.size() : json.find(around);
-  if (start == absl::string_view::npos) return 0;
-  if (!around.empty() && json.find(around, start + 1) != absl::string_view::npos) return 0;
-  const size_t caret = std::min(start + message.size() - last - 2, json.size());
-  return 1 + std::count(json.begin(), json.begin() + static_cast<std::ptrdiff_t>(caret), '\n');
-}
-
-// Rewrites the parser's "(uncertain[0].uniform) lower: …" as "uncertain[0].uniform.lower: …".
-std::string FieldMessage(absl::string_view message) {
-  absl::ConsumePrefix(&message, ": ");
-  std::string text(message);
-  if (absl::ConsumePrefix(&message, "(")) {
-    const size_t close = message.find(')');
-    if (close != absl::string_view::npos) {
-      absl::string_view rest = message.substr(close + 1);
-      const bool member = absl::ConsumePrefix(&rest, " ");
-      text = absl::StrCat(message.substr(0, close), member ? "." : "", rest);
-    }
-  }
-  return absl::StrReplaceAll(
-      text, {{"type.googleapis.com/polyest.v1.", ""},
-             {"Root element must be a message.", "the file must hold one JSON object"}});
-}
-
 absl::Status ParseError(absl::string_view json, absl::string_view name, absl::string_view message) {
-  const int64_t line = LineOf(json, message);
-  const std::string what = FieldMessage(message.substr(0, message.find('\n')));
-  if (line == 0) return absl::InvalidArgumentError(absl::StrCat(name, ": ", what));
-  return absl::InvalidArgumentError(absl::StrCat(name, ":", line, ": ", what));
+  const JsonError error = DescribeJsonError(json, message);
+  if (error.line == 0) return absl::InvalidArgumentError(absl::StrCat(name, ": ", error.what));
+  return absl::InvalidArgumentError(absl::StrCat(name, ":", error.line, ": ", error.what));
 }
 
 // Returns an error that names all unknown fields in one line.

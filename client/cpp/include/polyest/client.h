@@ -12,6 +12,7 @@
 #include <string>
 
 #include "polyest/connection.h"
+#include "polyest/v1/backup_service.grpc.pb.h"
 #include "polyest/v1/model_service.grpc.pb.h"
 #include "polyest/v1/operation_service.grpc.pb.h"
 #include "polyest/v1/problem_service.grpc.pb.h"
@@ -112,6 +113,12 @@ class Client {
       const std::string& session_id,
       const std::function<absl::StatusOr<std::optional<v1::SessionRecord>>()>& next);
 
+  // Calls `take` with each part of a backup of all sessions of all tenants. If `take` fails, the
+  // backup ends with its status.
+  absl::Status DownloadBackup(
+      const v1::DownloadBackupRequest& request,
+      const std::function<absl::Status(const v1::DownloadBackupResponse&)>& take);
+
   // The stub that MeasurementStream uses. Call it only after another call has succeeded.
   v1::SessionService::Stub& sessions() { return *sessions_; }
   // Adds the token to a call made on a stub.
@@ -142,6 +149,7 @@ class Client {
   std::unique_ptr<v1::StudyService::Stub> studies_;
   std::unique_ptr<v1::OperationService::Stub> operations_;
   std::unique_ptr<v1::StatusService::Stub> statuses_;
+  std::unique_ptr<v1::BackupService::Stub> backups_;
 };
 
 }  // namespace polyest

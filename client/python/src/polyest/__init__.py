@@ -16,7 +16,7 @@ The daemon `polyestd` computes; this package talks to it. A first estimate:
 `polyest.aio` is the same for asyncio. Everything is in SI units unless a unit is given.
 """
 
-from polyest import aio, datatree, plot, results
+from polyest import aio, datatree, io, plot, results
 from polyest._resume import StreamOptions
 from polyest.check import Check, Finding, Remark
 from polyest.client import Client, Experiment
@@ -63,11 +63,11 @@ __version__ = "0.1.0"
 __all__ = [
     "Aborted", "AlreadyExists", "Beta", "Cancelled", "ChannelEstimate", "Check", "Chirp", "Client",
     "Constant", "Cost", "DaemonStatus", "DataLoss", "DeadlineExceeded", "Diagnostic", "Direction",
-    "Estimate", "ExpansionSummary", "Experiment", "FailedPrecondition", "FilteredQuantity", "Finding", "Gamma",
-    "HalfSineBump", "InternalError", "InvalidInput", "LocalClient", "Lognormal",
+    "Estimate", "ExpansionSummary", "Experiment", "FailedPrecondition", "FilteredQuantity",
+    "Finding", "Gamma", "HalfSineBump", "InternalError", "InvalidInput", "LocalClient", "Lognormal",
     "MixtureComponent", "Model", "Noise", "Normal", "NotFound", "Parameter", "PermissionDenied",
     "PolyestError", "Problem", "Quantity", "Remark", "ResourceExhausted", "Samples", "Session",
     "SessionInfo", "Sinusoid", "Step", "StreamOptions", "Streamed", "TradeOff", "TruncatedNormal",
     "Unauthenticated", "Unavailable", "Uniform", "Unimplemented", "WindowEstimate", "aio",
-    "connect", "datatree", "estimate", "local", "plot", "results",
+    "connect", "datatree", "estimate", "io", "local", "plot", "results",
 ]

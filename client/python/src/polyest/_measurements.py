@@ -12,6 +12,7 @@ import numpy as np
 
 from polyest._proto.v1 import measurements_pb2, problem_pb2
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse
+from polyest.io._recording import Batch, Recording
 
 Measurements = measurements_pb2.Measurements
 
@@ -50,21 +51,43 @@ class MeasurementConverter:
         self._clock = Clock()
         self._noted: set[str] = set()
 
+    @property
+    def names(self) -> list[str]:
+        """What the problem takes from data: outputs, inputs, and names in its condition."""
+        return list(dict.fromkeys((*self._measured, *self._streamed, *self._conditions)))
+
+    @property
+    def inputs(self) -> list[str]:
+        """The streamed inputs."""
+        return list(self._streamed)
+
     def convert(self, data: Data, *, end_of_run: bool = False) -> Measurements:
         """Returns all rows as one message; NaN is a missing sample. Raises InvalidInput."""
         if isinstance(data, Measurements):
             return data
+        if isinstance(data, (Batch, Recording)):
+            rows = data.all() if isinstance(data, Recording) else data
+            return rows.measurements(self._units, end_of_run=end_of_run)
         table = Table(data)
         used: list[str] = []
         message = Measurements(end_of_run=end_of_run)
         message.time_s.extend(self._times(table, used))
         self._add_run(table, message, used)
-        quantities = dict.fromkeys((*self._measured, *self._streamed, *self._conditions))
-        for quantity in quantities:
+        for quantity in self.names:
             self._add_channel(table, quantity, message, used)
         self._check_channels(table, message)
         self._note_unused(table, used)
         return message
+
+    def convert_each(self, data: Data, *, end_of_run: bool = False) -> Iterator[Measurements]:
+        """Yields the rows of a recording batch by batch, those of other data as one message."""
+        if not isinstance(data, Recording):
+            yield self.convert(data, end_of_run=end_of_run)
+            return
+        for batch in data:
+            yield self.convert(batch)
+        if end_of_run:
+            yield Measurements(end_of_run=True)
 
     def _times(self, table: Table, used: list[str]) -> Floats:
         found = self._find(table, "t")

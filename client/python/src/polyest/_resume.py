@@ -36,6 +36,8 @@ class StreamOptions:
     max_unacknowledged: int = 16
     #: The daemon makes an estimate after every so many batches; None: only when it is asked.
     estimate_every: Optional[int] = 1
+    #: The least time from one estimate to the next, s, ≥ 0; one due earlier waits for a batch.
+    estimate_interval_s: float = 0.0
     #: The delay before the first attempt to connect again, s; it doubles from one to the next.
     first_delay_s: float = 0.1
     #: The longest such delay, s.
@@ -59,6 +61,8 @@ class BatchQueue:
         self._attempts = 0  # to reach the daemon, since the last acknowledgement or refusal
         self._refusals = 0  # for lack of room, since the last acknowledgement
         self._begun = False
+        #: Connections made so far.
+        self.connections = 0
 
     def __len__(self) -> int:
         """Returns the number of batches without acknowledgement."""
@@ -76,6 +80,7 @@ class BatchQueue:
             request.estimates.only_last = True
         else:
             request.estimates.batch_count = self.options.estimate_every
+            request.estimates.min_interval_s = self.options.estimate_interval_s
         return request
 
     def connected(self, last_sequence: int) -> None:
@@ -95,6 +100,7 @@ class BatchQueue:
                            f"them up to {first - 1}")
         self._drop(last_sequence)
         self._written = 0
+        self.connections += 1
 
     def _begin(self, last_sequence: int) -> None:
         """Numbers the batches that were added before the first connection."""

@@ -30,12 +30,16 @@ from polyest.studies import Studies
 Result = TypeVar("Result")
 
 
-def created_or_same(name: str, wanted: problem_pb2.Problem,
+def created_or_same(name: str, wanted: problem_pb2.Problem, window_s: Optional[float],
                     found: session_service_pb2.Session) -> session_service_pb2.Session:
-    """Returns an existing session. Raises AlreadyExists if its problem is another one."""
+    """Returns an existing session. Raises AlreadyExists if its problem or window is another one."""
     if found.problem != wanted:
         raise AlreadyExists(f"session '{name}' exists with another problem; choose another name, "
                             "or open it without a problem")
+    if window_s is not None and found.reorder_window_s != window_s:
+        raise AlreadyExists(f"session '{name}' exists with reorder_window_s = "
+                            f"{found.reorder_window_s}, not {window_s}; choose another name, or "
+                            "open it without a problem")
     return found
 
 
@@ -64,6 +68,10 @@ class Experiment(Studies):
         points: how many, 1 … 1000; each takes the time of an estimate.
         """
         return self._run(_calls.compute_history(self._subject(), points))
+
+    def _with(self, problem: problem_pb2.Problem) -> Experiment:
+        """Returns another problem with the same measurements."""
+        return Experiment(self._transport, problem, self._measurements, self._units)
 
     def _subject(self) -> Subject:
         return _calls.subject_of_experiment(self._message, self._measurements)
@@ -140,15 +148,20 @@ class Client:
     def session(self, name: str, problem: Optional[ProblemLike] = None, *,
                 units: Optional[Mapping[str, str]] = None,
                 on_estimate: Optional[Callable[[Estimate], None]] = None,
-                options: Optional[StreamOptions] = None) -> Session:
+                options: Optional[StreamOptions] = None,
+                reorder_window_s: Optional[float] = None) -> Session:
         """Opens a session; creates it if it does not exist and a problem is given.
 
         name: 1 … 63 of [a-z0-9-], first a letter.
         units: of columns, for all rows that are appended.
         on_estimate: called with each estimate of the stream, from a thread of its own.
         options: how batches are sent and connections made again.
+        reorder_window_s: of a new session, how much later than rows of other channels a row may
+            arrive, s, in [0, 3600]; so long rows are held back. 0, the default: rows come in the
+            order of time.
 
-        Raises NotFound without a problem, AlreadyExists if the session has another one.
+        Raises NotFound without a problem, AlreadyExists if the session has another one, or
+        another window than a given one.
         """
         options = options or StreamOptions()
         if problem is None:
@@ -158,9 +171,11 @@ class Client:
             try:
                 created = self._transport.unary(
                     _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(
-                        session=session_service_pb2.Session(problem=message), session_id=name))
+                        session_id=name, session=session_service_pb2.Session(
+                            problem=message, reorder_window_s=reorder_window_s or 0.0)))
             except AlreadyExists:
-                created = created_or_same(name, message, self._get_session(name))
+                created = created_or_same(name, message, reorder_window_s,
+                                          self._get_session(name))
         return Session(self._transport, created, units, options, on_estimate)
 
     def _get_session(self, name: str) -> session_service_pb2.Session:

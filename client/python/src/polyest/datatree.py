@@ -3,8 +3,8 @@
 The groups are those of ArviZ's schema as far as the daemon's answers go: `posterior`, `prior`,
 `observed_data`, and `prediction`, the moments and quantiles of the outputs. The daemon returns the
 samples of a posterior as one sequence of equal weight, so that there is one chain; its own R̂ and
-effective sample sizes are attributes of `posterior`. It returns no outputs at single draws, so that
-there is neither `log_likelihood` nor `posterior_predictive`.
+effective sample sizes are attributes of `posterior`. It returns no outputs at single draws: if they
+are asked for, each draw takes a call, which gives `log_likelihood` and `posterior_predictive`.
 """
 
 from __future__ import annotations
@@ -14,17 +14,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from google.protobuf import json_format
 
+from polyest._at_draws import outputs_at_draws
 from polyest._draws import prior_draws
+from polyest._table import refuse
 from polyest.results import Posterior, Prediction
 
 if TYPE_CHECKING:
     from polyest.studies import Studies
 
 
-def of_studies(studies: Studies, *, samples: int = 1000, seed: int = 0) -> Any:
+def of_studies(studies: Studies, *, samples: int = 1000, seed: int = 0,
+               predictive: bool = False) -> Any:
     """Returns an xarray.DataTree of a session or experiment.
 
-    samples: of the posterior and of the prior. seed: of the prior's, which are drawn here.
+    samples: of the posterior and of the prior. seed: of the prior's, which are drawn here, and of
+    new samples' noise. predictive: adds `posterior_predictive`, new samples at each draw, and
+    `log_likelihood`, in 1/unit, of the samples measured; of an experiment only, at the cost of a
+    call of the daemon for each draw, and where noise is known and white (InvalidInput elsewhere).
     Raises ImportError if xarray is not there, or older than 2024.10, which brought DataTree.
     """
     import xarray
@@ -32,16 +38,49 @@ def of_studies(studies: Studies, *, samples: int = 1000, seed: int = 0) -> Any:
     if not hasattr(xarray, "DataTree"):
         raise ImportError("a DataTree needs xarray 2024.10 or later; polyest.datatree.groups "
                           "returns its groups as a dict of xarray.Dataset")
-    return xarray.DataTree.from_dict(groups(studies, samples=samples, seed=seed))
+    return xarray.DataTree.from_dict(groups(studies, samples=samples, seed=seed,
+                                            predictive=predictive))
 
 
-def groups(studies: Studies, *, samples: int = 1000, seed: int = 0) -> dict[str, Any]:
+def groups(studies: Studies, *, samples: int = 1000, seed: int = 0,
+           predictive: bool = False) -> dict[str, Any]:
     """Returns the groups as xarray.Dataset by name; arguments as of `of_studies`."""
     problem = json_format.MessageToDict(studies._problem())
     prediction = studies.predict()
-    return {"posterior": _posterior(studies.posterior(samples=samples)),
-            "prior": _draws(prior_draws(problem, samples, seed)),
-            "observed_data": _observed(prediction), "prediction": _prediction(prediction)}
+    posterior = studies.posterior(samples=samples)
+    found = {"posterior": _posterior(posterior),
+             "prior": _draws(prior_draws(problem, samples, seed)),
+             "observed_data": _observed(prediction), "prediction": _prediction(prediction)}
+    if predictive:
+        found.update(_predictive(studies, posterior, prediction, seed))
+    return found
+
+
+def _predictive(studies: Studies, posterior: Posterior, prediction: Prediction,
+                seed: int) -> dict[str, Any]:
+    """Returns new samples at each draw, and the log density of those measured."""
+    import xarray
+
+    from polyest.client import Experiment
+
+    if not isinstance(studies, Experiment):
+        raise refuse("predictive", "is there for experiments; see Client.experiment")
+    generator = np.random.default_rng(seed)
+    new: dict[str, Any] = {}
+    likely: dict[str, Any] = {}
+    for name, at in outputs_at_draws(studies, posterior).items():
+        one = prediction.outputs[name]
+        units = {"units": one.unit}
+        new[name] = (("chain", "draw", "row"),
+                     generator.normal(at.mean, at.noise)[np.newaxis], units)
+        rows = one.measured_rows
+        whole = len(rows) == len(prediction.time_s)
+        off = (one.measured - at.mean[:, rows]) / at.noise[:, rows]
+        density = -0.5 * off**2 - np.log(at.noise[:, rows]) - 0.5 * np.log(2 * np.pi)
+        likely[name] = (("chain", "draw", "row" if whole else f"row_{name}"),
+                        density[np.newaxis], units)
+    return {"posterior_predictive": xarray.Dataset(new, coords=_row_coordinates(prediction)),
+            "log_likelihood": xarray.Dataset(likely)}
 
 
 def _draws(values: dict[str, Any]) -> Any:

@@ -100,7 +100,7 @@ class Problem:
 
     def process_noise(self, state: str,
                       spectral_density: Union[float, tuple[float, float]]) -> Problem:
-        """Drives a state of the model with white noise: what a model that is not perfect leaves out.
+        """Drives a state of the model with white noise, for what an imperfect model leaves out.
 
         Its spectral density is in (unit of the state)²/s; the bounds of an unknown one make it
         another uncertain parameter.

@@ -65,7 +65,8 @@ class Session(Studies):
     def append(self, data: Data, *, end_of_run: bool = False, wait: bool = True) -> int:
         """Adds rows, later than those before, and returns the number of the last batch.
 
-        data: columns as in `Client.estimate`. end_of_run: these are the last rows of their run.
+        data: columns as in `Client.estimate`, or a `polyest.io.Recording`, which is read and sent
+            batch by batch. end_of_run: these are the last rows of their run.
         wait: return when the daemon keeps the rows. Otherwise return as soon as they are on their
             way, and wait for room only; then `flush`, `estimate` or the end of the `with` block
             reports what goes wrong.
@@ -75,7 +76,12 @@ class Session(Studies):
         then, and `flush` tries again. Any other exception means that the rows were refused, and
         that those before them are kept.
         """
-        return self._send(self._converter.convert(data, end_of_run=end_of_run), wait)
+        sequence = 0
+        for part in self._converter.convert_each(data, end_of_run=end_of_run):
+            sequence = self._send(part, False)
+        if wait:
+            self.flush()
+        return sequence
 
     def end_run(self) -> None:
         """Says that the last row's run has no further rows.

@@ -61,7 +61,8 @@ class Studies(Subjects):
     def predict(self, outputs: Sequence[str] = (), *, record: Optional[Data] = None,
                 times: Optional[npt.ArrayLike] = None, run: int = 0,
                 probabilities: Sequence[float] = (0.025, 0.5, 0.975), draws: int = 0,
-                max_rows: int = 0, lags: int = 0, horizon_s: float = 0) -> results.Prediction:
+                max_rows: int = 0, lags: int = 0, horizon_s: float = 0,
+                smoothed: bool = False, forecast_s: float = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores.
 
         outputs: names of outputs and of parameters that drift; by default the measured outputs and
@@ -73,11 +74,16 @@ class Studies(Subjects):
         horizon_s: with process noise or drift, the length of windows within which no sample is
             used, s; 0: each row is predicted from all rows before it. `times` after the last row
             are forecasts.
+        smoothed: with process noise or drift, each row is told from all rows of its run, those
+            after it too: what drifting parameters have been. There are no scores then.
+        forecast_s: if > 0, `max_rows` evenly spaced times up to so many seconds after the last row,
+            in place of the record's rows; not where an input is streamed.
         """
         return self._run(self._predict_call(record, outputs=outputs, times=times, run=run,
                                             probabilities=probabilities, draws=draws,
                                             max_rows=max_rows, lags=lags,
-                                            horizon_s=horizon_s))
+                                            horizon_s=horizon_s, smoothed=smoothed,
+                                            forecast_s=forecast_s))
 
     def posterior(self, *, probabilities: Sequence[float] = (), density_bins: int = 0,
                   joints: Sequence[tuple[str, str]] = (), all_joints: bool = False,

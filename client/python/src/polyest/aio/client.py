@@ -112,7 +112,8 @@ class Client:
     async def session(self, name: str, problem: Optional[ProblemLike] = None, *,
                       units: Optional[Mapping[str, str]] = None,
                       on_estimate: Optional[Callable[[Estimate], None]] = None,
-                      options: Optional[StreamOptions] = None) -> Session:
+                      options: Optional[StreamOptions] = None,
+                      reorder_window_s: Optional[float] = None) -> Session:
         """Opens a session; creates it if it does not exist and a problem is given.
 
         on_estimate: called in the event loop with each estimate of the stream.
@@ -125,9 +126,11 @@ class Client:
             try:
                 created = await self._transport.unary(
                     _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(
-                        session=session_service_pb2.Session(problem=message), session_id=name))
+                        session_id=name, session=session_service_pb2.Session(
+                            problem=message, reorder_window_s=reorder_window_s or 0.0)))
             except AlreadyExists:
-                created = created_or_same(name, message, await self._get_session(name))
+                created = created_or_same(name, message, reorder_window_s,
+                                          await self._get_session(name))
         return Session(self._transport, created, units, options, on_estimate)
 
     async def _get_session(self, name: str) -> session_service_pb2.Session:

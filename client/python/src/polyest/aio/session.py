@@ -60,7 +60,12 @@ class Session(Studies):
 
     async def append(self, data: Data, *, end_of_run: bool = False, wait: bool = True) -> int:
         """Adds rows and returns the number of the last batch; as `polyest.Session.append`."""
-        return await self._send(self._converter.convert(data, end_of_run=end_of_run), wait)
+        sequence = 0
+        for part in self._converter.convert_each(data, end_of_run=end_of_run):
+            sequence = await self._send(part, False)
+        if wait:
+            await self.flush()
+        return sequence
 
     async def end_run(self) -> None:
         """Says that the last row's run has no further rows."""

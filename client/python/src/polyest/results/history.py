@@ -45,6 +45,9 @@ class HistoryPoint:
     sequence: int
     #: The parameters by name.
     parameters: dict[str, ParameterThen]
+    #: The values at that time of the parameters that drift, by name; their verdict is empty. Of
+    #: these, `parameters` has the values at the beginning.
+    drifting: dict[str, ParameterThen]
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,11 @@ def of_message(message: estimate_pb2.EstimateHistory) -> History:
     """Returns a history as the daemon has sent it."""
     return History([
         HistoryPoint(point.time_s, point.sample_count, point.sequence,
-                     {one.name: ParameterThen(one.name, one.unit, one.mean, one.std_dev,
-                                              one.lower95, one.upper95, enum_name(one, "verdict"))
-                      for one in point.parameters})
+                     {one.name: _then(one, enum_name(one, "verdict")) for one in point.parameters},
+                     {one.name: _then(one, "") for one in point.drifting})
         for point in message.points])
+
+
+def _then(message: estimate_pb2.EstimateHistory.Parameter, verdict: str) -> ParameterThen:
+    return ParameterThen(message.name, message.unit, message.mean, message.std_dev,
+                         message.lower95, message.upper95, verdict)

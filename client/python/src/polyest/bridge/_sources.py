@@ -1,0 +1,177 @@
+"""Where measurements come from: a CAN bus that may disappear, or MCAP on the standard input."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import IO, Any, Optional, Union
+
+from polyest.bridge._backoff import Backoff
+from polyest.bridge._configuration import CanBus, Configuration, McapStream
+from polyest.errors import InvalidInput
+from polyest.io._choices import needed, unknown
+from polyest.io._frames import FrameDecoder, load_database
+from polyest.io._rows import nanoseconds
+from polyest.io._topics import MessageDecoder, Path, check_encoding, unit_of
+from polyest.io.mcap import values_of
+
+#: Takes a time, ns, and the values that some channels had then.
+Put = Callable[[int, Mapping[str, float]], None]
+
+# How long a bus is listened to before the end is looked for, s.
+_POLL_S = 0.2
+
+
+class CanSource:
+    """A bus of python-can, opened again when it fails."""
+
+    #: Whether samples that find the queue full are dropped: a bus does not wait.
+    live = True
+
+    def __init__(self, bus: CanBus, channels: Mapping[str, str],
+                 say: Callable[[str], None]) -> None:
+        """Raises InvalidInput for a database or a signal that does not exist."""
+        self._bus = bus
+        self._say = say
+        self._decoder = FrameDecoder(load_database(bus.database), channels)
+        #: The unit of each channel as the database writes it.
+        self.units = self._decoder.units
+        #: How often the bus was opened again.
+        self.reconnects = 0
+        #: time.monotonic() of the last frame of these channels.
+        self.last: Optional[float] = None
+
+    @property
+    def undecodable(self) -> int:
+        """Frames of the wanted messages whose data do not fit them."""
+        return self._decoder.undecodable
+
+    def run(self, put: Put, stop: threading.Event) -> None:
+        """Puts all samples until `stop` is set."""
+        backoff = Backoff()
+        opened = False
+        while not stop.is_set():
+            try:
+                with open_bus(self._bus) as bus:
+                    self.reconnects += opened
+                    opened = True
+                    backoff.reset()
+                    self._listen(bus, put, stop)
+            except Exception as error:  # each interface of python-can has its own
+                self._say(f"the bus {self._bus.channel} fails: {error}; it is opened again in "
+                          f"{backoff.next_s:.1f} s")
+                stop.wait(backoff.delay_s())
+
+    def _listen(self, bus: Any, put: Put, stop: threading.Event) -> None:
+        last_chance = math.inf
+        while time.monotonic() < last_chance:
+            if stop.is_set() and last_chance == math.inf:  # what has arrived is read
+                last_chance = time.monotonic() + _POLL_S
+            frame = bus.recv(0 if stop.is_set() else _POLL_S)
+            if frame is None and stop.is_set():
+                return
+            values = self._decoder.decode(frame) if frame is not None else {}
+            if frame is not None and values:
+                self.last = time.monotonic()
+                put(nanoseconds(frame.timestamp), values)
+
+
+def open_bus(bus: CanBus) -> Any:
+    """Opens a bus. Raises what python-can raises."""
+    can = needed("can", "can")
+    channel: Union[str, int] = int(bus.channel) if bus.channel.isdigit() else bus.channel
+    arguments = {"channel": channel} if bus.channel else {}
+    return can.Bus(interface=bus.interface, **arguments, **dict(bus.options))
+
+
+class McapSource:
+    """Messages of an MCAP stream, which ends."""
+
+    #: A file waits for the daemon.
+    live = False
+
+    def __init__(self, stream: McapStream, channels: Mapping[str, str]) -> None:
+        """Use it from one thread."""
+        self._stream = stream
+        self._channels = channels
+        #: Units come with the messages: see `units_found`.
+        self.units = {name: "" for name in channels}
+        self.reconnects = 0
+        self.undecodable = 0
+        self.last: Optional[float] = None
+
+    def run(self, put: Put, stop: threading.Event) -> None:
+        """Puts all samples until the stream ends or `stop` is set. Raises InvalidInput."""
+        name = self._stream.file
+        if name == "-":
+            self._read(sys.stdin.buffer, put, stop)
+            return
+        try:
+            with open(name, "rb") as opened:
+                self._read(opened, put, stop)
+        except OSError as error:
+            raise InvalidInput(f"{name}: cannot be opened: {error.strerror}") from error
+
+    def _read(self, opened: IO[bytes], put: Put, stop: threading.Event) -> None:
+        paths: dict[str, Path] = {}
+        decoder = MessageDecoder()
+        for schema, channel, message in _messages(opened, self._stream.file):
+            if stop.is_set():
+                return
+            for quantity, text in self._channels.items():
+                fits = text == channel.topic or text.startswith((f"{channel.topic}.",
+                                                                 f"{channel.topic}["))
+                if quantity not in paths and fits:
+                    self._find(paths, quantity, text, schema, channel)
+            if any(path.topic == channel.topic for path in paths.values()):
+                values = values_of(paths, channel.topic,
+                                   decoder.decode(schema, channel, message.data))
+                if values:
+                    self.last = time.monotonic()
+                    put(message.log_time, values)
+        for quantity, text in self._channels.items():
+            if quantity not in paths:
+                raise unknown(f"channels.{quantity}", "topic", text, ())
+
+    def _find(self, paths: dict[str, Path], quantity: str, text: str, schema: Any,
+              channel: Any) -> None:
+        path = Path(f"channels.{quantity}", text, {channel.topic: channel})
+        check_encoding(f"channels.{quantity}", channel)
+        paths[quantity] = path
+        self.units[quantity] = unit_of(schema, channel, path.steps)
+
+
+def _messages(opened: IO[bytes], name: str) -> Iterator[tuple[Any, Any, Any]]:
+    """Yields schema, channel and message of a stream that cannot be searched."""
+    needed("mcap", "mcap")
+    reader = needed("mcap.stream_reader", "mcap").StreamReader(opened)
+    records = needed("mcap.records", "mcap")
+    schemas: dict[int, Any] = {}
+    channels: dict[int, Any] = {}
+    try:
+        for record in reader.records:
+            if isinstance(record, records.Schema):
+                schemas[record.id] = record
+            elif isinstance(record, records.Channel):
+                channels[record.id] = record
+            elif isinstance(record, records.Message):
+                channel = channels[record.channel_id]
+                yield schemas.get(channel.schema_id), channel, record
+    except InvalidInput:
+        raise
+    except Exception as error:  # mcap has several, and struct.error
+        raise InvalidInput(f"{name}: is no MCAP stream, or is cut short: "
+                           f"{error or type(error).__name__}") from error
+
+
+Source = Union[CanSource, McapSource]
+
+
+def source_of(configuration: Configuration, say: Callable[[str], None]) -> Source:
+    """Returns the source of a configuration. Raises InvalidInput."""
+    if isinstance(configuration.source, CanBus):
+        return CanSource(configuration.source, configuration.channels, say)
+    return McapSource(configuration.source, configuration.channels)

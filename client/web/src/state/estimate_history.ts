@@ -1,0 +1,129 @@
+// How the estimates of one session came about, as its strips show it: bounded, whatever comes.
+
+import type { Estimate, HistoryPoint } from '../api/messages';
+import { ThinnedTable } from './thinned_table';
+
+const CAPACITY = 1024;
+const MAX_TICKS = 200;
+
+// The table's columns: time and samples, then those of each parameter.
+const TIME = 0;
+const SAMPLES = 1;
+const FIRST = 2;
+const PER_PARAMETER = 4;
+
+export interface Series {
+  x: ArrayLike<number>;
+  mean: ArrayLike<number>;
+  stdDev: ArrayLike<number>;
+  lower: ArrayLike<number>;
+  upper: ArrayLike<number>;
+}
+
+interface Row {
+  time: number;
+  samples: number;
+  sequence: number;
+  parameters: { name: string; mean: number; stdDev: number; lower95: number; upper95: number }[];
+}
+
+export class EstimateHistory {
+  private readonly table = new ThinnedTable(CAPACITY, FIRST);
+  private names: string[] = [];
+  private last: Row | null = null;
+  private reexpansions = -1;
+  private ticks: { time: number; samples: number }[] = [];
+
+  // Whether times begin again, as they do with each run: x is then the number of samples.
+  hasRuns = false;
+
+  get length(): number {
+    return this.table.length;
+  }
+
+  // Begins anew with what the daemon has kept.
+  load(points: readonly HistoryPoint[]): void {
+    this.clear();
+    for (const point of points) this.add(point);
+  }
+
+  clear(): void {
+    this.table.clear();
+    this.names.length = 0;
+    while (this.table.width > FIRST) this.table.removeColumn(FIRST);
+    this.last = null;
+    this.hasRuns = false;
+  }
+
+  // Adds an estimate, unless it is older than the last one.
+  append(estimate: Estimate): void {
+    if (this.last !== null && estimate.sequence < this.last.sequence) return;
+    const { reexpansions } = estimate.expansion;
+    if (this.reexpansions >= 0 && reexpansions > this.reexpansions) {
+      this.ticks.push({ time: estimate.time, samples: estimate.samples });
+      if (this.ticks.length > MAX_TICKS) this.ticks.splice(0, this.ticks.length - MAX_TICKS);
+    }
+    this.reexpansions = reexpansions;
+    this.add(estimate);
+  }
+
+  // Forgets the ticks as well.
+  restart(): void {
+    this.clear();
+    this.ticks = [];
+    this.reexpansions = -1;
+  }
+
+  // The history of one parameter; null if there is none.
+  series(name: string): Series | null {
+    const index = this.names.indexOf(name);
+    if (index < 0) return null;
+    const at = FIRST + index * PER_PARAMETER;
+    return {
+      x: this.table.column(this.hasRuns ? SAMPLES : TIME),
+      mean: this.table.column(at),
+      stdDev: this.table.column(at + 1),
+      lower: this.table.column(at + 2),
+      upper: this.table.column(at + 3),
+    };
+  }
+
+  // Where the expansion moved while this page watched.
+  reexpansionTicks(): number[] {
+    return this.ticks.map((tick) => (this.hasRuns ? tick.samples : tick.time));
+  }
+
+  private add(row: Row): void {
+    const isSame = this.last !== null && row.samples === this.last.samples && row.sequence === this.last.sequence;
+    this.useColumnsOf(row);
+    const numbers = new Array<number>(this.table.width).fill(NaN);
+    numbers[TIME] = row.time;
+    numbers[SAMPLES] = row.samples;
+    for (const parameter of row.parameters) {
+      const at = FIRST + this.names.indexOf(parameter.name) * PER_PARAMETER;
+      numbers[at] = parameter.mean;
+      numbers[at + 1] = parameter.stdDev;
+      numbers[at + 2] = parameter.lower95;
+      numbers[at + 3] = parameter.upper95;
+    }
+    if (this.last !== null && row.time < this.last.time) this.hasRuns = true;
+    if (isSame) this.table.replaceLast(numbers);
+    else this.table.append(numbers);
+    this.last = row;
+  }
+
+  // Parameters of each run come and go: columns are those of the present ones.
+  private useColumnsOf(row: Row): void {
+    const present = new Set(row.parameters.map(({ name }) => name));
+    for (let i = this.names.length - 1; i >= 0; --i) {
+      if (present.has(this.names[i] as string)) continue;
+      this.names.splice(i, 1);
+      for (let k = 0; k < PER_PARAMETER; ++k) this.table.removeColumn(FIRST + i * PER_PARAMETER);
+    }
+    for (const name of present) {
+      if (this.names.includes(name)) continue;
+      this.names.push(name);
+      for (let k = 0; k < PER_PARAMETER; ++k) this.table.addColumn();
+    }
+  }
+}
