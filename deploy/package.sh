@@ -76,7 +76,9 @@ make_debian_folder() {
   cp -r "$root/deploy/debian" "$work/tree/debian"
   cd "$work/tree"
   cp "$root/deploy/systemd/polyestd.service" debian/polyest.polyestd.service
+  cp "$root/deploy/edge/polyest-edge.service" debian/polyest.polyest-edge.service
   cp "$root/deploy/systemd/polyest.sysusers" debian/polyest.sysusers
+  cp "$root/deploy/systemd/polyest.logrotate" debian/polyest.logrotate
   sed -i "s|@MAINTAINER@|$maintainer|" debian/control
   mkdir examples
   cp "$root"/client/examples/*.{json,csv,md} examples
