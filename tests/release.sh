@@ -5,14 +5,16 @@
 #   tests/release.sh [STEP]...    all steps, in this order, unless some are named
 #
 #   crashes      kills the daemon 200 times while rigs stream to it (a minute on two cores)
+#   attacks      attacks the daemon, also through the edge, for longer than .ci/run does (5 minutes)
 #   sanitized    the long unit tests under the address and undefined-behaviour sanitizers
 #   fuzz         fuzzes equations and calls for half an hour
 #   threads      looks for races in the tests in which threads meet (90 minutes)
-#   calibration  asks of 1,008 campaigns whether the uncertainty is true (10 minutes)
+#   calibration  asks of 1,708 campaigns whether the uncertainty is true (20 minutes)
 #   properties   compares estimates of 2,000 random small problems with exact posteriors
 #   adversary    asks for estimates of all problems made to mislead it, if their maker is there
 #   invariances  asks whether estimates depend on the assumed noise, the sampling rate or the half of a
 #                record, for measured records, if they are there, and the examples (10 minutes)
+#   python       tests the package for Python with protobuf 5, 6, 7, and with the newest packages of PyPI
 #   sbibm        compares posteriors with the reference draws of a public benchmark, which it downloads
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
@@ -22,14 +24,28 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-all_steps=(crashes sanitized fuzz threads calibration properties adversary invariances
-  sbibm package)
+all_steps=(crashes attacks sanitized fuzz threads calibration properties adversary invariances
+  python sbibm package)
 
 crashes() {
   deploy/install-packages.sh --tests
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target durability_test
   POLYEST_TEST_CRASHES=200 ctest --preset release --tests-regex 'integration/durability_test'
+}
+
+attacks() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyestd
+  local attack
+  for attack in connections descriptors continuation; do
+    python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20
+  done
+  for attack in connections resets continuation; do
+    python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20 \
+      --edge deploy/edge/edge.cfg
+  done
 }
 
 sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label long; }
@@ -40,9 +56,10 @@ threads() { tests/threads/run.sh; }
 
 calibration() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
-  cmake --build --preset release --parallel "$(nproc)" --target calibration bands
+  cmake --build --preset release --parallel "$(nproc)" --target calibration bands tracking
   build/release/bin/calibration 1008
   build/release/bin/bands 200
+  build/release/bin/tracking 100
 }
 
 properties() {
@@ -66,6 +83,13 @@ invariances() {
   # 77: the measured records are not there, as the step has said.
   python3 -B tests/invariances/run.py build/release/bin/polyest build/release/invariances ||
     [[ $? -eq 77 ]]
+}
+
+python() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest polyest_python
+  tests/python/versions.sh /usr/bin/python3 build/release
 }
 
 sbibm() {

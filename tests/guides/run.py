@@ -165,7 +165,7 @@ def main():
     source, programs = (Path(argument).resolve() for argument in sys.argv[1:3])
     guides = sys.argv[3:] or sorted(
         str(file.relative_to(source)) for file in source.rglob("*.md")
-        if not any(part in ("build", ".git") or part.startswith(".")
+        if not any(part in ("build", "node_modules") or part.startswith(".")
                    for part in file.relative_to(source).parts))
     failures, run, console = Failures(), 0, 0
     for guide in guides:

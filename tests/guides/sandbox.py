@@ -26,11 +26,11 @@ for argument in "$@"; do
   esac
 done
 stop-daemon
-arguments=(--listen 127.0.0.1:0 --metrics 127.0.0.1:0)
+arguments=(--listen 127.0.0.1:0 --metrics 127.0.0.1:0 --web 127.0.0.1:0)
 [[ " $* " == *" --data-dir "* ]] || arguments+=(--data-dir "$ROOT/sessions")
 while (($#)); do
   case "$1" in
-    --listen | --metrics) shift ;;
+    --listen | --metrics | --web) shift ;;
     *) arguments+=("$1") ;;
   esac
   shift
@@ -38,9 +38,12 @@ done
 rm -f "$ROOT/ready" && mkfifo "$ROOT/ready"
 "$PROGRAMS/polyestd" "${arguments[@]}" >"$ROOT/ready" 2>>"$ROOT/log" </dev/null &
 echo $! >"$ROOT/pid"
-read -r line <"$ROOT/ready" || { cat "$ROOT/log" >&2; exit 1; }
+exec 3<"$ROOT/ready"
+read -r line <&3 || { cat "$ROOT/log" >&2; exit 1; }
 echo "${line#listening on }" >"$ROOT/address"
 echo "$line"
+read -r _ <&3 && read -r page <&3
+sed 's|.*//||; s|/$||' <<<"$page" >"$ROOT/page"
 """
 
 # Runs a program for which HOST:PORT is the daemon of the test, port 50051 the one that the guide has
@@ -56,6 +59,11 @@ for argument in "$@"; do
   arguments+=("$argument")
 done
 exec PROGRAM "${arguments[@]}"
+"""
+
+# Runs curl, for which localhost:8080 is the page of the daemon that the guide has started.
+CURL = r"""#!/usr/bin/env bash
+exec /usr/bin/curl "${@//localhost:8080/$(<"$ROOT/page")}"
 """
 
 STOP_DAEMON = r"""#!/usr/bin/env bash
@@ -105,6 +113,7 @@ class Sandbox:
         self._write(folder / "polyest", CLIENT.replace("PROGRAM", '"$PROGRAMS/polyest"'))
         # The one that Debian's packages are for.
         self._write(folder / "python3", CLIENT.replace("PROGRAM", "/usr/bin/python3 -B"))
+        self._write(folder / "curl", CURL)
         self._write(folder / "stop-daemon", STOP_DAEMON)
         for name in REFUSED:
             self._write(folder / name, f'#!/bin/bash\necho "{name} is not for a test; fence the block '

@@ -3,6 +3,7 @@
 #include <absl/strings/match.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -69,7 +70,12 @@ TEST_F(AuthenticationTest, RefusesEveryMethodWithAWrongToken) {
 
 TEST_F(AuthenticationTest, LetsAReaderRead) { ExpectByRole(reader_.secret, Role::kReader); }
 TEST_F(AuthenticationTest, LetsAWriterWrite) { ExpectByRole(writer_.secret, Role::kWriter); }
-TEST_F(AuthenticationTest, LetsAnAdminDoEverything) { ExpectByRole(admin_.secret, Role::kAdmin); }
+TEST_F(AuthenticationTest, LetsAnAdminDoEverythingInATenant) {
+  ExpectByRole(admin_.secret, Role::kAdmin);
+}
+TEST_F(AuthenticationTest, LetsAnOperatorDoEverything) {
+  ExpectByRole(operator_.secret, Role::kOperator);
+}
 
 // Returns a request about sessions/rig, as bytes; nothing if the method is not about a session.
 std::optional<std::string> AboutTheRig(const std::string& method) {
@@ -186,7 +192,7 @@ TEST_F(AuthenticationTest, TellsOfItsHealthAndItsContractWithoutAToken) {
           .ok());
 }
 
-TEST(ClientCertificate, MakesAnAdminOfItsHolderWhereThereAreNoTokens) {
+TEST(ClientCertificate, MakesAnOperatorOfItsHolderWhereThereAreNoTokens) {
   const TestFolder folder;
   const CertificateAuthority authority("test CA");
   const IssuedCertificate own = authority.Issue("daemon");
@@ -245,6 +251,18 @@ TEST(SecurityFiles, AreRefusedInOneLineWhenTheyAreNoGood) {
               HasSubstr("none: there is no token in it"));
   EXPECT_THAT(Refusal({"--tls-certificate", certificate}, 2), HasSubstr("--tls-key"));
   EXPECT_THAT(Refusal({"--tls-client-ca", certificate}, 2), HasSubstr("--tls-certificate"));
+}
+
+TEST(SecurityFiles, AreSaidToBeOpenToAll) {
+  const TestFolder folder;
+  const std::string tokens = folder.Write("tokens", MakeTokenFor("rig1:chassis:writer")->line);
+  for (const auto mode : {std::filesystem::perms(0644), std::filesystem::perms(0640)}) {
+    std::filesystem::permissions(tokens, mode);
+    DaemonProcess daemon({"--listen", "127.0.0.1:0", "--tokens", tokens});
+    ASSERT_NE(daemon.ReadAddress(), "");
+    EXPECT_EQ(absl::StrContains(daemon.Errors(), tokens + " is open to all users of this machine"),
+              mode == std::filesystem::perms(0644));
+  }
 }
 
 TEST(NewToken, GivesTheSecretOnStdoutAndItsLineOnStderr) {

@@ -121,6 +121,17 @@ class DaemonTest : public testing::Test {
     return status;
   }
 
+  // Returns the present estimate of a session.
+  v1::Estimate EstimateOf(const std::string& session) {
+    grpc::ClientContext context;
+    v1::GetEstimateRequest request;
+    request.set_session(session);
+    v1::Estimate estimate;
+    const grpc::Status status = sessions_->GetEstimate(&context, request, &estimate);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return estimate;
+  }
+
   DaemonProcess daemon_;
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;

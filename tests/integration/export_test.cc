@@ -37,15 +37,6 @@ class ExportTest : public DaemonTest {
     if (session != nullptr) *session = imported;
     return status;
   }
-  v1::Estimate Estimate(const std::string& session) {
-    grpc::ClientContext context;
-    v1::GetEstimateRequest request;
-    request.set_session(session);
-    v1::Estimate response;
-    const grpc::Status status = sessions_->GetEstimate(&context, request, &response);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return response;
-  }
   v1::EstimateHistory History(const std::string& session) {
     grpc::ClientContext context;
     v1::GetHistoryRequest request;
@@ -61,7 +52,7 @@ class ExportTest : public DaemonTest {
     for (const int batch : {1, 2, 3}) {
       EXPECT_TRUE(Add("sessions/rig", batch, OscillatorRows(10 * (batch - 1), 10 * batch)).ok());
       // Past estimates are kept with the commit of the next batch, or later.
-      Estimate("sessions/rig");
+      EstimateOf("sessions/rig");
     }
     std::vector<v1::SessionRecord> records;
     const grpc::Status status = Export("sessions/rig", records);
@@ -84,7 +75,8 @@ TEST_F(ExportTest, BringsASessionBackToTheSameBits) {
   EXPECT_EQ(imported.name(), "sessions/copy");
   EXPECT_EQ(imported.last_sequence(), 3);
   EXPECT_EQ(imported.sample_count(), 30);
-  EXPECT_EQ(WithoutSequence(Estimate("sessions/copy")), WithoutSequence(Estimate("sessions/rig")));
+  EXPECT_EQ(WithoutSequence(EstimateOf("sessions/copy")),
+            WithoutSequence(EstimateOf("sessions/rig")));
   // The copy continues as the first session would.
   EXPECT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
   EXPECT_TRUE(Add("sessions/copy", 2, OscillatorRows(10, 20)).ok());
@@ -95,7 +87,7 @@ TEST_F(ExportTest, GivesAnImportTheNameThatItHadUnlessThatIsTaken) {
   EXPECT_EQ(Import("", records).error_code(), grpc::StatusCode::ALREADY_EXISTS);
   ASSERT_TRUE(Delete("sessions/rig").ok());
   EXPECT_TRUE(Import("", records).ok());
-  EXPECT_EQ(Estimate("sessions/rig").samples(), 30);
+  EXPECT_EQ(EstimateOf("sessions/rig").samples(), 30);
 }
 
 TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
@@ -141,7 +133,7 @@ TEST_F(ExportTest, BringsTheHistoryAlong) {
   }
   // It goes on.
   ASSERT_TRUE(Add("sessions/copy", 4, OscillatorRows(30, 40)).ok());
-  EXPECT_EQ(Estimate("sessions/copy").samples(), 40);
+  EXPECT_EQ(EstimateOf("sessions/copy").samples(), 40);
   EXPECT_EQ(History("sessions/copy").points().rbegin()->sequence(), 4);
 }
 

@@ -131,5 +131,20 @@ TEST_F(MetricsTest, OfASecondDaemonNeedAPortOfTheirOwn) {
   EXPECT_THAT(daemon.Errors(), HasSubstr("--metrics: cannot listen on 127.0.0.1:"));
 }
 
+TEST_F(MetricsTest, AreThereThoughOtherClientsSayNothing) {
+  // They are more than the endpoint has threads, and are let go one after the other.
+  std::vector<int> silent;
+  for (int i = 0; i < 20; ++i) {
+    silent.push_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address = {};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<uint16_t>(port_));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ASSERT_EQ(connect(silent.back(), reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+  }
+  EXPECT_EQ(ValueOf("polyest_ready", Scrape(port_)), 1);
+  for (const int one : silent) close(one);
+}
+
 }  // namespace
 }  // namespace polyest::internal

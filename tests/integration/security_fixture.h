@@ -94,7 +94,7 @@ class SecureDaemonTest : public testing::Test {
   void SetUp() override {
     Install(authority_.Issue("daemon"));
     folder_.Write("ca.pem", authority_.certificate());
-    folder_.Write("tokens", Lines({reader_, writer_, admin_, other_}));
+    folder_.Write("tokens", Lines({reader_, writer_, admin_, operator_, other_}));
     std::vector<std::string> arguments = {
         "--listen",     "127.0.0.1:0",       "--log-level",      "trace",     "--tokens",
         File("tokens"), "--tls-certificate", File("daemon.pem"), "--tls-key", File("daemon.key")};
@@ -137,6 +137,7 @@ class SecureDaemonTest : public testing::Test {
   const NewToken reader_ = *MakeTokenFor("anna:chassis:reader");
   const NewToken writer_ = *MakeTokenFor("rig1:chassis:writer");
   const NewToken admin_ = *MakeTokenFor("bert:chassis:admin");
+  const NewToken operator_ = *MakeTokenFor("olga:chassis:operator");
   const NewToken other_ = *MakeTokenFor("carl:engines:admin");
   const TestFolder folder_;
   std::optional<DaemonProcess> daemon_;

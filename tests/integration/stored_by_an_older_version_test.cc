@@ -9,7 +9,7 @@
 #include <optional>
 #include <sstream>
 
-#include "client/cli/json_format.h"
+#include "proto/wire/json/json_format.h"
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest::internal {

@@ -54,14 +54,22 @@ TEST_F(WatchTest, ShowsPredictionsToThoseWhoAskForThem) {
   context.TryCancel();
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
 
-  for (const bool bad_output : {true, false}) {
+  constexpr double kLastRow_s = 0.25;
+  request.mutable_prediction()->set_forecast_s(0.3);
+  grpc::ClientContext of_forecast;
+  const auto ahead = sessions_->WatchSession(&of_forecast, request);
+  while (!response.has_prediction() || response.prediction().time_s(0) <= kLastRow_s) {
+    ASSERT_TRUE(ahead->Read(&response));
+  }
+  EXPECT_NEAR(response.prediction().time_s(2), kLastRow_s + 0.3, 1e-12);
+  of_forecast.TryCancel();
+  EXPECT_EQ(ahead->Finish().error_code(), grpc::StatusCode::CANCELLED);
+
+  for (const int what : {0, 1, 2}) {
     v1::WatchSessionRequest bad = request;
-    bad.mutable_prediction()->clear_outputs();
-    if (bad_output) {
-      bad.mutable_prediction()->add_outputs("q");
-    } else {
-      bad.mutable_prediction()->set_min_interval_s(-1);
-    }
+    if (what == 0) bad.mutable_prediction()->set_outputs(0, "q");
+    if (what == 1) bad.mutable_prediction()->set_min_interval_s(-1);
+    if (what == 2) bad.mutable_prediction()->set_forecast_s(-1);
     grpc::ClientContext call;
     const auto refused = sessions_->WatchSession(&call, bad);
     while (refused->Read(&response)) EXPECT_FALSE(response.has_prediction());

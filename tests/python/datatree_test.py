@@ -35,6 +35,30 @@ def test_groups_have_draws_data_and_predictions(experiment, record):
         0.2 * estimate["k"].std_dev)
 
 
+def test_draws_have_the_likelihood_of_the_exact_solution(experiment, record):
+    groups = datatree.groups(experiment, samples=20, predictive=True)
+    k, c = (groups["posterior"][name].values[0][:, np.newaxis] for name in ("k", "c"))
+    t, frequency = record["t"], np.sqrt(k - c**2 / 4)
+    exact = np.exp(-c * t / 2) * (np.cos(frequency * t) + c / 2 / frequency * np.sin(frequency * t))
+    expected = -0.5 * ((record["x"] - exact) / 0.01) ** 2 - np.log(0.01 * np.sqrt(2 * np.pi))
+    found = groups["log_likelihood"]["x"]
+    assert found.dims == ("chain", "draw", "row")
+    # An error e of the trajectory changes the log density by up to 4 e/σ, σ = 0.01; e is 10⁻⁶.
+    np.testing.assert_allclose(found.values[0], expected, atol=4e-4)
+    new = groups["posterior_predictive"]["x"].values[0]
+    # The standard deviation of 20,000 draws scatters by 0.5 %.
+    assert abs((new - exact).std() / 0.01 - 1) < 4 * 0.005
+
+
+def test_samples_that_are_not_independent_have_no_likelihood_here(client, record):
+    wanted = (polyest.Problem.builtin("mass_spring_damper").fix(m=1.0, x0=1.0)
+              .uncertain("k", polyest.Uniform(31.584, 47.376))
+              .measure("x", polyest.Noise(unknown=True)))
+    with pytest.raises(polyest.InvalidInput, match="predictive: is not there for problems with "
+                       "noise that is unknown"):
+        datatree.groups(client.experiment(wanted, record), samples=10, predictive=True)
+
+
 @pytest.mark.skipif(not hasattr(xarray, "DataTree"), reason="xarray is older than 2024.10")
 def test_arviz_reads_the_tree(experiment):
     arviz = pytest.importorskip("arviz")

@@ -12,7 +12,7 @@ import pytest
 
 import polyest
 from conftest import ROOT
-from polyest import aio, datatree, plot, results
+from polyest import aio, datatree, io, plot, results
 
 PACKAGE = ROOT / "client" / "python"
 
@@ -30,7 +30,8 @@ def public(module):
                 yield f"{module.__name__}.{name}.{member}", part
 
 
-@pytest.mark.parametrize("module", [polyest, aio, plot, results, datatree],
+@pytest.mark.parametrize("module", [polyest, aio, plot, results, datatree, io, io.can, io.mcap,
+                                    io.mdf],
                          ids=lambda module: module.__name__)
 def test_every_public_name_is_described(module):
     names = list(public(module))
@@ -40,7 +41,7 @@ def test_every_public_name_is_described(module):
     assert undescribed == []
 
 
-@pytest.mark.parametrize("module", [polyest, results], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [polyest, results, io, io.mdf], ids=lambda module: module.__name__)
 def test_every_field_of_a_result_is_described(module):
     undescribed = []
     for name in module.__all__:

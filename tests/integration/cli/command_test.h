@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/json_format.h"
 #include "polyest/v1/estimate.pb.h"
+#include "proto/wire/json/json_format.h"
 #include "tests/integration/cli/process.h"
 #include "tests/testing/test_folder.h"
 

@@ -102,7 +102,8 @@ address=none
 run "Make certificates"
 run "Make a token"
 [[ $(stat -c %a rig1.token) == 600 ]] || fail "others may read the token"
-polyestd --new-token operator:chassis:admin >admin.token 2>>"$root/etc/polyest/tokens"
+polyestd --new-token bert:chassis:admin >admin.token 2>>"$root/etc/polyest/tokens"
+polyestd --new-token olga:chassis:operator >operator.token 2>>"$root/etc/polyest/tokens"
 systemctl start polyestd
 address=localhost:$(sed 's/.*://' "$root/address")
 export POLYEST_TLS_CA=$root/work/ca.pem
@@ -118,7 +119,18 @@ estimate=$(stream 60 | tail -n 1)
 expect "$estimate" '"samples":"60"'
 
 say "backing up, going on, and restoring"
-run "Back up" 1
+(
+  export POLYEST_TOKEN_FILE=$root/work/admin.token
+  ! commands "Back up" 1 | sed "s|HOST:PORT|$address|" | bash -eu 2>"$root/output" ||
+    fail "an admin of one tenant has the sessions of all"
+)
+expect "$(<"$root/output")" "needs the role operator"
+(
+  export POLYEST_TOKEN_FILE=$root/work/operator.token
+  run "Back up" 1
+)
+done_sections+=("Back up")
+expect "$(<"$root/output")" "1 sessions, 2 batches"
 (
   export POLYEST_TOKEN_FILE=$root/work/admin.token
   polyest export rig1-monday before.session --server "$address" >/dev/null

@@ -6,11 +6,11 @@
 #include <sstream>
 
 #include "client/cli/estimate_format.h"
-#include "client/cli/json_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
 #include "polyest/v1/model_service.pb.h"
 #include "polyest/v1/problem.pb.h"
+#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 namespace {

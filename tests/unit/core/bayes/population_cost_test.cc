@@ -45,6 +45,25 @@ struct Quadrature {
   }
 };
 
+// Compares with central differences. Their error in the gradient is kStep²/6 of the third
+// derivative, which is about 10 for Gaussians; that in the Hessian may be ten times as large.
+void ExpectDerivatives(const PopulationCost& cost, const Vector& xi, double error) {
+  constexpr double kStep = 1e-4;
+  const auto exact = cost.Differentiate(xi);
+  EXPECT_NEAR(exact.value, cost.Evaluate(xi), 1e-12);
+  for (Eigen::Index i = 0; i < xi.size(); ++i) {
+    Vector above = xi, below = xi;
+    above[i] += kStep;
+    below[i] -= kStep;
+    EXPECT_NEAR(exact.gradient[i], (cost.Evaluate(above) - cost.Evaluate(below)) / 2 / kStep,
+                error);
+    const Vector change =
+        (cost.Differentiate(above).gradient - cost.Differentiate(below).gradient) / 2 / kStep;
+    EXPECT_LT((exact.hessian.col(i) - change).cwiseAbs().maxCoeff(), 10 * error);
+  }
+  EXPECT_LT((exact.hessian - exact.hessian.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+}
+
 TEST(PopulationCost, IsTheIntegralOverTheRuns) {
   for (const double variance : {1e-4, 0.1, 0.6, 1.0}) {
     const Vector xi{{0.3, -0.8, 1.2}};
@@ -75,7 +94,6 @@ TEST(PopulationCost, OfAKnownScoreIsTheRatioOfTheDensities) {
 // A mixture of one component is a Gaussian; that of a skewed run has the derivatives of its
 // differences.
 TEST(PopulationCost, OfAMixtureHasTheDerivativesOfItsDifferences) {
-  constexpr double kStep = 1e-4;
   const Matrix slope{{0, 0, 0.3}};
   const Vector base = Vector::Constant(1, 0.4), variance = Vector::Constant(1, 0.2);
   const PopulationCost one(0, 1, base, slope, variance, {{0.1, 0.3, Vector::Zero(1)}});
@@ -85,19 +103,7 @@ TEST(PopulationCost, OfAMixtureHasTheDerivativesOfItsDifferences) {
   for (const double spread : {-6.0, -0.4, 1.5}) {
     const Vector xi{{0.3, spread, 1.2}};
     EXPECT_NEAR(one.Evaluate(xi), gaussian.Evaluate(xi), 1e-12);
-    const auto exact = cost.Differentiate(xi);
-    EXPECT_NEAR(exact.value, cost.Evaluate(xi), 1e-12);
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      Vector above = xi, below = xi;
-      above[i] += kStep;
-      below[i] -= kStep;
-      EXPECT_NEAR(exact.gradient[i], (cost.Evaluate(above) - cost.Evaluate(below)) / 2 / kStep,
-                  1e-5);
-      const Vector change =
-          (cost.Differentiate(above).gradient - cost.Differentiate(below).gradient) / 2 / kStep;
-      EXPECT_LT((exact.hessian.col(i) - change).cwiseAbs().maxCoeff(), 1e-4);
-    }
-    EXPECT_LT((exact.hessian - exact.hessian.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+    ExpectDerivatives(cost, xi, 1e-5);
   }
 }
 
@@ -126,23 +132,12 @@ TEST(PopulationCost, HasTheQuantilesOfTheRunInThePopulation) {
 }
 
 TEST(PopulationCost, HasTheDerivativesOfItsDifferences) {
-  constexpr double kStep = 1e-4;
   for (const double variance : {0.0, 0.3, 1.0}) {
     const PopulationCost cost = TwoRuns(variance, 0.2);
     const Vector xi{{0.3, -0.4, 1.2}};
+    ExpectDerivatives(cost, xi, 1e-6);
     const auto exact = cost.Differentiate(xi);
     EXPECT_DOUBLE_EQ(exact.value, cost.Evaluate(xi));
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      Vector above = xi, below = xi;
-      above[i] += kStep;
-      below[i] -= kStep;
-      // The error of central differences is kStep²/6 of the third derivative, which is about 10.
-      EXPECT_NEAR(exact.gradient[i], (cost.Evaluate(above) - cost.Evaluate(below)) / 2 / kStep,
-                  1e-6);
-      const Vector change =
-          (cost.Differentiate(above).gradient - cost.Differentiate(below).gradient) / 2 / kStep;
-      EXPECT_LT((exact.hessian.col(i) - change).cwiseAbs().maxCoeff(), 1e-5);
-    }
     EXPECT_EQ(exact.hessian, Matrix(exact.hessian.transpose()));
   }
 }

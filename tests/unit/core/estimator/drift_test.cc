@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
 #include <string>
 
@@ -13,77 +12,12 @@
 #include "core/estimator/problem/resolved_problem.h"
 #include "polyest/equation_model.h"
 #include "tests/unit/core/estimator/estimation.h"
+#include "tests/unit/core/estimator/local_level.h"
 
 namespace polyest::internal {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kStepS = 0.1;
-constexpr double kSigma = 0.2;
-constexpr double kRate = 0.3;
-constexpr double kPriorMean = 5, kPriorDeviation = 2;
-
-// Returns a model whose output is its parameter a; its state stays 0.
-std::shared_ptr<const Model> Level() {
-  return MakeEquationModel({.states = {{"z", "0"}},
-                            .outputs = {{"y", "z + a"}},
-                            .parameters = {{"a", 1}},
-                            .units = {{"a", "N"}}})
-      .value();
-}
-
-Problem DriftingLevel() {
-  Problem problem;
-  problem.model = Level();
-  problem.uncertain = {UncertainParameter::Normal("a", kPriorMean, kPriorDeviation).value()};
-  problem.uncertain[0].drift = RandomWalk{.std_dev_per_sqrt_s = kRate};
-  problem.measured = {{"y", {.absolute = kSigma}}};
-  return problem;
-}
-
-Problem WithUnknownRate() {
-  Problem problem = DriftingLevel();
-  problem.uncertain[0].drift = RandomWalk{.unknown = true, .lower = 0.01, .upper = 3};
-  return problem;
-}
-
-Samples Walk(int rows, uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  Samples samples;
-  samples.columns = {{"y", {}, {}}};
-  double a = 6;
-  for (int i = 1; i <= rows; ++i) {
-    a += kRate * std::sqrt(kStepS) * normal(random);
-    samples.time_s.push_back(i * kStepS);
-    samples.columns[0].value.push_back(a + kSigma * normal(random));
-  }
-  return samples;
-}
-
-struct LocalLevel {
-  double mean = kPriorMean, variance = kPriorDeviation * kPriorDeviation;  // now
-  double log_likelihood = 0;
-};
-
-// Takes the first `rows` rows.
-LocalLevel ExactFilter(const Samples& samples, double rate, size_t rows, double sigma = kSigma) {
-  LocalLevel level;
-  for (size_t i = 0; i < rows; ++i) {
-    const double z = samples.columns[0].value[i];
-    level.variance += rate * rate * kStepS;
-    const double S = level.variance + sigma * sigma, nu = z - level.mean;
-    level.log_likelihood -= 0.5 * (nu * nu / S + std::log(S));
-    level.mean += level.variance / S * nu;
-    level.variance -= level.variance * level.variance / S;
-  }
-  return level;
-}
-
-LocalLevel ExactFilter(const Samples& samples, double rate) {
-  return ExactFilter(samples, rate, samples.rows());
-}
 
 // The exact level is a normal distribution, and a normal prior's level is linear in the germ, so
 // that only the draws of the posterior differ: by 1 % of a standard deviation for 10⁴ of them.
@@ -160,99 +94,6 @@ TEST(Drift, IntervalsCoverTheLevel) {
     covered += a.lower95 <= truth && truth <= a.upper95;
   }
   EXPECT_GE(covered, 16);
-}
-
-// Expects the predictions from row 60 on, where the level at the beginning no longer matters, to be
-// those of the exact filter after the rows that `used` returns for a row.
-void ExpectExact(const Samples& samples, const Prediction& prediction,
-                 const std::function<size_t(size_t)>& used) {
-  ASSERT_EQ(prediction.outputs.size(), 2u);  // y and what drifts, a
-  const PredictedOutput& y = prediction.outputs[0];
-  for (size_t row = 60; row < prediction.rows.size(); ++row) {
-    const size_t rows = used(row);
-    const LocalLevel level = ExactFilter(samples, kRate, rows);
-    const double since = prediction.rows[row].time_s - static_cast<double>(rows) * kStepS;
-    const double deviation = std::sqrt(level.variance + kRate * kRate * since);
-    const auto k = static_cast<Eigen::Index>(row);
-    EXPECT_NEAR(y.mean[k], level.mean, 1e-6 * deviation) << row;
-    EXPECT_NEAR(y.std_dev[k], deviation, 1e-6 * deviation) << row;
-    EXPECT_NEAR(y.quantiles(k, 2), level.mean + 1.959964 * deviation, 1e-5 * deviation) << row;
-    if (row < samples.rows()) {
-      EXPECT_NEAR(y.sample_std_dev[k], std::hypot(deviation, kSigma), 1e-6 * deviation) << row;
-    }
-  }
-}
-
-TEST(Drift, PredictsEachRowFromTheRowsBefore) {
-  const Samples samples = Walk(150, 4);
-  const auto estimator = MakeEstimator(DriftingLevel());
-  ASSERT_TRUE(estimator->Append(samples).ok());
-  ASSERT_TRUE(estimator->Process().ok());
-  PredictionOptions options;
-  options.draws = 50;
-  const auto each = estimator->CurrentPrediction(options);
-  ASSERT_TRUE(each.ok()) << each.status();
-  ExpectExact(samples, *each, [](size_t row) { return row; });
-  EXPECT_EQ(each->outputs[0].score.samples, 150);
-  // 95 % of 150: 142.5 ± 3 · 2.7.
-  EXPECT_NEAR(each->outputs[0].score.coverage95, 0.95, 3 * 2.7 / 150);
-
-  // Windows of ten rows: row 60 is the first of the seventh.
-  options.horizon_s = 10.5 * kStepS;
-  const auto windows = estimator->CurrentPrediction(options);
-  ASSERT_TRUE(windows.ok()) << windows.status();
-  ExpectExact(samples, *windows, [](size_t row) { return row / 10 * 10; });
-
-  // Forecasts after the last row, from all.
-  options.horizon_s = 0;
-  for (int i = 1; i <= 100; ++i) options.times.push_back({0, (150 + i) * kStepS});
-  const auto forecasts = estimator->CurrentPrediction(options);
-  ASSERT_TRUE(forecasts.ok()) << forecasts.status();
-  ExpectExact(samples, *forecasts, [](size_t) { return size_t{150}; });
-}
-
-// The output is the level itself, so that both are predicted alike; a gain is the channel's alone.
-TEST(Drift, IsPredictedOverTime) {
-  Problem problem = DriftingLevel();
-  problem.fixed = {{"y.gain", 2}};
-  Samples samples = Walk(60, 4);
-  for (double& value : samples.columns[0].value) value *= 2;
-  problem.measured[0].noise.absolute = 2 * kSigma;
-  const auto estimator = MakeEstimator(problem);
-  ASSERT_TRUE(estimator->Append(samples).ok());
-  ASSERT_TRUE(estimator->Process().ok());
-  PredictionOptions options;
-  options.outputs = {"y", "a"};
-  options.draws = 50;
-  const auto prediction = estimator->CurrentPrediction(options);
-  ASSERT_TRUE(prediction.ok()) << prediction.status();
-  const PredictedOutput &y = prediction->outputs[0], &a = prediction->outputs[1];
-  EXPECT_EQ(a.output, "a");
-  EXPECT_EQ(a.unit, "N");
-  EXPECT_EQ(a.measured.size(), 0);
-  EXPECT_TRUE(a.mean.isApprox(0.5 * y.mean, 1e-12));
-  EXPECT_TRUE(a.quantiles.isApprox(0.5 * y.quantiles, 1e-9));
-  options.outputs = {"b"};
-  EXPECT_THAT(std::string(estimator->CurrentPrediction(options).status().message()),
-              HasSubstr("it has y, a"));
-}
-
-TEST(Drift, RefusesHorizonsThatAreNone) {
-  const auto estimator = MakeEstimator(DriftingLevel());
-  ASSERT_TRUE(estimator->Append(Walk(20, 4)).ok());
-  ASSERT_TRUE(estimator->Process().ok());
-  PredictionOptions options;
-  options.horizon_s = -1;
-  EXPECT_EQ(estimator->CurrentPrediction(options).status().message(),
-            "horizon_s: -1 must be a finite time ≥ 0");
-  Problem perfect = DriftingLevel();
-  perfect.uncertain[0].drift.reset();
-  const auto other = MakeEstimator(perfect);
-  ASSERT_TRUE(other->Append(Walk(20, 4)).ok());
-  ASSERT_TRUE(other->Process().ok());
-  options.horizon_s = 1;
-  EXPECT_THAT(std::string(other->CurrentPrediction(options).status().message()),
-              HasSubstr("horizon_s: 1 needs likelihood PREDICTION_ERROR"));
 }
 
 TEST(Drift, KeepsWithinTheBoundsOfThePrior) {

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -110,34 +111,36 @@ double ExactCost(const Samples& samples, const Eigen::Vector3d& at) {
 }
 
 struct Maximum {
-  Eigen::Vector3d at, std_dev;
+  Vector at, std_dev;
   double cost = 0;
 };
 
-// Minimizes the exact cost by Newton's method with central differences.
-Maximum Maximize(const Samples& samples) {
-  Eigen::Vector3d at(kTrueK, kTrueC, std::log(kTrueQ));
-  const Eigen::Vector3d step(0.02, 0.004, 0.02);
-  Eigen::Matrix3d hessian;
+// Minimizes by Newton's method with central differences.
+Maximum Minimize(const std::function<double(const Vector&)>& cost, Vector at, const Vector& step) {
+  const Eigen::Index n = at.size();
+  Matrix hessian(n, n);
   for (int iteration = 0; iteration < 30; ++iteration) {
-    Eigen::Vector3d gradient;
-    const auto cost = [&](const Eigen::Vector3d& by) {
-      return ExactCost(samples, at + step.cwiseProduct(by));
-    };
-    for (int i = 0; i < 3; ++i) {
-      const Eigen::Vector3d a = Eigen::Vector3d::Unit(i);
-      gradient[i] = (cost(a) - cost(-a)) / (2 * step[i]);
-      for (int j = 0; j < 3; ++j) {
-        const Eigen::Vector3d b = Eigen::Vector3d::Unit(j);
+    Vector gradient(n);
+    const auto near = [&](const Vector& by) { return cost(at + step.cwiseProduct(by)); };
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Vector a = Vector::Unit(n, i);
+      gradient[i] = (near(a) - near(-a)) / (2 * step[i]);
+      for (Eigen::Index j = 0; j < n; ++j) {
+        const Vector b = Vector::Unit(n, j);
         hessian(i, j) =
-            (cost(a + b) - cost(a - b) - cost(b - a) + cost(-a - b)) / (4 * step[i] * step[j]);
+            (near(a + b) - near(a - b) - near(b - a) + near(-a - b)) / (4 * step[i] * step[j]);
       }
     }
-    const Eigen::Vector3d move = hessian.inverse() * gradient;
+    const Vector move = hessian.inverse() * gradient;
     at -= move;
     if (move.norm() < 1e-6) break;
   }
-  return {at, hessian.inverse().diagonal().cwiseSqrt(), ExactCost(samples, at)};
+  return {at, hessian.inverse().diagonal().cwiseSqrt(), cost(at)};
+}
+
+Maximum Maximize(const Samples& samples) {
+  return Minimize([&](const Vector& at) { return ExactCost(samples, at); },
+                  Vector{{kTrueK, kTrueC, std::log(kTrueQ)}}, Vector{{0.02, 0.004, 0.02}});
 }
 
 TEST(ProcessNoise, AgreesWithTheMaximumOfTheExactLikelihood) {
@@ -203,6 +206,44 @@ TEST(ProcessNoise, BeginsAgainWithEachRun) {
     EXPECT_NEAR(twice.parameters[i].std_dev, once.parameters[i].std_dev / std::sqrt(2),
                 0.1 * once.parameters[i].std_dev);
   }
+}
+
+// Each run has a damping of its own; the likelihood is the product of those of the runs.
+TEST(ProcessNoise, KnowsParametersOfRuns) {
+  const std::vector<Samples> runs = {Measure(300, kTrueQ, 3), Measure(300, kTrueQ, 4)};
+  const Maximum exact = Minimize(
+      [&](const Vector& at) {
+        return ExactCost(runs[0], {at[0], at[1], at[3]}) +
+               ExactCost(runs[1], {at[0], at[2], at[3]});
+      },
+      Vector{{kTrueK, kTrueC, kTrueC, std::log(kTrueQ)}}, Vector{{0.02, 0.004, 0.004, 0.02}});
+  Samples samples = runs[0];
+  samples.run.assign(300, 0);
+  samples.run.resize(600, 1);
+  samples.time_s.insert(samples.time_s.end(), runs[1].time_s.begin(), runs[1].time_s.end());
+  samples.columns[0].value.insert(samples.columns[0].value.end(), runs[1].columns[0].value.begin(),
+                                  runs[1].columns[0].value.end());
+  Problem problem = WithUnknownNoise();
+  problem.uncertain[1].per_run = true;
+  const auto estimator = MakeEstimator(problem);
+  ASSERT_TRUE(estimator->Append(samples).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  const Estimate estimate = estimator->CurrentEstimate().value();
+  ASSERT_EQ(estimate.parameters.size(), 4u);
+  const std::vector<std::pair<std::string, int>> places = {{"k", 0}, {"c[0]", 1}, {"c[1]", 2}};
+  for (const auto& [name, place] : places) {
+    const auto found = std::ranges::find(estimate.parameters, name, &ParameterEstimate::name);
+    ASSERT_NE(found, estimate.parameters.end()) << name;
+    EXPECT_NEAR(found->map, exact.at[place], 0.15 * exact.std_dev[place]) << name;
+    EXPECT_NEAR(found->std_dev, exact.std_dev[place], 0.1 * exact.std_dev[place]) << name;
+  }
+  // Each run is predicted with its own damping: standardized residuals are white.
+  PredictionOptions options;
+  options.draws = 50;
+  const auto prediction = estimator->CurrentPrediction(options);
+  ASSERT_TRUE(prediction.ok()) << prediction.status();
+  EXPECT_LT(prediction->outputs[0].score.autocorrelation.head(10).cwiseAbs().maxCoeff(),
+            4 / std::sqrt(600));
 }
 
 double SquaredError(const Estimate& estimate) {
@@ -306,8 +347,8 @@ TEST(ProcessNoise, IsRefusedWithWhatFiltersCannotDo) {
   };
   EXPECT_THAT(refusal([](Problem& p) { p.likelihood = LikelihoodForm::kOutputError; }),
               HasSubstr("likelihood: OUTPUT_ERROR takes the model for perfect"));
-  EXPECT_THAT(refusal([](Problem& p) { p.uncertain[0].per_run = true; }),
-              HasSubstr("uncertain[0].per_run: is not available"));
+  EXPECT_THAT(refusal([](Problem& p) { p.uncertain[0].population = true; }),
+              HasSubstr("uncertain[0].population: is not available"));
   EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.unknown = true; }),
               HasSubstr("measured[0].noise.unknown: is not available"));
   EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.relative = 0.1; }),

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "polyest/equation_model.h"
-#include "tests/unit/core/propagation/ensemble.h"
+#include "tests/unit/core/propagation/random_oscillators.h"
 
 namespace polyest::internal {
 namespace {
@@ -18,12 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-// One member's parameters: x″ = −k x − c v + w, w of spectral density q.
-struct Member {
-  double k, c, x0, v0, q;
-};
-
-const std::vector<Member> kMembers = {
+const std::vector<Oscillator> kMembers = {
     {40, 0.3, 1, 0, 0.01}, {36, 0.2, 0.5, 1, 0.1}, {42, 0.5, 0, 0, 1e-4}, {39, 0.1, 1, -1, 0}};
 
 // The samples of one channel or two (x, v): the same for each test of a kind.
@@ -51,19 +46,8 @@ Record MakeRecord(int channels, int count, double step_s, double sigma) {
 
 Ensemble Oscillators(std::vector<const char*> outputs,
                      IntegrationMethod method = IntegrationMethod::kAuto) {
-  Ensemble ensemble("mass_spring_damper", static_cast<int>(kMembers.size()), std::move(outputs));
+  Ensemble ensemble = OscillatorEnsemble(kMembers, std::move(outputs));
   ensemble.specification.integration.method = method;
-  ensemble.specification.integration.relative_tolerance = 1e-10;
-  ensemble.specification.process_noise.setZero(ensemble.points(), 2);
-  for (int i = 0; i < ensemble.points(); ++i) {
-    const Member& member = kMembers[static_cast<size_t>(i)];
-    ensemble.Set("m", i, 1);
-    ensemble.Set("k", i, member.k);
-    ensemble.Set("c", i, member.c);
-    ensemble.Set("x0", i, member.x0);
-    ensemble.Set("v0", i, member.v0);
-    ensemble.specification.process_noise(i, 1) = member.q;
-  }
   return ensemble;
 }
 
@@ -80,7 +64,7 @@ Filtered Filter(FilterBank& bank, const FilterSamples& samples) {
 
 // The exact Kalman filter of a member with the same discretization of its process noise, in dense
 // matrices: the oracle. Reports the whitened innovations and log(S/r), 0 without a sample.
-Filtered ExactFilter(const Member& member, const Record& record) {
+Filtered ExactFilter(const Oscillator& member, const Record& record) {
   Eigen::Matrix2d A, Q = Eigen::Matrix2d::Zero();
   A << 0, 1, -member.k, -member.c;
   Q(1, 1) = member.q;

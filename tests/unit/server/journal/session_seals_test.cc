@@ -14,6 +14,7 @@
 #include "server/journal/sqlite_schema.h"
 #include "tests/testing/problem_json.h"
 #include "tests/testing/test_folder.h"
+#include "tests/unit/server/journal/append_batch.h"
 
 namespace polyest::internal {
 namespace {
@@ -83,22 +84,12 @@ class DamagedJournalTest : public testing::Test {
     journal_ = *std::move(opened);
   }
   int64_t Create(const std::string& name, bool hidden = false) {
-    SessionHead head;
-    head.tenant = "t";
-    head.name = name;
-    return journal_->Create(head, SmallProblem(), hidden).value();
+    return CreateIn(*journal_, name, SmallProblem(), hidden);
   }
   absl::Status Append(int64_t session, int64_t sequence, double time_s = 1) {
     v1::Measurements batch;
     batch.add_time_s(time_s);
-    JournalEntry entry;
-    entry.session = session;
-    entry.measurements = DeterministicBytes(batch);
-    entry.digest = Digest(entry.measurements);
-    entry.place.sequence = sequence;
-    std::promise<absl::Status> kept;
-    journal_->Append(std::move(entry), [&](const absl::Status& status) { kept.set_value(status); });
-    return kept.get_future().get();
+    return AppendTo(*journal_, session, sequence, batch);
   }
   absl::Status Read(int64_t session) {
     return journal_->ReadBatches(session, 0, [](const JournalBatch&) { return absl::OkStatus(); });

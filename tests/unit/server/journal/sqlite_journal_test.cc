@@ -15,6 +15,7 @@
 #include "server/journal/sqlite_schema.h"
 #include "tests/testing/problem_json.h"
 #include "tests/testing/test_folder.h"
+#include "tests/unit/server/journal/append_batch.h"
 
 namespace polyest::internal {
 namespace {
@@ -38,24 +39,12 @@ class SqliteJournalTest : public testing::Test {
     return absl::OkStatus();
   }
   int64_t Create(const std::string& name, bool hidden = false) {
-    SessionHead head;
-    head.tenant = "t";
-    head.name = name;
-    const auto number = journal_->Create(head, SmallProblem(), hidden);
-    EXPECT_TRUE(number.ok()) << number.status();
-    return number.value_or(0);
+    return CreateIn(*journal_, name, SmallProblem(), hidden);
   }
   absl::Status Append(int64_t session, int64_t sequence, size_t rows = 1) {
     v1::Measurements batch;
     for (size_t row = 0; row < rows; ++row) batch.add_time_s(static_cast<double>(row + 1));
-    JournalEntry entry;
-    entry.session = session;
-    entry.measurements = DeterministicBytes(batch);
-    entry.digest = Digest(entry.measurements);
-    entry.place.sequence = sequence;
-    std::promise<absl::Status> kept;
-    journal_->Append(std::move(entry), [&](const absl::Status& status) { kept.set_value(status); });
-    return kept.get_future().get();
+    return AppendTo(*journal_, session, sequence, batch);
   }
   absl::StatusOr<int> CountBatches(int64_t session) {
     int batches = 0;
@@ -121,6 +110,41 @@ TEST_F(SqliteJournalTest, LeavesAFolderToOneDaemon) {
   const absl::Status second = SqliteJournal::Open({.folder = folder_.path()}).status();
   EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(second.message()), HasSubstr("another daemon uses the folder"));
+}
+
+TEST_F(SqliteJournalTest, IsUsedByOneDaemonAlthoughTheLockWasRemoved) {
+  ASSERT_TRUE(Open().ok());
+  const int64_t session = Create("sessions/a");
+  fs::remove(folder_ / "lock");
+  const absl::Status second = SqliteJournal::Open({.folder = folder_.path()}).status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(second)) << second;
+  EXPECT_THAT(std::string(second.message()), HasSubstr("though not the lock beside it"));
+  // The attempt has not taken the locks of SQLite away.
+  EXPECT_TRUE(Append(session, 1).ok());
+}
+
+TEST_F(SqliteJournalTest, KeepsNoFieldsThatItDoesNotKnow) {
+  ASSERT_TRUE(Open().ok());
+  const int64_t session = Create("sessions/a");
+  v1::Measurements batch;
+  batch.add_time_s(1);
+  v1::Measurements stuffed = batch;
+  stuffed.add_channels()->set_name("x");
+  *batch.add_channels() = stuffed.channels(0);
+  google::protobuf::UnknownFieldSet& unknown =
+      *stuffed.channels(0).GetReflection()->MutableUnknownFields(stuffed.mutable_channels(0));
+  unknown.AddLengthDelimited(999, std::string(1 << 20, 'x'));
+  ASSERT_GT(stuffed.ByteSizeLong(), size_t{1} << 20);
+  ASSERT_TRUE(AppendTo(*journal_, session, 1, stuffed).ok());
+  // A client that repeats the batch without them repeats the same batch.
+  EXPECT_EQ(journal_->ReadDigest(session, 1).value(), Digest(DeterministicBytes(batch)));
+  ASSERT_TRUE(journal_
+                  ->ReadBatches(session, 0,
+                                [&](const JournalBatch& kept) {
+                                  EXPECT_LT(kept.measurements.ByteSizeLong(), 100u);
+                                  return absl::OkStatus();
+                                })
+                  .ok());
 }
 
 TEST_F(SqliteJournalTest, RefusesAFileThatIsNoDatabase) {

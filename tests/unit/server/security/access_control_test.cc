@@ -87,12 +87,12 @@ TEST_F(AccessControlTest, RefusesToOpenWithoutItsFile) {
             absl::StatusCode::kNotFound);
 }
 
-TEST(AccessControl, TakesEverybodyForAnAdminWithoutAuthentication) {
+TEST(AccessControl, TakesEverybodyForAnOperatorWithoutAuthentication) {
   const auto access = *AccessControl::Open({});
   const auto caller = access->Authorize(Identification{}, "DeleteSession");
   ASSERT_TRUE(caller.ok());
   EXPECT_EQ(caller->tenant, "default");
-  EXPECT_EQ(caller->role, Role::kAdmin);
+  EXPECT_EQ(caller->role, Role::kOperator);
   EXPECT_EQ(caller->name, "anonymous");
 }
 
@@ -102,7 +102,7 @@ TEST(AccessControl, KnowsHoldersOfCertificatesByTheirNames) {
       access->Authorize(Identification{.certificate_name = "rig 1"}, "DeleteSession");
   ASSERT_TRUE(caller.ok());
   EXPECT_EQ(caller->tenant, "default");
-  EXPECT_EQ(caller->role, Role::kAdmin);
+  EXPECT_EQ(caller->role, Role::kOperator);
   EXPECT_EQ(caller->name, "rig 1");
 }
 

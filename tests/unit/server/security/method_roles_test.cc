@@ -46,8 +46,13 @@ TEST(MethodRoles, LetReadersChangeNothing) {
   EXPECT_EQ(FindMethodRole("listModels"), nullptr);
 }
 
+TEST(MethodRoles, LetAdminsOfATenantReadNoOtherTenants) {
+  static_assert(Method("DownloadBackup").needed() == Role::kOperator);
+  EXPECT_LT(Role::kAdmin, Role::kOperator);
+}
+
 TEST(Caller, KnowsRolesByTheirNames) {
-  for (const Role role : {Role::kReader, Role::kWriter, Role::kAdmin}) {
+  for (const Role role : {Role::kReader, Role::kWriter, Role::kAdmin, Role::kOperator}) {
     EXPECT_EQ(ParseRole(RoleName(role)), role);
   }
   for (const char* name : {"", "Reader", "owner", "reader "}) EXPECT_FALSE(ParseRole(name)) << name;

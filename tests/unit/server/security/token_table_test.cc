@@ -69,7 +69,7 @@ TEST(TokenTable, NamesFileLineAndRuleOfAMalformedLine) {
   EXPECT_THAT(Refusal("rig1 " + std::string(65, 'x') + " writer " + kDigest),
               StartsWith("tokens, line 1: the tenant"));
   EXPECT_EQ(Refusal("rig1 chassis Writer " + kDigest),
-            "tokens, line 1: the role must be reader, writer or admin");
+            "tokens, line 1: the role must be reader, writer, admin or operator");
   for (const std::string& digest : {kDigest + "a", kDigest.substr(1), std::string(64, 'g')}) {
     EXPECT_EQ(Refusal("rig1 chassis writer " + digest),
               "tokens, line 1: the SHA-256 of the token must be 64 hexadecimal digits");

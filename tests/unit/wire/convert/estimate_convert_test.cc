@@ -138,6 +138,23 @@ TEST(EstimateToProto, CarriesTheWindowsOfARecord) {
   EXPECT_EQ(window.values(0).std_dev(), 6);
 }
 
+TEST(EstimateToProto, KeepsWhatDriftsInAHistory) {
+  Estimate estimate = TwoParameters();
+  const std::string name = estimate.parameters[0].name;
+  estimate.filtered = {
+      {.name = "x", .unit = "m", .mean = 1, .std_dev = 0.1, .lower95 = 0.8, .upper95 = 1.2},
+      {.name = name, .unit = "N/m", .mean = 40, .std_dev = 2, .lower95 = 36, .upper95 = 44}};
+  const v1::EstimateHistory::Point point = ToHistoryPoint(ToProto(estimate));
+  ASSERT_EQ(point.drifting_size(), 1);  // x is a state
+  const v1::EstimateHistory::Parameter& drifting = point.drifting(0);
+  EXPECT_EQ(drifting.name(), name);
+  EXPECT_EQ(drifting.unit(), "N/m");
+  EXPECT_EQ(drifting.mean(), 40);
+  EXPECT_EQ(drifting.std_dev(), 2);
+  EXPECT_EQ(drifting.lower95(), 36);
+  EXPECT_EQ(drifting.upper95(), 44);
+}
+
 TEST(EstimateToProto, KnowsEveryDiagnostic) {
   const std::pair<DiagnosticCode, v1::Diagnostic::Code> codes[] = {
       {DiagnosticCode::kNotIdentified, v1::Diagnostic::NOT_IDENTIFIED},

@@ -37,5 +37,21 @@ TEST(AutomaticOrder, LeavesEverythingElseAlone) {
   }
 }
 
+TEST(AutomaticOrder, IsFoundInTheProblemsOfARequestWhereverTheyAre) {
+  EXPECT_EQ(WithoutAutomaticOrders(R"({"subject": {"problem": {"expansion": {"order": "AUTO"}}},
+    "session": {"problem": {"expansion": {"points": "HALTON", "order":"AUTO"}}}})"),
+            R"({"subject": {"problem": {"expansion": {"order": null  }}},
+    "session": {"problem": {"expansion": {"points": "HALTON", "order":null  }}}})");
+  for (const char* json : {R"({"a": {"order": "AUTO"}})", R"({"expansion": [{"order": "AUTO"}]})",
+                           R"({"a": {"expansion": {"inner": {"order": "AUTO"}}}})"}) {
+    EXPECT_EQ(WithoutAutomaticOrders(json), json);
+  }
+}
+
+TEST(AutomaticOrder, IsNotLookedForInTextThatNestsWithoutEnd) {
+  const std::string deep = std::string(1'000'000, '[') + R"({"expansion": {"order": "AUTO"}})";
+  EXPECT_EQ(WithoutAutomaticOrders(deep), deep);
+}
+
 }  // namespace
 }  // namespace polyest::internal

@@ -261,6 +261,34 @@ TEST(CarryOver, BoundsAnUpdateAndGivesTheSamePosterior) {
   EXPECT_GT(most_replayed, 2 * most);
 }
 
+// Filters with so little process noise that the phase tells ever more for a long time. The oracle
+// is a prior so narrow that the first expansion is accurate and stays; it is flat, as the other.
+TEST(CarryOver, MovesFilters) {
+  constexpr int kCheckpoint = 512, kMany = 20'000, kBatch = 2000;
+  const Samples record = RingingRecord(kMany);
+  Problem problem = RingingProblem(kCheckpoint);
+  problem.uncertain[1] = UncertainParameter::Uniform("x0", 0.5, 1.5).value();
+  problem.process_noise = {{.state = "v", .spectral_density = 1e-8}};
+  const auto [carried, most] = TakeCounted(problem, record, kBatch);
+  // Two of them propagate the record again.
+  EXPECT_GT(carried.expansion.reexpansions, 3);
+  EXPECT_LT(most, 2 * kBatch + 4 * 2 * kCheckpoint);
+  for (size_t i = 0; i < 2; ++i) {
+    const ParameterEstimate& parameter = carried.parameters[i];
+    const double far = 10 * parameter.std_dev;
+    problem.uncertain[i] =
+        UncertainParameter::Uniform(parameter.name, parameter.map - far, parameter.map + far)
+            .value();
+  }
+  const Estimate exact = TakeCounted(problem, record, kBatch).first;
+  EXPECT_EQ(exact.expansion.reexpansions, 0);
+  for (size_t i = 0; i < 2; ++i) {
+    const ParameterEstimate &a = carried.parameters[i], &b = exact.parameters[i];
+    EXPECT_NEAR(a.map, b.map, kMaxCarriedShift * b.std_dev);
+    EXPECT_NEAR(a.std_dev, b.std_dev, kMaxCarriedShift * b.std_dev);
+  }
+}
+
 TEST(CarryOver, IsNotDisturbedByStops) {
   const Problem problem = RingingProblem(64);
   const Samples record = RingingRecord(3000);

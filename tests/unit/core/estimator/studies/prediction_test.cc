@@ -164,6 +164,23 @@ TEST(Prediction, IsMadeAtTimesAskedFor) {
   EXPECT_EQ(prediction.outputs[0].score.samples, 8);  // of the record all the same
 }
 
+TEST(Prediction, ForecastsBeyondTheLastRow) {
+  const auto estimator = Processed(LineProblem(), kValues);
+  PredictionOptions options;
+  options.draws = 50;
+  options.max_rows = 4;
+  options.forecast_s = 2;
+  const Prediction forecast = PredictionOf(*estimator, options);
+  options.forecast_s = 0;
+  options.times = {{0, 8.5}, {0, 9}, {0, 9.5}, {0, 10}};
+  const Prediction asked = PredictionOf(*estimator, options);
+  ASSERT_EQ(forecast.rows.size(), 4u);
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(forecast.rows[i].time_s, options.times[i].time_s);
+  EXPECT_EQ(forecast.outputs[0].mean, asked.outputs[0].mean);
+  EXPECT_EQ(forecast.outputs[0].quantiles, asked.outputs[0].quantiles);
+  EXPECT_EQ(forecast.outputs[0].score.samples, 8);
+}
+
 TEST(Prediction, ThinsItsRowsAndScoresAllOfThem) {
   std::vector<double> values;
   std::mt19937_64 generator(5);
@@ -268,6 +285,14 @@ TEST(Prediction, RefusesWhatItCannotPredict) {
                "times[0].run: the record has no run 1");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.times = {{0, 2}, {0, 1}}; }), "times[1]: run 0");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.times = {{0, -1}}; }), "times[0].time_s: -1");
+  EXPECT_PRED2(contains, refusal([](auto& o) { o.forecast_s = -1; }), "forecast_s: -1 must be");
+  EXPECT_PRED2(contains, refusal([](auto& o) { o.forecast_s = 1e-300; }),
+               "forecast_s: 1e-300 is too small");
+  EXPECT_PRED2(contains, refusal([](auto& o) {
+                 o.forecast_s = 1;
+                 o.times = {{0, 1}};
+               }),
+               "forecast_s: cannot be combined with times");
   EXPECT_PRED2(contains, refusal([](auto& o) {
                  o.record.emplace();
                  o.record->time_s = {1};
@@ -295,7 +320,12 @@ TEST(Prediction, RefusesTimesWhereTheStreamedInputsAreNotKnown) {
   EXPECT_EQ(estimator->CurrentPrediction(options).status().message(),
             "times[1].time_s: t = 0.96 s is after the last row of run 0; the streamed inputs are "
             "not known there");
-  options.times.pop_back();
+  options.times.clear();
+  options.forecast_s = 1;
+  EXPECT_EQ(estimator->CurrentPrediction(options).status().message(),
+            "forecast_s: 1 needs inputs that are known in advance, and one is streamed");
+  options.forecast_s = 0;
+  options.times = {{0, 0.51}};
   options.outputs = {"v", "x"};
   const Prediction prediction = PredictionOf(*estimator, options);
   ASSERT_EQ(prediction.outputs.size(), 2u);

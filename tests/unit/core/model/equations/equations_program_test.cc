@@ -12,7 +12,7 @@
 namespace polyest::internal::equations {
 namespace {
 
-// Compiles expressions of the variables a, b, c, d.
+// Compiles expressions of the variables a, b, c, d and of the time t.
 class Shared {
  public:
   explicit Shared(const std::vector<std::string>& texts) {
@@ -20,6 +20,8 @@ class Shared {
       names_[name] = graph_.Variable(static_cast<int>(places_.size()));
       places_.push_back({0, std::ssize(places_)});
     }
+    names_["t"] = graph_.Variable(static_cast<int>(places_.size()));
+    places_.push_back({VariablePlace::kTime, 0});
     for (const std::string& text : texts) {
       const auto syntax = Parse("text", text, {});
       EXPECT_TRUE(syntax.ok()) << syntax.status();
@@ -83,6 +85,30 @@ TEST(EquationProgram, ReusesRegistersThatAreNoLongerNeeded) {
   // The program has a hundred sines and sums, and all products except that with 1.
   EXPECT_EQ(program.instructions(), 299);
   EXPECT_LE(program.registers(), 3);
+}
+
+// The oracle is the same expression of a variable that has the time in every row: the same bits.
+TEST(EquationProgram, ComputesWhatDependsOnTheTimeAloneOnceForAllRows) {
+  const Program program =
+      Shared({"2*sin(3*t) + a", "sin(3*t)", "exp(-t)*cos(t)", "a*sin(3*t) - t"}).Compile();
+  // 3 t and its sine, −t, its exponential, the cosine and their product.
+  EXPECT_EQ(program.instructions_of_time(), 6);
+  // Two sums with products, and two copies into all rows.
+  EXPECT_EQ(program.instructions(), 4);
+  const Program of_rows =
+      Shared({"2*sin(3*d) + a", "sin(3*d)", "exp(-d)*cos(d)", "a*sin(3*d) - d"}).Compile();
+  EXPECT_EQ(of_rows.instructions_of_time(), 0);
+  constexpr Eigen::Index kMany = Program::kRows + 2 * kLanes;
+  Eigen::ArrayXXd variables(kMany, 4), results(kMany, 4), expected(kMany, 4);
+  for (const double time_s : {0.0, 0.7, 12.3}) {
+    variables.setRandom();
+    variables.col(3) = time_s;
+    const ConstBlock block(variables);
+    const std::array<const ConstBlock*, 1> blocks = {&block};
+    program.Run(time_s, blocks, results);
+    of_rows.Run(0, blocks, expected);
+    EXPECT_TRUE((results == expected).all());
+  }
 }
 
 TEST(EquationProgram, ComputesConstantsVariablesAndZeros) {
