@@ -31,34 +31,6 @@ absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
 
 }  // namespace
 
-class SqliteJournal::Reader {
- public:
-  explicit Reader(const SqliteJournal& journal) : journal_(journal) {
-    const std::lock_guard lock(journal.readers_mutex_);
-    if (journal.readers_.empty()) return;
-    database_ = std::move(journal.readers_.back());
-    journal.readers_.pop_back();
-  }
-  ~Reader() {
-    if (database_ == nullptr) return;
-    const std::lock_guard lock(journal_.readers_mutex_);
-    journal_.readers_.push_back(std::move(database_));
-  }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
-
-  absl::StatusOr<SqliteDatabase*> database() {
-    if (database_ == nullptr) {
-      POLYEST_ASSIGN_OR_RETURN(database_, SqliteDatabase::Open(journal_.folder_->journal_file()));
-    }
-    return database_.get();
-  }
-
- private:
-  const SqliteJournal& journal_;
-  std::unique_ptr<SqliteDatabase> database_;
-};
-
 absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
     const SqliteJournalOptions& options) {
   POLYEST_ASSIGN_OR_RETURN(auto folder, DataFolder::Take(options.folder));
@@ -143,30 +115,6 @@ void SqliteJournal::SealCommit(bool kept) {
     }
   }
   unsealed_.clear();
-}
-
-absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(
-      *database,
-      "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, "
-      "session.digest, coalesce(sequence, 0), coalesce(place_samples, 0), coalesce(place_rows, 0), "
-      "coalesce(place_run, 0), coalesce(place_time_s, 0) FROM session LEFT JOIN batch ON "
-      "batch.session = number AND sequence = (SELECT max(sequence) FROM batch WHERE session = "
-      "number) ORDER BY tenant, name");
-  std::vector<SessionHead> heads;
-  while (true) {
-    POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
-    if (!more) return heads;
-    SessionRow row = ReadSessionRow(query);
-    if (row.hidden && !row.damaged) continue;
-    SessionHead& head = heads.emplace_back(std::move(row.head));
-    head.place.sequence = query.Integer(9);
-    head.place.samples = query.Integer(10);
-    head.place.rows = query.Integer(11);
-    head.place.last_row = {static_cast<int>(query.Integer(12)), query.Real(13)};
-  }
 }
 
 absl::StatusOr<int64_t> SqliteJournal::Create(const SessionHead& head, const v1::Problem& problem,
@@ -265,98 +213,6 @@ void SqliteJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint point,
         return InsertHistoryPoint(database, session, point, stride);
       },
       LaneOf(session));
-}
-
-absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database,
-                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
-                    "problem, digest FROM session WHERE number = ?");
-  query.Bind(session);
-  POLYEST_ASSIGN_OR_RETURN(const bool there, query.Step());
-  if (!there) return NoSuchSession();
-  const SessionRow row = ReadSessionRow(query);
-  v1::Problem problem;
-  if (!row.damaged && problem.ParseFromString(row.problem)) return problem;
-  return absl::DataLossError(
-      absl::StrFormat("%s is damaged in the journal: its name, its window or its problem is not "
-                      "what was stored",
-                      row.head.name));
-}
-
-absl::Status SqliteJournal::ReadBatches(
-    int64_t session, int64_t after,
-    const std::function<absl::Status(const JournalBatch&)>& take) const {
-  // The seal is looked up first, so that the statement sees its batches.
-  const std::optional<Seal> seal = after == 0 ? seals_->Of(session) : std::nullopt;
-  Seal read = Seal::At(session, "", "", seal ? seal->from : 0);
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  // One statement looks for the session and for its batches, because the session may be deleted and
-  // its batches removed between two. Without batches it gives one row, which has no sequence.
-  SqliteQuery query(*database,
-                    "SELECT sequence, measurements, batch.digest FROM session LEFT JOIN batch ON "
-                    "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
-  query.Bind(session).Bind(after);
-  POLYEST_ASSIGN_OR_RETURN(bool row, query.Step());
-  if (!row) return NoSuchSession();
-  JournalBatch batch;
-  batch.sequence = after;
-  while (row && query.Integer(0) > 0) {
-    const std::string bytes = query.Bytes(1);
-    const bool whole = query.Integer(0) == batch.sequence + 1 && query.Bytes(2) == Digest(bytes) &&
-                       batch.measurements.ParseFromString(bytes);
-    ++batch.sequence;
-    if (seal && batch.sequence > seal->from) read.Add(batch.sequence, query.Bytes(2));
-    if (!whole) {
-      return absl::DataLossError(absl::StrFormat(
-          "batch %d of the session is damaged or missing in the journal", batch.sequence));
-    }
-    if (seal && batch.sequence == seal->sequence && read.chain != seal->chain) {
-      return absl::DataLossError(
-          absl::StrFormat("batches %d to %d of the session are not those that were acknowledged",
-                          seal->from + 1, seal->sequence));
-    }
-    POLYEST_RETURN_IF_ERROR(take(batch));
-    POLYEST_ASSIGN_OR_RETURN(row, query.Step());
-  }
-  return absl::OkStatus();
-}
-
-absl::StatusOr<std::string> SqliteJournal::ReadDigest(int64_t session, int64_t sequence) const {
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database, "SELECT digest FROM batch WHERE session = ? AND sequence = ?");
-  query.Bind(session).Bind(sequence);
-  POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-  if (!row) return absl::NotFoundError("the journal has no such batch");
-  return query.Bytes(0);
-}
-
-absl::StatusOr<std::optional<JournalSnapshot>> SqliteJournal::ReadSnapshot(int64_t session) const {
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database, "SELECT sequence, rows, state FROM snapshot WHERE session = ?");
-  query.Bind(session);
-  POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-  if (!row) return std::nullopt;
-  return JournalSnapshot{query.Integer(0), query.Integer(1), query.Bytes(2)};
-}
-
-absl::StatusOr<std::vector<JournalHistoryPoint>> SqliteJournal::ReadHistory(int64_t session) const {
-  queue_->Flush();
-  Reader reader(*this);
-  POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(
-      *database, "SELECT ordinal, sequence, point FROM history WHERE session = ? ORDER BY ordinal");
-  query.Bind(session);
-  std::vector<JournalHistoryPoint> history;
-  while (true) {
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) return history;
-    history.push_back({query.Integer(0), query.Integer(1), query.Bytes(2)});
-  }
 }
 
 }  // namespace polyest::internal

@@ -65,10 +65,18 @@ class SqliteJournal final : public SessionJournal {
 
   // Borrows a connection to read with, and gives it back when destroyed.
   class Reader;
+  struct KeptBatch {
+    int64_t sequence = 0;
+    std::string measurements;  // serialized
+    std::string digest;
+  };
 
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
                 std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
                 std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+  absl::StatusOr<int64_t> LastBatch(int64_t session) const;
+  absl::StatusOr<std::vector<KeptBatch>> ReadPage(int64_t session, int64_t after,
+                                                  size_t bytes) const;
   absl::StatusOr<std::vector<Seal>> BeginSnapshot(SqliteDatabase& source);
   // Copies the journal into a file that is open as `descriptor`, and verifies the copy.
   absl::StatusOr<JournalContents> CopyTo(const std::string& file, int descriptor, const Stop& stop);

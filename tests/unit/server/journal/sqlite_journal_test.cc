@@ -5,7 +5,6 @@
 
 #include <sys/stat.h>
 
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -301,26 +300,6 @@ TEST_F(SqliteJournalTest, KeepsTheWriteAheadLogShort) {
   }
   EXPECT_LT(log_size(), uintmax_t{15'000'000});
   EXPECT_GT(fs::file_size(file_), uintmax_t{10'000'000});
-}
-
-// The log cannot be made short while somebody reads from it. A writer that waited for them would
-// wait for the 10 s for which a connection waits for a lock.
-TEST_F(SqliteJournalTest, LetsNoBatchWaitForThoseWhoReadALongSession) {
-  ASSERT_TRUE(Open().ok());
-  const int64_t read = Create("sessions/read"), written = Create("sessions/written");
-  for (const int64_t sequence : {1, 2}) ASSERT_TRUE(Append(read, sequence).ok());
-  std::chrono::steady_clock::duration longest{};
-  int64_t sequence = 0;
-  const absl::Status status = journal_->ReadBatches(read, 0, [&](const JournalBatch& batch) {
-    while (batch.sequence == 1 && fs::file_size(file_ + "-wal") < 24'000'000) {
-      const auto begin = std::chrono::steady_clock::now();
-      EXPECT_TRUE(Append(written, ++sequence, 50'000).ok());
-      longest = std::max(longest, std::chrono::steady_clock::now() - begin);
-    }
-    return absl::OkStatus();
-  });
-  EXPECT_TRUE(status.ok()) << status;
-  EXPECT_LT(longest, std::chrono::milliseconds(kBusyTimeoutMs));
 }
 
 TEST_F(SqliteJournalTest, IsMadeForItsOwnerOnlyWhateverTheUmask) {
