@@ -2,10 +2,12 @@
 # Runs what a release must pass beside .ci/run, and what takes too long for it, and says how long each
 # step took. Needs a Debian 12 machine, and root to install packages and boot one.
 #
-#   tests/release.sh [STEP]...    all steps, in this order, unless some are named
+#   tests/release.sh [--minutes M] [STEP]...    all steps, in this order, unless some are named
 #
 #   crashes      kills the daemon 200 times while rigs stream to it (a minute on two cores)
 #   attacks      attacks the daemon, also through the edge, for longer than .ci/run does (5 minutes)
+#   soak         asks for an hour of streams and of sessions that come and go whether the daemon's
+#                memory stays within 5 %; --minutes M makes it shorter
 #   sanitized    the long unit tests under the address and undefined-behaviour sanitizers
 #   fuzz         fuzzes equations and calls for half an hour
 #   threads      looks for races in the tests in which threads meet (90 minutes)
@@ -24,7 +26,7 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-all_steps=(crashes attacks sanitized fuzz threads calibration properties adversary invariances
+all_steps=(crashes attacks soak sanitized fuzz threads calibration properties adversary invariances
   python sbibm package)
 
 crashes() {
@@ -46,6 +48,13 @@ attacks() {
     python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20 \
       --edge deploy/edge/edge.cfg
   done
+}
+
+soak() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target polyestd
+  python3 -B tests/soak/soak.py build/release/bin/polyestd --minutes "$soak_minutes"
 }
 
 sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label long; }
@@ -105,20 +114,30 @@ package() {
   tests/bench/packaged.sh
 }
 
-for step in "$@"; do
+soak_minutes=60
+steps=()
+while [[ $# -gt 0 ]]; do
+  step="$1"
+  shift
   if [[ "$step" == --help ]]; then
     sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
     exit 0
+  fi
+  if [[ "$step" == --minutes && "${1-}" =~ ^[1-9][0-9]*$ ]]; then
+    soak_minutes="$1"
+    shift
+    continue
   fi
   if [[ " ${all_steps[*]} " != *" $step "* ]]; then
     echo "tests/release.sh: unknown step '$step'; there are ${all_steps[*]}" >&2
     exit 2
   fi
+  steps+=("$step")
 done
-[[ $# -gt 0 ]] || set -- "${all_steps[@]}"
+[[ ${#steps[@]} -gt 0 ]] || steps=("${all_steps[@]}")
 
 summary=()
-for step in "$@"; do
+for step in "${steps[@]}"; do
   printf '\n==> %s\n' "$step"
   began=$SECONDS
   "$step"

@@ -44,7 +44,7 @@ struct DaemonOptions {
   int64_t max_disk_mb = 0;  // size of the journal's file, MiB; 0: as large as the disk
   SessionLimits limits{};
   int64_t max_memory_mb = 0;  // resident memory of the process, MiB; 0: no limit
-  std::chrono::milliseconds unload_after{std::chrono::minutes(10)};
+  std::chrono::milliseconds unload_after{HousekeepingOptions().idle};
   int max_message_mb = 64;
   int64_t max_computing_s = 3'600;  // computing time of one call, or of one batch of a stream
   std::string fmu_dir{};            // folder of the FMUs that problems may name; empty: none

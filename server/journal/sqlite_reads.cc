@@ -39,7 +39,10 @@ class SqliteJournal::Reader {
 
   absl::StatusOr<SqliteDatabase*> database() {
     if (database_ == nullptr) {
-      POLYEST_ASSIGN_OR_RETURN(database_, SqliteDatabase::Open(journal_.folder_->journal_file()));
+      POLYEST_ASSIGN_OR_RETURN(auto opened, SqliteDatabase::Open(journal_.folder_->journal_file()));
+      // There may be as many readers as threads, and what they read they seldom need again.
+      POLYEST_RETURN_IF_ERROR(opened->Execute("PRAGMA cache_size = -256"));
+      database_ = std::move(opened);
     }
     return database_.get();
   }

@@ -12,7 +12,7 @@ namespace polyest::internal {
 namespace {
 
 // Number of looks within the time after which a session is idle.
-constexpr int kLooks = 4;
+constexpr int kLooks = 10;
 constexpr std::chrono::milliseconds kShortestPause{10};
 // A look that finds the memory full unloads one in this many of the idle sessions in memory.
 constexpr size_t kLeaving = 4;
@@ -30,12 +30,13 @@ Housekeeper::Housekeeper(SessionRegistry& registry, const HousekeepingOptions& o
       thread_([this](std::stop_token stop) { Run(stop); }) {}
 
 void Housekeeper::Run(std::stop_token stop) {
-  auto pause = std::max(kShortestPause, options_.idle / kLooks);
+  auto pause = std::max(kShortestPause, std::min(options_.idle / kLooks, options_.trim));
   if (registry_.services().memory.limited()) pause = std::min(pause, options_.memory_pause);
   std::unique_lock lock(mutex_);
   while (!stopping_.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); })) {
     UnloadIdle();
     if (registry_.services().memory.Exceeded()) MakeRoom();
+    if (std::chrono::steady_clock::now() - trimmed_ >= options_.trim) Trim();
   }
 }
 
@@ -56,9 +57,14 @@ void Housekeeper::MakeRoom() {
   std::sort(idle.begin(), idle.end(), std::greater<>());
   idle.resize((idle.size() + kLeaving - 1) / kLeaving);
   for (const auto& [time, session] : idle) Unload(session);
-  // Returns the memory of sessions that were unloaded since the last look, and which the allocator
-  // would otherwise keep, to the operating system.
+  // The sessions that were unloaded since the last look have freed theirs.
+  Trim();
+}
+
+// The allocator would keep what was freed between blocks that are still in use.
+void Housekeeper::Trim() {
   malloc_trim(0);
+  trimmed_ = std::chrono::steady_clock::now();
 }
 
 }  // namespace polyest::internal

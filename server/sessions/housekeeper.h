@@ -1,7 +1,8 @@
 #pragma once
 
 // Unloads the estimators of idle sessions: after a time, and, while the daemon uses more memory
-// than it may, those first that have been idle longest.
+// than it may, those first that have been idle longest. Returns memory that was freed to the
+// operating system, now and then.
 
 #include <chrono>
 #include <condition_variable>
@@ -15,7 +16,9 @@ namespace polyest::internal {
 
 struct HousekeepingOptions {
   // Idle time after which an estimator is unloaded.
-  std::chrono::milliseconds idle{std::chrono::minutes(10)};
+  std::chrono::milliseconds idle{std::chrono::minutes(5)};
+  // Time between two returns of memory that was freed.
+  std::chrono::milliseconds trim{std::chrono::seconds(30)};
   // Longest time between two looks at the memory, if that is limited.
   std::chrono::milliseconds memory_pause{std::chrono::seconds(1)};
 };
@@ -29,9 +32,11 @@ class Housekeeper {
   void Run(std::stop_token stop);
   void UnloadIdle();
   void MakeRoom();
+  void Trim();
 
   SessionRegistry& registry_;
   const HousekeepingOptions options_;
+  std::chrono::steady_clock::time_point trimmed_ = std::chrono::steady_clock::now();
   std::mutex mutex_;
   std::condition_variable_any stopping_;
   std::jthread thread_;
