@@ -111,7 +111,7 @@ absl::Status Daemon::OpenJournal() {
   journal.on_commit = [this](const CommitReport& commit) {
     metrics_.Count(Metrics::Commit{static_cast<int64_t>(commit.writes), !commit.outcome.ok(),
                                    commit.duration.count()});
-    readiness_.OnCommit(commit.outcome.ok());
+    readiness_.OnCommit(commit.outcome.ok() && commit.room);
   };
   POLYEST_ASSIGN_OR_RETURN(auto opened, SqliteJournal::Open(journal));
   for (const std::string& damage : opened->damage()) {

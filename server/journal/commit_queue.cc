@@ -21,9 +21,11 @@ bool ConcernsOnlyItself(const absl::Status& status) {
 
 }  // namespace
 
-CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit)
+CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit,
+                         CommitRoom room)
     : database_(std::move(database)),
       on_commit_(std::move(on_commit)),
+      room_(std::move(room)),
       thread_([this] { Serve(); }) {}
 
 CommitQueue::~CommitQueue() {
@@ -32,11 +34,12 @@ CommitQueue::~CommitQueue() {
   submitted_.notify_one();
 }
 
-void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_t bytes) {
+void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_t bytes,
+                         DiskUse use) {
   const std::lock_guard lock(mutex_);
   std::deque<Item>& queue = lanes_[lane];
   if (queue.empty()) turns_.push_back(lane);
-  queue.push_back({std::move(write), std::move(done), bytes});
+  queue.push_back({std::move(write), std::move(done), bytes, use});
   submitted_.notify_one();
 }
 
@@ -56,11 +59,12 @@ void CommitQueue::Flush() {
   }
 }
 
-absl::Status CommitQueue::Run(Write write, const std::string& lane) {
+absl::Status CommitQueue::Run(Write write, const std::string& lane, DiskUse use) {
   std::promise<absl::Status> promise;
   auto outcome = promise.get_future();
   Submit(
-      std::move(write), [&](const absl::Status& status) { promise.set_value(status); }, lane);
+      std::move(write), [&](const absl::Status& status) { promise.set_value(status); }, lane, 0,
+      use);
   return outcome.get();
 }
 
@@ -120,17 +124,40 @@ void CommitQueue::TakeLazy(std::vector<Item>& items) {
   lazy_.erase(due, lazy_.end());
 }
 
+// On a full disk, writes that free room are committed without the others, which are refused.
 void CommitQueue::Commit(std::vector<Item> items) {
+  const absl::Status room = room_.check ? room_.check(*database_) : absl::OkStatus();
+  const size_t submitted = items.size();
+  if (!room.ok() && RefuseThoseThatNeedRoom(items, room) && on_commit_) {
+    on_commit_({submitted - items.size(), {}, room, /*room=*/false});
+  }
+  if (items.empty()) return;
   const auto begin = std::chrono::steady_clock::now();
   std::vector<absl::Status> outcomes(items.size());
   const absl::Status committed = WriteAll(items, outcomes);
   if (!committed.ok()) database_->Execute("ROLLBACK").IgnoreError();
   if (on_commit_) {
-    on_commit_({items.size(), std::chrono::steady_clock::now() - begin, committed});
+    const auto duration = std::chrono::steady_clock::now() - begin;
+    on_commit_({items.size(), duration, committed, room.ok()});
+  }
+  if (IsDiskFull(committed)) {
+    const bool made = room_.make && room_.make();
+    // What is left is tried again, since it is less or there is more room; so this ends.
+    if (RefuseThoseThatNeedRoom(items, committed) || made) return Commit(std::move(items));
   }
   for (size_t i = 0; i < items.size(); ++i) {
     items[i].done(committed.ok() ? outcomes[i] : committed);
   }
+}
+
+// Returns whether there were any.
+bool CommitQueue::RefuseThoseThatNeedRoom(std::vector<Item>& items, const absl::Status& refusal) {
+  const auto needing = std::stable_partition(
+      items.begin(), items.end(), [](const Item& item) { return item.use == DiskUse::kFreesRoom; });
+  const bool any = needing != items.end();
+  for (auto item = needing; item != items.end(); ++item) item->done(refusal);
+  items.erase(needing, items.end());
+  return any;
 }
 
 absl::Status CommitQueue::WriteAll(const std::vector<Item>& items,

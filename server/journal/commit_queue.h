@@ -27,6 +27,18 @@ struct CommitReport {
   size_t writes = 0;
   std::chrono::duration<double> duration{0};
   absl::Status outcome;
+  bool room = true;  // whether there is room on the disk for more than deletions
+};
+
+// Whether a write needs room on the disk. One that frees room goes on when the disk is full.
+enum class DiskUse { kNeedsRoom, kFreesRoom };
+
+// Says what is done about a full disk, by the writing thread. Default: nothing.
+struct CommitRoom {
+  // Returns with what writes that need room are refused before a commit, if at all.
+  std::function<absl::Status(SqliteDatabase&)> check{};
+  // Called when the disk is full; returns whether that has made room.
+  std::function<bool()> make{};
 };
 
 class CommitQueue {
@@ -40,7 +52,8 @@ class CommitQueue {
   // Called after each commit, before those who wait for it are told; must not wait.
   using OnCommit = std::function<void(const CommitReport&)>;
 
-  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {});
+  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {},
+                       CommitRoom room = {});
   // Writes everything submitted, then ends.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
@@ -52,20 +65,22 @@ class CommitQueue {
 
   // Queues a write of so many bytes. The writes of a lane run in the order of the calls; any thread
   // may call this.
-  void Submit(Write write, Done done, const std::string& lane = "", int64_t bytes = 0);
+  void Submit(Write write, Done done, const std::string& lane = "", int64_t bytes = 0,
+              DiskUse use = DiskUse::kNeedsRoom);
   // Queues a write that nobody waits for: once the writes before it in its lane are done, it goes
   // into the next commit that there is anyway, or into one of its own at the end.
   void SubmitLazily(Write write, const std::string& lane = "");
   // Waits until lazy writes submitted so far are on disk, or could not be written.
   void Flush();
   // Submits a write and waits for its outcome.
-  absl::Status Run(Write write, const std::string& lane = "");
+  absl::Status Run(Write write, const std::string& lane = "", DiskUse use = DiskUse::kNeedsRoom);
 
  private:
   struct Item {
     Write write;
     Done done;
     int64_t bytes = 0;
+    DiskUse use = DiskUse::kNeedsRoom;
   };
 
   void Serve();
@@ -74,10 +89,12 @@ class CommitQueue {
   void TakeTurns(std::vector<Item>& items, bool large);
   void TakeLazy(std::vector<Item>& items);
   void Commit(std::vector<Item> items);
+  static bool RefuseThoseThatNeedRoom(std::vector<Item>& items, const absl::Status& refusal);
   absl::Status WriteAll(const std::vector<Item>& items, std::vector<absl::Status>& outcomes);
 
   std::unique_ptr<SqliteDatabase> database_;
   const OnCommit on_commit_;
+  const CommitRoom room_;
   std::mutex mutex_;
   std::condition_variable submitted_;
   std::map<std::string, std::deque<Item>> lanes_;    // those with writes

@@ -25,6 +25,7 @@ constexpr char kJournal[] = "journal.db";
 constexpr char kLock[] = "lock";
 constexpr char kSeals[] = "seals";
 constexpr char kBackup[] = "backup.db";
+constexpr char kReserve[] = "reserve";
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kFileMode = 0600;
 // The bits of a mode by which the group and all others may read, write or enter.
@@ -33,10 +34,10 @@ constexpr mode_t kPermissions = 07777;
 
 std::string ErrnoText() { return std::strerror(errno); }
 
-// Returns whether a file is the journal's own: its lock, its seals, SQLite's file or a backup of
-// it, or one that SQLite puts beside these.
+// Returns whether a file is the journal's own: its lock, its seals, its reserve, SQLite's file
+// or a backup of it, or one that SQLite puts beside these.
 bool IsOwn(const std::string& name) {
-  return name == kLock || name == kSeals || absl::StartsWith(name, kJournal) ||
+  return name == kLock || name == kSeals || name == kReserve || absl::StartsWith(name, kJournal) ||
          absl::StartsWith(name, kBackup);
 }
 
@@ -99,7 +100,7 @@ absl::Status MakeFolderPrivate(const std::string& folder) {
 
 // Makes the files private that an earlier version, which left their mode to the umask, has made.
 absl::Status MakeFilesPrivate(const std::string& folder) {
-  for (const char* name : {kLock, kSeals, kJournal, "journal.db-wal", "journal.db-shm"}) {
+  for (const char* name : {kLock, kSeals, kReserve, kJournal, "journal.db-wal", "journal.db-shm"}) {
     const std::string file = absl::StrCat(folder, "/", name);
     std::error_code ignored;
     if (!fs::exists(file, ignored)) continue;
@@ -160,6 +161,7 @@ DataFolder::DataFolder(const std::string& folder, int lock)
     : journal_file_(absl::StrCat(folder, "/", kJournal)),
       seals_file_(absl::StrCat(folder, "/", kSeals)),
       backup_file_(absl::StrCat(folder, "/", kBackup)),
+      reserve_file_(absl::StrCat(folder, "/", kReserve)),
       lock_(lock) {}
 
 absl::Status DataFolder::LockJournal() {

@@ -32,6 +32,8 @@ class DataFolder {
   const std::string& backup_file() const { return backup_file_; }
   // Returns the path of the file of seals (SessionSeals).
   const std::string& seals_file() const { return seals_file_; }
+  // Returns the path of the file of the DiskReserve.
+  const std::string& reserve_file() const { return reserve_file_; }
 
  private:
   DataFolder(const std::string& folder, int lock);
@@ -42,6 +44,7 @@ class DataFolder {
   const std::string journal_file_;
   const std::string seals_file_;
   const std::string backup_file_;
+  const std::string reserve_file_;
   const int lock_;         // descriptor of the locked file
   int journal_lock_ = -1;  // and of the journal's. Once it is closed, SQLite's locks are gone
 };

@@ -90,13 +90,12 @@ absl::Status CopyPages(SqliteDatabase& from, SqliteDatabase& to, int descriptor,
 absl::StatusOr<std::vector<Seal>> SqliteJournal::BeginSnapshot(SqliteDatabase& source) {
   absl::Status begun;
   std::vector<Seal> seals;
-  const absl::Status ran = queue_->Run([&](SqliteDatabase&) {
+  const auto begin = [&](SqliteDatabase&) {
     begun = source.Execute("BEGIN; SELECT count(*) FROM deleted");
     if (begun.ok()) seals = seals_->All();
     return absl::OkStatus();
-  });
-  // A full disk may have refused what others wrote in the same commit; that is theirs.
-  if (!ran.ok() && !absl::IsResourceExhausted(ran)) return ran;
+  };
+  POLYEST_RETURN_IF_ERROR(queue_->Run(begin, "", DiskUse::kFreesRoom));
   POLYEST_RETURN_IF_ERROR(begun);
   return seals;
 }

@@ -45,14 +45,22 @@ absl::StatusCode CodeOf(int code) {
 
 absl::Status FromSqlite(int code, std::string_view doing) {
   if (code == SQLITE_OK || code == SQLITE_ROW || code == SQLITE_DONE) return absl::OkStatus();
-  if ((code & 0xff) == SQLITE_FULL) {
-    return Refuse(CodeOf(code),
-                  "the disk is full, or the sessions on it are as large as they may be "
-                  "(--max-disk-mb)",
-                  {.reason = kDiskFull, .retry_delay = kFullDiskDelay});
-  }
+  // The index of the write-ahead log cannot grow on a full disk either.
+  if ((code & 0xff) == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE) return DiskFull();
   return absl::Status(CodeOf(code),
                       absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code));
+}
+
+absl::Status DiskFull() {
+  return Refuse(absl::StatusCode::kResourceExhausted,
+                "the disk is full, or the sessions on it are as large as they may be "
+                "(--max-disk-mb)",
+                {.reason = kDiskFull, .retry_delay = kFullDiskDelay});
+}
+
+bool IsDiskFull(const absl::Status& status) {
+  const auto refusal = RefusalOf(status);
+  return refusal && refusal->reason == kDiskFull;
 }
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(const std::string& file) {

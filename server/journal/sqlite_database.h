@@ -23,6 +23,11 @@ namespace polyest::internal {
 // was tried.
 absl::Status FromSqlite(int code, std::string_view doing);
 
+// Returns how a full disk refuses what is to be written.
+absl::Status DiskFull();
+// Returns whether a status is that of a full disk, or of a database that is as large as it may be.
+bool IsDiskFull(const absl::Status& status);
+
 // Longest wait of a connection for a lock that another one of this process holds for a moment.
 inline constexpr int kBusyTimeoutMs = 10'000;
 

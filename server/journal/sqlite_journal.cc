@@ -4,6 +4,7 @@
 #include <absl/strings/str_format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/common/status.h"
@@ -17,15 +18,21 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kPageBytes = 4'096;
+// The largest number of pages that SQLite knows.
+constexpr int64_t kUnlimitedPages = 0x3fffffff;
+// The most pages of the write-ahead log before they are copied into the file.
+constexpr int kMaxCheckpointPages = 4'000;
+// Bytes of the reserve for each of these pages, so that the log has room in half of it.
+constexpr int64_t kReserveOfPage = 4 * 4'096;
 
-absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_mb) {
+int64_t MaxPages(int64_t max_mb) {
+  return max_mb == 0 ? kUnlimitedPages : std::min(max_mb * (1'048'576 / 4'096), kUnlimitedPages);
+}
+
+absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_pages) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
   POLYEST_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
-  if (max_mb > 0) {
-    const int64_t pages = max_mb * 1024 * 1024 / kPageBytes;
-    POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", pages)));
-  }
+  POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", max_pages)));
   return DeleteHidden(database);
 }
 
@@ -35,12 +42,14 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
     const SqliteJournalOptions& options) {
   POLYEST_ASSIGN_OR_RETURN(auto folder, DataFolder::Take(options.folder));
   const std::string& file = folder->journal_file();
+  // Whatever is written below has the room of the reserve.
+  auto reserve = std::make_unique<DiskReserve>(folder->reserve_file());
   const auto named = [&](const absl::Status& status) {
     return absl::Status(status.code(), absl::StrFormat("%s: %s", file, status.message()));
   };
   auto writer = SqliteDatabase::Open(file);
   if (!writer.ok()) return named(writer.status());
-  const absl::Status prepared = SetUpWriter(**writer, options.max_mb);
+  const absl::Status prepared = SetUpWriter(**writer, MaxPages(options.max_mb));
   if (!prepared.ok()) return named(prepared);
   POLYEST_ASSIGN_OR_RETURN(auto seals, SessionSeals::Open(folder->seals_file()));
   const absl::Status restored = RestoreBackupSeals(**writer, *seals);
@@ -49,18 +58,23 @@ absl::StatusOr<std::unique_ptr<SqliteJournal>> SqliteJournal::Open(
   if (!found.ok()) return named(found.status());
   auto maintainer = SqliteDatabase::Open(file);
   if (!maintainer.ok()) return named(maintainer.status());
-  return std::unique_ptr<SqliteJournal>(new SqliteJournal(std::move(folder), *std::move(writer),
-                                                          *std::move(maintainer), std::move(seals),
-                                                          *std::move(found), options.on_commit));
+  return std::unique_ptr<SqliteJournal>(
+      new SqliteJournal(std::move(folder), std::move(reserve), *std::move(writer),
+                        *std::move(maintainer), std::move(seals), *std::move(found), options));
 }
 
 SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
+                             std::unique_ptr<DiskReserve> reserve,
                              std::unique_ptr<SqliteDatabase> writer,
                              std::unique_ptr<SqliteDatabase> maintainer,
                              std::unique_ptr<SessionSeals> seals, std::vector<std::string> damage,
-                             CommitQueue::OnCommit on_commit)
+                             const SqliteJournalOptions& options)
     : folder_(std::move(folder)),
+      reserve_(std::move(reserve)),
+      checkpoint_pages_(static_cast<int>(
+          std::clamp<int64_t>(reserve_->bytes() / kReserveOfPage, 1, kMaxCheckpointPages))),
       damage_(std::move(damage)),
+      max_pages_(MaxPages(options.max_mb)),
       maintainer_(std::move(maintainer)),
       seals_(std::move(seals)) {
   // This hook takes the place of SQLite's own checkpoint, which would delay the commit that it
@@ -70,16 +84,20 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
       [](void* self, sqlite3*, const char*, int pages) {
         auto& journal = *static_cast<SqliteJournal*>(self);
         journal.log_pages_ = pages;
-        if (pages >= kCheckpointPages) journal.WakeMaintenance();
+        if (pages >= journal.checkpoint_pages_) journal.WakeMaintenance();
         return SQLITE_OK;
       },
       this);
-  const auto seal = [this, on_commit = std::move(on_commit)](const CommitReport& commit) {
+  const auto seal = [this, on_commit = options.on_commit](const CommitReport& commit) {
     SealCommit(commit.outcome.ok());
     if (on_commit) on_commit(commit);
   };
   ReadTenants(*writer);
-  queue_ = std::make_unique<CommitQueue>(std::move(writer), seal);
+  CheckDisk(*writer).IgnoreError();
+  queue_ = std::make_unique<CommitQueue>(
+      std::move(writer), seal,
+      CommitRoom{.check = [this](SqliteDatabase& database) { return CheckDisk(database); },
+                 .make = [this] { return MakeRoom(); }});
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 
@@ -163,14 +181,14 @@ absl::Status SqliteJournal::Show(int64_t session) {
 }
 
 absl::Status SqliteJournal::Delete(int64_t session) {
-  const absl::Status deleted =
-      queue_->Run([this, session](SqliteDatabase& database) -> absl::Status {
-        POLYEST_RETURN_IF_ERROR(
-            RunForSession(database, "DELETE FROM session WHERE number = ?", session));
-        if (database.changes() == 0) return NoSuchSession();
-        unsealed_[session] = std::nullopt;
-        return RunForSession(database, "INSERT INTO deleted VALUES (?)", session);
-      });
+  const auto remove = [this, session](SqliteDatabase& database) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(
+        RunForSession(database, "DELETE FROM session WHERE number = ?", session));
+    if (database.changes() == 0) return NoSuchSession();
+    unsealed_[session] = std::nullopt;
+    return RunForSession(database, "INSERT INTO deleted VALUES (?)", session);
+  };
+  const absl::Status deleted = queue_->Run(remove, "", DiskUse::kFreesRoom);
   if (deleted.ok()) {
     {
       const std::lock_guard lock(tenants_mutex_);

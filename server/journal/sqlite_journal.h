@@ -14,6 +14,7 @@
 
 #include "server/journal/commit_queue.h"
 #include "server/journal/data_folder.h"
+#include "server/journal/disk_reserve.h"
 #include "server/journal/session_journal.h"
 #include "server/journal/session_seals.h"
 
@@ -60,8 +61,7 @@ class SqliteJournal final : public SessionJournal {
   absl::StatusOr<std::vector<JournalHistoryPoint>> ReadHistory(int64_t session) const override;
 
  private:
-  // Number of pages in the write-ahead log from which on they are copied into the file.
-  static constexpr int kCheckpointPages = 4'000;
+  static constexpr int64_t kPageBytes = 4'096;
 
   // Borrows a connection to read with, and gives it back when destroyed.
   class Reader;
@@ -71,9 +71,10 @@ class SqliteJournal final : public SessionJournal {
     std::string digest;
   };
 
-  SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
-                std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
-                std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+  SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<DiskReserve> reserve,
+                std::unique_ptr<SqliteDatabase> writer, std::unique_ptr<SqliteDatabase> maintainer,
+                std::unique_ptr<SessionSeals> seals, std::vector<std::string> damage,
+                const SqliteJournalOptions& options);
   absl::StatusOr<int64_t> LastBatch(int64_t session) const;
   absl::StatusOr<std::vector<KeptBatch>> ReadPage(int64_t session, int64_t after,
                                                   size_t bytes) const;
@@ -84,12 +85,18 @@ class SqliteJournal final : public SessionJournal {
   void ReadTenants(SqliteDatabase& database);
   // Returns the lane of the commit queue in which a session is written: its tenant's.
   std::string LaneOf(int64_t session) const;
+  // Says whether there is room on the disk for more than deletions, or how it is refused.
+  absl::Status CheckDisk(SqliteDatabase& database);
+  bool MakeRoom();
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
   void WakeMaintenance();
 
   const std::unique_ptr<DataFolder> folder_;
+  const std::unique_ptr<DiskReserve> reserve_;
+  // Number of pages in the write-ahead log from which on they are copied into the file.
+  const int checkpoint_pages_;
   const std::vector<std::string> damage_;
   mutable std::mutex readers_mutex_;
   mutable std::vector<std::unique_ptr<SqliteDatabase>> readers_;
@@ -97,10 +104,14 @@ class SqliteJournal final : public SessionJournal {
   mutable std::mutex tenants_mutex_;
   std::map<int64_t, std::string> tenants_;  // of the sessions
 
+  const int64_t max_pages_;  // of the file
+  bool grows_ = true;        // whether the file may have so many. Used by the writing thread only
+
   std::unique_ptr<SqliteDatabase> maintainer_;  // connection of the maintenance thread
   std::mutex maintenance_mutex_;
   std::condition_variable_any maintenance_;
   std::atomic<int> log_pages_ = 0;  // pages in the write-ahead log
+  bool short_of_room_ = false;      // whether the log is to be copied, however short it is
   bool deleted_ = true;             // whether there may be batches of deleted sessions
 
   const std::unique_ptr<SessionSeals> seals_;
