@@ -8,6 +8,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "server/digest/digest.h"
 
 namespace polyest::internal {
 
@@ -21,7 +22,12 @@ absl::StatusOr<std::vector<SessionHead>> MemoryJournal::Heads() const {
   std::vector<SessionHead> heads;
   const std::lock_guard lock(mutex_);
   for (const auto& [number, kept] : sessions_) {
-    if (!kept.hidden) heads.push_back(kept.head);
+    if (kept.hidden) continue;
+    SessionHead& head = heads.emplace_back(kept.head);
+    head.bytes = static_cast<int64_t>(DeterministicBytes(kept.problem).size());
+    for (const JournalEntry& batch : kept.batches) {
+      head.bytes += static_cast<int64_t>(batch.measurements.size());
+    }
   }
   std::sort(heads.begin(), heads.end(), [](const SessionHead& a, const SessionHead& b) {
     return std::tie(a.tenant, a.name) < std::tie(b.tenant, b.name);

@@ -42,6 +42,7 @@ struct SessionHead {
   std::string name;  // `sessions/{id}`; unique among the tenant's visible sessions
   google::protobuf::Timestamp create_time;
   SessionPlace place;
+  int64_t bytes = 0;            // of its problem and its batches, serialized; set by Heads
   double reorder_window_s = 0;  // within which rows may arrive out of order; 0: they may not
 };
 

@@ -56,6 +56,11 @@ constexpr const char* kMigrations[] = {
     "ALTER TABLE session ADD COLUMN reorder_window_s REAL NOT NULL DEFAULT 0;",
     // The digest of the session's row (session_digest.h).
     "ALTER TABLE session ADD COLUMN digest BLOB;",
+    // The bytes of the measurements up to the batch; nobody asks for those of earlier batches.
+    R"(ALTER TABLE batch ADD COLUMN place_bytes INTEGER NOT NULL DEFAULT 0;
+       UPDATE batch SET place_bytes = (SELECT sum(length(measurements)) FROM batch AS other
+         WHERE other.session = batch.session) WHERE sequence = (SELECT max(sequence)
+         FROM batch AS other WHERE other.session = batch.session);)",
 };
 constexpr int64_t kVersionWithDigests = 5;
 

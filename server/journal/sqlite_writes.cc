@@ -15,10 +15,12 @@ absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t se
 }
 
 absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
-  SqliteQuery query(database,
-                    "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE ?2 = 1 + "
-                    "(SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
-                    "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
+  SqliteQuery query(
+      database,
+      "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, length(?3) + coalesce("
+      "(SELECT place_bytes FROM batch WHERE session = ?1 AND sequence = ?2 - 1), 0) "
+      "WHERE ?2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
+      "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
   query.Bind(entry.session)
       .Bind(entry.place.sequence)
       .BindBlob(entry.measurements)

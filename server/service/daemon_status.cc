@@ -19,6 +19,9 @@ v1::DaemonStatus DescribeDaemon(const ServiceContext& context, const std::string
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - context.start;
   status.set_uptime_s(uptime.count());
   status.set_memory_bytes(ResidentMemoryBytes());
+  const SessionServices& sessions = context.sessions.services();
+  status.set_stored_bytes(sessions.stored->OfTenant(tenant).bytes);
+  status.set_max_stored_bytes(sessions.limits.disk_mb_per_tenant << 20);
   return status;
 }
 

@@ -134,14 +134,15 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   return loaded;
 }
 
-absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const {
+absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
+                               int64_t bytes) const {
   POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, place, batch));
-  if (services_.rows == nullptr) return absl::OkStatus();
-  return services_.rows->Take(number(), tenant(), batch.time_s_size());
+  if (services_.stored == nullptr) return absl::OkStatus();
+  return services_.stored->Take(number(), tenant(), {batch.time_s_size(), bytes});
 }
 
-void Session::ReleaseRoom(int64_t rows) const {
-  if (services_.rows != nullptr) services_.rows->Release(number(), rows);
+void Session::ReleaseRoom(const StoredAmount& amount) const {
+  if (services_.stored != nullptr) services_.stored->Release(number(), amount);
 }
 
 absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Measurements& batch,
@@ -164,8 +165,9 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
   if (kind == BatchLedger::Kind::kNext) {
     const SessionPlace before = intake.place();
     const double measured_s = intake.measured_s();
-    POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch));
-    absl::Cleanup release_room = [&] { ReleaseRoom(batch.time_s_size()); };
+    const auto bytes = static_cast<int64_t>(entry.measurements.size());
+    POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch, bytes));
+    absl::Cleanup release_room = [&] { ReleaseRoom({batch.time_s_size(), bytes}); };
     const auto record = [&](const SessionPlace& place) {
       entry.place = place;
       return ledger_.Take(place, entry.digest, present.losses);
@@ -185,14 +187,15 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
 void Session::Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values,
                    double measured_s) {
   const int64_t sequence = entry.place.sequence;
+  const StoredAmount amount{rows, static_cast<int64_t>(entry.measurements.size())};
   services_.journal.Append(
-      std::move(entry), [self = shared_from_this(), losses, sequence, rows, values, measured_s,
+      std::move(entry), [self = shared_from_this(), losses, sequence, amount, values, measured_s,
                          begin = Clock::now()](const absl::Status& kept) {
         const std::chrono::duration<double> duration = Clock::now() - begin;
         if (Metrics* const metrics = self->services_.metrics; metrics != nullptr && kept.ok()) {
-          metrics->Count(Metrics::Batch{rows, values, measured_s, duration.count()});
+          metrics->Count(Metrics::Batch{amount.rows, values, measured_s, duration.count()});
         }
-        if (!kept.ok()) self->ReleaseRoom(rows);
+        if (!kept.ok()) self->ReleaseRoom(amount);
         self->ledger_.Settle(losses, sequence, kept);
       });
 }

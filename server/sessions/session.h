@@ -26,7 +26,7 @@
 #include "server/sessions/observer_list.h"
 #include "server/sessions/session_activity.h"
 #include "server/sessions/session_observer.h"
-#include "server/sessions/stored_rows.h"
+#include "server/sessions/stored_data.h"
 #include "server/sessions/writer_lease.h"
 
 namespace polyest::internal {
@@ -41,8 +41,8 @@ struct SessionServices {
   SessionLimits limits = {};
   Metrics* metrics = nullptr;  // null: no metrics are counted
   MemoryLimit memory = MemoryLimit();
-  // Counts the stored rows; null: they are not counted. The registry sets it.
-  std::shared_ptr<StoredRows> rows = nullptr;
+  // Counts what is stored; null: it is not counted. The registry sets it.
+  std::shared_ptr<StoredData> stored = nullptr;
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -158,9 +158,10 @@ class Session : public std::enable_shared_from_this<Session> {
   };
 
   absl::Status CheckOpen() const;
-  // Checks that the next batch keeps to the limits, and takes room for its rows.
-  absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch) const;
-  void ReleaseRoom(int64_t rows) const;
+  // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
+  absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
+                        int64_t bytes) const;
+  void ReleaseRoom(const StoredAmount& amount) const;
   // Returns the loaded session; loads it first if need be. Batches taken may wait in it for the
   // numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);

@@ -28,7 +28,7 @@ SessionImport::SessionImport(SessionRegistry& registry, std::string tenant) : re
 SessionImport::~SessionImport() {
   if (loaded_ == nullptr) return;
   registry_.services().journal.Delete(head_.number).IgnoreError();
-  registry_.services().rows->Forget(head_.number);
+  registry_.services().stored->Forget(head_.number);
 }
 
 absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
@@ -78,7 +78,8 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
   loaded->Attach(services.journal, head_.number);
   loaded_ = std::move(loaded);
-  return absl::OkStatus();
+  const auto bytes = static_cast<int64_t>(DeterministicBytes(problem).size());
+  return services.stored->Take(head_.number, head_.tenant, {0, bytes});
 }
 
 absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
@@ -95,12 +96,13 @@ absl::Status SessionImport::Append(const v1::SessionRecord::Batch& batch) {
   POLYEST_RETURN_IF_ERROR(services.memory.Check());
   BatchIntake& intake = loaded_->intake();
   POLYEST_RETURN_IF_ERROR(CheckRows(services.limits, intake.place(), batch.measurements()));
-  POLYEST_RETURN_IF_ERROR(
-      services.rows->Take(head_.number, head_.tenant, batch.measurements().time_s_size()));
-  POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements(), services.limits.problem));
   JournalEntry entry;
   entry.session = head_.number;
   entry.measurements = DeterministicBytes(batch.measurements());
+  POLYEST_RETURN_IF_ERROR(services.stored->Take(
+      head_.number, head_.tenant,
+      {batch.measurements().time_s_size(), static_cast<int64_t>(entry.measurements.size())}));
+  POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements(), services.limits.problem));
   entry.digest = Digest(entry.measurements);
   entry.place = intake.place();
   std::promise<absl::Status> kept;

@@ -10,6 +10,7 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
+#include "server/digest/digest.h"
 
 namespace polyest::internal {
 namespace {
@@ -35,8 +36,7 @@ absl::Status CheckSessionId(const std::string& id) {
 
 SessionRegistry::SessionRegistry(const SessionServices& services, WallClock clock)
     : services_(services), clock_(std::move(clock)) {
-  const SessionLimits& limits = services.limits;
-  services_.rows = std::make_shared<StoredRows>(limits.rows_per_tenant, limits.total_rows);
+  services_.stored = std::make_shared<StoredData>(services.limits);
 }
 
 absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
@@ -45,7 +45,7 @@ absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
   std::unique_ptr<SessionRegistry> registry(new SessionRegistry(services, std::move(clock)));
   for (SessionHead& head : heads) {
     ++registry->count_[head.tenant];
-    registry->services_.rows->Count(head.number, head.tenant, head.place.rows);
+    registry->services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes});
     const Key key(head.tenant, head.name);
     registry->sessions_.emplace(key,
                                 std::make_shared<Session>(registry->services_, std::move(head)));
@@ -83,6 +83,12 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   }
   POLYEST_RETURN_IF_ERROR(number.status());
   head.number = *number;
+  const auto bytes = static_cast<int64_t>(DeterministicBytes(kept).size());
+  const absl::Status room = services_.stored->Take(*number, tenant, {0, bytes});
+  if (!room.ok()) {
+    services_.journal.Delete(*number).IgnoreError();
+    return room;
+  }
   return Adopt(std::move(head), std::move(loaded));
 }
 
@@ -93,7 +99,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
   const absl::Status added = Add(key, session);
   if (added.ok()) return session;
   services_.journal.Delete(session->number()).IgnoreError();
-  services_.rows->Forget(session->number());
+  services_.stored->Forget(session->number());
   return added;
 }
 
@@ -184,7 +190,7 @@ absl::Status SessionRegistry::Delete(const std::string& tenant, const std::strin
       --count_[tenant];
     }
   }
-  services_.rows->Forget(session->number());
+  services_.stored->Forget(session->number());
   session->Close();
   return absl::OkStatus();
 }

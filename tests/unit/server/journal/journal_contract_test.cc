@@ -168,6 +168,19 @@ TEST_P(JournalContractTest, StopsReadingWhenAskedTo) {
   EXPECT_EQ(read, 1);
 }
 
+TEST_P(JournalContractTest, CountsTheBytesOfAProblemAndItsBatches) {
+  const int64_t number = Create("t", "sessions/a");
+  const auto problem = static_cast<int64_t>(DeterministicBytes(SmallProblem()).size());
+  EXPECT_EQ(journal_->Heads()->front().bytes, problem);
+  int64_t bytes = problem;
+  for (const int64_t sequence : {1, 2, 3}) {
+    const JournalEntry entry = Entry(number, sequence, static_cast<double>(sequence));
+    bytes += static_cast<int64_t>(entry.measurements.size());
+    ASSERT_TRUE(Append(entry).ok());
+  }
+  EXPECT_EQ(journal_->Heads()->front().bytes, bytes);
+}
+
 TEST_P(JournalContractTest, ForgetsWhatIsDeleted) {
   const int64_t a = Create("t", "sessions/a");
   ASSERT_TRUE(Append(Entry(a, 1, 1)).ok());

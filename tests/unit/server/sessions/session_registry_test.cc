@@ -45,7 +45,7 @@ class SessionRegistryTest : public testing::Test {
     return request;
   }
 
-  static v1::Measurements Rows(std::initializer_list<double> times) {
+  static v1::Measurements Rows(const std::vector<double>& times) {
     v1::Measurements batch;
     auto& x = *batch.add_channels();
     x.set_name("x");
@@ -283,6 +283,22 @@ TEST_F(SessionRegistryTest, HoldsNoMoreRowsThanATenantMayHaveAlsoAfterARestart) 
   EXPECT_TRUE(Add(b, 1, Rows({0.1})).ok());
   ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
   EXPECT_TRUE(Add(b, 2, Rows({0.2, 0.3})).ok());
+}
+
+TEST_F(SessionRegistryTest, StoresNoMoreBytesThanATenantMayHaveAlsoAfterARestart) {
+  limits_.disk_mb_per_tenant = 1;
+  Open();
+  ASSERT_TRUE(StatusOfCreate("a").ok());
+  std::vector<double> times;
+  for (int row = 1; row <= 40'000; ++row) times.push_back(0.001 * row);  // 16 bytes each
+  ASSERT_TRUE(Add(*registry_->Get("t", "sessions/a"), 1, Rows(times)).ok());
+  Open();
+  ASSERT_TRUE(StatusOfCreate("b").ok());
+  const auto b = *registry_->Get("t", "sessions/b");
+  const auto refused = Add(b, 1, Rows(times));
+  EXPECT_EQ(RefusalOf(refused.status())->limit, "--max-tenant-disk-mb");
+  ASSERT_TRUE(registry_->Delete("t", "sessions/a").ok());
+  EXPECT_TRUE(Add(b, 1, Rows(times)).ok());
 }
 
 TEST_F(SessionRegistryTest, CountsNoRowsThatWereRefused) {
