@@ -5,6 +5,7 @@
 #   tests/release.sh [--minutes M] [STEP]...    all steps, in this order, unless some are named
 #
 #   crashes      kills the daemon 200 times while rigs stream to it (a minute on two cores)
+#   damages      damages 200 journals at random and asks for their estimates (a minute)
 #   attacks      attacks the daemon, also through the edge, for longer than .ci/run does (5 minutes)
 #   soak         asks for an hour of streams and of sessions that come and go whether the daemon's
 #                memory stays within 5 %; --minutes M makes it shorter
@@ -26,7 +27,7 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-all_steps=(crashes attacks soak sanitized fuzz threads calibration properties adversary invariances
+all_steps=(crashes damages attacks soak sanitized fuzz threads calibration properties adversary invariances
   python sbibm package)
 
 crashes() {
@@ -34,6 +35,13 @@ crashes() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target durability_test
   POLYEST_TEST_CRASHES=200 ctest --preset release --tests-regex 'integration/durability_test'
+}
+
+damages() {
+  deploy/install-packages.sh --tests
+  cmake --preset release -DPOLYEST_BUILD_TESTS=ON
+  cmake --build --preset release --parallel "$(nproc)" --target durability_test
+  POLYEST_TEST_DAMAGES=200 build/release/bin/durability_test --gtest_filter='DamagedFilesTest.*'
 }
 
 attacks() {

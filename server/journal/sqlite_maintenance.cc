@@ -125,7 +125,10 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
   seals_->Sync();
   int64_t session = 0;
   {
-    SqliteQuery query(*maintainer_, "SELECT session FROM deleted LIMIT 1");
+    // A damaged file may name a session that is not deleted.
+    SqliteQuery query(*maintainer_,
+                      "SELECT session FROM deleted WHERE session NOT IN (SELECT number FROM "
+                      "session) LIMIT 1");
     POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
     if (!row) return false;
     session = query.Integer(0);

@@ -19,11 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kSessions = 3;
-constexpr int kBatches = 8;
-constexpr int kRowsABatch = 40;
+constexpr int kDamagedSessions = 3;
+constexpr int kBatchesEach = 8;
+constexpr int kRowsOfBatch = 40;
 
-std::string NameOf(int session) { return "sessions/rig-" + std::to_string(session); }
+std::string DamagedName(int session) { return "sessions/rig-" + std::to_string(session); }
 
 int Damages() {
   const char* const damages = std::getenv("POLYEST_TEST_DAMAGES");
@@ -49,7 +49,7 @@ class Caller {
     request.set_session(name);
     request.set_sequence(batch);
     *request.mutable_measurements() =
-        OscillatorRows((batch - 1) * kRowsABatch, batch * kRowsABatch);
+        OscillatorRows((batch - 1) * kRowsOfBatch, batch * kRowsOfBatch);
     v1::AddMeasurementsResponse response;
     return Call(&v1::SessionService::Stub::AddMeasurements, request, response);
   }
@@ -101,13 +101,13 @@ class DamagedFilesTest : public testing::Test {
       const std::string address = daemon.ReadAddress();
       ASSERT_FALSE(address.empty()) << daemon.Errors();
       Caller caller(address);
-      for (int session = 0; session < kSessions; ++session) {
+      for (int session = 0; session < kDamagedSessions; ++session) {
         if (half == 0) {
-          ASSERT_TRUE(caller.Create(NameOf(session)).ok());
+          ASSERT_TRUE(caller.Create(DamagedName(session)).ok());
         }
-        for (int batch = 1; batch <= kBatches / 2; ++batch) {
-          const int sequence = half * kBatches / 2 + batch;
-          ASSERT_TRUE(caller.Add(NameOf(session), sequence).ok());
+        for (int batch = 1; batch <= kBatchesEach / 2; ++batch) {
+          const int sequence = half * kBatchesEach / 2 + batch;
+          ASSERT_TRUE(caller.Add(DamagedName(session), sequence).ok());
           if (session == 0) Remember(caller, sequence);
         }
       }
@@ -117,7 +117,7 @@ class DamagedFilesTest : public testing::Test {
   }
   void Remember(Caller& caller, int sequence) {
     v1::Estimate estimate;
-    ASSERT_TRUE(caller.GetEstimate(NameOf(0), estimate).ok());
+    ASSERT_TRUE(caller.GetEstimate(DamagedName(0), estimate).ok());
     expected_[sequence] = WithoutSequence(estimate);
   }
 
@@ -127,13 +127,17 @@ class DamagedFilesTest : public testing::Test {
     const grpc::Status status = caller.GetEstimate(name, estimate);
     const bool named = log.find(name) != std::string::npos;
     if (status.error_code() == grpc::StatusCode::DATA_LOSS) {
-      ++refused_;
+      ++noticed_;
       return "";
     }
-    if (status.error_code() == grpc::StatusCode::NOT_FOUND) return named ? "" : "silently missing";
+    if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
+      ++noticed_;
+      return named ? "" : "silently missing";
+    }
     if (!status.ok()) return "refused with " + status.error_message();
     const int sequence = static_cast<int>(estimate.sequence());
-    if (sequence < kBatches && !named) return "silently shorter";
+    if (sequence < kBatchesEach && !named) return "silently shorter";
+    noticed_ += sequence < kBatchesEach ? 1 : 0;
     if (sequence == 0) return "";
     if (WithoutSequence(estimate) != expected_[sequence]) return "a wrong estimate";
     ++served_;
@@ -149,21 +153,21 @@ class DamagedFilesTest : public testing::Test {
     fs::permissions(copy, fs::perms(0700));
     const char* const files[] = {"journal.db", "journal.db-wal", "seals"};
     const std::string file = files[seed % 3];
-    const int places = std::uniform_int_distribution<int>(1, 3)(random);
+    const int places = std::uniform_int_distribution<int>(1, 8)(random);
     for (int i = 0; i < places; ++i) Damage(copy + "/" + file, random);
     DaemonProcess daemon({"--listen", "127.0.0.1:0", "--data-dir", copy});
     const std::string address = daemon.ReadAddress();
     if (address.empty()) {
       EXPECT_EQ(daemon.Wait(), 1) << "seed " << seed << ", " << file << "\n" << daemon.Errors();
       EXPECT_NE(daemon.Errors().find("journal"), std::string::npos) << daemon.Errors();
-      ++refused_;
+      ++noticed_;
       return;
     }
     Caller caller(address);
     const std::string log = daemon.Errors();
-    for (int session = 0; session < kSessions; ++session) {
-      EXPECT_EQ(WrongWith(caller, NameOf(session), log), "")
-          << "seed " << seed << ", " << file << ", " << NameOf(session) << "\n"
+    for (int session = 0; session < kDamagedSessions; ++session) {
+      EXPECT_EQ(WrongWith(caller, DamagedName(session), log), "")
+          << "seed " << seed << ", " << file << ", " << DamagedName(session) << "\n"
           << log;
     }
   }
@@ -171,16 +175,16 @@ class DamagedFilesTest : public testing::Test {
   const TestFolder data_;
   std::map<int, std::string> expected_;  // estimates, by the number of the last batch
   int served_ = 0;
-  int refused_ = 0;
+  int noticed_ = 0;
 };
 
 TEST_F(DamagedFilesTest, AreNeverServedAsAWrongAnswer) {
-  ASSERT_EQ(expected_.size(), size_t{kBatches});
+  ASSERT_EQ(expected_.size(), size_t{kBatchesEach});
   for (uint64_t seed = 1; seed <= static_cast<uint64_t>(Damages()); ++seed) Try(seed);
   RecordProperty("served", served_);
-  RecordProperty("refused", refused_);
+  RecordProperty("noticed", noticed_);
   EXPECT_GT(served_, 0);
-  EXPECT_GT(refused_, 0);
+  EXPECT_GT(noticed_, 0);
 }
 
 }  // namespace
