@@ -158,8 +158,12 @@ absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expans
   if (costs.empty()) return confirmed;
   std::vector<Eigen::Index> rows;
   const double limit = *std::min_element(costs.begin(), costs.end()) + kMostAbove;
-  for (size_t i = 1; i < costs.size(); ++i) {
-    if (costs[i] < kInfinity && costs[i] <= limit) rows.push_back(static_cast<Eigen::Index>(i));
+  for (size_t i = 0; i < costs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (i > 0 && !(costs[i] < kInfinity && costs[i] <= limit)) continue;
+    const double error = std::abs(costs[i] - cost.Evaluate(etas.row(row).transpose()).total);
+    confirmed.error = std::max(confirmed.error, error);
+    if (i > 0) rows.push_back(row);
   }
   confirmed.points = etas(rows, Eigen::all);
   return confirmed;

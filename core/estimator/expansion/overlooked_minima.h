@@ -14,6 +14,7 @@ namespace polyest::internal {
 struct ConfirmedMinima {
   Matrix points;                // one row each, local coordinates; usually none
   int64_t propagated_rows = 0;  // by the model, to confirm them
+  double error = 0;  // largest difference between model and expansion in a cost at these minima
 };
 
 // Returns the local minima of `cost`, the cost on `expansion`, that lie outside the region of the

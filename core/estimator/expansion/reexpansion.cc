@@ -28,6 +28,8 @@ constexpr int kMaxDimensionToTrust = 3;
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
+// Up to such errors in the cost at its minima an expansion can tell the pieces around them apart.
+constexpr double kMaxErrorAtMinima = 1;
 constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
@@ -177,7 +179,7 @@ class Settler {
           DrawsAround(cost, found.points.row(i).transpose(), each,
                       request_.seed + static_cast<uint64_t>(attempt) + static_cast<uint64_t>(i));
       result_.memory.costs.resize(0);  // the particles are no draws any more
-      result_.overlooked = true;
+      result_.overlooked = found.error <= kMaxErrorAtMinima;
     }
     return absl::OkStatus();
   }
