@@ -29,12 +29,14 @@ absl::Status BringUpToDate(SqliteDatabase& database, Seal seal, SessionSeals& se
 absl::Status CheckSession(SqliteDatabase& database, const SessionRow& row, int64_t sequence,
                           SessionSeals& seals, std::vector<std::string>& found) {
   const std::string label = SealLabel(row.head.tenant, row.head.name);
+  const std::optional<Seal> seal = seals.Of(row.head.number);
   if (row.damaged) {
-    found.push_back(label + ": its name, its window or its problem is damaged; it is not served");
+    // The name may be what is damaged; the seal has that which was acknowledged.
+    const std::string& known = seal && !seal->label.empty() ? seal->label : label;
+    found.push_back(known + ": its name, its window or its problem is damaged; it is not served");
     return absl::OkStatus();
   }
   const std::string head = SessionDigest(row.head, /*hidden=*/false, row.problem);
-  const std::optional<Seal> seal = seals.Of(row.head.number);
   if (!seal || seal->head != head) {
     seals.Put(Seal::At(row.head.number, label, head, sequence));
   } else if (seal->sequence > sequence) {
