@@ -5,7 +5,8 @@
 #include <set>
 #include <utility>
 
-#include "core/common/status.h"
+#include "server/journal/postgres_writer.h"
+#include "server/journal/sqlite_database.h"
 
 namespace polyest::internal {
 namespace {
@@ -14,25 +15,23 @@ namespace {
 // fails, and how long others wait for it.
 constexpr size_t kMaxWrites = 512;
 
-bool ConcernsOnlyItself(const absl::Status& status) {
-  return absl::IsNotFound(status) || absl::IsAlreadyExists(status) ||
-         absl::IsFailedPrecondition(status);
-}
-
 }  // namespace
 
-CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit)
+template <typename Database>
+CommitQueue<Database>::CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit)
     : database_(std::move(database)),
       on_commit_(std::move(on_commit)),
       thread_([this] { Serve(); }) {}
 
-CommitQueue::~CommitQueue() {
+template <typename Database>
+CommitQueue<Database>::~CommitQueue() {
   const std::lock_guard lock(mutex_);
   ending_ = true;
   submitted_.notify_one();
 }
 
-void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_t bytes) {
+template <typename Database>
+void CommitQueue<Database>::Submit(Write write, Done done, const std::string& lane, int64_t bytes) {
   const std::lock_guard lock(mutex_);
   std::deque<Item>& queue = lanes_[lane];
   if (queue.empty()) turns_.push_back(lane);
@@ -40,23 +39,26 @@ void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_
   submitted_.notify_one();
 }
 
-void CommitQueue::SubmitLazily(Write write, const std::string& lane) {
+template <typename Database>
+void CommitQueue<Database>::SubmitLazily(Write write, const std::string& lane) {
   const std::lock_guard lock(mutex_);
   lazy_.emplace_back(lane, std::move(write));
 }
 
-void CommitQueue::Flush() {
+template <typename Database>
+void CommitQueue<Database>::Flush() {
   std::set<std::string> lanes;
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [lane, write] : lazy_) lanes.insert(lane);
   }
   for (const std::string& lane : lanes) {
-    Run([](SqliteDatabase&) { return absl::OkStatus(); }, lane).IgnoreError();
+    Run([](Database&) { return absl::OkStatus(); }, lane).IgnoreError();
   }
 }
 
-absl::Status CommitQueue::Run(Write write, const std::string& lane) {
+template <typename Database>
+absl::Status CommitQueue<Database>::Run(Write write, const std::string& lane) {
   std::promise<absl::Status> promise;
   auto outcome = promise.get_future();
   Submit(
@@ -64,29 +66,32 @@ absl::Status CommitQueue::Run(Write write, const std::string& lane) {
   return outcome.get();
 }
 
-void CommitQueue::Serve() {
-  for (auto items = Take(); !items.empty(); items = Take()) Commit(std::move(items));
+template <typename Database>
+void CommitQueue<Database>::Serve() {
+  for (Group group = Take(); !group.writes.empty(); group = Take()) Commit(group);
 }
 
 // Waits for writes and returns them; returns none at the end.
-std::vector<CommitQueue::Item> CommitQueue::Take() {
-  std::vector<Item> items;
+template <typename Database>
+typename CommitQueue<Database>::Group CommitQueue<Database>::Take() {
+  Group group;
   std::unique_lock lock(mutex_);
   submitted_.wait(lock, [this] { return !turns_.empty() || ending_; });
-  TakeTurns(items, /*large=*/!large_before_);
-  if (items.empty()) TakeTurns(items, /*large=*/true);
-  large_before_ = std::any_of(items.begin(), items.end(),
-                              [](const Item& item) { return item.bytes > kMaxBytes; });
-  TakeLazy(items);
-  return items;
+  TakeTurns(group, /*large=*/!large_before_);
+  if (group.writes.empty()) TakeTurns(group, /*large=*/true);
+  large_before_ = std::any_of(group.bytes.begin(), group.bytes.end(),
+                              [](int64_t bytes) { return bytes > kMaxBytes; });
+  TakeLazy(group);
+  return group;
 }
 
 // Takes one write of each lane at a time, as long as there is room; one larger than a commit only
 // if `large` and only once. A lane whose next write has no room keeps its turn.
-void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
+template <typename Database>
+void CommitQueue<Database>::TakeTurns(Group& group, bool large) {
   int64_t bytes = 0;
   size_t passed_over = 0;  // the lanes at the front of turns_ whose next write has no room
-  while (passed_over < turns_.size() && items.size() < kMaxWrites) {
+  while (passed_over < turns_.size() && group.writes.size() < kMaxWrites) {
     const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(passed_over);
     const auto lane = lanes_.find(*turn);
     Item& next = lane->second.front();
@@ -100,7 +105,7 @@ void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
     } else {
       bytes += next.bytes;
     }
-    items.push_back(std::move(next));
+    group.Add(std::move(next));
     lane->second.pop_front();
     turns_.erase(turn);
     if (lane->second.empty()) {
@@ -111,36 +116,30 @@ void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
   }
 }
 
-void CommitQueue::TakeLazy(std::vector<Item>& items) {
+template <typename Database>
+void CommitQueue<Database>::TakeLazy(Group& group) {
   const auto due = std::stable_partition(
       lazy_.begin(), lazy_.end(), [this](const auto& one) { return lanes_.contains(one.first); });
   for (auto one = due; one != lazy_.end(); ++one) {
-    items.push_back({std::move(one->second), [](const absl::Status&) {}, 0});
+    group.Add({std::move(one->second), [](const absl::Status&) {}, 0});
   }
   lazy_.erase(due, lazy_.end());
 }
 
-void CommitQueue::Commit(std::vector<Item> items) {
+template <typename Database>
+void CommitQueue<Database>::Commit(const Group& group) {
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<absl::Status> outcomes(items.size());
-  const absl::Status committed = WriteAll(items, outcomes);
-  if (!committed.ok()) database_->Execute("ROLLBACK").IgnoreError();
+  std::vector<absl::Status> outcomes(group.writes.size());
+  const absl::Status committed = database_->Commit(group.writes, outcomes);
   if (on_commit_) {
-    on_commit_({items.size(), std::chrono::steady_clock::now() - begin, committed});
+    on_commit_({group.writes.size(), std::chrono::steady_clock::now() - begin, committed});
   }
-  for (size_t i = 0; i < items.size(); ++i) {
-    items[i].done(committed.ok() ? outcomes[i] : committed);
+  for (size_t i = 0; i < group.done.size(); ++i) {
+    group.done[i](committed.ok() ? outcomes[i] : committed);
   }
 }
 
-absl::Status CommitQueue::WriteAll(const std::vector<Item>& items,
-                                   std::vector<absl::Status>& outcomes) {
-  POLYEST_RETURN_IF_ERROR(database_->Execute("BEGIN IMMEDIATE"));
-  for (size_t i = 0; i < items.size(); ++i) {
-    outcomes[i] = items[i].write(*database_);
-    if (!outcomes[i].ok() && !ConcernsOnlyItself(outcomes[i])) return outcomes[i];
-  }
-  return database_->Execute("COMMIT");
-}
+template class CommitQueue<SqliteDatabase>;
+template class CommitQueue<PostgresWriter>;
 
 }  // namespace polyest::internal

@@ -18,8 +18,6 @@
 #include <utility>
 #include <vector>
 
-#include "server/journal/sqlite_database.h"
-
 namespace polyest::internal {
 
 // Describes a commit, successful or not.
@@ -29,18 +27,23 @@ struct CommitReport {
   absl::Status outcome;
 };
 
+// Called after each commit, before those who wait for it are told; must not wait.
+using OnCommit = std::function<void(const CommitReport&)>;
+
+// `Database` is SqliteDatabase or PostgresWriter. It has
+//   absl::Status Commit(const std::vector<Write>& writes, std::vector<absl::Status>& outcomes),
+// which commits all writes in one transaction, or none of them if it returns an error, and sets the
+// outcome of each, which are OK at first.
+template <typename Database>
 class CommitQueue {
  public:
   // Changes the database. NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that the write has
   // changed nothing and that others may be committed; any other error undoes the whole commit.
-  using Write = std::function<absl::Status(SqliteDatabase&)>;
+  using Write = std::function<absl::Status(Database&)>;
   // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  // Called after each commit, before those who wait for it are told; must not wait.
-  using OnCommit = std::function<void(const CommitReport&)>;
-
-  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {});
+  explicit CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit = {});
   // Writes everything submitted, then ends.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
@@ -67,16 +70,27 @@ class CommitQueue {
     Done done;
     int64_t bytes = 0;
   };
+  // Holds what goes into one commit.
+  struct Group {
+    void Add(Item item) {
+      bytes.push_back(item.bytes);
+      writes.push_back(std::move(item.write));
+      done.push_back(std::move(item.done));
+    }
+
+    std::vector<Write> writes;
+    std::vector<Done> done;
+    std::vector<int64_t> bytes;
+  };
 
   void Serve();
-  std::vector<Item> Take();
+  Group Take();
   // The following are called with the mutex held.
-  void TakeTurns(std::vector<Item>& items, bool large);
-  void TakeLazy(std::vector<Item>& items);
-  void Commit(std::vector<Item> items);
-  absl::Status WriteAll(const std::vector<Item>& items, std::vector<absl::Status>& outcomes);
+  void TakeTurns(Group& group, bool large);
+  void TakeLazy(Group& group);
+  void Commit(const Group& group);
 
-  std::unique_ptr<SqliteDatabase> database_;
+  std::unique_ptr<Database> database_;
   const OnCommit on_commit_;
   std::mutex mutex_;
   std::condition_variable submitted_;

@@ -86,7 +86,7 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
                              std::unique_ptr<SqliteDatabase> writer,
                              std::unique_ptr<SqliteDatabase> maintainer,
                              std::unique_ptr<SessionSeals> seals, std::vector<std::string> damage,
-                             CommitQueue::OnCommit on_commit)
+                             OnCommit on_commit)
     : folder_(std::move(folder)),
       damage_(std::move(damage)),
       maintainer_(std::move(maintainer)),
@@ -107,7 +107,7 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
     if (on_commit) on_commit(commit);
   };
   ReadTenants(*writer);
-  queue_ = std::make_unique<CommitQueue>(std::move(writer), seal);
+  queue_ = std::make_unique<CommitQueue<SqliteDatabase>>(std::move(writer), seal);
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 

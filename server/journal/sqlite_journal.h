@@ -16,6 +16,7 @@
 #include "server/journal/data_folder.h"
 #include "server/journal/session_journal.h"
 #include "server/journal/session_seals.h"
+#include "server/journal/sqlite_database.h"
 
 namespace polyest::internal {
 
@@ -25,7 +26,7 @@ struct SqliteJournalOptions {
   // Largest size of that file, MiB; 0: as large as the disk. Past it, writes are
   // RESOURCE_EXHAUSTED.
   int64_t max_mb = 0;
-  CommitQueue::OnCommit on_commit{};
+  OnCommit on_commit{};
 };
 
 class SqliteJournal final : public SessionJournal {
@@ -68,7 +69,7 @@ class SqliteJournal final : public SessionJournal {
 
   SqliteJournal(std::unique_ptr<DataFolder> folder, std::unique_ptr<SqliteDatabase> writer,
                 std::unique_ptr<SqliteDatabase> maintainer, std::unique_ptr<SessionSeals> seals,
-                std::vector<std::string> damage, CommitQueue::OnCommit on_commit);
+                std::vector<std::string> damage, OnCommit on_commit);
   absl::StatusOr<std::vector<Seal>> BeginSnapshot(SqliteDatabase& source);
   // Copies the journal into a file that is open as `descriptor`, and verifies the copy.
   absl::StatusOr<JournalContents> CopyTo(const std::string& file, int descriptor, const Stop& stop);
@@ -102,7 +103,7 @@ class SqliteJournal final : public SessionJournal {
   // Whether there is a backup. Backups may outlive the journal.
   const std::shared_ptr<std::atomic<bool>> backing_up_ = std::make_shared<std::atomic<bool>>(false);
 
-  std::unique_ptr<CommitQueue> queue_;
+  std::unique_ptr<CommitQueue<SqliteDatabase>> queue_;
   std::jthread maintenance_thread_;
 };
 
