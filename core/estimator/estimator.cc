@@ -13,6 +13,7 @@
 #include "core/estimator/estimator_access.h"
 #include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/record/checkpoints.h"
+#include "core/estimator/record/known_inputs_store.h"
 #include "core/estimator/record/memory_store.h"
 #include "core/estimator/record/sample_checks.h"
 #include "core/estimator/second_search.h"
@@ -30,6 +31,13 @@ namespace {
 
 constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
 
+std::shared_ptr<SampleStore> StoreFor(const ResolvedProblem& problem,
+                                      std::shared_ptr<SampleStore> store) {
+  if (!store) store = std::make_shared<MemoryStore>();
+  if (problem.lead_s() == 0) return store;
+  return std::make_shared<KnownInputsStore>(problem, std::move(store));
+}
+
 }  // namespace
 
 // Owns the record and the mixture of components that represents the posterior.
@@ -38,7 +46,7 @@ class Estimator::Implementation {
   Implementation(ResolvedProblem problem, EstimatorOptions options)
       : problem_(std::move(problem)),
         threads_(options.threads),
-        store_(options.store ? std::move(options.store) : std::make_shared<MemoryStore>()),
+        store_(StoreFor(problem_, std::move(options.store))),
         checks_(problem_),
         snapshot_(std::move(options.snapshot)),
         checkpoints_(problem_.problem().integration.samples_between_checkpoints,
@@ -67,7 +75,7 @@ class Estimator::Implementation {
                                                const Stop& stop) const;
 
  private:
-  int64_t SettledRows() const;
+  absl::StatusOr<int64_t> SettledRows() const;
   absl::StatusOr<Prediction> PredictOther(PredictionSubject subject,
                                           const PredictionOptions& options, const Stop& stop) const;
   void MakeSnapshot(int64_t rows);
@@ -96,15 +104,15 @@ absl::Status Estimator::Implementation::Append(const Samples& samples) {
 }
 
 // Returns the number of rows up to which the streamed inputs are settled, whatever rows may follow.
-int64_t Estimator::Implementation::SettledRows() const {
+absl::StatusOr<int64_t> Estimator::Implementation::SettledRows() const {
   const RecordPosition& last = checks_.position();
   if (last.run_ended) return last.rows;
   return polyest::internal::SettledRows(problem_, last.knots, last.rows - last.rows_in_run,
-                                        last.rows);
+                                        last.rows, *store_);
 }
 
 absl::Status Estimator::Implementation::Process(const Stop& stop) {
-  const int64_t settled = SettledRows();
+  POLYEST_ASSIGN_OR_RETURN(const int64_t settled, SettledRows());
   while (true) {
     const int64_t checkpoint = checkpoints_.next().value_or(kNever);
     const int64_t rows = std::min({settled, checkpoint, search_.row()});
@@ -232,13 +240,13 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
                            problem_.WithRuns(problem_.per_run() ? std::max(0, last_run) + 1 : 1));
   const absl::StatusOr<CheckedSamples> checked = SampleChecks(other).Check(*options.record);
   if (!checked.ok()) return OfRecord(checked.status());
-  MemoryStore store;
-  POLYEST_RETURN_IF_ERROR(store.Append(*checked));
-  POLYEST_RETURN_IF_ERROR(Validate(options, other, store.rows()));
+  const std::shared_ptr<SampleStore> store = StoreFor(other, nullptr);
+  POLYEST_RETURN_IF_ERROR(store->Append(*checked));
+  POLYEST_RETURN_IF_ERROR(Validate(options, other, store->rows()));
   subject.thetas = ThetasOfOtherRuns(problem_, subject.thetas, other);
   subject.problem = &other;
-  subject.store = &store;
-  subject.rows = store.rows();
+  subject.store = store.get();
+  subject.rows = store->rows();
   return Predict(subject, options, threads_, stop);
 }
 

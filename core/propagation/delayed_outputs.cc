@@ -25,11 +25,11 @@ constexpr double kTooClose = 0.25;  // spacings: a node so near the end of the r
 }  // namespace
 
 DelayedOutputs::DelayedOutputs(std::unique_ptr<TrajectoryEnsemble> ensemble, Matrix delays_s,
-                               double relative_tolerance, bool known_to_samples)
+                               double relative_tolerance, double ahead_s)
     : ensemble_(std::move(ensemble)),
       delays_s_(std::move(delays_s)),
       max_difference_(kMaxDifference * relative_tolerance),
-      known_to_samples_(known_to_samples) {
+      ahead_s_(ahead_s) {
   double least_s = std::numeric_limits<double>::infinity();
   double largest_s = -least_s;
   for (const double delay_s : delays_s_.reshaped()) {
@@ -41,7 +41,7 @@ DelayedOutputs::DelayedOutputs(std::unique_ptr<TrajectoryEnsemble> ensemble, Mat
     least_delay_s_ = least_s;
     largest_delay_s_ = largest_s;
   }
-  POLYEST_CHECK(!known_to_samples_ || least_delay_s_ >= 0);
+  POLYEST_CHECK(least_delay_s_ >= -ahead_s_);
 }
 
 absl::Status DelayedOutputs::Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -53,9 +53,9 @@ absl::Status DelayedOutputs::Advance(std::span<const double> times_s, MatrixRef 
     const double time_s = times_s[k];
     NoteInterval(time_s);
     const double latest_s = std::max(0.0, time_s - least_delay_s_);
-    const double limit_s = known_to_samples_ ? time_s : std::numeric_limits<double>::infinity();
+    const double limit_s = time_s + ahead_s_;
     POLYEST_RETURN_IF_ERROR(AddNodes(latest_s, limit_s, stop));
-    if (nodes_.back().time_s < latest_s) POLYEST_RETURN_IF_ERROR(AddEnd(time_s, stop));
+    if (nodes_.back().time_s < latest_s) POLYEST_RETURN_IF_ERROR(AddEnd(limit_s, stop));
     Read(time_s, static_cast<Eigen::Index>(k) * m, outputs);
     DropNodesBefore(time_s - largest_delay_s_);
   }
@@ -106,7 +106,7 @@ absl::Status DelayedOutputs::AddNode(double time_s, const Stop& stop) {
   return absl::OkStatus();
 }
 
-// Adds a node at the present time, after which nothing is known yet. It stands in for the last one
+// Adds a node at the time after which nothing is known yet. It stands in for the last one
 // if that is too close for a well-conditioned stencil.
 absl::Status DelayedOutputs::AddEnd(double time_s, const Stop& stop) {
   if (nodes_.size() > 1 && time_s - nodes_.back().time_s < kTooClose * spacing_s_) {

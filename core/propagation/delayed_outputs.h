@@ -36,10 +36,10 @@ class DelayedOutputs final : public TrajectoryEnsemble {
   static constexpr double kMaxDifference = 30;
 
   // `delays_s`: Q × m, in s; the outputs of a point whose delay is not finite are NaN.
-  // `known_to_samples`: whether the ensemble cannot be advanced beyond a sample time before Advance
-  // is called for it, because its inputs are streamed; delays must then not be negative.
+  // `ahead_s`: how far beyond a time the ensemble can be advanced when Advance is called for it, +∞
+  // unless its inputs are streamed. No delay may be below −ahead_s.
   DelayedOutputs(std::unique_ptr<TrajectoryEnsemble> ensemble, Matrix delays_s,
-                 double relative_tolerance, bool known_to_samples);
+                 double relative_tolerance, double ahead_s);
 
   int points() const override { return ensemble_->points(); }
   // A trajectory that fails within the nodes around a time is NaN there.
@@ -78,12 +78,12 @@ class DelayedOutputs final : public TrajectoryEnsemble {
   const std::unique_ptr<TrajectoryEnsemble> ensemble_;
   const Matrix delays_s_;
   const double max_difference_;
-  const bool known_to_samples_;
+  const double ahead_s_;
   double least_delay_s_ = 0, largest_delay_s_ = 0;
 
   std::deque<Node> nodes_;
   std::vector<Node> unused_;  // memory for nodes to come
-  bool has_end_ = false;      // whether the last node is only for the present time
+  bool has_end_ = false;      // whether the last node is where nothing is known after it yet
   Node replaced_;             // the node that the end took the place of, if any
   bool has_replaced_ = false;
   double spacing_s_ = 0;

@@ -128,11 +128,12 @@ EnsemblePropagator::EnsemblePropagator(EnsembleSpecification specification,
     : output_gains_(specification.output_gains), output_offsets_(specification.output_offsets) {
   Matrix delays_s = specification.output_delays_s;
   const double tolerance = specification.integration.relative_tolerance;
+  const bool streamed = std::ranges::any_of(*inputs, &InputSignal::streamed);
+  const double ahead_s = streamed ? specification.inputs_ahead_s : kInfinity;
   ensemble_ = StartEnsemble(std::move(specification), inputs);
   if (delays_s.size() == 0) return;
-  const bool streamed = std::ranges::any_of(*inputs, &InputSignal::streamed);
   auto delayed = std::make_unique<DelayedOutputs>(std::move(ensemble_), std::move(delays_s),
-                                                  tolerance, streamed);
+                                                  tolerance, ahead_s);
   delayed_ = delayed.get();
   ensemble_ = std::move(delayed);
 }

@@ -54,7 +54,10 @@ struct EnsembleSpecification {
   std::vector<int> outputs;  // columns of the model's outputs to read
   Matrix output_gains;       // Q × outputs read
   Matrix output_offsets;     // Q × outputs read
-  Matrix output_delays_s;    // Q × outputs read; not negative if an input is streamed
+  Matrix output_delays_s;    // Q × outputs read
+  // How far beyond a time streamed inputs are settled when Advance is called for it, in s, ≥ 0. No
+  // delay of an output may be below its negative if an input is streamed.
+  double inputs_ahead_s = 0;
   // Q × states: spectral densities of white process noise, in (unit of the state)²/s. Filters alone
   // use it (filter_bank.h); a trajectory has none. Empty: none.
   Matrix process_noise;

@@ -47,7 +47,7 @@ class Gateway final : public HttpHandler {
   std::optional<HttpAnswer> AnswerHead(const HttpRequest& request) const override;
   HttpAnswer Answer(const HttpRequest& request, const std::string& body) const override;
   HttpAnswer Refusal(int status, std::string_view why) const override;
-  void OnAnswered(int status) const override { options_.count(status); }
+  void OnAnswer(int status) const override { options_.count(status); }
 
  private:
   // A place among the streams, which is given back when its last owner goes.

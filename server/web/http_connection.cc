@@ -170,8 +170,9 @@ RequestLoop::RequestLoop(ClientSocket& socket, const HttpLimits& limits, BodyMem
   });
   Post(".*", [this](const httplib::Request&, httplib::Response& response,
                     const httplib::ContentReader& reader) { OnBody(response, reader); });
-  set_logger([this](const httplib::Request&, const httplib::Response& response) {
-    handler_.OnAnswered(response.status);
+  // Before the answer is sent: whoever has it finds it counted.
+  set_post_routing_handler([this](const httplib::Request&, const httplib::Response& response) {
+    handler_.OnAnswer(response.status);
   });
   AnswerFailures();
 }

@@ -55,8 +55,8 @@ class HttpHandler {
   virtual HttpAnswer Answer(const HttpRequest& request, const std::string& body) const = 0;
   // Returns the answer to a request that is not well-formed HTTP, or beyond a limit of its form.
   virtual HttpAnswer Refusal(int status, std::string_view why) const = 0;
-  // Notes the answer to a request.
-  virtual void OnAnswered(int status) const = 0;
+  // Notes the answer to a request before it is sent.
+  virtual void OnAnswer(int status) const = 0;
 };
 
 }  // namespace polyest::internal

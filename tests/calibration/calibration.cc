@@ -5,11 +5,14 @@
 //   - the truth's rank among draws of the posterior must be uniform (Talts et al. 2018), by
 //     Kolmogorov's test.
 //
-//   calibration [CAMPAIGNS] [--no-limits]
+//   calibration [CAMPAIGNS] [--only TEXT] [--no-limits]
 //
-// CAMPAIGNS is 1000 by default; they are dealt out evenly over rigs, lengths and noises. Prints a
-// table and exits with 1 when the whole is off: by more than 2 % in coverage and 0.05 in standard
-// deviation for a thousand, by three standard errors where that is more, or ranks with p < 0.01.
+// CAMPAIGNS is 1000 by default; they are dealt out evenly over rigs, lengths and noises, or over
+// those of them whose row of the table contains TEXT. Prints a table and exits with 1 when the
+// whole is off: by more than 2 % in coverage and 0.05 in standard deviation for a thousand, by
+// three standard errors where that is more, or ranks with p < 0.01.
+
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -80,10 +83,21 @@ Outcomes Estimate(const Campaign& campaign) {
   return outcomes;
 }
 
-void Print(const std::string& rig, const char* length, const char* noise, int campaigns,
-           const Outcomes& outcomes) {
-  std::printf("| %-11s | %-5s | %-14s | %4d | %5.1f %% | %5.2f | %6.3f |\n", rig.c_str(), length,
-              noise, campaigns, 100 * outcomes.Coverage(), outcomes.StandardDeviation(),
+// What is asked of the campaigns of one row of the table.
+struct Row {
+  const Rig* rig = nullptr;
+  bool is_long = false;
+  Noise noise = Noise::kWhite;
+
+  std::string Label() const {
+    return absl::StrFormat("%-11s | %-6s | %-14s", rig->name, is_long ? "long" : "short",
+                           NameOf(noise));
+  }
+};
+
+void Print(const std::string& label, int campaigns, const Outcomes& outcomes) {
+  std::printf("| %s | %4d | %5.1f %% | %5.2f | %6.3f |\n", label.c_str(), campaigns,
+              100 * outcomes.Coverage(), outcomes.StandardDeviation(),
               KolmogorovProbability(outcomes.ranks));
   std::fflush(stdout);
 }
@@ -97,37 +111,64 @@ bool WithinLimits(const Outcomes& all, double campaigns) {
          KolmogorovProbability(all.ranks) > 0.01;
 }
 
-int Run(int campaigns, bool limits) {
-  const std::vector<Rig> rigs = Rigs();
-  const int kinds = static_cast<int>(rigs.size()) * 2 * static_cast<int>(std::size(kNoises));
-  const int each = (campaigns + kinds - 1) / kinds;
-  std::printf(
-      "| rig         | record | noise        | runs | covered | sd    | p      |\n"
-      "|---|---|---|---|---|---|---|\n");
-  Outcomes all;
-  uint64_t seed = 0;
+// Returns the rows of the table whose labels contain the text.
+std::vector<Row> RowsWith(const std::string& text, const std::vector<Rig>& rigs) {
+  std::vector<Row> rows;
   for (const Rig& rig : rigs) {
     for (const bool is_long : {false, true}) {
       for (const Noise noise : kNoises) {
-        Outcomes outcomes;
-        for (int i = 0; i < each; ++i) {
-          outcomes.Add(
-              Estimate(MakeCampaign(rig, is_long ? rig.long_rows : rig.short_rows, noise, ++seed)));
-        }
-        Print(rig.name, is_long ? "long" : "short", NameOf(noise), each, outcomes);
-        all.Add(outcomes);
+        const Row row{&rig, is_long, noise};
+        if (row.Label().find(text) != std::string::npos) rows.push_back(row);
       }
     }
   }
-  Print("all", "", "", each * kinds, all);
-  return !limits || WithinLimits(all, each * kinds) ? EXIT_SUCCESS : EXIT_FAILURE;
+  return rows;
+}
+
+int Run(int campaigns, const std::string& only, bool limits) {
+  const std::vector<Rig> rigs = Rigs();
+  const std::vector<Row> rows = RowsWith(only, rigs);
+  if (rows.empty()) {
+    std::fprintf(stderr, "calibration: no row of the table contains '%s'\n", only.c_str());
+    return 2;
+  }
+  const int each = (campaigns + static_cast<int>(rows.size()) - 1) / static_cast<int>(rows.size());
+  std::printf(
+      "| rig         | record | noise          | runs | covered | sd    | p      |\n"
+      "|---|---|---|---|---|---|---|\n");
+  Outcomes all;
+  uint64_t seed = 0;
+  for (const Row& row : rows) {
+    Outcomes outcomes;
+    for (int i = 0; i < each; ++i) {
+      const int length = row.is_long ? row.rig->long_rows : row.rig->short_rows;
+      outcomes.Add(Estimate(MakeCampaign(*row.rig, length, row.noise, ++seed)));
+    }
+    Print(row.Label(), each, outcomes);
+    all.Add(outcomes);
+  }
+  const int total = each * static_cast<int>(rows.size());
+  Print(absl::StrFormat("%-11s | %-6s | %-14s", "all", "", ""), total, all);
+  return !limits || WithinLimits(all, total) ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 }  // namespace
 }  // namespace polyest::internal::calibration
 
 int main(int argc, char** argv) {
-  const bool limits = argc < 2 || std::string(argv[argc - 1]) != "--no-limits";
-  const int campaigns = argc > 1 ? std::atoi(argv[1]) : 1'000;
-  return polyest::internal::calibration::Run(campaigns > 0 ? campaigns : 1'000, limits);
+  int campaigns = 1'000;
+  std::string only;
+  bool limits = true;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--no-limits") {
+      limits = false;
+    } else if (argument == "--only" && i + 1 < argc) {
+      only = argv[++i];
+    } else if ((campaigns = std::atoi(argv[i])) <= 0) {
+      std::fprintf(stderr, "calibration [CAMPAIGNS] [--only TEXT] [--no-limits]\n");
+      return 2;
+    }
+  }
+  return polyest::internal::calibration::Run(campaigns, only, limits);
 }

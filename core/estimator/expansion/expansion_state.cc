@@ -209,7 +209,7 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
   }
   StartRun(state.run, begin, first_knots);
   POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last.time_s));
-  if (!inputs_->SettledUpTo(last.time_s)) {
+  if (!inputs_->SettledFor(last.time_s)) {
     return absl::FailedPreconditionError(
         "the rows that settle the inputs at the snapshot have not been appended");
   }

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "core/bayes/newton_starts.h"
+#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/model_agreement.h"
@@ -17,8 +19,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kMostStarts = 12;
-constexpr int kMostRuns = 6;  // of the model, at the lowest minima outside
+constexpr int kMostStarts = 12;  // of collocation points, and of guesses
+constexpr int kMostRuns = 6;     // of the model, at the lowest minima outside
 // How far the model's cost at such a minimum may be above its cost at the lowest one. The minimum
 // of an inaccurate expansion lies beside the model's, so that more than its weight is allowed for.
 constexpr double kMostAbove = 12;
@@ -30,8 +32,18 @@ double ModelCost(const RegionalExpansion& expansion, const Cost& cost, const Vec
   return cost.power() * model + cost.regularization() * cost.Evaluate(eta).prior;
 }
 
+// Returns the rows of `points` with the least of the costs, kMostStarts at most.
+Matrix Least(const Matrix& points, const Vector& costs) {
+  std::vector<Eigen::Index> order(static_cast<size_t>(points.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order,
+                           [&](Eigen::Index a, Eigen::Index b) { return costs[a] < costs[b]; });
+  order.resize(std::min<size_t>(kMostStarts, order.size()));
+  return points(order, Eigen::all);
+}
+
 // Returns the collocation points of least cost, by the model or by the expansion.
-Matrix StartsOf(const RegionalExpansion& expansion, const Cost& cost) {
+Matrix BestPoints(const RegionalExpansion& expansion, const Cost& cost) {
   const Matrix& points = expansion.design().points;
   Vector least;
   cost.EvaluateMany(points, least);
@@ -42,23 +54,36 @@ Matrix StartsOf(const RegionalExpansion& expansion, const Cost& cost) {
                              : kInfinity;
     least[q] = std::fmin(std::fmin(least[q], model), kInfinity);
   }
-  std::vector<Eigen::Index> order(static_cast<size_t>(points.rows()));
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return least[a] < least[b]; });
-  order.resize(std::min<size_t>(kMostStarts, order.size()));
-  return points(order, Eigen::all);
+  return Least(points, least);
+}
+
+// Returns the guesses (germ coordinates) of least cost outside the region, in local coordinates.
+Matrix BestOutside(const Cost& cost, const Matrix& guesses, const Region& region) {
+  const Matrix inside = region.ManyToLocal(guesses);
+  std::vector<Eigen::Index> outside;
+  for (Eigen::Index i = 0; i < guesses.rows(); ++i) {
+    if (inside.row(i).cwiseAbs().maxCoeff() > 1) outside.push_back(i);
+  }
+  if (outside.empty()) return Matrix(0, cost.dimension());
+  const Matrix etas = cost.region().ManyToLocal(guesses(outside, Eigen::all));
+  Vector costs;
+  cost.EvaluateMany(etas, costs);
+  return Least(etas, costs.unaryExpr([](double c) { return std::fmin(c, kInfinity); }));
 }
 
 // Returns the minima (local coordinates) that lie outside the region of the particles, the lowest
 // ones first, and before them the lowest of all.
 Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
-                        const Matrix& particles, const Stop& stop) {
+                        const Matrix& particles, const Matrix& guesses, const Stop& stop) {
   const MinimizationProblem search = SearchOf(cost, expansion.design());
   const MinimizerOptions options;
-  const Matrix starts = ImprovedStarts(cost, search, StartsOf(expansion, cost), options);
-  const std::vector<Minimum> minima = FindMinima(search, starts, options, stop);
   const Region kept = RegionOfParticles(particles);
+  const Matrix points = BestPoints(expansion, cost);
+  const Matrix outside = BestOutside(cost, guesses, kept);
+  Matrix starts(points.rows() + outside.rows(), cost.dimension());
+  starts << points, outside;
+  const std::vector<Minimum> minima =
+      FindMinima(search, ImprovedStarts(cost, search, starts, options), options, stop);
   Matrix found(1, cost.dimension());
   found.row(0) = minima.front().point.transpose();
   for (const Minimum& minimum : minima) {
@@ -125,7 +150,7 @@ absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expans
                                                  const Cost& cost, const Matrix& particles,
                                                  const SettleRequest& request, const Stop& stop) {
   ConfirmedMinima confirmed{.points = Matrix(0, cost.dimension())};
-  const Matrix etas = LowestAndOutside(expansion, cost, particles, stop);
+  const Matrix etas = LowestAndOutside(expansion, cost, particles, request.guesses, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());
   if (etas.rows() == 1) return confirmed;
   POLYEST_ASSIGN_OR_RETURN(const std::vector<double> costs,
@@ -133,11 +158,32 @@ absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expans
   if (costs.empty()) return confirmed;
   std::vector<Eigen::Index> rows;
   const double limit = *std::min_element(costs.begin(), costs.end()) + kMostAbove;
-  for (size_t i = 1; i < costs.size(); ++i) {
-    if (costs[i] < kInfinity && costs[i] <= limit) rows.push_back(static_cast<Eigen::Index>(i));
+  for (size_t i = 0; i < costs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (i > 0 && !(costs[i] < kInfinity && costs[i] <= limit)) continue;
+    const double error = std::abs(costs[i] - cost.Evaluate(etas.row(row).transpose()).total);
+    confirmed.error = std::max(confirmed.error, error);
+    if (i > 0) rows.push_back(row);
   }
-  confirmed.points = expansion.design().region.ManyToGerm(etas(rows, Eigen::all));
+  confirmed.points = etas(rows, Eigen::all);
   return confirmed;
+}
+
+Matrix DrawsAround(const Cost& cost, const Vector& minimum, Eigen::Index count, uint64_t seed) {
+  Matrix etas = minimum.transpose().replicate(count, 1);
+  const SymmetricEigen curvature = DecomposeSymmetric(cost.Hessian(minimum));
+  if (curvature.values.minCoeff() > 0) {
+    const Matrix factor =
+        curvature.vectors * curvature.values.cwiseSqrt().cwiseInverse().asDiagonal();
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Vector z = Vector::NullaryExpr(minimum.size(), [&] { return normal(generator); });
+      const Vector eta = minimum + factor * z;
+      if (std::isfinite(cost.Evaluate(eta).total)) etas.row(i) = eta.transpose();
+    }
+  }
+  return cost.region().ManyToGerm(etas);
 }
 
 }  // namespace polyest::internal

@@ -14,12 +14,14 @@ namespace {
 constexpr int64_t kRows = 16;
 constexpr std::chrono::seconds kPatience{1};
 
-// Returns the first rows, as far as the beginning settles the streamed inputs.
-RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning) {
+// Returns the first rows, as far as the beginning, which is what the store has, settles the
+// streamed inputs.
+RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning,
+                   const SampleStore& store) {
   const RecordPosition after = After(SampleChecks(problem).position(), beginning);
+  const auto settled = SettledRows(problem, after.knots, 0, beginning.count(), store);
   RowBlock block;
-  AppendRows(beginning, 0, std::min(kRows, SettledRows(problem, after.knots, 0, beginning.count())),
-             block);
+  if (settled.ok()) AppendRows(beginning, 0, std::min(kRows, *settled), block);
   return block;
 }
 
@@ -44,12 +46,12 @@ void AddPredictionsOf(const RegionalExpansion& expansion, int row, RecordSummary
 
 void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record) {
   if (record.facts().intervals().StartsLate()) return;
-  const RowBlock block = FirstRows(problem, record.beginning());
+  MemoryStore store;
+  if (!store.Append(record.beginning()).ok()) return;
+  const RowBlock block = FirstRows(problem, record.beginning(), store);
   if (block.count() == 0) return;
   auto design = DesignForPrior(problem);
   if (!design.ok()) return;
-  MemoryStore store;
-  if (!store.Append(record.beginning()).ok()) return;
   auto expansion =
       RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1);
   if (!expansion.ok()) return;

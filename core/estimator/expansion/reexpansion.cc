@@ -28,6 +28,8 @@ constexpr int kMaxDimensionToTrust = 3;
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
+// Up to such errors in the cost at its minima an expansion can tell the pieces around them apart.
+constexpr double kMaxErrorAtMinima = 1;
 constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
@@ -55,7 +57,10 @@ class Settler {
         continue;
       }
       if (!may_move) break;
-      if (Pays(RegionOfParticles(result_.particles))) POLYEST_RETURN_IF_ERROR(AddOverlooked());
+      if (Pays(RegionOfParticles(result_.particles))) {
+        POLYEST_RETURN_IF_ERROR(AddOverlooked(attempt));
+        if (result_.overlooked && request_.ends_at_overlooked) break;
+      }
       const Region region = RegionOfParticles(result_.particles);
       if (!Pays(region)) {
         if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
@@ -157,8 +162,8 @@ class Settler {
     return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
   }
 
-  // Puts particles at minima that a contraction to the region of the particles would lose.
-  absl::Status AddOverlooked() {
+  // Puts particles around minima that a contraction to the region of the particles would lose.
+  absl::Status AddOverlooked(int attempt) {
     Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
     cost.set_power(power_);
     POLYEST_ASSIGN_OR_RETURN(
@@ -170,8 +175,11 @@ class Settler {
     Eigen::Index row = result_.particles.rows();
     for (Eigen::Index i = 0; i < found.points.rows() && row >= 2 * each; ++i) {
       row -= each;
-      result_.particles.middleRows(row, each).rowwise() = found.points.row(i);
-      result_.memory.costs.resize(0);  // these are no draws
+      result_.particles.middleRows(row, each) =
+          DrawsAround(cost, found.points.row(i).transpose(), each,
+                      request_.seed + static_cast<uint64_t>(attempt) + static_cast<uint64_t>(i));
+      result_.memory.costs.resize(0);  // the particles are no draws any more
+      result_.overlooked = found.error <= kMaxErrorAtMinima;
     }
     return absl::OkStatus();
   }

@@ -36,12 +36,17 @@ struct SettleRequest {
   int threads = 1;
   bool may_raise_order = true;  // has an effect only if the order is automatic
   bool may_replay = true;       // whether the record may be propagated from its beginning
+  // Whether to end where particles have been added at minima that the sampler overlooked and the
+  // expansion knows well, before it moves.
+  bool ends_at_overlooked = false;
 };
 
 struct Settlement {
   std::unique_ptr<RegionalExpansion> expansion;  // null if the present one stays
   Matrix particles;                              // particles of the posterior, germ coordinates
   SettlementMemory memory;
+  // Whether particles have been added at overlooked minima, which the expansion knows well.
+  bool overlooked = false;
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // by all expansions but the returned one
 };

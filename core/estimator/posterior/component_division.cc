@@ -46,20 +46,31 @@ int MostComponents(const ResolvedProblem& problem) {
   return std::max(kPiecesAtLeast, static_cast<int>(kMostTrajectories / points));
 }
 
-// Returns true when the posterior is in pieces on the present expansion, which no move makes
-// accurate. Does not look for pieces before the noise is learned, because the noise would decide
-// between them.
-bool MixtureComponent::LookForPieces() {
+// Pieces are not looked for before the noise is learned, because the noise would decide between
+// them.
+bool MixtureComponent::MayLookForPieces() const {
   if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
   for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
     const bool unknown = problem_.problem().measured[c].noise.unknown;
     if (unknown && !expansion_->noise().channels[c].learned) return false;
   }
+  return true;
+}
+
+// Returns true when the particles and the cost on the present expansion are in pieces.
+bool MixtureComponent::DivideIntoPieces() {
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  if (AgreementWithModel(*expansion_, cost).shift > kMaxShiftInPieces) return false;
   std::vector<Piece> pieces = FindPieces(cost, expansion_->design(), particles_);
   if (pieces.size() > 1) pieces_ = std::move(pieces);
   return must_divide();
+}
+
+// Returns true when the posterior is in pieces on the present expansion, which no move makes
+// accurate.
+bool MixtureComponent::LookForPieces() {
+  if (!MayLookForPieces()) return false;
+  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
+  return AgreementWithModel(*expansion_, cost).shift <= kMaxShiftInPieces && DivideIntoPieces();
 }
 
 bool MixtureComponent::MayBisect() const {
@@ -166,7 +177,7 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Pie
                                        const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
   bool moved = !parent.halves_;
-  for (int i = 0; moved && i < kMaxSettlementsAtRow; ++i) {
+  for (int i = 0; moved && !must_divide() && i < kMaxSettlementsAtRow; ++i) {
     POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
   }
   return absl::OkStatus();

@@ -304,6 +304,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     const bool follows = accurate();
     if (follows && !Leans()) return moved;
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
+    if (must_divide()) return true;
     if (!settled) break;
     moved = true;
   }
@@ -311,12 +312,25 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
-// Returns true when the expansion moved.
+// Returns true when the expansion moved or must be divided. Where the sampler has overlooked
+// minima, the pieces around them are told apart on the expansion that shows them; only if that is
+// not possible does it move to where all of them are.
 absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order,
                                               bool may_replay) {
   SettleRequest request;
   request.may_replay = may_replay;
   request.may_raise_order = may_raise_order && !bisected_;
+  request.ends_at_overlooked = MayLookForPieces();
+  POLYEST_ASSIGN_OR_RETURN(const Settled first, SettleOnce(request, stop));
+  if (!first.overlooked || !request.ends_at_overlooked) return first.moved;
+  if (DivideIntoPieces()) return true;
+  request.ends_at_overlooked = false;
+  POLYEST_ASSIGN_OR_RETURN(const Settled second, SettleOnce(request, stop));
+  return first.moved || second.moved;
+}
+
+absl::StatusOr<MixtureComponent::Settled> MixtureComponent::SettleOnce(SettleRequest request,
+                                                                       const Stop& stop) {
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;
@@ -331,9 +345,9 @@ absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_o
   memory_ = std::move(settlement.memory);
   abandoned_rows_ += settlement.propagated_rows;
   reexpansions_ += settlement.reexpansions;
-  if (!settlement.expansion) return false;
-  Adopt(std::move(settlement.expansion));
-  return true;
+  const bool moved = settlement.expansion != nullptr;
+  if (moved) Adopt(std::move(settlement.expansion));
+  return Settled{moved, settlement.overlooked};
 }
 
 absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
@@ -341,7 +355,9 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (!AgreementWithModel(*expansion_, cost).mean_difference) {
-    POLYEST_RETURN_IF_ERROR(Settle(stop, /*may_raise_order=*/false).status());
+    SettleRequest request;
+    request.may_raise_order = false;
+    POLYEST_RETURN_IF_ERROR(SettleOnce(std::move(request), stop).status());
   }
   comparable_row_ = taken_;
   return absl::OkStatus();

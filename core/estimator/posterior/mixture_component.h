@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/run_elimination.h"
 #include "core/estimator/expansion/settlement_memory.h"
@@ -132,12 +133,19 @@ class MixtureComponent {
                                                                       const Stop& stop) const;
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order, bool may_replay = true);
+  struct Settled {
+    bool moved = false;
+    bool overlooked = false;  // whether there are particles at minima that were overlooked
+  };
+  absl::StatusOr<Settled> SettleOnce(SettleRequest request, const Stop& stop);
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);
   int64_t NextLook() const;
   bool Leans() const;
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
   absl::StatusOr<bool> SettleAhead(const Stop& stop);
+  bool MayLookForPieces() const;
+  bool DivideIntoPieces();
   bool LookForPieces();
   bool MayBisect() const;
   bool BisectElement();

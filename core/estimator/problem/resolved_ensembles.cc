@@ -41,6 +41,7 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.model = model_;
   specification.outputs = std::move(outputs);
   settable_.Fill(values, specification);
+  specification.inputs_ahead_s = output_lead_s_;
   specification.integration = problem_.integration;
   specification.threads = threads;
   return specification;

@@ -215,15 +215,21 @@ void ResolvedProblem::Resolver::ResolveDelay(const FieldPath& field,
   if (!delay.is_delay()) return;
   const auto& streamed = resolved_.streamed_inputs_;
   if (delay.of_input()) {
-    if (smallest_s >= 0 || std::ranges::find(streamed, delay.column) == streamed.end()) return;
-    return Refuse(field,
-                  "%s may be as small as %g s; the delay of a streamed input must not be negative, "
-                  "since values to come would be needed",
-                  delay.name, smallest_s);
+    if (std::ranges::find(streamed, delay.column) == streamed.end()) return;
+    if (!std::isfinite(smallest_s)) {
+      return Refuse(field,
+                    "the delay %s of a streamed input needs a lower bound, since samples wait for "
+                    "the values of the input that they need",
+                    delay.name);
+    }
+    resolved_.input_lead_s_ = std::max(resolved_.input_lead_s_, -smallest_s);
+    return;
   }
-  absl::Status check =
-      CheckOutputDelay(field, delay.name, smallest_s, largest_s, !streamed.empty());
+  absl::Status check = CheckOutputDelay(field, delay.name, smallest_s, largest_s);
   if (!check.ok()) return Refuse(std::move(check));
+  if (!streamed.empty()) {
+    resolved_.output_lead_s_ = std::max(resolved_.output_lead_s_, -smallest_s);
+  }
   resolved_.delays_outputs_ = resolved_.delays_outputs_ || smallest_s != 0 || largest_s != 0;
   for (size_t c = 0; c < resolved_.outputs_.size(); ++c) {
     if (resolved_.outputs_[c] == delay.column) {

@@ -104,6 +104,9 @@ class ResolvedProblem {
   // Returns, by channel, the time from which samples are used, in s: the largest delay of the
   // output that the problem allows, and at least 0.
   const std::vector<double>& used_from_s() const { return used_from_s_; }
+  // How far beyond a time its samples need the streamed inputs, in s, ≥ 0: the inputs' negative
+  // delays and those of the outputs together.
+  double lead_s() const { return input_lead_s_ + output_lead_s_; }
   // The condition under which rows are used; null if all are.
   const RowGate* gate() const { return gate_.get(); }
   // Whether the likelihood is that of the prediction errors of filters (process_noise.h), which
@@ -162,6 +165,7 @@ class ResolvedProblem {
   std::vector<int> streamed_inputs_;
   std::vector<int> knots_needed_;
   std::vector<double> used_from_s_;
+  double input_lead_s_ = 0, output_lead_s_ = 0;
   bool delays_outputs_ = false;
   std::shared_ptr<const RowGate> gate_;
 };

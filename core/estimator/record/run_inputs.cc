@@ -65,15 +65,17 @@ void RunInputs::Forget(double time_s) {
   }
 }
 
-bool RunInputs::SettledUpTo(double time_s) const {
+bool RunInputs::SettledFor(double time_s) const {
+  const double needed_s = time_s + problem_.lead_s();
   return std::ranges::all_of(problem_.streamed_inputs(), [&](int input) {
-    return signals_[static_cast<size_t>(input)].SettledUpTo(time_s);
+    const InputSignal& signal = signals_[static_cast<size_t>(input)];
+    return signal.finished() || (last_row_s_ >= needed_s && signal.SettledUpTo(needed_s));
   });
 }
 
 absl::Status RunInputs::ReadUpTo(double time_s) {
   if (problem_.streamed_inputs().empty()) return absl::OkStatus();
-  while (!finished_ && (last_row_s_ < time_s || !SettledUpTo(time_s))) {
+  while (!finished_ && !SettledFor(time_s)) {
     if (next_in_block_ == block_.rows.size()) {
       if (next_row_ == store_->rows()) return Finish();
       POLYEST_RETURN_IF_ERROR(ReadNextRows());

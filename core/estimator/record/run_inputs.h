@@ -4,8 +4,9 @@
 // rows, of which any may lack one.
 //
 // Up to a row an input is determined by the knots up to there and a few later ones
-// (InputSignal::SettledUpTo). They are read from the store ahead of the row, each row once and no
-// more than needed, so what is known at a row is a function of the record alone.
+// (InputSignal::SettledUpTo), and those up to ResolvedProblem::lead_s later where delays are
+// negative. They are read from the store ahead of the row, each row once and no more than needed,
+// so what is known at a row is a function of the record alone.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -35,14 +36,15 @@ class RunInputs {
   // `problem` and `store` must outlive the inputs; the store may be null if no input is streamed.
   RunInputs(const ResolvedProblem& problem, const SampleStore* store, int run, int64_t first_row);
 
-  // Reads on until all inputs are settled up to `time_s`, or the run or the store ends. Returns the
-  // store's errors.
+  // Reads on until all inputs are settled as far as samples at `time_s` need them, or the run or
+  // the store ends. Returns the store's errors.
   absl::Status ReadUpTo(double time_s);
   // Releases the memory of knots that are not needed at or after `time_s`, before which the signals
   // must not be evaluated any more.
   void Forget(double time_s);
-  // Whether all inputs are settled up to `time_s`, the time of a row that has been read.
-  bool SettledUpTo(double time_s) const;
+  // Whether all inputs are settled as far as samples at `time_s` need them, the time of a row that
+  // has been read.
+  bool SettledFor(double time_s) const;
 
   // The signals, one for each of the model's inputs.
   const InputSignals& signals() const { return signals_; }

@@ -10,8 +10,10 @@
 //
 // by default gain 1, delay 0 and offset 0. The delay of an output must be bounded by its prior.
 // Samples of an output before the largest delay that the prior allows are not used: they show what
-// was before the run. A negative delay, by which an output shows what is to come, is possible
-// without streamed inputs only; with them, give the inputs' values at earlier times.
+// was before the run. With a negative delay an output shows what is to come, or an input was
+// recorded late. If inputs are streamed, samples then wait for the values that they need, at most
+// as long as the priors allow, and those at the end of a run, which would need values after the
+// last ones, are not used. A negative delay of a streamed input must be bounded by its prior.
 
 #include <map>
 #include <memory>

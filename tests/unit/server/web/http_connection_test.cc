@@ -50,7 +50,7 @@ class Echo final : public HttpHandler {
   HttpAnswer Refusal(int status, std::string_view why) const override {
     return {.status = status, .body = std::string(why) + "\n"};
   }
-  void OnAnswered(int status) const override {
+  void OnAnswer(int status) const override {
     const std::lock_guard lock(mutex);
     answered.push_back(status);
   }
@@ -135,6 +135,17 @@ TEST_F(HttpConnectionTest, AnswersOneRequestAfterTheOther) {
       "POST /d HTTP/1.1\r\nHost: h\r\nTransfer-Encoding: "
       "chunked\r\n\r\n2\r\nxy\r\n1\r\nz\r\n0\r\n\r\n");
   EXPECT_THAT(ReadUntil("]"), HasSubstr("[POST /d xyz]"));
+}
+
+// Who counts answers must not see fewer than a client that has them.
+TEST_F(HttpConnectionTest, NotesAnAnswerBeforeItIsSent) {
+  Start(limits_);
+  for (int count = 1; count <= 100; ++count) {
+    Send("GET /a HTTP/1.1\r\nHost: h\r\n\r\n");
+    ASSERT_THAT(ReadUntil("]"), HasSubstr("200 OK"));
+    const std::lock_guard lock(echo_.mutex);
+    ASSERT_EQ(echo_.answered.size(), count);
+  }
 }
 
 TEST_F(HttpConnectionTest, AnswersRequestsThatComeAtOnce) {

@@ -73,21 +73,6 @@ std::string RefusalOf(const std::function<void(Problem&)>& change) {
   return std::string(ResolvedProblem::Make(std::move(problem)).status().message());
 }
 
-TEST(ChannelParameters, OfAStreamMayNotLookAhead) {
-  EXPECT_EQ(RefusalOf([](Problem& p) {
-              p.uncertain[1] = UncertainParameter::Uniform("force.delay", -0.1, 0.1).value();
-            }),
-            "uncertain[1]: force.delay may be as small as -0.1 s; the delay of a streamed input "
-            "must not be negative, since values to come would be needed");
-  EXPECT_EQ(RefusalOf([](Problem& p) {
-              p.uncertain.erase(p.uncertain.begin() + 1);
-              p.fixed["force.delay"] = -0.2;
-            }),
-            "fixed.force.delay: force.delay may be as small as -0.2 s; the delay of a streamed "
-            "input must not be negative, since values to come would be needed");
-  EXPECT_EQ(RefusalOf([](Problem& p) { p.inputs[0].signal = SinusoidInput{}; }), "");
-}
-
 TEST(ChannelParameters, NeedTheirChannel) {
   EXPECT_EQ(RefusalOf([](Problem& p) { p.inputs.clear(); }),
             "uncertain[1]: force.delay needs a signal for input force in inputs");

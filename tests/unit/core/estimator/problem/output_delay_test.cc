@@ -43,8 +43,8 @@ Problem LateProblem() {
   return problem;
 }
 
-// x at 1 kHz, the force at 95 Hz.
-Samples LateRecord(double until_s) {
+// x at 1 kHz, the force at 95 Hz; each shows what was so long before.
+Samples LateRecord(double until_s, double late_s = kDelay_s, double force_late_s = 0) {
   std::map<double, bool> times;  // whether x is sampled
   for (int k = 0; 0.001 * k <= until_s; ++k) times[0.001 * k] = true;
   for (int k = 0; k / 95.0 <= until_s; ++k) times.try_emplace(k / 95.0, false);
@@ -55,12 +55,12 @@ Samples LateRecord(double until_s) {
   int next_force = 0;
   for (const auto& [t, sampled] : times) {
     samples.time_s.push_back(t);
-    samples.columns[0].value.push_back(DrivenDisplacement(std::max(0.0, t - kDelay_s)) +
+    samples.columns[0].value.push_back(DrivenDisplacement(std::max(0.0, t - late_s)) +
                                        normal(generator));
     samples.columns[0].missing.push_back(!sampled);
     const bool forced = t == next_force / 95.0;
     next_force += forced ? 1 : 0;
-    samples.columns[1].value.push_back(std::sin(kForceFrequency * t));
+    samples.columns[1].value.push_back(std::sin(kForceFrequency * std::max(0.0, t - force_late_s)));
     samples.columns[1].missing.push_back(!forced);
   }
   samples.end_of_run = true;
@@ -121,11 +121,67 @@ std::string RefusalOfDelay(const UncertainParameter& delay) {
   return std::string(ResolvedProblem::Make(problem).status().message());
 }
 
-TEST(OutputDelay, MustBeBoundedAndNotNegativeWithStreamedInputs) {
+// The force is recorded late: its recorded values from then on are those that the mass feels now.
+Problem LateForceProblem() {
+  Problem problem = LateProblem();
+  problem.uncertain[1] = UncertainParameter::Uniform("force.delay", -0.02, 0.02).value();
+  return problem;
+}
+
+TEST(OutputDelay, OfAStreamedInputMayBeNegative) {
+  const Estimate estimate = EstimateOf(LateForceProblem(), LateRecord(2, 0, kDelay_s));
+  EXPECT_NEAR(estimate.parameters[0].mean, kStiffness, 2 * estimate.parameters[0].std_dev);
+  EXPECT_NEAR(estimate.parameters[1].mean, -kDelay_s, 2 * estimate.parameters[1].std_dev);
+  EXPECT_LT(estimate.parameters[1].std_dev, 2e-4);
+}
+
+TEST(OutputDelay, MayBeNegativeWithStreamedInputs) {
+  Problem problem = LateProblem();
+  problem.uncertain[1] = UncertainParameter::Uniform("x.delay", -0.02, 0.02).value();
+  const Estimate estimate = EstimateOf(problem, LateRecord(2, -kDelay_s));
+  EXPECT_NEAR(estimate.parameters[0].mean, kStiffness, 2 * estimate.parameters[0].std_dev);
+  EXPECT_NEAR(estimate.parameters[1].mean, -kDelay_s, 2 * estimate.parameters[1].std_dev);
+  EXPECT_LT(estimate.parameters[1].std_dev, 2e-4);
+}
+
+// The samples of the last 20 ms before the last of the force's would need forces after it.
+TEST(OutputDelay, LeavesOutWhatIsAfterTheInputs) {
+  const Samples record = LateRecord(2, 0, kDelay_s);
+  const double last_force_s = 190 / 95.0;
+  int64_t used = 0;
+  for (size_t k = 0; k < record.rows(); ++k) {
+    used += !record.columns[0].missing[k] && record.time_s[k] <= last_force_s - 0.02 ? 1 : 0;
+  }
+  EXPECT_EQ(EstimateOf(LateForceProblem(), record).samples, used);
+}
+
+TEST(OutputDelay, GivesTheSameBitsForAnyBatchesWithNegativeDelays) {
+  const Samples record = LateRecord(0.3, 0, kDelay_s);
+  const Estimate whole = EstimateInBatches(LateForceProblem(), record, 1000);
+  ExpectSame(EstimateInBatches(LateForceProblem(), record, 1), whole);
+  ExpectSame(EstimateInBatches(LateForceProblem(), record, 37), whole);
+}
+
+// Samples wait as long as the prior allows.
+TEST(OutputDelay, WaitsForTheInputsThatSamplesNeed) {
+  Samples record = LateRecord(0.3, 0, kDelay_s);
+  record.end_of_run = false;
+  const auto estimator = Estimator::Make(LateForceProblem()).value();
+  ASSERT_TRUE(estimator->Append(record).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  // The curve through the forces is settled up to one that so many others follow.
+  const int needed = ResolvedProblem::Make(LateForceProblem())->knots_needed().front();
+  const double known_to_s = (29 - needed) / 95.0;
+  const auto settled =
+      std::ranges::count_if(record.time_s, [&](double t) { return t + 0.02 <= known_to_s; });
+  EXPECT_EQ(estimator->rows_processed(), settled);
+}
+
+TEST(OutputDelay, MustBeBounded) {
   EXPECT_THAT(RefusalOfDelay(UncertainParameter::Normal("x.delay", 0.01, 0.001).value()),
               HasSubstr("uncertain[1]: the delay x.delay of an output needs bounds"));
-  EXPECT_THAT(RefusalOfDelay(UncertainParameter::Uniform("x.delay", -0.01, 0.01).value()),
-              HasSubstr("x.delay may be as small as -0.01 s; with a streamed input"));
+  EXPECT_THAT(RefusalOfDelay(UncertainParameter::Normal("force.delay", 0.01, 0.001).value()),
+              HasSubstr("uncertain[1]: the delay force.delay of a streamed input needs a lower"));
   Problem problem = LateProblem();
   problem.derived = {{"x.delay", "0.001*k"}};
   problem.uncertain.pop_back();
