@@ -12,10 +12,10 @@ packages=(
   build-essential cmake ninja-build ccache pkg-config
   libeigen3-dev libsundials-dev libnlopt-dev libnlopt-cxx-dev libabsl-dev libcereal-dev zlib1g-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libsystemd-dev libspdlog-dev prometheus-cpp-dev libcpp-httplib-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libssl-dev
+  libsystemd-dev libspdlog-dev prometheus-cpp-dev libcpp-httplib-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libpq-dev libssl-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev clang-format curl openssl sqlite3 libfaketime haproxy
+  libgtest-dev libgmock-dev libbenchmark-dev clang-format curl openssl sqlite3 postgresql libfaketime haproxy
   python3-yaml python3-grpcio python3-protobuf python3-numpy python3-scipy
   python3-pytest python3-pandas python3-matplotlib python3-xarray python3-emcee
   mypy python3-pip python3-setuptools python3-wheel

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <absl/strings/str_cat.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <iostream>
@@ -11,6 +13,7 @@
 #include "server/daemon/configuration.h"
 #include "server/daemon/web_options.h"
 #include "server/journal/journal_check.h"
+#include "server/journal/postgres_target.h"
 #include "server/security/exposure.h"
 #include "server/security/token_table.h"
 
@@ -204,6 +207,7 @@ absl::Status Listen(const std::vector<std::string>& addresses, bool insecure,
 // Options whose text is understood when all of them are known.
 struct Texts {
   std::vector<std::string> listen{DaemonOptions().listen.front().ToString()};
+  std::string journal = "sqlite:";
   std::string durability = "disk";
   std::string metrics;
   std::string new_token;
@@ -222,6 +226,14 @@ void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
   app.add_option("--data-dir", daemon.data_dir,
                  "Folder in which sessions are kept; by default $STATE_DIRECTORY, or "
                  "$XDG_STATE_HOME/polyest, or ~/.local/state/polyest");
+  app.add_option(
+         "--journal", texts.journal,
+         "Where sessions are kept: sqlite: is the data folder; postgresql://… is a database "
+         "that several daemons may share, without a password (passfile=FILE names one)")
+      ->capture_default_str();
+  app.add_option("--advertise", daemon.advertise,
+                 "HOST:PORT at which clients reach this daemon, for other daemons of the same "
+                 "database; by default the first of --listen");
   app.add_option("--durability", texts.durability,
                  "disk: a batch is acknowledged when it is on disk; memory: sessions end with the "
                  "daemon")
@@ -238,9 +250,34 @@ void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
       ->capture_default_str();
 }
 
+// Sets the database, if sessions are kept in one.
+absl::Status ApplyJournal(const Texts& texts, DaemonOptions& daemon) {
+  if (texts.journal == "sqlite:") {
+    if (daemon.advertise.empty()) return absl::OkStatus();
+    return absl::FailedPreconditionError(
+        "--advertise: only daemons that share a database (--journal postgresql://…) ask for it");
+  }
+  const auto target = PostgresTarget::Parse(texts.journal);
+  if (!target.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--journal: ", target.status().message(), "; the other choice is sqlite:"));
+  }
+  if (texts.durability == "memory" || daemon.max_disk_mb > 0) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(texts.durability == "memory" ? "--durability memory" : "--max-disk-mb",
+                     ": does not apply to sessions that --journal keeps in a PostgreSQL database"));
+  }
+  if (!daemon.advertise.empty()) {
+    POLYEST_RETURN_IF_ERROR(ListenAddress::Parse(daemon.advertise, "--advertise").status());
+  }
+  daemon.database = texts.journal;
+  return absl::OkStatus();
+}
+
 // Sets what follows from the texts. INVALID_ARGUMENT or FAILED_PRECONDITION, naming the option.
 absl::Status Apply(const Texts& texts, DaemonOptions& daemon) {
-  if (texts.durability == "memory") {
+  POLYEST_RETURN_IF_ERROR(ApplyJournal(texts, daemon));
+  if (texts.durability == "memory" || !daemon.database.empty()) {
     daemon.data_dir.clear();
   } else if (daemon.data_dir.empty()) {
     daemon.data_dir = DefaultDataDir();

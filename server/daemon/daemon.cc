@@ -10,8 +10,11 @@
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <climits>
 #include <future>
 #include <thread>
 #include <utility>
@@ -103,22 +106,48 @@ Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
                .capacity_per_lane = kWaitingTasksOfLane}) {}
 
 absl::Status Daemon::OpenJournal() {
-  if (options_.data_dir.empty()) {
-    journal_ = std::make_unique<MemoryJournal>();
-    return absl::OkStatus();
-  }
-  SqliteJournalOptions journal{.folder = options_.data_dir, .max_mb = options_.max_disk_mb};
-  journal.on_commit = [this](const CommitReport& commit) {
+  const auto on_commit = [this](const CommitReport& commit) {
     metrics_.Count(Metrics::Commit{static_cast<int64_t>(commit.writes), !commit.outcome.ok(),
                                    commit.duration.count()});
     readiness_.OnCommit(commit.outcome.ok() && commit.room);
   };
+  if (!options_.database.empty()) return OpenDatabase(on_commit);
+  if (options_.data_dir.empty()) {
+    journal_ = std::make_unique<MemoryJournal>();
+    return absl::OkStatus();
+  }
+  const SqliteJournalOptions journal{
+      .folder = options_.data_dir, .max_mb = options_.max_disk_mb, .on_commit = on_commit};
   POLYEST_ASSIGN_OR_RETURN(auto opened, SqliteJournal::Open(journal));
   for (const std::string& damage : opened->damage()) {
     spdlog::error("the journal is damaged: {}", damage);
   }
   journal_ = std::move(opened);
   return absl::OkStatus();
+}
+
+absl::Status Daemon::OpenDatabase(OnCommit on_commit) {
+  // No two daemons that live have the same machine and port.
+  std::array<char, HOST_NAME_MAX + 1> host{};
+  gethostname(host.data(), HOST_NAME_MAX);
+  const ListenAddress& address = options_.listen.front();
+  const std::string node =
+      address.port == 0 ? "" : absl::StrCat(host.data(), " ", address.ToString());
+  auto opened = PostgresJournal::Open(
+      {.uri = options_.database, .node = node, .on_commit = std::move(on_commit)});
+  if (!opened.ok()) {
+    return absl::Status(opened.status().code(),
+                        absl::StrFormat("--journal: %s", opened.status().message()));
+  }
+  database_ = opened->get();
+  journal_ = *std::move(opened);
+  return absl::OkStatus();
+}
+
+void Daemon::Advertise() {
+  if (database_ == nullptr) return;
+  database_->Announce(options_.advertise.empty() ? addresses_.front().ToString()
+                                                 : options_.advertise);
 }
 
 absl::Status Daemon::OpenSessions() {
@@ -275,6 +304,7 @@ absl::Status Daemon::Listen() {
     server_->GetHealthCheckService()->SetServingStatus(service->full_name(), true);
   }
   listener_->Start();
+  Advertise();
   readiness_.Start(server_->GetHealthCheckService(), Described());
   if (audit_ != nullptr) audit_->Add("started", Described());
   return absl::OkStatus();

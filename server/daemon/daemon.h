@@ -22,6 +22,7 @@
 #include "server/daemon/readiness.h"
 #include "server/daemon/self_check.h"
 #include "server/execution/executor.h"
+#include "server/journal/postgres_journal.h"
 #include "server/security/access_control.h"
 #include "server/security/file_watch.h"
 #include "server/security/server_tls.h"
@@ -41,6 +42,10 @@ struct DaemonOptions {
   int threads = 0;  // threads of the numerics; 0: one a core
   // Folder in which sessions are kept; empty: sessions are in memory and end with the daemon.
   std::string data_dir{};
+  // URI of the PostgreSQL database in which sessions are kept instead, postgresql://…; empty: none.
+  std::string database{};
+  std::string
+      advertise{};  // HOST:PORT at which clients reach this daemon; empty: its first address
   int64_t max_disk_mb = 0;  // size of the journal's file, MiB; 0: as large as the disk
   SessionLimits limits{};
   int64_t max_memory_mb = 0;  // resident memory of the process, MiB; 0: no limit
@@ -64,7 +69,8 @@ struct DaemonOptions {
 class Daemon {
  public:
   // Starts the daemon. UNAVAILABLE when an address cannot be listened on, NOT_FOUND when there is
-  // no folder of FMUs. Other errors are those of SqliteJournal::Open for the data folder, and of
+  // no folder of FMUs. Other errors are those of SqliteJournal::Open for the data folder,
+  // of PostgresJournal::Open for the database, and of
   // TokenTable and ReadTlsMaterial for tokens, certificates and keys.
   static absl::StatusOr<std::unique_ptr<Daemon>> Start(const DaemonOptions& options);
   // Stops the daemon first, as Stop does.
@@ -97,6 +103,9 @@ class Daemon {
  private:
   Daemon(const DaemonOptions& options, ModelLibrary models);
   absl::Status OpenJournal();
+  absl::Status OpenDatabase(OnCommit on_commit);
+  // Tells the other daemons of the database where this one is reached.
+  void Advertise();
   absl::Status OpenSessions();
   // Logs which of the files that hold secrets others may read.
   void WarnOfReadableSecrets() const;
@@ -123,6 +132,7 @@ class Daemon {
   // The following members are declared in the order in which they need each other: the executors
   // finish their tasks, which use the journal, before the journal is destroyed.
   std::unique_ptr<SessionJournal> journal_;
+  PostgresJournal* database_ = nullptr;  // the journal, if it is one
   Executor executor_;
   Executor intake_;
   std::unique_ptr<SessionRegistry> sessions_;

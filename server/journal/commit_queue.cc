@@ -5,7 +5,8 @@
 #include <set>
 #include <utility>
 
-#include "core/common/status.h"
+#include "server/journal/postgres_writer.h"
+#include "server/journal/sqlite_database.h"
 
 namespace polyest::internal {
 namespace {
@@ -14,28 +15,26 @@ namespace {
 // fails, and how long others wait for it.
 constexpr size_t kMaxWrites = 512;
 
-bool ConcernsOnlyItself(const absl::Status& status) {
-  return absl::IsNotFound(status) || absl::IsAlreadyExists(status) ||
-         absl::IsFailedPrecondition(status);
-}
-
 }  // namespace
 
-CommitQueue::CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit,
-                         CommitRoom room)
+template <typename Database>
+CommitQueue<Database>::CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit,
+                                   Room room)
     : database_(std::move(database)),
       on_commit_(std::move(on_commit)),
       room_(std::move(room)),
       thread_([this] { Serve(); }) {}
 
-CommitQueue::~CommitQueue() {
+template <typename Database>
+CommitQueue<Database>::~CommitQueue() {
   const std::lock_guard lock(mutex_);
   ending_ = true;
   submitted_.notify_one();
 }
 
-void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_t bytes,
-                         DiskUse use) {
+template <typename Database>
+void CommitQueue<Database>::Submit(Write write, Done done, const std::string& lane, int64_t bytes,
+                                   DiskUse use) {
   const std::lock_guard lock(mutex_);
   std::deque<Item>& queue = lanes_[lane];
   if (queue.empty()) turns_.push_back(lane);
@@ -43,23 +42,26 @@ void CommitQueue::Submit(Write write, Done done, const std::string& lane, int64_
   submitted_.notify_one();
 }
 
-void CommitQueue::SubmitLazily(Write write, const std::string& lane) {
+template <typename Database>
+void CommitQueue<Database>::SubmitLazily(Write write, const std::string& lane) {
   const std::lock_guard lock(mutex_);
   lazy_.emplace_back(lane, std::move(write));
 }
 
-void CommitQueue::Flush() {
+template <typename Database>
+void CommitQueue<Database>::Flush() {
   std::set<std::string> lanes;
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [lane, write] : lazy_) lanes.insert(lane);
   }
   for (const std::string& lane : lanes) {
-    Run([](SqliteDatabase&) { return absl::OkStatus(); }, lane).IgnoreError();
+    Run([](Database&) { return absl::OkStatus(); }, lane).IgnoreError();
   }
 }
 
-absl::Status CommitQueue::Run(Write write, const std::string& lane, DiskUse use) {
+template <typename Database>
+absl::Status CommitQueue<Database>::Run(Write write, const std::string& lane, DiskUse use) {
   std::promise<absl::Status> promise;
   auto outcome = promise.get_future();
   Submit(
@@ -68,29 +70,32 @@ absl::Status CommitQueue::Run(Write write, const std::string& lane, DiskUse use)
   return outcome.get();
 }
 
-void CommitQueue::Serve() {
-  for (auto items = Take(); !items.empty(); items = Take()) Commit(std::move(items));
+template <typename Database>
+void CommitQueue<Database>::Serve() {
+  for (Group group = Take(); !group.writes.empty(); group = Take()) Commit(std::move(group));
 }
 
 // Waits for writes and returns them; returns none at the end.
-std::vector<CommitQueue::Item> CommitQueue::Take() {
-  std::vector<Item> items;
+template <typename Database>
+typename CommitQueue<Database>::Group CommitQueue<Database>::Take() {
+  Group group;
   std::unique_lock lock(mutex_);
   submitted_.wait(lock, [this] { return !turns_.empty() || ending_; });
-  TakeTurns(items, /*large=*/!large_before_);
-  if (items.empty()) TakeTurns(items, /*large=*/true);
-  large_before_ = std::any_of(items.begin(), items.end(),
-                              [](const Item& item) { return item.bytes > kMaxBytes; });
-  TakeLazy(items);
-  return items;
+  TakeTurns(group, /*large=*/!large_before_);
+  if (group.writes.empty()) TakeTurns(group, /*large=*/true);
+  large_before_ = std::any_of(group.bytes.begin(), group.bytes.end(),
+                              [](int64_t bytes) { return bytes > kMaxBytes; });
+  TakeLazy(group);
+  return group;
 }
 
 // Takes one write of each lane at a time, as long as there is room; one larger than a commit only
 // if `large` and only once. A lane whose next write has no room keeps its turn.
-void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
+template <typename Database>
+void CommitQueue<Database>::TakeTurns(Group& group, bool large) {
   int64_t bytes = 0;
   size_t passed_over = 0;  // the lanes at the front of turns_ whose next write has no room
-  while (passed_over < turns_.size() && items.size() < kMaxWrites) {
+  while (passed_over < turns_.size() && group.writes.size() < kMaxWrites) {
     const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(passed_over);
     const auto lane = lanes_.find(*turn);
     Item& next = lane->second.front();
@@ -104,7 +109,7 @@ void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
     } else {
       bytes += next.bytes;
     }
-    items.push_back(std::move(next));
+    group.Add(std::move(next));
     lane->second.pop_front();
     turns_.erase(turn);
     if (lane->second.empty()) {
@@ -115,59 +120,59 @@ void CommitQueue::TakeTurns(std::vector<Item>& items, bool large) {
   }
 }
 
-void CommitQueue::TakeLazy(std::vector<Item>& items) {
+template <typename Database>
+void CommitQueue<Database>::TakeLazy(Group& group) {
   const auto due = std::stable_partition(
       lazy_.begin(), lazy_.end(), [this](const auto& one) { return lanes_.contains(one.first); });
   for (auto one = due; one != lazy_.end(); ++one) {
-    items.push_back({std::move(one->second), [](const absl::Status&) {}, 0});
+    group.Add({std::move(one->second), [](const absl::Status&) {}, 0, DiskUse::kNeedsRoom});
   }
   lazy_.erase(due, lazy_.end());
 }
 
 // On a full disk, writes that free room are committed without the others, which are refused.
-void CommitQueue::Commit(std::vector<Item> items) {
+template <typename Database>
+void CommitQueue<Database>::Commit(Group group) {
   const absl::Status room = room_.check ? room_.check(*database_) : absl::OkStatus();
-  const size_t submitted = items.size();
-  if (!room.ok() && RefuseThoseThatNeedRoom(items, room) && on_commit_) {
-    on_commit_({submitted - items.size(), {}, room, /*room=*/false});
+  const size_t submitted = group.writes.size();
+  if (!room.ok() && RefuseThoseThatNeedRoom(group, room) && on_commit_) {
+    on_commit_({submitted - group.writes.size(), {}, room, /*room=*/false});
   }
-  if (items.empty()) return;
+  if (group.writes.empty()) return;
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<absl::Status> outcomes(items.size());
-  const absl::Status committed = WriteAll(items, outcomes);
-  if (!committed.ok()) database_->Execute("ROLLBACK").IgnoreError();
+  std::vector<absl::Status> outcomes(group.writes.size());
+  const absl::Status committed = database_->Commit(group.writes, outcomes);
   if (on_commit_) {
     const auto duration = std::chrono::steady_clock::now() - begin;
-    on_commit_({items.size(), duration, committed, room.ok()});
+    on_commit_({group.writes.size(), duration, committed, room.ok()});
   }
   if (IsDiskFull(committed)) {
     const bool made = room_.make && room_.make();
     // What is left is tried again, since it is less or there is more room; so this ends.
-    if (RefuseThoseThatNeedRoom(items, committed) || made) return Commit(std::move(items));
+    if (RefuseThoseThatNeedRoom(group, committed) || made) return Commit(std::move(group));
   }
-  for (size_t i = 0; i < items.size(); ++i) {
-    items[i].done(committed.ok() ? outcomes[i] : committed);
+  for (size_t i = 0; i < group.done.size(); ++i) {
+    group.done[i](committed.ok() ? outcomes[i] : committed);
   }
 }
 
 // Returns whether there were any.
-bool CommitQueue::RefuseThoseThatNeedRoom(std::vector<Item>& items, const absl::Status& refusal) {
-  const auto needing = std::stable_partition(
-      items.begin(), items.end(), [](const Item& item) { return item.use == DiskUse::kFreesRoom; });
-  const bool any = needing != items.end();
-  for (auto item = needing; item != items.end(); ++item) item->done(refusal);
-  items.erase(needing, items.end());
-  return any;
+template <typename Database>
+bool CommitQueue<Database>::RefuseThoseThatNeedRoom(Group& group, const absl::Status& refusal) {
+  Group kept;
+  for (size_t i = 0; i < group.writes.size(); ++i) {
+    if (group.uses[i] == DiskUse::kNeedsRoom) {
+      group.done[i](refusal);
+    } else {
+      kept.Add(
+          {std::move(group.writes[i]), std::move(group.done[i]), group.bytes[i], group.uses[i]});
+    }
+  }
+  std::swap(group, kept);
+  return group.writes.size() < kept.writes.size();
 }
 
-absl::Status CommitQueue::WriteAll(const std::vector<Item>& items,
-                                   std::vector<absl::Status>& outcomes) {
-  POLYEST_RETURN_IF_ERROR(database_->Execute("BEGIN IMMEDIATE"));
-  for (size_t i = 0; i < items.size(); ++i) {
-    outcomes[i] = items[i].write(*database_);
-    if (!outcomes[i].ok() && !ConcernsOnlyItself(outcomes[i])) return outcomes[i];
-  }
-  return database_->Execute("COMMIT");
-}
+template class CommitQueue<SqliteDatabase>;
+template class CommitQueue<PostgresWriter>;
 
 }  // namespace polyest::internal

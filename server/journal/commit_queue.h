@@ -18,8 +18,6 @@
 #include <utility>
 #include <vector>
 
-#include "server/journal/sqlite_database.h"
-
 namespace polyest::internal {
 
 // Describes a commit, successful or not.
@@ -33,27 +31,33 @@ struct CommitReport {
 // Whether a write needs room on the disk. One that frees room goes on when the disk is full.
 enum class DiskUse { kNeedsRoom, kFreesRoom };
 
-// Says what is done about a full disk, by the writing thread. Default: nothing.
-struct CommitRoom {
-  // Returns with what writes that need room are refused before a commit, if at all.
-  std::function<absl::Status(SqliteDatabase&)> check{};
-  // Called when the disk is full; returns whether that has made room.
-  std::function<bool()> make{};
-};
+// Called after each commit, before those who wait for it are told; must not wait.
+using OnCommit = std::function<void(const CommitReport&)>;
 
+// `Database` is SqliteDatabase or PostgresWriter. It has
+//   absl::Status Commit(const std::vector<Write>& writes, std::vector<absl::Status>& outcomes),
+// which commits all writes in one transaction, or none of them if it returns an error, and sets the
+// outcome of each, which are OK at first.
+template <typename Database>
 class CommitQueue {
  public:
   // Changes the database. NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that the write has
   // changed nothing and that others may be committed; any other error undoes the whole commit.
-  using Write = std::function<absl::Status(SqliteDatabase&)>;
+  using Write = std::function<absl::Status(Database&)>;
   // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  // Called after each commit, before those who wait for it are told; must not wait.
-  using OnCommit = std::function<void(const CommitReport&)>;
+  // Says what is done about a full disk, by the writing thread. Default: nothing.
+  struct Room {
+    // Returns with what writes that need room are refused before a commit, if at all.
+    std::function<absl::Status(Database&)> check{};
+    // Called when the disk is full; returns whether that has made room.
+    std::function<bool()> make{};
+  };
 
-  explicit CommitQueue(std::unique_ptr<SqliteDatabase> database, OnCommit on_commit = {},
-                       CommitRoom room = {});
+  CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit, Room room);
+  explicit CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit = {})
+      : CommitQueue(std::move(database), std::move(on_commit), Room()) {}
   // Writes everything submitted, then ends.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
@@ -82,19 +86,32 @@ class CommitQueue {
     int64_t bytes = 0;
     DiskUse use = DiskUse::kNeedsRoom;
   };
+  // Holds what goes into one commit.
+  struct Group {
+    void Add(Item item) {
+      bytes.push_back(item.bytes);
+      uses.push_back(item.use);
+      writes.push_back(std::move(item.write));
+      done.push_back(std::move(item.done));
+    }
+
+    std::vector<Write> writes;
+    std::vector<Done> done;
+    std::vector<int64_t> bytes;
+    std::vector<DiskUse> uses;
+  };
 
   void Serve();
-  std::vector<Item> Take();
+  Group Take();
   // The following are called with the mutex held.
-  void TakeTurns(std::vector<Item>& items, bool large);
-  void TakeLazy(std::vector<Item>& items);
-  void Commit(std::vector<Item> items);
-  static bool RefuseThoseThatNeedRoom(std::vector<Item>& items, const absl::Status& refusal);
-  absl::Status WriteAll(const std::vector<Item>& items, std::vector<absl::Status>& outcomes);
+  void TakeTurns(Group& group, bool large);
+  void TakeLazy(Group& group);
+  void Commit(Group group);
+  static bool RefuseThoseThatNeedRoom(Group& group, const absl::Status& refusal);
 
-  std::unique_ptr<SqliteDatabase> database_;
+  std::unique_ptr<Database> database_;
   const OnCommit on_commit_;
-  const CommitRoom room_;
+  const Room room_;
   std::mutex mutex_;
   std::condition_variable submitted_;
   std::map<std::string, std::deque<Item>> lanes_;    // those with writes

@@ -14,7 +14,7 @@ namespace polyest::internal {
 
 absl::StatusOr<const MemoryJournal::Kept*> MemoryJournal::Find(int64_t session) const {
   const auto found = sessions_.find(session);
-  if (found == sessions_.end()) return absl::NotFoundError("the journal has no such session");
+  if (found == sessions_.end()) return NoSuchSession();
   return &found->second;
 }
 

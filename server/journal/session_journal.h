@@ -78,6 +78,36 @@ struct JournalHistoryPoint {
   std::string point;     // serialized
 };
 
+inline absl::Status NoSuchSession() {
+  return absl::NotFoundError("the journal has no such session");
+}
+
+// A journal that several daemons share. Each session belongs to one of them, its owner, and
+// sessions come and go without the others. Thread-safe; all but Owns wait for the database.
+class SharedJournal {
+ public:
+  virtual ~SharedJournal() = default;
+
+  // Makes this daemon the owner of a session, the only one that adds to it, and returns its place.
+  // UNAVAILABLE, naming the owner, when it belongs to another daemon that lives. Whatever was
+  // appended before is either kept, and the place tells of it, or never will be.
+  virtual absl::StatusOr<SessionPlace> Claim(int64_t session) = 0;
+  // Lets other daemons have a session that this one no longer uses.
+  virtual void Release(int64_t session) = 0;
+  // Returns whether this daemon owns a session, as far as it knows. One that has lost a session to
+  // another finds it out at the latest when it appends.
+  virtual bool Owns(int64_t session) const = 0;
+  // Returns the visible session of this name, if there is one. UNAVAILABLE, naming the owner, when
+  // it belongs to another daemon that lives.
+  virtual absl::StatusOr<std::optional<SessionHead>> HeadOf(const std::string& tenant,
+                                                            const std::string& name) const = 0;
+  // Returns at most `count` of a tenant's sessions with names after `after`, in the order of their
+  // names.
+  virtual absl::StatusOr<std::vector<SessionHead>> HeadsAfter(const std::string& tenant,
+                                                              const std::string& after,
+                                                              int64_t count) const = 0;
+};
+
 // Thread-safe. Errors: NOT_FOUND for a session that does not exist, RESOURCE_EXHAUSTED for a full
 // disk, UNAVAILABLE for a disk that fails, DATA_LOSS for data that was kept and cannot be read.
 class SessionJournal {
@@ -97,6 +127,9 @@ class SessionJournal {
   // room for the copy, or as long as another one exists; the errors of `stop`.
   virtual absl::StatusOr<std::unique_ptr<JournalBackup>> BackUp(const Stop& stop);
 
+  // Returns what the journal can do besides if several daemons share it; null if they do not.
+  virtual SharedJournal* shared() { return nullptr; }
+
   // Returns all sessions that are not hidden, in the order of tenants and names.
   virtual absl::StatusOr<std::vector<SessionHead>> Heads() const = 0;
   // Creates a session, which is kept when this returns, and returns its number; the head's number
@@ -109,7 +142,9 @@ class SessionJournal {
   virtual absl::Status Delete(int64_t session) = 0;
 
   // Appends a batch and calls `done` once the batch is kept or cannot be kept. FAILED_PRECONDITION
-  // when it does not follow the last one of a session that exists.
+  // when it does not follow the last one of a session that exists; UNAVAILABLE when the session has
+  // been claimed by another daemon. A batch that failed UNAVAILABLE may be kept all the same until
+  // the session is claimed again.
   virtual void Append(JournalEntry entry, Done done) = 0;
   // Saves the latest snapshot of a session, now or later. Drops it silently when the session or the
   // snapshot's batch does not exist or the disk fails, because snapshots only save time.

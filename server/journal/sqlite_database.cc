@@ -41,6 +41,11 @@ absl::StatusCode CodeOf(int code) {
   }
 }
 
+bool ConcernsOnlyItself(const absl::Status& status) {
+  return absl::IsNotFound(status) || absl::IsAlreadyExists(status) ||
+         absl::IsFailedPrecondition(status);
+}
+
 }  // namespace
 
 absl::Status FromSqlite(int code, std::string_view doing) {
@@ -90,6 +95,25 @@ SqliteDatabase::~SqliteDatabase() {
 
 absl::Status SqliteDatabase::Execute(const std::string& sql) {
   return FromSqlite(sqlite3_exec(database_, sql.c_str(), nullptr, nullptr, nullptr), "the journal");
+}
+
+absl::Status SqliteDatabase::Commit(
+    const std::vector<std::function<absl::Status(SqliteDatabase&)>>& writes,
+    std::vector<absl::Status>& outcomes) {
+  const absl::Status written = WriteAll(writes, outcomes);
+  if (!written.ok()) Execute("ROLLBACK").IgnoreError();
+  return written;
+}
+
+absl::Status SqliteDatabase::WriteAll(
+    const std::vector<std::function<absl::Status(SqliteDatabase&)>>& writes,
+    std::vector<absl::Status>& outcomes) {
+  POLYEST_RETURN_IF_ERROR(Execute("BEGIN IMMEDIATE"));
+  for (size_t i = 0; i < writes.size(); ++i) {
+    outcomes[i] = writes[i](*this);
+    if (!outcomes[i].ok() && !ConcernsOnlyItself(outcomes[i])) return outcomes[i];
+  }
+  return Execute("COMMIT");
 }
 
 absl::StatusOr<int64_t> SqliteDatabase::Number(const std::string& sql) {

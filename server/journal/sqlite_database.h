@@ -7,10 +7,12 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -44,6 +46,11 @@ class SqliteDatabase {
 
   // Runs one or more statements without results.
   absl::Status Execute(const std::string& sql);
+  // Makes changes in one transaction, all of them or, if it returns an error, none; sets the
+  // outcome of each. A change that returns NOT_FOUND, ALREADY_EXISTS or FAILED_PRECONDITION has
+  // changed nothing, and the others are committed; any other error undoes them all.
+  absl::Status Commit(const std::vector<std::function<absl::Status(SqliteDatabase&)>>& writes,
+                      std::vector<absl::Status>& outcomes);
   // Returns the number that a statement such as `PRAGMA user_version` gives.
   absl::StatusOr<int64_t> Number(const std::string& sql);
   int64_t last_insert_rowid() const;
@@ -60,6 +67,8 @@ class SqliteDatabase {
   // Returns the statement for `sql`, which is prepared once for each text. The text must outlive
   // the connection.
   absl::StatusOr<sqlite3_stmt*> Prepare(const char* sql);
+  absl::Status WriteAll(const std::vector<std::function<absl::Status(SqliteDatabase&)>>& writes,
+                        std::vector<absl::Status>& outcomes);
 
   sqlite3* database_;
   std::map<std::string_view, sqlite3_stmt*> statements_;

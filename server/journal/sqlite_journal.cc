@@ -94,10 +94,11 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
   };
   ReadTenants(*writer);
   CheckDisk(*writer).IgnoreError();
-  queue_ = std::make_unique<CommitQueue>(
+  queue_ = std::make_unique<CommitQueue<SqliteDatabase>>(
       std::move(writer), seal,
-      CommitRoom{.check = [this](SqliteDatabase& database) { return CheckDisk(database); },
-                 .make = [this] { return MakeRoom(); }});
+      CommitQueue<SqliteDatabase>::Room{
+          .check = [this](SqliteDatabase& database) { return CheckDisk(database); },
+          .make = [this] { return MakeRoom(); }});
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 

@@ -17,6 +17,7 @@
 #include "server/journal/disk_reserve.h"
 #include "server/journal/session_journal.h"
 #include "server/journal/session_seals.h"
+#include "server/journal/sqlite_database.h"
 
 namespace polyest::internal {
 
@@ -26,7 +27,7 @@ struct SqliteJournalOptions {
   // Largest size of that file, MiB; 0: as large as the disk. Past it, writes are
   // RESOURCE_EXHAUSTED.
   int64_t max_mb = 0;
-  CommitQueue::OnCommit on_commit{};
+  OnCommit on_commit{};
 };
 
 class SqliteJournal final : public SessionJournal {
@@ -121,7 +122,7 @@ class SqliteJournal final : public SessionJournal {
   // Whether there is a backup. Backups may outlive the journal.
   const std::shared_ptr<std::atomic<bool>> backing_up_ = std::make_shared<std::atomic<bool>>(false);
 
-  std::unique_ptr<CommitQueue> queue_;
+  std::unique_ptr<CommitQueue<SqliteDatabase>> queue_;
   std::jthread maintenance_thread_;
 };
 

@@ -6,8 +6,6 @@
 
 namespace polyest::internal {
 
-absl::Status NoSuchSession() { return absl::NotFoundError("the journal has no such session"); }
-
 absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t session) {
   SqliteQuery query(database, sql);
   query.Bind(session);

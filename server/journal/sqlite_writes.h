@@ -9,8 +9,6 @@
 
 namespace polyest::internal {
 
-// Returns the refusal of what concerns a session that does not exist.
-absl::Status NoSuchSession();
 // Runs a statement whose one parameter is the number of a session.
 absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t session);
 

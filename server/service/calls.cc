@@ -21,13 +21,31 @@ Job JobInLane(const ServiceContext& context, const Caller& caller, const char* l
           }};
 }
 
+using FoundSession = absl::StatusOr<std::shared_ptr<Session>>;
+
+// Looks for the session on the executor, because that waits, and then submits the task to its
+// strand. Where there is none to submit it to, the task runs at once and tells why.
+absl::Status SubmitWhenFound(const ServiceContext& context, const Caller& caller,
+                             const std::string& name, const std::shared_ptr<FoundSession>& found,
+                             Task task) {
+  const auto look = [&context, caller, name, found, task = std::move(task)] {
+    *found = context.sessions.Find(caller.tenant, name);
+    if (!found->ok()) return task();
+    const absl::Status accepted = (**found)->strand().Submit(task);
+    if (accepted.ok()) return;
+    *found = accepted;
+    task();
+  };
+  return context.executor.Submit(absl::StrCat(caller.tenant, "/sessions"), look);
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<Session>> FindSession(const ServiceContext& context,
                                                      const Caller& caller, const std::string& field,
                                                      const std::string& name) {
   POLYEST_RETURN_IF_ERROR(ResourceId(field, "sessions", name).status());
-  return context.sessions.Get(caller.tenant, name);
+  return context.sessions.Find(caller.tenant, name);
 }
 
 Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work) {
@@ -38,15 +56,27 @@ Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, Caller
   return JobInLane(context, caller, "/sessions", std::move(work));
 }
 
-Job JobOfSession(std::shared_ptr<Session> session, SessionWork work) {
-  return {[session](Task task) { return session->strand().Submit(std::move(task)); },
-          [session, work = std::move(work)](const Stop& stop,
-                                            UnaryCall::Finisher finish) -> absl::Status {
-            const uint64_t losses = session->losses();
-            POLYEST_RETURN_IF_ERROR(work(session, stop));
-            session->WhenAllKept(losses, std::move(finish));
-            return absl::OkStatus();
-          }};
+absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& caller,
+                                 const std::string& field, const std::string& name,
+                                 SessionWork work) {
+  POLYEST_RETURN_IF_ERROR(ResourceId(field, "sessions", name).status());
+  const auto found = std::make_shared<FoundSession>();
+  if (!context.sessions.shared()) {
+    POLYEST_ASSIGN_OR_RETURN(*found, context.sessions.Get(caller.tenant, name));
+  }
+  const auto submit = [&context, caller, name, found](Task task) {
+    if (found->ok()) return (**found)->strand().Submit(std::move(task));
+    return SubmitWhenFound(context, caller, name, found, std::move(task));
+  };
+  return Job{submit,
+             [found, work = std::move(work)](const Stop& stop,
+                                             UnaryCall::Finisher finish) -> absl::Status {
+               POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, *found);
+               const uint64_t losses = session->losses();
+               POLYEST_RETURN_IF_ERROR(work(session, stop));
+               session->WhenAllKept(losses, std::move(finish));
+               return absl::OkStatus();
+             }};
 }
 
 grpc::ServerUnaryReactor* StartCall(

@@ -23,8 +23,9 @@ struct Job {
 using CallerWork = std::function<absl::Status(const Caller&, const Stop&)>;
 using SessionWork = std::function<absl::Status(const std::shared_ptr<Session>&, const Stop&)>;
 
-// Returns the caller's session of this name. NOT_FOUND when there is none; INVALID_ARGUMENT, naming
-// `field`, when `name` is no name of a session.
+// Returns the caller's session of this name; waits for a journal that daemons share. NOT_FOUND when
+// there is none; INVALID_ARGUMENT, naming `field`, when `name` is no name of a session;
+// UNAVAILABLE, naming the owner, when it belongs to another daemon.
 absl::StatusOr<std::shared_ptr<Session>> FindSession(const ServiceContext& context,
                                                      const Caller& caller, const std::string& field,
                                                      const std::string& name);
@@ -34,9 +35,11 @@ Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork 
 // Returns a job for work that is soon done, in the lane of the caller's sessions, where it does not
 // wait for long requests.
 Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
-// Returns a job that runs on the session's strand. The call is finished when everything is kept
-// that the work may have seen.
-Job JobOfSession(std::shared_ptr<Session> session, SessionWork work);
+// Returns a job that finds the caller's session, as FindSession does, and runs on its strand. The
+// call is finished when everything is kept that the work may have seen.
+absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& caller,
+                                 const std::string& field, const std::string& name,
+                                 SessionWork work);
 
 // Starts a unary call with the job that is made for its caller and fills `answer`. A caller who may
 // not call the method is refused before anything else.

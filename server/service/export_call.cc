@@ -16,9 +16,19 @@ using ExportFlow = RecordFlow<v1::SessionRecord>;
 absl::StatusOr<ExportFlow::Next> RecordsOf(const ServiceContext& context, const Caller& caller,
                                            const std::string& session) {
   POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", session).status());
-  POLYEST_ASSIGN_OR_RETURN(auto found, context.sessions.Get(caller.tenant, session));
-  const auto records = std::make_shared<SessionExport>(std::move(found));
-  return [records](const Stop&) { return records->Next(); };
+  if (!context.sessions.shared()) {
+    POLYEST_RETURN_IF_ERROR(context.sessions.Get(caller.tenant, session).status());
+  }
+  // Looking for it may wait, as the records do.
+  const auto records = std::make_shared<std::unique_ptr<SessionExport>>();
+  return [records, &context, tenant = caller.tenant,
+          session](const Stop&) -> absl::StatusOr<std::vector<v1::SessionRecord>> {
+    if (*records == nullptr) {
+      POLYEST_ASSIGN_OR_RETURN(auto found, context.sessions.Find(tenant, session));
+      *records = std::make_unique<SessionExport>(std::move(found));
+    }
+    return (*records)->Next();
+  };
 }
 
 }  // namespace

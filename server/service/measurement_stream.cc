@@ -1,5 +1,6 @@
 #include "server/service/measurement_stream.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
@@ -80,12 +81,39 @@ absl::Status MeasurementFlow::Attach(const Caller& caller,
     return InvalidField("writer", absl::StrFormat("%d characters are more than %d",
                                                   request.writer().size(), kLongestWriter));
   }
-  POLYEST_ASSIGN_OR_RETURN(auto session, context_.sessions.Get(caller.tenant, request.session()));
-  POLYEST_RETURN_IF_ERROR(session->ClaimWriter(shared_from_this(), request.writer()));
-  losses_ = session->losses();
-  session_ = std::move(session);
   timer_.Stop();
+  if (!context_.sessions.shared()) {
+    return Join(context_.sessions.Get(caller.tenant, request.session()), request.writer());
+  }
+  stage_ = Stage::kFinding;
+  const absl::Status accepted = context_.executor.Submit(
+      absl::StrCat(caller.tenant, "/sessions"),
+      [flow = shared_from_this(), tenant = caller.tenant, session = request.session(),
+       writer = request.writer()] { flow->Find(tenant, session, writer); });
+  if (!accepted.ok()) stage_ = Stage::kNone;
+  return accepted;
+}
+
+absl::Status MeasurementFlow::Join(absl::StatusOr<std::shared_ptr<Session>> session,
+                                   const std::string& writer) {
+  POLYEST_RETURN_IF_ERROR(session.status());
+  POLYEST_RETURN_IF_ERROR((*session)->ClaimWriter(shared_from_this(), writer));
+  losses_ = (*session)->losses();
+  session_ = *std::move(session);
   return absl::OkStatus();
+}
+
+// Looks for the session where a thread may wait for that.
+void MeasurementFlow::Find(const std::string& tenant, const std::string& session,
+                           const std::string& writer) {
+  auto found = context_.sessions.Find(tenant, session);
+  std::lock_guard lock(mutex_);
+  stage_ = Stage::kNone;
+  if (!end_) {
+    const absl::Status joined = Join(std::move(found), writer);
+    if (!joined.ok()) End(joined);
+  }
+  Advance();
 }
 
 void MeasurementFlow::OnWritten(bool ok) {
@@ -159,8 +187,8 @@ bool MeasurementFlow::HasRoom() const {
 }
 
 bool MeasurementFlow::MayRead() const {
-  return !half_closed_ && !draining_ && !end_ && inbox_.size() < kInbox &&
-         held_bytes_ < context_.held_bytes && HasRoom();
+  return !half_closed_ && !draining_ && !end_ && stage_ != Stage::kFinding &&
+         inbox_.size() < kInbox && held_bytes_ < context_.held_bytes && HasRoom();
 }
 
 bool MeasurementFlow::AllTaken() const {
@@ -198,7 +226,8 @@ void MeasurementFlow::StartComputing() {
 }
 
 void MeasurementFlow::FinishIfIdle() {
-  const bool working = taking_ || computing_ || stage_ == Stage::kLoading;
+  const bool working =
+      taking_ || computing_ || stage_ == Stage::kFinding || stage_ == Stage::kLoading;
   if (!end_ || working || writing_ || !outbox_.empty()) return;
   finished_ = true;
   // The lease is released before the client hears of the end, because the client may come back at

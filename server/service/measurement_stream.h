@@ -81,11 +81,13 @@ class MeasurementFlow final : public SessionObserver,
     v1::StreamMeasurementsResponse response;
     int64_t sequence = 0;  // number of that batch
   };
-  enum class Stage { kNone, kLoading, kReady };
+  enum class Stage { kNone, kFinding, kLoading, kReady };
 
   // The following are called with the mutex held.
   void Accept(v1::StreamMeasurementsRequest request);
   absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
+  // Makes this the writer of the session.
+  absl::Status Join(absl::StatusOr<std::shared_ptr<Session>> session, const std::string& writer);
   void End(const absl::Status& status);
   void Break(const absl::Status& status);
   // Starts whatever can be started: a write, a read, work, or the end of the call.
@@ -100,8 +102,9 @@ class MeasurementFlow final : public SessionObserver,
   bool AllTaken() const;
   std::vector<Uncomputed> NextTurn();
 
-  // The following are called without the mutex: Load and Compute on the strand, Take on a thread of
-  // the intake.
+  // The following are called without the mutex: Find on the executor, Load and Compute on the
+  // strand, Take on a thread of the intake.
+  void Find(const std::string& tenant, const std::string& session, const std::string& writer);
   void Load();
   void Take();
   void Compute();

@@ -14,7 +14,7 @@
 namespace polyest::internal {
 namespace {
 
-absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& sessions,
+absl::StatusOr<v1::ListSessionsResponse> ListPage(SessionRegistry& sessions,
                                                   const std::string& tenant,
                                                   const v1::ListSessionsRequest& request) {
   POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
@@ -23,7 +23,7 @@ absl::StatusOr<v1::ListSessionsResponse> ListPage(const SessionRegistry& session
     return UnknownPageToken(request.page_token());
   }
   // One session more than asked for tells whether there is another page.
-  auto page = sessions.List(tenant, request.page_token(), page_size + 1);
+  POLYEST_ASSIGN_OR_RETURN(auto page, sessions.List(tenant, request.page_token(), page_size + 1));
   v1::ListSessionsResponse response;
   if (page.size() > page_size) {
     page.pop_back();
@@ -89,11 +89,9 @@ class SessionService final : public v1::SessionService::CallbackService {
   }
   Unary* OnStrand(Context* call, Method method, const google::protobuf::Message* answer,
                   const std::string& session, SessionWork work) {
-    return StartCall(
-        context_, call, method, answer, [&](const Caller& caller) -> absl::StatusOr<Job> {
-          POLYEST_ASSIGN_OR_RETURN(auto found, FindSession(context_, caller, "session", session));
-          return JobOfSession(std::move(found), std::move(work));
-        });
+    return StartCall(context_, call, method, answer, [&](const Caller& caller) {
+      return JobOfSession(context_, caller, "session", session, std::move(work));
+    });
   }
 
   ServiceContext context_;
@@ -131,6 +129,11 @@ SessionService::Unary* SessionService::GetSession(Context* call,
 SessionService::Unary* SessionService::ListSessions(Context* call,
                                                     const v1::ListSessionsRequest* request,
                                                     v1::ListSessionsResponse* response) {
+  if (context_.sessions.shared()) {
+    return ForCaller(call, "ListSessions", response, [=, this](const Caller& caller, const Stop&) {
+      return Deliver(ListPage(context_.sessions, caller.tenant, *request), response);
+    });
+  }
   const auto caller = context_.access.Authorize(*call, "ListSessions");
   if (!caller.ok()) return FinishAtOnce(call, caller.status());
   return FinishAtOnce(call,

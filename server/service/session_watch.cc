@@ -82,12 +82,38 @@ void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
 absl::Status WatchFlow::Attach(const std::string& session) {
   POLYEST_ASSIGN_OR_RETURN(const Caller caller, Authorize());
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", session).status());
-  POLYEST_ASSIGN_OR_RETURN(session_, context_.sessions.Get(caller.tenant, session));
   registering_ = true;
+  if (context_.sessions.shared()) {
+    const absl::Status looking =
+        context_.executor.Submit(absl::StrCat(caller.tenant, "/sessions"),
+                                 [flow = shared_from_this(), tenant = caller.tenant, session] {
+                                   flow->Find(tenant, session);
+                                 });
+    if (!looking.ok()) registering_ = false;
+    return looking;
+  }
+  auto found = context_.sessions.Get(caller.tenant, session);
+  registering_ = found.ok();
+  POLYEST_ASSIGN_OR_RETURN(session_, std::move(found));
   const absl::Status accepted =
       session_->strand().Submit([flow = shared_from_this()] { flow->Register(); });
   if (!accepted.ok()) registering_ = false;
   return accepted;
+}
+
+// Looks for the session where a thread may wait for that.
+void WatchFlow::Find(const std::string& tenant, const std::string& session) {
+  auto found = context_.sessions.Find(tenant, session);
+  std::lock_guard lock(mutex_);
+  absl::Status accepted = found.status();
+  if (accepted.ok()) {
+    session_ = *std::move(found);
+    accepted = session_->strand().Submit([flow = shared_from_this()] { flow->Register(); });
+  }
+  if (accepted.ok()) return;
+  registering_ = false;
+  End(accepted);
+  Advance();
 }
 
 void WatchFlow::Register() {

@@ -55,6 +55,7 @@ class WatchFlow final : public SessionObserver,
   // Computes a prediction; runs on the strand.
   void Predict();
   // Makes the watch an observer of the session; runs on the strand.
+  void Find(const std::string& tenant, const std::string& session);
   void Register();
 
   ServiceContext& context_;

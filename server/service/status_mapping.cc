@@ -100,6 +100,7 @@ void AddErrorInfo(const Refusal& refusal, rpc::Status& status) {
   info.set_reason(refusal.reason);
   info.set_domain("polyest");
   if (!refusal.limit.empty()) (*info.mutable_metadata())["limit"] = refusal.limit;
+  if (!refusal.owner.empty()) (*info.mutable_metadata())["owner"] = refusal.owner;
   AddDetail(info, status);
 }
 

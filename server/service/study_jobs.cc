@@ -132,16 +132,16 @@ absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller
                      response);
     });
   }
-  POLYEST_ASSIGN_OR_RETURN(auto session,
-                           FindSession(context, caller, "subject.session", subject.session()));
   if constexpr (RunsTheModel<Request>) {
-    return JobOfCaller(context, caller, [=, &context](const Caller&, const Stop& stop) {
-      const absl::Status room = context.sessions.services().memory.Check();
-      if (!room.ok()) return room;
+    const auto run = [=, &context](const Caller& asking, const Stop& stop) -> absl::Status {
+      POLYEST_ASSIGN_OR_RETURN(const auto session,
+                               FindSession(context, asking, "subject.session", subject.session()));
+      POLYEST_RETURN_IF_ERROR(context.sessions.services().memory.Check());
       return OfStoredExperiment(*request, *session, context, stop, *response);
-    });
+    };
+    return JobOfCaller(context, caller, run);
   } else {
-    return JobOfSession(std::move(session),
+    return JobOfSession(context, caller, "subject.session", subject.session(),
                         [=, &context](const std::shared_ptr<Session>& found, const Stop& stop) {
                           return OnStrand(*request, *found, context, stop, *response);
                         });

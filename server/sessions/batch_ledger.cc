@@ -91,6 +91,22 @@ void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& 
   for (const auto& [waited_for, done] : settled) done(kept);
 }
 
+void BatchLedger::Restart(const SessionPlace& place) {
+  std::multimap<int64_t, Done> lost;
+  const absl::Status loss = absl::UnavailableError(
+      "the session has been taken anew from the journal; send what was not acknowledged again");
+  {
+    const std::lock_guard lock(mutex_);
+    kept_ = taken_ = place;
+    if (under_way_.empty()) return;
+    ++losses_;
+    last_loss_ = loss;
+    under_way_.clear();
+    lost.swap(waiting_);
+  }
+  for (const auto& [waited_for, done] : lost) done(loss);
+}
+
 void BatchLedger::WhenKept(int64_t sequence, uint64_t losses, Done done) {
   absl::Status now;
   {

@@ -2,6 +2,7 @@
 
 #include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <future>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "proto/wire/refusal/refusal.h"
 #include "server/digest/digest.h"
 #include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
@@ -114,6 +116,7 @@ void Session::Replace(InMemory in_memory) {
 
 absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
+  POLYEST_RETURN_IF_ERROR(Own());
   const uint64_t losses = ledger_.losses();
   const InMemory present = Present();
   if (present.loaded != nullptr && present.losses == losses) {
@@ -132,6 +135,45 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   history_.reset();
   Replace({loaded, losses});
   return loaded;
+}
+
+absl::Status Session::Own() {
+  SharedJournal* const shared = services_.journal.shared();
+  if (shared == nullptr) return absl::OkStatus();
+  const InMemory present = Present();
+  const bool whole = present.loaded != nullptr && present.losses == ledger_.losses();
+  if (whole && shared->Owns(number())) return absl::OkStatus();
+  // A batch that is just being taken goes to the journal before the claim, which settles it.
+  { const std::lock_guard taking(taking_); }
+  const absl::StatusOr<SessionPlace> place = shared->Claim(number());
+  if (!place.ok()) {
+    const std::optional<Refusal> refusal = RefusalOf(place.status());
+    if (refusal && refusal->reason == kOwnedElsewhere) Drop();
+    return place.status();
+  }
+  const SessionPlace kept = ledger_.kept();
+  if (place->sequence < kept.sequence) {
+    return absl::DataLossError(
+        absl::StrFormat("batches %d to %d of the session were acknowledged and are missing in the "
+                        "journal",
+                        place->sequence + 1, kept.sequence));
+  }
+  if (place->sequence == kept.sequence && ledger_.all_kept()) return absl::OkStatus();
+  Drop();
+  GoOnFrom(*place);
+  return absl::OkStatus();
+}
+
+void Session::GoOnFrom(const SessionPlace& place) {
+  const int64_t more = place.rows - ledger_.kept().rows;
+  if (services_.stored != nullptr) services_.stored->Count(number(), tenant(), {more, 0});
+  ledger_.Restart(place);
+}
+
+void Session::Follow(const SessionPlace& place) {
+  SharedJournal* const shared = services_.journal.shared();
+  if (loaded() || shared == nullptr || shared->Owns(number())) return;
+  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) GoOnFrom(place);
 }
 
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
@@ -297,6 +339,13 @@ absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const S
   return observers_.Add(std::move(observer));
 }
 
+// Takes what is computed out of memory.
+void Session::Drop() {
+  Replace({nullptr, Present().losses});
+  passed_on_ = nullptr;
+  history_.reset();
+}
+
 void Session::Unobserve(const SessionObserver* observer) {
   observers_.Remove(observer);
   activity_.OnUsed();
@@ -304,9 +353,8 @@ void Session::Unobserve(const SessionObserver* observer) {
 
 void Session::Unload() {
   if (!IdleTime()) return;
-  Replace({nullptr, Present().losses});
-  passed_on_ = nullptr;
-  history_.reset();
+  Drop();
+  if (SharedJournal* const shared = services_.journal.shared()) shared->Release(number());
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
 }
 

@@ -91,6 +91,10 @@ class Session : public std::enable_shared_from_this<Session> {
   // Takes the lease back from a writer, if it holds the lease.
   void ReleaseWriter(const SessionObserver* writer);
 
+  // Goes on to the place that a journal shared with other daemons has told, if that is a later one
+  // and this daemon does not own the session.
+  void Follow(const SessionPlace& place);
+
   // Ends the session for everybody: tells its observers and its writer. Calls on it are NOT_FOUND
   // from here on.
   void Close();
@@ -158,6 +162,10 @@ class Session : public std::enable_shared_from_this<Session> {
   };
 
   absl::Status CheckOpen() const;
+  // Makes this daemon the session's owner if it may be another one's.
+  absl::Status Own();
+  // Goes on from the place that the journal has told.
+  void GoOnFrom(const SessionPlace& place);
   // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
                         int64_t bytes) const;
@@ -173,6 +181,7 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status AwaitKept(const LoadedSession& loaded);
   InMemory Present() const;
   void Replace(InMemory in_memory);
+  void Drop();
   absl::Status LoadHistory();
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 

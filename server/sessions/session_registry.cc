@@ -76,7 +76,15 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   // The address of the schema is for editors, and may be of any length.
   v1::Problem kept = problem;
   kept.clear_schema();
-  const auto number = services_.journal.Create(head, kept, /*hidden=*/false);
+  auto number = services_.journal.Create(head, kept, /*hidden=*/false);
+  // Another daemon may have chosen the same name.
+  while (id.empty() && absl::IsAlreadyExists(number.status())) {
+    {
+      const std::lock_guard lock(mutex_);
+      head.name = ChooseName(tenant);
+    }
+    number = services_.journal.Create(head, kept, /*hidden=*/false);
+  }
   if (absl::IsAlreadyExists(number.status())) {
     return absl::AlreadyExistsError(
         absl::StrFormat("there is a session \"%s\" already", head.name));
@@ -96,23 +104,28 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
     SessionHead head, std::unique_ptr<LoadedSession> loaded) {
   const Key key(head.tenant, head.name);
   auto session = std::make_shared<Session>(services_, std::move(head), std::move(loaded));
-  const absl::Status added = Add(key, session);
-  if (added.ok()) return session;
+  auto added = Add(key, session);
+  if (added.ok()) return added;
   services_.journal.Delete(session->number()).IgnoreError();
   services_.stored->Forget(session->number());
   return added;
 }
 
-absl::Status SessionRegistry::Add(const Key& key, const std::shared_ptr<Session>& session) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Add(const Key& key,
+                                                              std::shared_ptr<Session> session) {
   const std::lock_guard lock(mutex_);
+  // Somebody may have found it in a shared journal.
+  const auto there = sessions_.find(key);
+  if (there != sessions_.end() && there->second->number() == session->number()) {
+    return there->second;
+  }
   // The journal has no two sessions of a name, so one that is still here is just being deleted. The
   // new one takes its place.
-  if (!sessions_.contains(key)) {
+  if (there == sessions_.end()) {
     POLYEST_RETURN_IF_ERROR(CheckCount(key.first));
     ++count_[key.first];
   }
-  sessions_[key] = session;
-  return absl::OkStatus();
+  return sessions_[key] = std::move(session);
 }
 
 absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
@@ -121,7 +134,8 @@ absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::st
 }
 
 absl::Status SessionRegistry::CheckFree(const Key& key) const {
-  if (sessions_.contains(key)) {
+  // A session that is known here may have been deleted by another daemon: the journal tells.
+  if (!shared() && sessions_.contains(key)) {
     return absl::AlreadyExistsError(
         absl::StrFormat("there is a session \"%s\" already", key.second));
   }
@@ -163,10 +177,62 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Get(const std::string&
   return found->second;
 }
 
-std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant,
-                                                            const std::string& after,
-                                                            size_t count) const {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant,
+                                                               const std::string& name) {
+  SharedJournal* const shared = services_.journal.shared();
+  auto known = Get(tenant, name);
+  if (shared == nullptr) return known;
+  if (known.ok() && (*known)->loaded() && shared->Owns((*known)->number())) return known;
+  POLYEST_ASSIGN_OR_RETURN(std::optional<SessionHead> head, shared->HeadOf(tenant, name));
+  if (head) return Follow(*std::move(head));
+  Forget({tenant, name});
+  return NotFound(name);
+}
+
+std::shared_ptr<Session> SessionRegistry::Follow(SessionHead head) {
+  const Key key(head.tenant, head.name);
+  std::shared_ptr<Session> before;
+  {
+    const std::lock_guard lock(mutex_);
+    std::shared_ptr<Session>& session = sessions_[key];
+    if (session != nullptr && session->number() == head.number) {
+      session->Follow(head.place);
+      return session;
+    }
+    if (session == nullptr) ++count_[key.first];
+    before = std::exchange(session, nullptr);
+    services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes});
+    session = std::make_shared<Session>(services_, std::move(head));
+    if (before == nullptr) return session;
+  }
+  services_.stored->Forget(before->number());
+  before->Close();
+  return *Get(key.first, key.second);
+}
+
+void SessionRegistry::Forget(const Key& key) {
+  std::shared_ptr<Session> forgotten;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = sessions_.find(key);
+    if (found == sessions_.end()) return;
+    forgotten = std::move(found->second);
+    sessions_.erase(found);
+    --count_[key.first];
+  }
+  services_.stored->Forget(forgotten->number());
+  forgotten->Close();
+}
+
+absl::StatusOr<std::vector<std::shared_ptr<Session>>> SessionRegistry::List(
+    const std::string& tenant, const std::string& after, size_t count) {
   std::vector<std::shared_ptr<Session>> page;
+  if (SharedJournal* const shared = services_.journal.shared()) {
+    POLYEST_ASSIGN_OR_RETURN(std::vector<SessionHead> heads,
+                             shared->HeadsAfter(tenant, after, static_cast<int64_t>(count)));
+    for (SessionHead& head : heads) page.push_back(Follow(std::move(head)));
+    return page;
+  }
   const std::lock_guard lock(mutex_);
   for (auto it = sessions_.upper_bound({tenant, after});
        it != sessions_.end() && it->first.first == tenant && page.size() < count; ++it) {
@@ -176,7 +242,7 @@ std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& t
 }
 
 absl::Status SessionRegistry::Delete(const std::string& tenant, const std::string& name) {
-  POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, Get(tenant, name));
+  POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, Find(tenant, name));
   // The journal comes first, so that a session that cannot be deleted goes on as it was.
   const absl::Status deleted = services_.journal.Delete(session->number());
   if (absl::IsNotFound(deleted)) return NotFound(name);

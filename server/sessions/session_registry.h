@@ -32,12 +32,20 @@ class SessionRegistry {
   absl::StatusOr<std::shared_ptr<Session>> Create(const std::string& tenant, const std::string& id,
                                                   const v1::Problem& problem,
                                                   double reorder_window_s = 0);
-  // Returns the session of this full name; NOT_FOUND when there is none.
+  // Returns the session of this full name; NOT_FOUND when there is none that this daemon knows.
   absl::StatusOr<std::shared_ptr<Session>> Get(const std::string& tenant,
                                                const std::string& name) const;
+  // Does the same for any journal: looks the session up if several daemons share the journal, and
+  // then waits for it. UNAVAILABLE, naming the owner, when it belongs to another daemon that lives.
+  absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
   // Returns at most `count` sessions with names after `after`, in the order of their names.
-  std::vector<std::shared_ptr<Session>> List(const std::string& tenant, const std::string& after,
-                                             size_t count) const;
+  // Waits for the journal if several daemons share it.
+  absl::StatusOr<std::vector<std::shared_ptr<Session>>> List(const std::string& tenant,
+                                                             const std::string& after,
+                                                             size_t count);
+  // Returns whether several daemons share the journal, so that sessions are to be looked for with
+  // Find, where a thread may wait.
+  bool shared() const { return services_.journal.shared() != nullptr; }
   // Deletes a session and closes it; NOT_FOUND when there is none. Waits for the journal.
   absl::Status Delete(const std::string& tenant, const std::string& name);
 
@@ -57,7 +65,12 @@ class SessionRegistry {
   using Key = std::pair<std::string, std::string>;  // tenant, name
 
   SessionRegistry(const SessionServices& services, WallClock clock);
-  absl::Status Add(const Key& key, const std::shared_ptr<Session>& session);
+  // Returns the session whose head the shared journal has told.
+  std::shared_ptr<Session> Follow(SessionHead head);
+  // Forgets a session that another daemon has deleted.
+  void Forget(const Key& key);
+  // Adds a session, unless it has been added already; returns the one that is there.
+  absl::StatusOr<std::shared_ptr<Session>> Add(const Key& key, std::shared_ptr<Session> session);
   // The following are called with the mutex held.
   absl::Status CheckFree(const Key& key) const;
   absl::Status CheckCount(const std::string& tenant) const;

@@ -28,6 +28,7 @@
 #include "polyest/v1/session_service.grpc.pb.h"
 #include "server/daemon/daemon.h"
 #include "server/journal/commit_queue.h"
+#include "server/journal/sqlite_database.h"
 #include "tests/testing/test_folder.h"
 
 namespace polyest::internal {
@@ -92,7 +93,7 @@ class BareService final : public v1::SessionService::Service {
                                        ->Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = "
                                                  "FULL; CREATE TABLE batch (bytes BLOB)")
                                        .ok());
-    queue_ = std::make_unique<CommitQueue>(*std::move(database));
+    queue_ = std::make_unique<CommitQueue<SqliteDatabase>>(*std::move(database));
   }
 
   grpc::Status StreamMeasurements(
@@ -116,7 +117,7 @@ class BareService final : public v1::SessionService::Service {
   }
 
  private:
-  std::unique_ptr<CommitQueue> queue_;
+  std::unique_ptr<CommitQueue<SqliteDatabase>> queue_;
 };
 
 std::unique_ptr<Stub> Connect(int port) {

@@ -19,6 +19,8 @@ struct Refusal {
   std::string limit{};  // the option that sets the limit, "--max-sessions"; empty: no option does
   // Time after which the request may be tried again; none: waiting does not help.
   std::optional<std::chrono::milliseconds> retry_delay{};
+  // Address of the daemon that serves the session at present, HOST:PORT; empty: not known.
+  std::string owner{};
 };
 
 inline constexpr char kLimitExceeded[] = "LIMIT_EXCEEDED";
@@ -26,6 +28,8 @@ inline constexpr char kDiskFull[] = "DISK_FULL";
 inline constexpr char kBusy[] = "BUSY";
 inline constexpr char kOutOfMemory[] = "OUT_OF_MEMORY";
 inline constexpr char kShuttingDown[] = "SHUTTING_DOWN";
+inline constexpr char kDatabaseAway[] = "DATABASE_AWAY";
+inline constexpr char kOwnedElsewhere[] = "OWNED_ELSEWHERE";
 
 // Returns a status with these details. `code` must not be OK and the reason must not be empty.
 absl::Status Refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);

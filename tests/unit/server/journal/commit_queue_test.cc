@@ -5,6 +5,7 @@
 
 #include <future>
 
+#include "server/journal/sqlite_database.h"
 #include "tests/testing/test_folder.h"
 
 namespace polyest::internal {
@@ -13,7 +14,9 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr int64_t kLarge = CommitQueue::kMaxBytes + 1;
+using Queue = CommitQueue<SqliteDatabase>;
+
+constexpr int64_t kLarge = Queue::kMaxBytes + 1;
 
 // Writes nothing; notes in which commit each write ran.
 class CommitQueueTest : public testing::Test {
@@ -21,7 +24,7 @@ class CommitQueueTest : public testing::Test {
   void SetUp() override {
     auto database = SqliteDatabase::Open(folder_ / "db");
     ASSERT_TRUE(database.ok()) << database.status();
-    queue_ = std::make_unique<CommitQueue>(*std::move(database), [this](const CommitReport&) {
+    queue_ = std::make_unique<Queue>(*std::move(database), [this](const CommitReport&) {
       commits_.push_back(std::exchange(commit_, {}));
     });
     // The first commit waits until everything else has been submitted.
@@ -34,7 +37,7 @@ class CommitQueueTest : public testing::Test {
         [](const absl::Status&) {});
     begun_.get_future().wait();
   }
-  CommitQueue::Write Note(const std::string& name) {
+  Queue::Write Note(const std::string& name) {
     return [this, name](SqliteDatabase&) {
       commit_.push_back(name);
       return absl::OkStatus();
@@ -55,7 +58,7 @@ class CommitQueueTest : public testing::Test {
   std::promise<void> begun_, go_;
   std::vector<std::string> commit_;
   std::vector<std::vector<std::string>> commits_;
-  std::unique_ptr<CommitQueue> queue_;
+  std::unique_ptr<Queue> queue_;
 };
 
 TEST_F(CommitQueueTest, TakesTurnsBetweenLanesAndKeepsTheOrderOfEach) {
@@ -75,14 +78,14 @@ TEST_F(CommitQueueTest, WritesNoLargeOneTwiceInARowWhileOthersWait) {
   for (const char* name : {"A1", "A2"}) Submit("a", name, kLarge);
   Submit("b", "B1", kLarge);
   Submit("b", "b2");
-  Submit("c", "c1", CommitQueue::kMaxBytes);
-  Submit("c", "c2", CommitQueue::kMaxBytes);
+  Submit("c", "c1", Queue::kMaxBytes);
+  Submit("c", "c2", Queue::kMaxBytes);
   EXPECT_THAT(Commits(), ElementsAre(ElementsAre("A1", "c1"), ElementsAre("c2"),
                                      ElementsAre("B1", "b2"), ElementsAre("A2")));
 }
 
 TEST_F(CommitQueueTest, BoundsTheBytesOfACommit) {
-  for (const char* name : {"a1", "a2", "a3"}) Submit("a", name, CommitQueue::kMaxBytes / 2);
+  for (const char* name : {"a1", "a2", "a3"}) Submit("a", name, Queue::kMaxBytes / 2);
   Submit("b", "b1", 1);
   EXPECT_THAT(Commits(), ElementsAre(ElementsAre("a1", "b1"), ElementsAre("a2", "a3")));
 }

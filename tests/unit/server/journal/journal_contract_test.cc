@@ -8,7 +8,9 @@
 
 #include "server/digest/digest.h"
 #include "server/journal/memory_journal.h"
+#include "server/journal/postgres_journal.h"
 #include "server/journal/sqlite_journal.h"
+#include "tests/testing/postgres_server.h"
 #include "tests/testing/problem_json.h"
 #include "tests/testing/test_folder.h"
 
@@ -38,13 +40,22 @@ JournalEntry Entry(int64_t session, int64_t sequence, double time) {
   return entry;
 }
 
-enum class Kind { kMemory, kSqlite };
+enum class Kind { kMemory, kSqlite, kPostgres };
+
+std::string NameOf(Kind kind) {
+  if (kind == Kind::kMemory) return "Memory";
+  return kind == Kind::kSqlite ? "Sqlite" : "Postgres";
+}
 
 class JournalContractTest : public testing::TestWithParam<Kind> {
  protected:
   void SetUp() override {
     if (GetParam() == Kind::kMemory) {
       journal_ = std::make_unique<MemoryJournal>();
+    } else if (GetParam() == Kind::kPostgres) {
+      auto opened = PostgresJournal::Open({.uri = PostgresServer::Shared().MakeDatabase()});
+      ASSERT_TRUE(opened.ok()) << opened.status();
+      journal_ = *std::move(opened);
     } else {
       auto opened = SqliteJournal::Open({.folder = folder_.path()});
       ASSERT_TRUE(opened.ok()) << opened.status();
@@ -258,10 +269,9 @@ TEST_P(JournalContractTest, HasTheHistoryOfBatchesThatItKeepsAndThinsIt) {
   EXPECT_EQ(*journal_->ReadHistory(other), (Points{{3, 1, "other"}}));
 }
 
-INSTANTIATE_TEST_SUITE_P(, JournalContractTest, testing::Values(Kind::kMemory, Kind::kSqlite),
-                         [](const auto& kind) {
-                           return kind.param == Kind::kMemory ? "Memory" : "Sqlite";
-                         });
+INSTANTIATE_TEST_SUITE_P(, JournalContractTest,
+                         testing::Values(Kind::kMemory, Kind::kSqlite, Kind::kPostgres),
+                         [](const auto& kind) { return NameOf(kind.param); });
 
 }  // namespace
 }  // namespace polyest::internal

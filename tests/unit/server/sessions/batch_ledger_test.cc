@@ -117,6 +117,25 @@ TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
   EXPECT_EQ(ledger_.kept().sequence, 5);
 }
 
+TEST_F(BatchLedgerTest, GoesOnFromThePlaceThatTheJournalTells) {
+  const uint64_t losses = ledger_.losses();
+  ledger_.Restart(At(5));
+  EXPECT_EQ(ledger_.kept().sequence, 5);
+  EXPECT_EQ(ledger_.taken().sequence, 5);
+  EXPECT_EQ(ledger_.losses(), losses);  // nothing was under way
+  Take(6);
+  std::vector<absl::StatusCode> told;
+  ledger_.WhenKept(6, losses, [&](const absl::Status& kept) { told.push_back(kept.code()); });
+  ledger_.Restart(At(7));
+  EXPECT_EQ(told, (std::vector{absl::StatusCode::kUnavailable}));
+  EXPECT_EQ(ledger_.losses(), losses + 1);
+  // The journal settles the lost batch afterwards, which changes nothing.
+  ledger_.Settle(losses, 6, absl::OkStatus());
+  EXPECT_EQ(ledger_.kept().sequence, 7);
+  EXPECT_TRUE(ledger_.all_kept());
+  EXPECT_EQ(*Check(8, "new"), BatchLedger::Kind::kNext);
+}
+
 TEST_F(BatchLedgerTest, DoesNotTakeALaterBatchForALostOneOfTheSameNumber) {
   std::vector<absl::StatusCode> told;
   const auto tell = [&](const absl::Status& kept) { told.push_back(kept.code()); };

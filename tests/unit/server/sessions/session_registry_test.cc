@@ -33,7 +33,9 @@ class SessionRegistryTest : public testing::Test {
 
   std::vector<std::string> NamesAfter(const std::string& after, size_t count) {
     std::vector<std::string> names;
-    for (const auto& session : registry_->List("t", after, count)) names.push_back(session->name());
+    const auto page = registry_->List("t", after, count);
+    EXPECT_TRUE(page.ok()) << page.status();
+    for (const auto& session : *page) names.push_back(session->name());
     return names;
   }
 

@@ -1,0 +1,117 @@
+#include "server/journal/postgres_rows.h"
+
+#include <utility>
+
+#include "core/common/status.h"
+
+namespace polyest::internal {
+namespace {
+
+// Number of heads that one statement gives.
+constexpr int64_t kHeadsOfPage = 500;
+
+// The columns of a head, and where they come from.
+#define POLYEST_HEADS                                                                              \
+  "SELECT number, tenant, name, created_s, created_ns, reorder_window_s, coalesce(sequence, 0), "  \
+  "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "                  \
+  "coalesce(place_time_s, 0), octet_length(problem) + coalesce(place_bytes, 0) FROM session LEFT " \
+  "JOIN LATERAL (SELECT * FROM batch WHERE "                                                       \
+  "batch.session = session.number ORDER BY sequence DESC LIMIT 1) last ON true WHERE NOT hidden "
+
+constexpr char kHeads[] =
+    POLYEST_HEADS "AND (tenant, name) > ($1, $2) ORDER BY tenant, name LIMIT $3";
+constexpr char kHeadsOfTenant[] =
+    POLYEST_HEADS "AND tenant = $1 AND name > $2 ORDER BY name LIMIT $3";
+constexpr char kHeadOf[] = POLYEST_HEADS "AND tenant = $1 AND name = $2";
+#undef POLYEST_HEADS
+
+constexpr char kRow[] =
+    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, digest "
+    "FROM session WHERE number = $1";
+// One statement looks for the session and for its batches, because the session may be deleted and
+// its batches removed between two. A page has at most 8 MiB, or one batch.
+constexpr char kPage[] =
+    "SELECT coalesce(sequence, 0), measurements, page.digest FROM session LEFT JOIN LATERAL "
+    "(SELECT "
+    "* FROM (SELECT sequence, measurements, batch.digest, sum(octet_length(measurements)) OVER "
+    "(ORDER BY sequence) AS bytes FROM (SELECT * FROM batch WHERE batch.session = $1 AND sequence "
+    "> "
+    "$2 ORDER BY sequence LIMIT 256) batch) summed WHERE bytes <= 8388608 OR sequence = $2 + 1) "
+    "page ON true WHERE number = $1 ORDER BY 1";
+
+SessionHead HeadIn(const PostgresResult& result, int row) {
+  SessionHead head;
+  head.number = result.Integer(row, 0);
+  head.tenant = result.Bytes(row, 1);
+  head.name = result.Bytes(row, 2);
+  head.create_time.set_seconds(result.Integer(row, 3));
+  head.create_time.set_nanos(static_cast<int32_t>(result.Integer(row, 4)));
+  head.reorder_window_s = result.Real(row, 5);
+  head.place.sequence = result.Integer(row, 6);
+  head.place.samples = result.Integer(row, 7);
+  head.place.rows = result.Integer(row, 8);
+  head.place.last_row = {static_cast<int>(result.Integer(row, 9)), result.Real(row, 10)};
+  head.bytes = result.Integer(row, 11);
+  return head;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<SessionHead>> ReadHeads(PostgresPool& pool) {
+  std::vector<SessionHead> heads;
+  std::string tenant, name;
+  while (true) {
+    POLYEST_ASSIGN_OR_RETURN(
+        const PostgresResult page,
+        pool.Query(kHeads, PostgresParameters().AddText(tenant).AddText(name).Add(kHeadsOfPage)));
+    for (int row = 0; row < page.rows(); ++row) heads.push_back(HeadIn(page, row));
+    if (page.rows() < kHeadsOfPage) return heads;
+    tenant = heads.back().tenant;
+    name = heads.back().name;
+  }
+}
+
+absl::StatusOr<std::vector<SessionHead>> ReadHeadsAfter(PostgresPool& pool,
+                                                        const std::string& tenant,
+                                                        const std::string& after, int64_t count) {
+  POLYEST_ASSIGN_OR_RETURN(
+      const PostgresResult page,
+      pool.Query(kHeadsOfTenant, PostgresParameters().AddText(tenant).AddText(after).Add(count)));
+  std::vector<SessionHead> heads;
+  for (int row = 0; row < page.rows(); ++row) heads.push_back(HeadIn(page, row));
+  return heads;
+}
+
+absl::StatusOr<std::optional<SessionHead>> FindHead(PostgresPool& pool, const std::string& tenant,
+                                                    const std::string& name) {
+  POLYEST_ASSIGN_OR_RETURN(const PostgresResult found,
+                           pool.Query(kHeadOf, PostgresParameters().AddText(tenant).AddText(name)));
+  if (found.rows() == 0) return std::nullopt;
+  return HeadIn(found, 0);
+}
+
+absl::StatusOr<SessionRow> ReadRow(PostgresPool& pool, int64_t session) {
+  POLYEST_ASSIGN_OR_RETURN(const PostgresResult found,
+                           pool.Query(kRow, PostgresParameters().Add(session)));
+  if (found.rows() == 0) return NoSuchSession();
+  SessionRow row;
+  row.head.number = found.Integer(0, 0);
+  row.head.tenant = found.Bytes(0, 1);
+  row.head.name = found.Bytes(0, 2);
+  row.hidden = found.Flag(0, 3);
+  row.head.create_time.set_seconds(found.Integer(0, 4));
+  row.head.create_time.set_nanos(static_cast<int32_t>(found.Integer(0, 5)));
+  row.head.reorder_window_s = found.Real(0, 6);
+  row.problem = found.Bytes(0, 7);
+  row.damaged = found.Bytes(0, 8) != SessionDigest(row.head, row.hidden, row.problem);
+  return row;
+}
+
+absl::StatusOr<PostgresResult> ReadPage(PostgresPool& pool, int64_t session, int64_t after) {
+  POLYEST_ASSIGN_OR_RETURN(PostgresResult page,
+                           pool.Query(kPage, PostgresParameters().Add(session).Add(after)));
+  if (page.rows() == 0) return NoSuchSession();
+  return page;
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,33 @@
+#pragma once
+
+// Holds the address of a PostgreSQL database, as a connection URI of libpq.
+
+#include <absl/status/statusor.h>
+
+#include <string>
+
+namespace polyest::internal {
+
+class PostgresTarget {
+ public:
+  // Parses `postgresql://…`. INVALID_ARGUMENT, without the text of the URI, when libpq cannot read
+  // it, and when it holds a password: passwords are read from the file that `passfile` or
+  // PGPASSFILE names, so that no list of processes and no log shows them.
+  static absl::StatusOr<PostgresTarget> Parse(const std::string& uri);
+
+  const std::string& uri() const { return uri_; }
+  // Returns hosts, ports and database, for the log.
+  const std::string& label() const { return label_; }
+
+ private:
+  PostgresTarget(std::string uri, std::string label)
+      : uri_(std::move(uri)), label_(std::move(label)) {}
+
+  std::string uri_;
+  std::string label_;
+};
+
+// Returns whether a text is meant to be the URI of a PostgreSQL database.
+bool IsPostgresUri(const std::string& text);
+
+}  // namespace polyest::internal

@@ -1,0 +1,36 @@
+#pragma once
+
+// The statements by which sessions change in PostgreSQL. Those of a session that exists carry the
+// epoch of its owner and do nothing when that is not the present one.
+
+#include <string_view>
+
+#include "server/journal/postgres_writer.h"
+#include "server/journal/session_journal.h"
+
+namespace polyest::internal {
+
+// Identifies the owner for which a session is changed.
+struct PostgresOwner {
+  int64_t node = 0;
+  int64_t epoch = 0;
+};
+
+// Inserts the row of a session and that of its owner, with epoch 1. ALREADY_EXISTS when the name is
+// taken.
+void SendSession(PostgresWriter& writer, const SessionHead& head, bool hidden,
+                 std::string_view problem, std::string_view digest, int64_t node);
+// The following are NOT_FOUND when there is no such session, and UNAVAILABLE when it has another
+// owner or epoch.
+void SendShow(PostgresWriter& writer, int64_t session, std::string_view digest,
+              const PostgresOwner& owner);
+void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& owner);
+// FAILED_PRECONDITION when the batch does not follow the last one.
+void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const PostgresOwner& owner);
+// Do nothing when there is no such session, owner or batch.
+void SendSnapshot(PostgresWriter& writer, int64_t session, const JournalSnapshot& snapshot,
+                  const PostgresOwner& owner);
+void SendHistoryPoint(PostgresWriter& writer, int64_t session, const JournalHistoryPoint& point,
+                      int64_t stride, const PostgresOwner& owner);
+
+}  // namespace polyest::internal
