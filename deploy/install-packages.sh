@@ -69,8 +69,14 @@ install_missing() {
   local apt_get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
     apt-get --quiet --quiet --option DPkg::Lock::Timeout=300)
   # apt's messages go to stderr: stdout belongs to the caller.
-  "${apt_get[@]}" update </dev/null >&2 &&
-    "${apt_get[@]}" install --yes --no-install-recommends "${missing[@]}" </dev/null >&2
+  "${apt_get[@]}" update </dev/null >&2 || return
+  # The tests start servers of their own. The package would make one and leave it running.
+  if [[ " ${missing[*]} " == *" postgresql "* ]] && ! is_installed postgresql-common; then
+    "${apt_get[@]}" install --yes --no-install-recommends postgresql-common </dev/null >&2 &&
+      "${as_root[@]}" sed -i 's/^#\?create_main_cluster.*/create_main_cluster = false/' \
+        /etc/postgresql-common/createcluster.conf || return
+  fi
+  "${apt_get[@]}" install --yes --no-install-recommends "${missing[@]}" </dev/null >&2
 }
 
 for argument in "$@"; do
