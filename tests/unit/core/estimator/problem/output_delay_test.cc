@@ -77,6 +77,37 @@ TEST(OutputDelay, IsFoundBesideTheStiffness) {
   EXPECT_NEAR(estimate.channels[0].chi_squared, 1981, 4 * std::sqrt(2 * 1981));
 }
 
+// The record shows nonsense for a fifth of a second, which a column tells. By hand the force is
+// interpolated to the times of x, x is moved by the delay that is known, and the nonsense left out.
+TEST(OutputDelay, AgreesWithDataResampledByHand) {
+  const auto nonsense = [](double t) { return t > 0.8 && t < 1; };
+  Problem problem = LateProblem();
+  problem.use_when = "ok > 0.5";
+  Samples record = LateRecord(2), by_hand;
+  by_hand.columns = {{"x", {}, {}}, {"force", {}, {}}};
+  record.columns.push_back({"ok", {}, {}});
+  for (size_t k = 0; k < record.rows(); ++k) {
+    const double t = record.time_s[k];
+    double& x = record.columns[0].value[k];
+    record.columns[2].value.push_back(nonsense(t) ? 0 : 1);
+    if (!record.columns[0].missing[k] && t >= kDelay_s) {
+      by_hand.time_s.push_back(t - kDelay_s);
+      by_hand.columns[0].value.push_back(x);
+      by_hand.columns[0].missing.push_back(nonsense(t));
+      by_hand.columns[1].value.push_back(std::sin(kForceFrequency * (t - kDelay_s)));
+    }
+    if (nonsense(t)) x += 0.1;
+  }
+  by_hand.end_of_run = true;
+  Problem simple = LateProblem();
+  simple.uncertain.pop_back();
+  const ParameterEstimate found = EstimateOf(problem, record).parameters[0];
+  const ParameterEstimate expected = EstimateOf(simple, by_hand).parameters[0];
+  EXPECT_NEAR(found.mean, kStiffness, 2 * found.std_dev);
+  EXPECT_NEAR(found.mean, expected.mean, 0.5 * expected.std_dev);
+  EXPECT_NEAR(found.std_dev / expected.std_dev, 1, 0.2);
+}
+
 TEST(OutputDelay, GivesTheSameBitsForAnyBatches) {
   const Samples record = LateRecord(0.3);
   const Estimate whole = EstimateInBatches(LateProblem(), record, 1000);
