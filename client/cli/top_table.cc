@@ -27,9 +27,9 @@ void PrintHeader(const v1::DaemonStatus& status, std::ostream& out) {
                          FormatDuration(status.uptime_s()), FormatBytes(status.memory_bytes()),
                          status.durable() ? "sessions on disk" : "sessions in memory only");
   out << absl::StrFormat(
-      "%d sessions, %d of them loaded; %d writers, %d watchers, %d tasks waiting\n\n",
-      status.session_count(), status.loaded_session_count(), status.writer_count(),
-      status.watcher_count(), status.waiting_task_count());
+      "%d sessions, %d of them loaded; %s stored, %d writers, %d watchers, %d tasks waiting\n\n",
+      status.session_count(), status.loaded_session_count(), FormatBytes(status.stored_bytes()),
+      status.writer_count(), status.watcher_count(), status.waiting_task_count());
 }
 
 const v1::Session* Find(const DaemonView& view, const std::string& name) {

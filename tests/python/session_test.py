@@ -29,6 +29,15 @@ def test_batches_that_are_not_waited_for_are_kept_at_the_end(client, problem, ro
     assert (info.last_sequence, info.sample_count, info.has_writer) == (40, 200, False)
 
 
+def test_the_status_tells_what_is_stored(client, problem, rows):
+    before = client.status()
+    with client.session("stored", problem) as session:
+        session.append(rows(0, 100))
+    # A row has a time and a sample.
+    assert client.status().stored_bytes - before.stored_bytes > 100 * 16
+    assert before.max_stored_bytes == 0
+
+
 def test_long_data_are_cut_into_batches(client, problem, record):
     options = polyest.StreamOptions(batch_rows=300)
     with client.session("cut", problem, options=options) as session:

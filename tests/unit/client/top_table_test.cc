@@ -58,6 +58,7 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   view.status.set_durable(true);
   view.status.set_uptime_s(7200);
   view.status.set_memory_bytes(3 << 20);
+  view.status.set_stored_bytes(5 << 20);
   view.status.set_session_count(5);
   view.status.set_loaded_session_count(1);
   auto& activity = *view.sessions[0].mutable_activity();
@@ -71,7 +72,7 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   activity.set_idle_time_s(90);
   const std::string text = Print(view);
   EXPECT_THAT(text, HasSubstr("polyestd 1.2.3, up 2.0 h, 3.0 MiB, sessions on disk\n"));
-  EXPECT_THAT(text, HasSubstr("5 sessions, 1 of them loaded; 0 writers"));
+  EXPECT_THAT(text, HasSubstr("5 sessions, 1 of them loaded; 5.0 MiB stored, 0 writers"));
   EXPECT_EQ(LastRow(text), (std::vector<std::string>{"rig", "7", "1200", "-", "6", "2", "12.5", "4",
                                                      "yes", "3", "yes", "2", "min"}));
 }

@@ -135,10 +135,15 @@ class DaemonStatus:
     uptime_s: float
     #: Resident memory, bytes.
     memory_bytes: int
+    #: Bytes of the problems and measurements that the caller's tenant has stored.
+    stored_bytes: int
+    #: The most that it may have stored, bytes; 0: there is no limit.
+    max_stored_bytes: int
 
 
 def status_of(message: status_service_pb2.DaemonStatus) -> DaemonStatus:
     """Returns the status as the daemon has sent it."""
     return DaemonStatus(message.version, message.durable, message.session_count,
                         message.loaded_session_count, message.writer_count, message.watcher_count,
-                        message.waiting_task_count, message.uptime_s, message.memory_bytes)
+                        message.waiting_task_count, message.uptime_s, message.memory_bytes,
+                        message.stored_bytes, message.max_stored_bytes)
