@@ -1,6 +1,7 @@
 // Tests daemons whose sessions are in a PostgreSQL database, one daemon and several.
 
 #include <signal.h>
+#include <sys/wait.h>
 
 #include "polyest/rpc/error_details.pb.h"
 #include "polyest/v1/backup_service.grpc.pb.h"
@@ -245,6 +246,9 @@ TEST_F(PostgresTest, LetsADaemonThatWasStoppedPastItsLeaseWriteNothing) {
   stream.Send("sessions/rig", 1, BatchOf(1));
   stream.ExpectAcknowledgement(1);
   first.process().Signal(SIGSTOP);
+  // Until the last of its threads has stopped, it could still send a batch to the database.
+  siginfo_t stopped;
+  ASSERT_EQ(waitid(P_PID, static_cast<id_t>(first.process().pid()), &stopped, WSTOPPED), 0);
   // The batch waits in the socket of the daemon, whose stream is open.
   stream.Send("sessions/rig", 2, BatchOf(2));
   v1::Estimate estimate;
@@ -254,9 +258,11 @@ TEST_F(PostgresTest, LetsADaemonThatWasStoppedPastItsLeaseWriteNothing) {
   while (stream.Read(response)) {
     EXPECT_NE(response.acknowledgement().sequence(), 2) << response.ShortDebugString();
   }
-  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  const grpc::Status ended = stream.Finish();
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::UNAVAILABLE) << ended.error_message();
   EXPECT_EQ(Batches(), 1);
-  EXPECT_EQ(first.Add(2).error_code(), grpc::StatusCode::UNAVAILABLE);
+  const grpc::Status refused = first.Add(2);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNAVAILABLE) << refused.error_message();
   const grpc::Status added = second.Add(2);
   EXPECT_TRUE(added.ok()) << added.error_message();
   EXPECT_EQ(EstimateAt(second), Undisturbed(2));
