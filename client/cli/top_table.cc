@@ -22,14 +22,17 @@ constexpr int kRowsBesidesSessions = 6;
 
 std::string YesOrUnknown(bool yes) { return yes ? "yes" : kUnknown; }
 
+// Two lines that fit into 80 columns for any daemon with fewer than 10,000 sessions.
 void PrintHeader(const v1::DaemonStatus& status, std::ostream& out) {
-  out << absl::StrFormat("polyestd %s, up %s, %s, %s\n", status.version(),
-                         FormatDuration(status.uptime_s()), FormatBytes(status.memory_bytes()),
-                         status.durable() ? "sessions on disk" : "sessions in memory only");
+  const std::string stored = FormatBytes(status.stored_bytes());
   out << absl::StrFormat(
-      "%d sessions, %d of them loaded; %s stored, %d writers, %d watchers, %d tasks waiting\n\n",
-      status.session_count(), status.loaded_session_count(), FormatBytes(status.stored_bytes()),
-      status.writer_count(), status.watcher_count(), status.waiting_task_count());
+      "polyestd %s, up %s, %s of memory, %s\n", status.version(), FormatDuration(status.uptime_s()),
+      FormatBytes(status.memory_bytes()),
+      status.durable() ? absl::StrCat("sessions on disk: ", stored) : "sessions in memory only");
+  out << absl::StrFormat("%d sessions, %d loaded, %d writers, %d watchers, %d tasks waiting\n\n",
+                         status.session_count(), status.loaded_session_count(),
+                         status.writer_count(), status.watcher_count(),
+                         status.waiting_task_count());
 }
 
 const v1::Session* Find(const DaemonView& view, const std::string& name) {

@@ -30,8 +30,10 @@ TEST_F(TopTest, ShowsTheDaemonAndItsSessionsOnce) {
   ASSERT_EQ(top.exit_status, 0) << top.err;
   const auto lines = Lines(top.out);
   ASSERT_EQ(lines.size(), 6u) << top.out;
-  EXPECT_THAT(lines[0], MatchesRegex("polyestd [0-9.]+, up [0-9]+ s, .* MiB, sessions on disk"));
-  EXPECT_THAT(lines[1], StartsWith("2 sessions, 2 of them loaded; "));
+  EXPECT_THAT(
+      lines[0],
+      MatchesRegex("polyestd [0-9.]+, up [0-9]+ s, .* MiB of memory, sessions on disk: .* KiB"));
+  EXPECT_THAT(lines[1], StartsWith("2 sessions, 2 loaded, "));
   EXPECT_THAT(lines[3], StartsWith("session"));
   // The session has 60 rows in batches of 30, and an estimate after each batch.
   EXPECT_THAT(lines[4], MatchesRegex("rig-1 +2 +60 +- +2 +[0-9]+ +[0-9.e+]+ .*"));

@@ -1,5 +1,6 @@
 #include "client/cli/top_table.h"
 
+#include <absl/strings/str_split.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -71,10 +72,29 @@ TEST(TopTableTest, ShowsTheDaemonAndASession) {
   activity.set_loaded(true);
   activity.set_idle_time_s(90);
   const std::string text = Print(view);
-  EXPECT_THAT(text, HasSubstr("polyestd 1.2.3, up 2.0 h, 3.0 MiB, sessions on disk\n"));
-  EXPECT_THAT(text, HasSubstr("5 sessions, 1 of them loaded; 5.0 MiB stored, 0 writers"));
+  EXPECT_THAT(
+      text, HasSubstr("polyestd 1.2.3, up 2.0 h, 3.0 MiB of memory, sessions on disk: 5.0 MiB\n"));
+  EXPECT_THAT(text, HasSubstr("5 sessions, 1 loaded, 0 writers"));
   EXPECT_EQ(LastRow(text), (std::vector<std::string>{"rig", "7", "1200", "-", "6", "2", "12.5", "4",
                                                      "yes", "3", "yes", "2", "min"}));
+}
+
+// A terminal of 80 columns must show the header of a large daemon too.
+TEST(TopTableTest, KeepsTheHeaderWithinEightyColumns) {
+  DaemonView view = ViewOf(0, 0);
+  view.status.set_version("10.10.10");
+  view.status.set_durable(true);
+  view.status.set_uptime_s(23.5 * 3600);
+  view.status.set_memory_bytes((int64_t{1023} << 20) + 900'000);
+  view.status.set_stored_bytes((int64_t{1023} << 30) + 900'000'000);
+  view.status.set_session_count(9999);
+  view.status.set_loaded_session_count(9999);
+  view.status.set_writer_count(9999);
+  view.status.set_watcher_count(9999);
+  view.status.set_waiting_task_count(9999);
+  const std::vector<std::string> lines = absl::StrSplit(Print(view), '\n');
+  EXPECT_LE(lines[0].size(), 80u) << lines[0];
+  EXPECT_LE(lines[1].size(), 80u) << lines[1];
 }
 
 TEST(TopTableTest, SaysNothingWhereNothingIsKnown) {
