@@ -81,7 +81,7 @@ make_debian_folder() {
   cp "$root/deploy/systemd/polyest.logrotate" debian/polyest.logrotate
   sed -i "s|@MAINTAINER@|$maintainer|" debian/control
   mkdir examples
-  cp "$root"/client/examples/*.{json,csv,md} examples
+  cp -r "$root"/client/examples/{*.{json,csv,md},umbridge} examples
   cat >debian/changelog <<END
 polyest ($version) bookworm; urgency=medium
 
