@@ -41,7 +41,8 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
     const ChannelEstimate& channel = estimate.channels[c];
     if (findings.problem->problem().measured[c].noise.unknown) continue;
     const auto samples = static_cast<double>(channel.samples);
-    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers)) {
+    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers,
+                     findings.problem->uses_filters())) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
