@@ -7,10 +7,10 @@
 //
 // with independent white process noises of spectral densities q (one for each state) and e_k ~
 // N(0, 1), or Student's t (heavy_tail.h), where r is a sample's variance times the square of a
-// member's own factor. The filters
-// are square-root cubature Kalman filters (gaussian_states.h): exact for models that are linear in
-// their states, and without Jacobians. They begin at t = 0 with the model's initial states, which
-// are known exactly (P = 0); what is uncertain of them is an uncertain parameter.
+// member's own factor. The filters are square-root cubature Kalman filters (gaussian_states.h):
+// exact for models that are linear in their states, and without Jacobians. They begin at t = 0 with
+// the model's initial states, which are known exactly (P = 0); what is uncertain of them is an
+// uncertain parameter.
 //
 // From one sample to the next process noise is added by Simpson's rule,
 //

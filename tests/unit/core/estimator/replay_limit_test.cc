@@ -90,9 +90,16 @@ int64_t MostRead(const Problem& problem) {
 // A block that ends where a state is kept is read twice, and the rest of one that was left because
 // the expansion moved again.
 TEST(ReplayLimit, BoundsTheRowsOfAnUpdate) {
-  constexpr int64_t kTwice = 2;
-  EXPECT_LE(MostRead(LateStep(kLimit)), kTwice * (kLimit + 2 * kBatch));
+  EXPECT_LE(MostRead(LateStep(kLimit)), 2 * (kLimit + 2 * kBatch));
   EXPECT_GT(MostRead(LateStep(std::nullopt)), 1200);
+}
+
+TEST(ReplayLimit, BoundsTheRowsOfFilters) {
+  Problem problem = LateStep(std::nullopt);
+  problem.process_noise = {{.state = "v", .spectral_density = 1e-5}};
+  EXPECT_GT(MostRead(problem), 1200);
+  problem.expansion.max_replay_rows = kLimit;
+  EXPECT_LE(MostRead(problem), 2 * (kLimit + 2 * kBatch));
 }
 
 // A state is kept 16 rows before the step. The expansion over this prior does not follow the model
