@@ -115,8 +115,8 @@ void Measure(const char* name, LikelihoodForm likelihood, std::optional<int64_t>
 void Run(int minutes) {
   std::printf("likelihood            limit  longest update                  speed  k - truth%22s\n",
               "c - truth");
-  for (const std::optional<int64_t> limit :
-       {std::optional<int64_t>(), std::optional<int64_t>(50'000)}) {
+  for (const int64_t rows : {0, 50'000, 16'384}) {
+    const std::optional<int64_t> limit = rows > 0 ? std::optional<int64_t>(rows) : std::nullopt;
     Measure("OUTPUT_ERROR", LikelihoodForm::kOutputError, limit, minutes);
     Measure("PREDICTION_ERROR", LikelihoodForm::kPredictionError, limit, minutes);
   }
