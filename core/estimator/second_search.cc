@@ -19,7 +19,7 @@ constexpr int64_t kSearchesInLimit = 10;
 
 bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
   if (!problem.expansion.adaptive || misfit < kMinMisfit) return false;
-  const std::optional<int64_t>& limit = problem.expansion.max_replay_rows;
+  const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
   if (limit && state_.row > *limit / kSearchesInLimit) return false;
   return static_cast<double>(state_.row) >= kPatience * static_cast<double>(state_.tried_row) ||
          misfit >= kPatience * state_.tried_misfit;

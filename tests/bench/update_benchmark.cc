@@ -43,7 +43,7 @@ Problem Oscillator(LikelihoodForm likelihood, std::optional<int64_t> limit) {
   if (likelihood == LikelihoodForm::kPredictionError) {
     problem.process_noise = {{.state = "v", .spectral_density = 1e-6}};
   }
-  problem.expansion.max_replay_rows = limit;
+  problem.expansion.max_replay_row_count = limit;
   return problem;
 }
 

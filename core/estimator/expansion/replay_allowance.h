@@ -1,6 +1,6 @@
 #pragma once
 
-// The bound on the rows that one update propagates again (ExpansionOptions::max_replay_rows).
+// The bound on the rows that one update propagates again (ExpansionOptions::max_replay_row_count).
 //
 // A component of the posterior may propagate as many rows again as the limit says. What it has used
 // comes back by one row with each row of the record, so that while the record grows by B rows at

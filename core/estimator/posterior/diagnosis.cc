@@ -256,11 +256,12 @@ void AddPostponed(const Findings& findings, std::vector<Diagnostic>& diagnostics
   if (parts.empty()) return;
   diagnostics.push_back(
       {DiagnosticCode::kReplayPostponed,
-       absl::StrFormat("expansion.maxReplayRows = %d keeps the record from being propagated again: "
-                       "%s; %sraise it, or narrow the priors so that the expansion moves early",
-                       findings.problem->problem().expansion.max_replay_rows.value_or(0),
-                       absl::StrJoin(parts, ", "),
-                       postponed.any() ? "no parameter is called IDENTIFIED until then; " : "")});
+       absl::StrFormat(
+           "expansion.maxReplayRowCount = %d keeps the record from being propagated again: "
+           "%s; %sraise it, or narrow the priors so that the expansion moves early",
+           findings.problem->problem().expansion.max_replay_row_count.value_or(0),
+           absl::StrJoin(parts, ", "),
+           postponed.any() ? "no parameter is called IDENTIFIED until then; " : "")});
 }
 
 void AddEdge(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
@@ -290,7 +291,7 @@ double Findings::WideningForShift() const {
 }
 
 bool Findings::CarriesError() const {
-  return problem->problem().expansion.max_replay_rows && carried_shift > kMaxCarriedShift;
+  return problem->problem().expansion.max_replay_row_count && carried_shift > kMaxCarriedShift;
 }
 
 const std::string& Findings::NameOf(int parameter) const {

@@ -56,7 +56,7 @@ MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleS
       threads_(threads),
       learns_noise_(LearnsNoise(problem_.problem())),
       particles_(0, problem_.dimension()),
-      allowance_(problem_.problem().expansion.max_replay_rows) {}
+      allowance_(problem_.problem().expansion.max_replay_row_count) {}
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,

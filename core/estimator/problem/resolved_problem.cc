@@ -55,9 +55,9 @@ absl::Status ValidatePriors(const Problem& problem) {
 
 // A record of four intervals between checkpoints is always propagated again.
 absl::Status ValidateReplayLimit(const Problem& problem) {
-  const std::optional<int64_t>& limit = problem.expansion.max_replay_rows;
+  const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
   if (!limit) return absl::OkStatus();
-  const FieldPath field{"expansion", "max_replay_rows"};
+  const FieldPath field{"expansion", "max_replay_row_count"};
   const int64_t least = 4 * int64_t{problem.integration.samples_between_checkpoints};
   if (*limit < least) {
     return InvalidField(field, absl::StrFormat("%d must be at least %d", *limit, least));

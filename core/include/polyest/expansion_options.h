@@ -40,7 +40,7 @@ struct ExpansionOptions {
   // posterior propagates at most as many rows again, and B: once the record is longer, the
   // expansion moves only as far as its sums can be carried over. What is put off is said by
   // DiagnosticCode::kReplayPostponed. Not available with parameters of each run.
-  std::optional<int64_t> max_replay_rows = std::nullopt;
+  std::optional<int64_t> max_replay_row_count = std::nullopt;
 
   // Returns OK for options that suit n = `dimension` uncertain parameters; INVALID_ARGUMENT or
   // RESOURCE_EXHAUSTED name the field, the value and the rule.

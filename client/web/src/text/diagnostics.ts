@@ -22,8 +22,8 @@ const EXPLANATIONS: Record<string, Explanation> = {
   },
   REPLAY_POSTPONED: {
     title: 'Limit on the work of an update reached',
-    meaning: 'expansion.maxReplayRows keeps the record from being propagated again although the estimate needs it. Nothing is called identified until that is made up for, and what it costs in accuracy has widened the uncertainty.',
-    remedy: 'Raise expansion.maxReplayRows as far as the time of an update allows, or narrow the priors so that the expansion moves early.',
+    meaning: 'expansion.maxReplayRowCount keeps the record from being propagated again although the estimate needs it. Nothing is called identified until that is made up for, and what it costs in accuracy has widened the uncertainty.',
+    remedy: 'Raise expansion.maxReplayRowCount as far as the time of an update allows, or narrow the priors so that the expansion moves early.',
     severity: 'serious',
   },
   POINTS_FAILED: {

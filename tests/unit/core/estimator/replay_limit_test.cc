@@ -47,7 +47,7 @@ Problem LateStep(std::optional<int64_t> limit) {
   problem.uncertain = {UncertainParameter::Uniform("k", 8, 12).value()};
   problem.inputs = {{"force", StepInput{.amplitude = 5, .time_s = kStepTime}}};
   problem.integration.samples_between_checkpoints = kInterval;
-  problem.expansion.max_replay_rows = limit;
+  problem.expansion.max_replay_row_count = limit;
   return problem;
 }
 
@@ -98,7 +98,7 @@ TEST(ReplayLimit, BoundsTheRowsOfFilters) {
   Problem problem = LateStep(std::nullopt);
   problem.process_noise = {{.state = "v", .spectral_density = 1e-5}};
   EXPECT_GT(MostRead(problem), 1200);
-  problem.expansion.max_replay_rows = kLimit;
+  problem.expansion.max_replay_row_count = kLimit;
   EXPECT_LE(MostRead(problem), 2 * (kLimit + 2 * kBatch));
 }
 
@@ -122,7 +122,7 @@ TEST(ReplayLimit, SaysWhatItHasPutOffAndIdentifiesNothing) {
   EXPECT_FALSE(Has(free, DiagnosticCode::kReplayPostponed));
   const Estimate limited = EstimateOf(WideLateStep(kLongLimit), record);
   EXPECT_THAT(Message(limited, DiagnosticCode::kReplayPostponed),
-              HasSubstr("expansion.maxReplayRows = 1200 keeps the record from"));
+              HasSubstr("expansion.maxReplayRowCount = 1200 keeps the record from"));
   EXPECT_NE(limited.parameters[0].verdict, Verdict::kIdentified);
   EXPECT_GE(limited.parameters[0].posterior_std_dev, free.parameters[0].posterior_std_dev);
   EXPECT_LE(limited.parameters[0].lower95, kTrueStiffness);
@@ -180,7 +180,8 @@ TEST(ReplayLimit, MustLetAShortRecordBePropagatedAgain) {
     return std::string(ResolvedProblem::Make(problem).status().message());
   };
   Problem problem = LateStep(kLimit - 1);
-  EXPECT_THAT(refusal(problem), HasSubstr("expansion.max_replay_rows: 127 must be at least 128"));
+  EXPECT_THAT(refusal(problem),
+              HasSubstr("expansion.max_replay_row_count: 127 must be at least 128"));
   problem = LateStep(kLimit);
   problem.uncertain[0].per_run = true;
   EXPECT_THAT(refusal(problem), HasSubstr("is not available with a parameter of each run, k"));
