@@ -42,6 +42,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "suspicious data";
     case v1::Diagnostic::INCONSISTENT_OVER_TIME:
       return "inconsistent over time";
+    case v1::Diagnostic::REPLAY_POSTPONED:
+      return "replay postponed";
     case v1::Diagnostic::WINDOWS_DISAGREE:
       return "windows disagree";
     default:

@@ -71,6 +71,20 @@ inline double LackOfWeight(OutlierHandling outliers, double u) {
   return 0;
 }
 
+// Where filters take the samples (core/propagation/heavy_tail.h), Student's t is not weighed but
+// has its likelihood ½ w², w² = (ν + 1) log(1 + u²/ν) for states that are known. What follows is of
+// w.
+
+// E[w²] = (ν + 1) (ψ(½ν + ½) − ψ(½ν)) for noise of this kind.
+inline constexpr double kFilteredDegreesFactor = 1.4018615;
+// −log of its density at 0 less that of the normal density.
+inline constexpr double kFilteredLack = 0.0618907;
+
+// Returns the weight that a sample would have.
+inline double FilteredOutlierWeight(double w) {
+  return (1 + 1 / kStudentTDegreesOfFreedom) * std::exp(-w * w / (kStudentTDegreesOfFreedom + 1));
+}
+
 // Returns whether any property of the noise is to be learned from the record.
 inline bool IsLearned(const NoiseModel& noise) {
   return noise.unknown || noise.correlation == NoiseCorrelation::kUnknown ||

@@ -84,7 +84,8 @@ void AddOptions(Archive& archive, const Problem& problem) {
           Number(expansion.points), expansion.adaptive, problem.regularization,
           Number(problem.regularization_mode), Number(integration.method),
           integration.relative_tolerance, integration.max_steps,
-          integration.samples_between_checkpoints, problem.tolerance_follows_noise);
+          integration.samples_between_checkpoints, problem.tolerance_follows_noise,
+          expansion.max_replay_row_count);
 }
 
 template <class Element>

@@ -12,11 +12,15 @@ constexpr double kMinMisfit = 3;
 constexpr double kPatience = 4;
 // Ratio of the misfits from which on the second mixture is the better one.
 constexpr double kBetter = 0.8;
+// Where the rows that are propagated again are limited, a search may take this part of them.
+constexpr int64_t kSearchesInLimit = 10;
 
 }  // namespace
 
-bool SecondSearch::IsDue(double misfit) const {
-  if (misfit < kMinMisfit) return false;
+bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
+  if (!problem.expansion.adaptive || misfit < kMinMisfit) return false;
+  const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
+  if (limit && state_.row > *limit / kSearchesInLimit) return false;
   return static_cast<double>(state_.row) >= kPatience * static_cast<double>(state_.tried_row) ||
          misfit >= kPatience * state_.tried_misfit;
 }
@@ -25,7 +29,7 @@ absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStor
                                 int threads, const Stop& stop,
                                 std::unique_ptr<ComponentMixture>& mixture) {
   const double misfit = mixture->Misfit();
-  if (problem.problem().expansion.adaptive && IsDue(misfit)) {
+  if (IsDue(problem.problem(), misfit)) {
     if (!second_) {
       std::optional<ResolvedProblem> first_run;
       if (problem.runs() > 1) {

@@ -11,7 +11,8 @@
 //
 // The looks are at rows that are a function of the record alone. After a search that found nothing,
 // the next one waits until the record is four times as long or the misfit four times as large, so
-// that all searches together cost at most a third more than the record.
+// that all searches together cost at most a third more than the record. Where the rows that an
+// update propagates again are limited, only the first tenth of so many rows is searched again.
 
 #include <absl/status/status.h>
 
@@ -45,7 +46,7 @@ class SecondSearch {
   void Restore(const State& state) { state_ = state; }
 
  private:
-  bool IsDue(double misfit) const;
+  bool IsDue(const Problem& problem, double misfit) const;
 
   State state_;
   std::unique_ptr<ComponentMixture> second_;  // during a search

@@ -190,7 +190,9 @@ void serialize(Archive& archive, ComponentState& component) {
           component.ahead_row, component.patient_until, component.whole_until,
           component.settled_row, component.settlements_at_row, component.comparable_row,
           component.settlements, component.reexpansions, component.abandoned_rows,
-          component.summary);
+          component.summary, component.allowance.used, component.allowance.used_at,
+          component.allowance.exempt_at, component.postponed.expansion, component.postponed.noise,
+          component.postponed.tolerance);
 }
 
 template <class Archive>

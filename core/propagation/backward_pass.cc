@@ -82,8 +82,8 @@ void BackwardPass::AddMotion(const Eigen::ArrayXXd& points, const Eigen::ArrayXX
 }
 
 void BackwardPass::AddSample(const Eigen::ArrayXd& outputs, const Eigen::ArrayXd& innovation,
-                             const Eigen::ArrayXd& variance, const Eigen::ArrayXXd& before,
-                             const Eigen::ArrayXXd& after) {
+                             const Eigen::ArrayXd& variance, const Eigen::ArrayXd& spread,
+                             const Eigen::ArrayXXd& before, const Eigen::ArrayXXd& after) {
   const double half = 0.5 / std::sqrt(static_cast<double>(n_));
   // A hᵀ
   slope_.setZero();
@@ -92,11 +92,11 @@ void BackwardPass::AddSample(const Eigen::ArrayXd& outputs, const Eigen::ArrayXd
                                      outputs.segment((n_ + j) * members_, members_));
     for (Eigen::Index i = 0; i < n_; ++i) slope_.col(i) += Full(map_.A, i, j) * h;
   }
-  // a ← a + A hᵀ ν/S,  B ← B + (A hᵀ)(A hᵀ)ᵀ/S
+  // a ← a + A hᵀ ν/S,  B ← B + (A hᵀ)(A hᵀ)ᵀ/spread
   for (Eigen::Index i = 0; i < n_; ++i) {
     map_.a.col(i) += slope_.col(i) * innovation / variance;
     for (Eigen::Index j = 0; j < n_; ++j) {
-      Full(map_.B, i, j) += slope_.col(i) * slope_.col(j) / variance;
+      Full(map_.B, i, j) += slope_.col(i) * slope_.col(j) / spread;
     }
   }
   stage_.setZero();

@@ -41,10 +41,11 @@ class BackwardPass {
   // Adds a stage in which the points (as GaussianStates::Draw writes them) have moved to `points`,
   // of which `after` are the factors.
   void AddMotion(const Eigen::ArrayXXd& points, const Eigen::ArrayXXd& after);
-  // Adds a sample; the arguments are those of GaussianStates::Update after the call.
+  // Adds a sample; the arguments are those of GaussianStates::Update after the call. With noise
+  // that is not Gaussian, `variance` is 1/A and `spread` 1/(A − B) (heavy_tail.h); else both are S.
   void AddSample(const Eigen::ArrayXd& outputs, const Eigen::ArrayXd& innovation,
-                 const Eigen::ArrayXd& variance, const Eigen::ArrayXXd& before,
-                 const Eigen::ArrayXXd& after);
+                 const Eigen::ArrayXd& variance, const Eigen::ArrayXd& spread,
+                 const Eigen::ArrayXXd& before, const Eigen::ArrayXXd& after);
 
   // Marks the present instant, at which the filters are in these states.
   void Mark(const GaussianStates& states);

@@ -18,6 +18,8 @@ EnsembleSpecification WithProcessNoise(EnsembleSpecification specification) {
   if (process_noise.size() == 0) process_noise.setZero(members, states);
   POLYEST_CHECK(process_noise.rows() == members && process_noise.cols() == states);
   POLYEST_CHECK(specification.output_delays_s.size() == 0);
+  POLYEST_CHECK(specification.heavy_tailed.empty() ||
+                specification.heavy_tailed.size() == specification.outputs.size());
   return specification;
 }
 

@@ -6,10 +6,11 @@
 //   dx = f(t, x, θ, u) dt + √q dβ,   z_k = h(t_k, x, θ) + √r e_k,
 //
 // with independent white process noises of spectral densities q (one for each state) and e_k ~
-// N(0, 1), where r is a sample's variance times the square of a member's own factor. The filters
-// are square-root cubature Kalman filters (gaussian_states.h): exact for models that are linear in
-// their states, and without Jacobians. They begin at t = 0 with the model's initial states, which
-// are known exactly (P = 0); what is uncertain of them is an uncertain parameter.
+// N(0, 1), or Student's t (heavy_tail.h), where r is a sample's variance times the square of a
+// member's own factor. The filters are square-root cubature Kalman filters (gaussian_states.h):
+// exact for models that are linear in their states, and without Jacobians. They begin at t = 0 with
+// the model's initial states, which are known exactly (P = 0); what is uncertain of them is an
+// uncertain parameter.
 //
 // From one sample to the next process noise is added by Simpson's rule,
 //
@@ -31,6 +32,7 @@
 #include "core/common/types.h"
 #include "core/propagation/backward_pass.h"
 #include "core/propagation/gaussian_states.h"
+#include "core/propagation/heavy_tail.h"
 #include "core/propagation/trajectory_block.h"
 #include "core/propagation/trajectory_ensemble.h"
 #include "polyest/stop.h"
@@ -109,6 +111,12 @@ class FilterBlock {
   void SelectOutput(int channel);
   void Update(const FilterSamples& samples, Eigen::Index sample, int channel, MatrixRef innovations,
               MatrixRef log_variances);
+  void UpdateNormal(double z, double sigma);
+  void UpdateTailed(double z, double sigma);
+  bool IsTailed(int channel) const {
+    return !specification_.heavy_tailed.empty() &&
+           specification_.heavy_tailed[static_cast<size_t>(channel)];
+  }
   void NoteFailures();
   int member_count() const { return static_cast<int>(gaussians_.members()); }
 
@@ -125,9 +133,11 @@ class FilterBlock {
   Matrix jacobian_, square_;                      // n × n
   const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
   Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;
-  std::unique_ptr<BackwardPass> backward_;  // null unless StartBackward was called
-  Eigen::ArrayXXd factor_before_;           // of the stage that is added to it
-  std::vector<bool> alive_;                 // by member
+  HeavyTail tail_;
+  Eigen::ArrayXd gain_variance_, spread_, whitened_;  // as it gives them, by member
+  std::unique_ptr<BackwardPass> backward_;            // null unless StartBackward was called
+  Eigen::ArrayXXd factor_before_;                     // of the stage that is added to it
+  std::vector<bool> alive_;                           // by member
   size_t failures_seen_ = 0;
   std::vector<PointFailure> failures_;
 };

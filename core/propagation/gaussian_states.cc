@@ -82,6 +82,13 @@ void GaussianStates::Collect(const Eigen::ArrayXXd& points) {
 
 void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& r,
                             Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance) {
+  variance = r;
+  Compare(outputs, z, innovation, variance);
+  Correct(innovation, variance, r);
+}
+
+void GaussianStates::Compare(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& innovation,
+                             Eigen::ArrayXd& variance) {
   const Eigen::Index n = states(), m = members();
   const double share = 1 / static_cast<double>(2 * n);
   const double root = std::sqrt(share);
@@ -90,11 +97,15 @@ void GaussianStates::Update(const Eigen::ArrayXd& outputs, double z, Eigen::Arra
   for (Eigen::Index s = 1; s < 2 * n; ++s) product_ += outputs.segment(s * m, m) - first;
   product_ = first + share * product_;  // ẑ
   innovation = z - product_;
-  variance = r;
   for (Eigen::Index s = 0; s < 2 * n; ++s) {
     deviation_.col(s) = root * (outputs.segment(s * m, m) - product_);
     variance += deviation_.col(s).square();
   }
+}
+
+void GaussianStates::Correct(const Eigen::ArrayXd& innovation, const Eigen::ArrayXd& variance,
+                             Eigen::ArrayXd& r) {
+  const Eigen::Index n = states();
   // The points deviate from the mean by ±√(1/2) L e_j, in units of the root of their number.
   const double half = std::sqrt(0.5);
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -57,6 +57,11 @@ class GaussianStates {
   //   K = P_xz/S,   m ← m + K ν,   P ← P − K S Kᵀ.
   void Update(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& r,
               Eigen::ArrayXd& innovation, Eigen::ArrayXd& variance);
+  // The two halves of Update. Compare writes ν and adds the variance of the outputs to `variance`;
+  // Correct takes S and r as they are then, which may be those of another noise (heavy_tail.h).
+  void Compare(const Eigen::ArrayXd& outputs, double z, Eigen::ArrayXd& innovation,
+               Eigen::ArrayXd& variance);
+  void Correct(const Eigen::ArrayXd& innovation, const Eigen::ArrayXd& variance, Eigen::ArrayXd& r);
 
  private:
   auto L(Eigen::Index i, Eigen::Index j) { return factor_.col(FactorColumn(states(), i, j)); }

@@ -63,6 +63,9 @@ struct EnsembleSpecification {
   Matrix process_noise;
   // Q × outputs read: factors of the noise of samples. Filters alone use it. Empty: 1.
   Matrix noise_factors;
+  // By output read: whether the noise of its samples is Student's t (heavy_tail.h). Filters alone
+  // use it. Empty: none is.
+  std::vector<bool> heavy_tailed;
   IntegrationOptions integration;
   int threads = 1;
 };

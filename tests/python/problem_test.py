@@ -67,6 +67,8 @@ def test_process_noise_and_drift_are_written_as_in_the_examples():
         .uncertain("c", polyest.Lognormal(1, 0.4), drift=(0.001, 1))
         .measure("x", polyest.Noise(absolute=0.005)))
     assert warming == polyest.Problem.read(EXAMPLES / "warming.json")
+    limited = polyest.Problem({}).expand(max_replay_row_count=20000)
+    assert limited.as_dict() == {"expansion": {"maxReplayRowCount": 20000}}
     known = polyest.Problem({}).uncertain("c", polyest.Normal(1, 0.4), drift=0.05)
     assert known.as_dict()["uncertain"][0]["drift"] == {"randomWalk": {"stdDevPerSqrtS": 0.05}}
 

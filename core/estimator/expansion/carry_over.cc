@@ -93,10 +93,10 @@ struct Inherited {
 absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalExpansion& present,
                                 const ExpansionState& kept, const ExpansionDesign& design,
                                 const SampleStore& store, int64_t rows, int threads,
-                                const Stop& stop) {
+                                const Stop& stop, double max_shift) {
   POLYEST_RETURN_IF_ERROR(Refusal(problem, present, kept, design));
   Inherited inherited{.error = ErrorIn(design, present, kept.absorbed)};
-  const double most = kMaxCarriedShift * kMaxCarriedShift * present.noise().misfit;
+  const double most = max_shift * max_shift * present.noise().misfit;
   if (!(inherited.error <= most)) return Refused("the sums are not accurate enough");
   if (!kept.ensemble) return inherited;
   if (rows - kept.absorbed.rows < RowsToJudge(problem)) {
@@ -116,15 +116,13 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(const ResolvedProblem& problem,
-                                                             const RegionalExpansion& present,
-                                                             const ExpansionDesign& design,
-                                                             const SampleStore& store, int64_t rows,
-                                                             int threads, const Stop& stop) {
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(
+    const ResolvedProblem& problem, const RegionalExpansion& present, const ExpansionDesign& design,
+    const SampleStore& store, int64_t rows, int threads, const Stop& stop, double max_shift) {
   const std::shared_ptr<const ExpansionState> kept = present.kept_state();
   if (!kept || rows != present.absorbed_rows()) return Refused("there is no state to go on from");
-  POLYEST_ASSIGN_OR_RETURN(const Inherited inherited,
-                           Judge(problem, present, *kept, design, store, rows, threads, stop));
+  POLYEST_ASSIGN_OR_RETURN(const Inherited inherited, Judge(problem, present, *kept, design, store,
+                                                            rows, threads, stop, max_shift));
   POLYEST_ASSIGN_OR_RETURN(ExpansionState state,
                            CarriedState(problem, present, *kept, design, inherited.error));
   state.absorbed.propagated = inherited.propagated;
@@ -135,6 +133,11 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(const ResolvedProbl
   POLYEST_RETURN_IF_ERROR(moved.status());
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, **moved));
   return moved;
+}
+
+// Twice the rows since the state kept: to compare the states, and to go on from it.
+int64_t RowsToCarryOver(const RegionalExpansion& present, int64_t rows) {
+  return present.kept_state() ? 2 * (rows - present.kept_state()->absorbed.rows) : 0;
 }
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Restored(const RegionalExpansion& present,

@@ -52,13 +52,18 @@ inline int64_t RowsOfShortRecord(const ResolvedProblem& problem) {
 }
 
 // Returns an expansion of the design that has absorbed the first `rows` rows of the store, as
-// `present` has. Returns FailedPrecondition where the error would be too large or the case is one
-// of the above; the record must then be propagated from its beginning.
+// `present` has. Returns FailedPrecondition where the error might shift the posterior by more than
+// `max_shift` of its standard deviations or the case is one of the above; the record must then be
+// propagated from its beginning.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(const ResolvedProblem& problem,
                                                              const RegionalExpansion& present,
                                                              const ExpansionDesign& design,
                                                              const SampleStore& store, int64_t rows,
-                                                             int threads, const Stop& stop);
+                                                             int threads, const Stop& stop,
+                                                             double max_shift = kMaxCarriedShift);
+
+// Returns how many rows CarryOver propagates at most, 0 if it cannot.
+int64_t RowsToCarryOver(const RegionalExpansion& present, int64_t rows);
 
 // Returns the expansion `present` as it was after the first `rows` rows of the store, at or after
 // the state that it keeps; from the record's beginning if it keeps none.

@@ -129,6 +129,7 @@ absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, 
     }
     return costs;
   }
+  if (!request.allowance.AllowsRecord(request.rows)) return std::vector<double>();
   const Vector inside = particles.colwise().mean().transpose();
   auto model = RunModel(expansion, etas, inside, request, stop);
   if (absl::IsFailedPrecondition(model.status())) return std::vector<double>();

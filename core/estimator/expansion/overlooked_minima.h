@@ -20,8 +20,9 @@ struct ConfirmedMinima {
 // Returns the local minima of `cost`, the cost on `expansion`, that lie outside the region of the
 // particles (germ coordinates) and that the model confirms: there its own cost is at most 12 above
 // that at the lowest minimum. They are sought from the best collocation points and from the best of
-// the request's guesses outside. The model runs only if there are minima outside. Returns an error
-// on a stop request or when the store cannot be read.
+// the request's guesses outside. The model runs only if there are minima outside, and if the
+// request's allowance lets the record be propagated again; none is confirmed without. Returns an
+// error on a stop request or when the store cannot be read.
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
                                                  const Cost& cost, const Matrix& particles,
                                                  const SettleRequest& request, const Stop& stop);

@@ -41,6 +41,7 @@ class Settler {
   absl::StatusOr<Settlement> Run() {
     result_.particles = request_.guesses;
     result_.memory = request_.memory;
+    result_.allowance = request_.allowance;
     if (IsInVain()) return std::move(result_);
     bool may_move = true;
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
@@ -112,6 +113,8 @@ class Settler {
   // Raises the order to the first one that follows the model; the present order stays if none does.
   absl::Status RaiseOrder(const Region& region) {
     if (!MayRaiseOrder(region)) return absl::OkStatus();
+    result_.postponed = Withheld();
+    if (Withheld()) return absl::OkStatus();
     OrderInVain tried;
     auto next = NextTruncation(options(), request_.problem->dimension(), present());
     for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
@@ -168,8 +171,9 @@ class Settler {
     cost.set_power(power_);
     POLYEST_ASSIGN_OR_RETURN(
         const ConfirmedMinima found,
-        OverlookedMinima(expansion(), cost, result_.particles, request_, stop_));
+        OverlookedMinima(expansion(), cost, result_.particles, RequestNow(), stop_));
     result_.propagated_rows += found.propagated_rows;
+    if (found.propagated_rows > 0) result_.allowance.Use(request_.rows, request_.rows);
     const auto each = static_cast<Eigen::Index>(
         std::ceil(kShareOfOverlooked * static_cast<double>(result_.particles.rows())));
     Eigen::Index row = result_.particles.rows();
@@ -198,29 +202,49 @@ class Settler {
     return design;
   }
 
+  // Whether the allowance forbids to propagate the record from its beginning.
+  bool Withheld() const { return !result_.allowance.AllowsRecord(request_.rows); }
+
+  SettleRequest RequestNow() const {
+    SettleRequest request = request_;
+    request.allowance = result_.allowance;
+    return request;
+  }
+
   // Moves the sums to the region without propagating the record, with no fewer terms.
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> Carried(const Region& region,
-                                                             const Truncation& truncation) const {
+                                                             const Truncation& truncation) {
     if (request_.rows <= RowsOfShortRecord(*request_.problem)) {
       return absl::FailedPreconditionError("the record is short");
     }
+    const int64_t cost = RowsToCarryOver(expansion(), request_.rows);
+    if (!result_.allowance.Allows(request_.rows, cost)) {
+      return absl::FailedPreconditionError("too many rows would be propagated again");
+    }
+    const double max_shift = Withheld() ? kMaxShiftUnderLimit : kMaxCarriedShift;
     const Truncation& terms = truncation.order < present().order ? present() : truncation;
-    return CarryOver(*request_.problem, expansion(), DesignOn(region, terms), *request_.store,
-                     request_.rows, request_.threads, stop_);
+    auto carried = CarryOver(*request_.problem, expansion(), DesignOn(region, terms),
+                             *request_.store, request_.rows, request_.threads, stop_, max_shift);
+    result_.allowance.Use(request_.rows, cost);
+    return carried;
   }
 
   // Returns false when the new expansion cannot be built; the present one then stays.
   absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
     if (absl::IsFailedPrecondition(moved.status()) && request_.may_replay) {
+      result_.postponed = Withheld();
+      if (Withheld()) return false;
       moved = Replay(*request_.problem, DesignOn(std::move(region), truncation),
                      present_.noise().ForNewExpansion(), *request_.store, request_.rows,
                      request_.threads, stop_);
+      result_.allowance.Use(request_.rows, request_.rows);
     }
     if (absl::IsFailedPrecondition(moved.status())) return false;
     if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
     result_.expansion = *std::move(moved);
+    result_.postponed = false;
     ++result_.reexpansions;
     return true;
   }

@@ -13,7 +13,8 @@
 // What the previous settlements tried in vain is not tried again (settlement_memory.h).
 // Each move lowers the order by one. Where the record is long and the present expansion is accurate
 // the sums are carried over instead of propagating the record, with the order as it is
-// (carry_over.h). The region is derived from particles and never from a minimum
+// (carry_over.h), with a larger error if the record may not be propagated again
+// (replay_allowance.h). The region is derived from particles and never from a minimum
 // and its Hessian: in a direction that the data do not inform yet, the position of the minimum is
 // arbitrary.
 
@@ -22,6 +23,7 @@
 #include <memory>
 
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/expansion/settlement_memory.h"
 
 namespace polyest::internal {
@@ -36,6 +38,7 @@ struct SettleRequest {
   int threads = 1;
   bool may_raise_order = true;  // has an effect only if the order is automatic
   bool may_replay = true;       // whether the record may be propagated from its beginning
+  ReplayAllowance allowance;    // and how many rows may be propagated again
   // Whether to end where particles have been added at minima that the sampler overlooked and the
   // expansion knows well, before it moves.
   bool ends_at_overlooked = false;
@@ -47,6 +50,9 @@ struct Settlement {
   SettlementMemory memory;
   // Whether particles have been added at overlooked minima, which the expansion knows well.
   bool overlooked = false;
+  ReplayAllowance allowance;  // what is left of it
+  // Whether the expansion should have moved, or its order risen, and the allowance forbade it.
+  bool postponed = false;
   int reexpansions = 0;
   int64_t propagated_rows = 0;  // by all expansions but the returned one
 };

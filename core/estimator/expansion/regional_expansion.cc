@@ -90,7 +90,9 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
     const bool found = noise_.channels[static_cast<size_t>(c)].time_constant_s > 0 &&
                        model.outliers == OutlierHandling::kNone;
     sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned && !found;
-    sums.degrees_factor = DegreesFactor(model.outliers);
+    sums.degrees_factor = !problem_.uses_filters() ? DegreesFactor(model.outliers)
+                          : IsTailed(c)            ? kFilteredDegreesFactor
+                                                   : 1;
   }
   if (problem_.uses_filters()) {
     for (ChannelSums& sums : absorbed_.sums) sums.log_variance.setZero(reference_phi_.size());
@@ -296,10 +298,12 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   const auto coefficients = coefficients_.col(column);
   const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
   const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
-  const double weight = OutlierWeight(model.outliers, deviation);
+  // Filters handle outliers themselves.
+  const OutlierHandling outliers = filters_ ? OutlierHandling::kNone : model.outliers;
+  const double weight = OutlierWeight(outliers, deviation);
   // e = z − cᵀφ_0,  R = σ²/w + ρ
-  double noise = VarianceFactor(model.outliers) * sigma * sigma / weight;
-  double lack = LackOfWeight(model.outliers, deviation);
+  double noise = VarianceFactor(outliers) * sigma * sigma / weight;
+  double lack = filters_ && IsTailed(c) ? kFilteredLack : LackOfWeight(outliers, deviation);
   if (IsScored(c)) {
     const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
     z = scored.value;
@@ -314,8 +318,10 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.discount[c] += own_error / variance;
   absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
-  Normalize(VarianceFactor(model.outliers) * sigma * sigma, own_error, lack);
-  if (weight < 0.5) ++absorbed_.outliers[static_cast<size_t>(c)];
+  Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
+  const bool is_outlier =
+      filters_ ? IsTailed(c) && FilteredOutlierWeight(deviation) < 0.5 : weight < 0.5;
+  if (is_outlier) ++absorbed_.outliers[static_cast<size_t>(c)];
   Compare(column, z, noise);
   CompareControls(column, variance);
   if (filters_) AddLogVariance(column, noise, variance);

@@ -14,7 +14,8 @@
 // Where the likelihood is that of prediction errors (polyest/problem.h), each point runs a filter
 // (propagation/filter_bank.h), and what is expanded is the whitened innovation w = ν/√S and
 // log(S/σ²). In the sums the innovations take the place of the residuals: y_k stands for z_k − σ_k
-// w_k. The variances add ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R.
+// w_k. The variances add ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R. Outliers are
+// handled by the filters (propagation/heavy_tail.h), whose w and log S/σ² are those of Student's t.
 
 #include <absl/status/statusor.h>
 
@@ -238,6 +239,10 @@ class RegionalExpansion {
   void Linearize();
   void PredictNoise(int first);
   bool IsScored(int channel) const;
+  bool IsTailed(int channel) const {
+    return problem_.problem().measured[static_cast<size_t>(channel)].noise.outliers !=
+           OutlierHandling::kNone;
+  }
   ScoredSample Scored(int channel, const ConstVectorRef& coefficients, double z, double variance,
                       double own_error) const;
   void EndRunOfSums();

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/expansion_state.h"
 #include "core/estimator/expansion/reexpansion.h"
 
@@ -78,11 +77,9 @@ void Divide(const Vector& factors, AbsorbedRows& absorbed) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(const ResolvedProblem& problem,
-                                                            const RegionalExpansion& present,
-                                                            LearnedNoise noise,
-                                                            const SampleStore& store, int64_t rows,
-                                                            int threads, const Stop& stop) {
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
+    const ResolvedProblem& problem, const RegionalExpansion& present, LearnedNoise noise,
+    const SampleStore& store, int64_t rows, int threads, const Stop& stop, double max_shift) {
   const bool is_short = rows <= RowsOfShortRecord(problem);
   if (is_short || !present.kept_state() || rows != present.absorbed_rows()) {
     return absl::FailedPreconditionError("there is no state to go on from");
@@ -92,7 +89,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(const ResolvedProble
   ExpansionState state = *present.kept_state();
   if ((factors->array() != 1).any()) {
     const double error = present.OwnError() / factors->minCoeff();
-    if (!(error <= kMaxCarriedShift * kMaxCarriedShift * noise.misfit)) {
+    if (!(error <= max_shift * max_shift * noise.misfit)) {
       return absl::FailedPreconditionError("the expansion is not accurate enough");
     }
     Divide(*factors, state.absorbed);

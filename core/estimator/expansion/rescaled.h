@@ -15,6 +15,7 @@
 
 #include <memory>
 
+#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/regional_expansion.h"
 
 namespace polyest::internal {
@@ -23,11 +24,13 @@ namespace polyest::internal {
 // the same `rows` rows with `noise`. Returns FailedPrecondition where the sums do not tell what
 // they would be: if anything but scales differs, if a scale that differs belongs to noise with
 // outliers or is not learned yet, if the correlation of noise is being learned, or if the expansion
-// keeps no state or is not accurate enough.
+// keeps no state or its error might shift the posterior by more than `max_shift` of its standard
+// deviations.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(const ResolvedProblem& problem,
                                                             const RegionalExpansion& present,
                                                             LearnedNoise noise,
                                                             const SampleStore& store, int64_t rows,
-                                                            int threads, const Stop& stop);
+                                                            int threads, const Stop& stop,
+                                                            double max_shift = kMaxCarriedShift);
 
 }  // namespace polyest::internal

@@ -86,6 +86,7 @@ class Assessment {
  private:
   void NoteMinimum(const Minimum& minimum, const Vector& eta) {
     findings_.problem = &problem_;
+    findings_.postponed = request_.postponed;
     findings_.expansion = request_.expansion;
     findings_.record = request_.record;
     findings_.map_xi = design_.region.ToGerm(eta);
@@ -165,6 +166,7 @@ class Assessment {
     const Agreement agreement = AgreementWithModel(*request_.expansion, cost);
     findings_.integration_shift = IntegrationShift(*request_.expansion, cost);
     findings_.shift = agreement.shift;
+    findings_.carried_shift = std::sqrt(cost.power() * request_.expansion->CarriedError());
     ExpansionSummary& expansion = estimate_.expansion;
     expansion.order = design_.basis->order();
     expansion.terms = design_.basis->size();
@@ -195,7 +197,7 @@ class Assessment {
         CorrectByModel(DifferencesAtChecks(*request_.expansion, cost), etas, posterior_.weights);
     estimate_.expansion.pareto_shape = correction.pareto_shape;
     if (correction.degree == 0) return;
-    findings_.shift = std::min(findings_.shift, correction.shift);
+    findings_.shift = std::min(findings_.shift, correction.shift + findings_.carried_shift);
     Reweigh(correction.log_factors, posterior_);
   }
 
@@ -219,8 +221,7 @@ class Assessment {
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation_[i] / prior_deviation[i];
       parameter.verdict = VerdictOfContraction(std::min(1.0, widening[i] * informed[i]));
-      if (parameter.verdict == Verdict::kIdentified &&
-          findings_.windows.doubtful[static_cast<size_t>(i)]) {
+      if (parameter.verdict == Verdict::kIdentified && findings_.IsDoubtful(i)) {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
@@ -247,8 +248,7 @@ class Assessment {
   }
 
   void WidenForShift() {
-    shift_widening_ =
-        findings_.shift > kInaccurateShift ? std::sqrt(1 + findings_.shift * findings_.shift) : 1;
+    shift_widening_ = findings_.WideningForShift();
     WidenPosterior(Vector::Constant(prior_.dimension(), shift_widening_));
   }
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/filtered_quantities.h"
 #include "core/estimator/posterior/mixture_share.h"
@@ -33,6 +34,7 @@ struct AssessmentRequest {
   bool weigh = false;
   std::optional<double> power;  // of the likelihood, if it is common to several
   double last_weight = 1;
+  Postponed postponed;  // what the limit on rows that are propagated again has put off
 };
 
 struct Assessed {

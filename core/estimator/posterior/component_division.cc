@@ -49,7 +49,7 @@ int MostComponents(const ResolvedProblem& problem) {
 // Pieces are not looked for before the noise is learned, because the noise would decide between
 // them.
 bool MixtureComponent::MayLookForPieces() const {
-  if (!adaptive() || taken_ < whole_until_ || room_ < 2) return false;
+  if (!adaptive() || taken_ < whole_until_ || room_ < 2 || IsReplayWithheld()) return false;
   for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
     const bool unknown = problem_.problem().measured[c].noise.unknown;
     if (unknown && !expansion_->noise().channels[c].learned) return false;
@@ -74,7 +74,7 @@ bool MixtureComponent::LookForPieces() {
 }
 
 bool MixtureComponent::MayBisect() const {
-  return adaptive() && taken_ >= whole_until_ && room_ > 1 &&
+  return adaptive() && taken_ >= whole_until_ && room_ > 1 && !IsReplayWithheld() &&
          problem_.dimension() <= kMaxDimensionToBisect;
 }
 
@@ -106,6 +106,7 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
       halves_ = false;
       whole_until_ = NextWindow(taken_, windows_from_);
       parts.clear();
+      allowance_.Use(taken_, taken_);
       return parts;
     }
     POLYEST_RETURN_IF_ERROR(begun);
@@ -116,11 +117,13 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
 }
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const Piece& whole,
-                                                                          const Stop& stop) const {
+                                                                          const Stop& stop) {
+  if (IsReplayWithheld()) return nullptr;
   std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
   const absl::Status begun = united->ExpandOn(*this, whole, stop);
-  if (absl::IsFailedPrecondition(begun)) return nullptr;
-  POLYEST_RETURN_IF_ERROR(begun);
+  if (!begun.ok() && !absl::IsFailedPrecondition(begun)) return begun;
+  allowance_.Use(taken_, taken_);
+  if (!begun.ok()) return nullptr;
   united->whole_until_ = 0;
   united->bisected_ = false;
   const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
@@ -169,6 +172,8 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
                                               *store_, taken_, threads_, stop));
   ++reexpansions_;
+  allowance_ = parent.allowance_;
+  allowance_.Use(taken_, taken_);
   return absl::OkStatus();
 }
 

@@ -96,8 +96,9 @@ absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& bloc
     raised->channels[c].scale = *scale;
   }
   if (!raised) return false;
-  POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(raised), stop));
-  return true;
+  // The sample must not be taken with a noise that is far too small.
+  allowance_.ExemptAt(taken_);
+  return Reweigh(*std::move(raised), stop);
 }
 
 // Returns whether the record was reweighed with another noise. Smaller noise requires a more
@@ -108,8 +109,12 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     std::optional<LearnedNoise> revised =
         ReviseNoise(problem_, *expansion_, summary_, particles_, stop);
-    if (!revised) break;
-    POLYEST_RETURN_IF_ERROR(Reweigh(*std::move(revised), stop));
+    if (!revised) {
+      postponed_.noise = 0;
+      break;
+    }
+    POLYEST_ASSIGN_OR_RETURN(const bool reweighed, Reweigh(*std::move(revised), stop));
+    if (!reweighed) break;
     moved = true;
     if (!adaptive()) continue;
     POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
@@ -118,30 +123,60 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
   return moved;
 }
 
+// Goes on from the state that the expansion keeps, if the allowance lets the rows since then be
+// propagated again and the sums tell what they would be.
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::RescaledTo(LearnedNoise noise,
+                                                                                const Stop& stop) {
+  const int64_t cost = RowsToCarryOver(*expansion_, taken_) / 2;
+  if (!allowance_.Allows(taken_, cost)) {
+    return absl::FailedPreconditionError("too many rows would be propagated again");
+  }
+  const double max_shift = IsReplayWithheld() ? kMaxShiftUnderLimit : kMaxCarriedShift;
+  auto rescaled =
+      Rescaled(problem_, *expansion_, std::move(noise), *store_, taken_, threads_, stop, max_shift);
+  if (rescaled.ok()) allowance_.Use(taken_, cost);
+  return rescaled;
+}
+
+// Propagates the record so far again, if the allowance lets it.
+absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::ReplayedWith(
+    const LearnedNoise& noise, const Stop& stop) {
+  if (IsReplayWithheld()) {
+    return absl::FailedPreconditionError("too many rows would be propagated again");
+  }
+  auto replayed = Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_,
+                         threads_, stop);
+  if (replayed.ok()) allowance_.Use(taken_, taken_);
+  return replayed;
+}
+
 // Weighs the samples of the record so far by `noise`; propagates it again unless its sums tell what
-// they would be.
-absl::Status MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
-  auto reweighed = Rescaled(problem_, *expansion_, noise, *store_, taken_, threads_, stop);
+// they would be. Returns false, and the present noise stays, if that is put off.
+absl::StatusOr<bool> MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
+  auto reweighed = RescaledTo(noise, stop);
   if (absl::IsFailedPrecondition(reweighed.status())) {
-    reweighed = Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_,
-                       threads_, stop);
+    if (IsReplayWithheld()) {
+      if (postponed_.noise == 0) postponed_.noise = taken_;
+      return false;
+    }
+    reweighed = ReplayedWith(noise, stop);
   }
   POLYEST_RETURN_IF_ERROR(reweighed.status());
   Adopt(*std::move(reweighed));
-  return absl::OkStatus();
+  postponed_.noise = 0;
+  return true;
 }
 
 // Returns the present expansion with the problem's new tolerance. If the trajectories so far are
 // accurate enough, only those to come are integrated with it.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::WithNewTolerance(
-    double shift, const Stop& stop) const {
+    double shift, const Stop& stop) {
   const LearnedNoise& noise = expansion_->noise();
   if (shift <= kMaxCarriedShift) {
-    auto going_on = Rescaled(problem_, *expansion_, noise, *store_, taken_, threads_, stop);
+    auto going_on = RescaledTo(noise, stop);
     if (!absl::IsFailedPrecondition(going_on.status())) return going_on;
   }
-  return Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_, threads_,
-                stop);
+  return ReplayedWith(noise, stop);
 }
 
 // Returns the shift that the control trajectories show; 0 without any. They are compared with the
@@ -173,14 +208,21 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (needed < present) tolerance = 0.5 * needed;
   const double shift = ShiftOfControls();
   tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls(shift)));
-  if (tolerance >= present || expansion_->StepsExactly()) return false;
+  if (tolerance >= present || expansion_->StepsExactly()) {
+    postponed_.tolerance = 0;
+    return false;
+  }
+  const bool withheld = IsReplayWithheld();
   problem_.set_relative_tolerance(tolerance);
   auto replayed = WithNewTolerance(shift, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
-    if (absl::IsFailedPrecondition(replayed.status())) return false;  // the present expansion stays
-    return replayed.status();
+    if (!absl::IsFailedPrecondition(replayed.status())) return replayed.status();
+    // The present expansion stays.
+    if (withheld && postponed_.tolerance == 0) postponed_.tolerance = taken_;
+    return false;
   }
+  postponed_.tolerance = 0;
   Adopt(*std::move(replayed));
   return true;
 }

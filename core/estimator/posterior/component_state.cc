@@ -44,7 +44,9 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
          state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
          IsMemoryFor(problem, state.memory, state.particles) && state.weight >= 0 &&
-         state.weight <= 1 && state.room >= 1 && IsSummaryFor(problem, state.summary, state.taken);
+         state.weight <= 1 && state.room >= 1 &&
+         IsSummaryFor(problem, state.summary, state.taken) &&
+         ReplayAllowance::IsState(state.allowance, state.taken);
 }
 
 // Whether the ended runs have the windows that they must have.
@@ -115,6 +117,8 @@ ComponentState MixtureComponent::State() const {
   state.settlements = settlements_;
   state.reexpansions = reexpansions_;
   state.abandoned_rows = abandoned_rows_;
+  state.allowance = allowance_.state();
+  state.postponed = postponed_;
   state.summary = summary_;
   return state;
 }
@@ -147,6 +151,8 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
   component->settlements_ = state.settlements;
   component->reexpansions_ = state.reexpansions;
   component->abandoned_rows_ = state.abandoned_rows;
+  component->allowance_.Restore(state.allowance);
+  component->postponed_ = state.postponed;
   component->summary_ = std::move(state.summary);
   return component;
 }

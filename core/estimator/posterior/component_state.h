@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/estimator/expansion/expansion_state.h"
+#include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/record/record_summary.h"
 
@@ -35,6 +36,8 @@ struct ComponentState {
   uint64_t settlements = 0;
   int reexpansions = 0;
   int64_t abandoned_rows = 0;
+  ReplayAllowance::State allowance;
+  Postponed postponed;
   RecordSummary summary;
 };
 

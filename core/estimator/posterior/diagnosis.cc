@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/posterior/residual_diagnosis.h"
 #include "core/estimator/posterior/undersampling.h"
 #include "core/estimator/record/suspicious_data.h"
@@ -236,6 +237,33 @@ void AddPopulation(const Findings& findings, std::vector<Diagnostic>& diagnostic
            findings.population_shift)});
 }
 
+// Reports what the limit on the rows that are propagated again has put off.
+void AddPostponed(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
+  const Postponed& postponed = findings.postponed;
+  std::vector<std::string> parts;
+  const auto add = [&parts](int64_t rows, const char* what) {
+    if (rows > 0) parts.push_back(absl::StrFormat("since row %d %s", rows, what));
+  };
+  add(postponed.expansion, "the expansion has not followed the posterior");
+  add(postponed.noise, "the noise has not been learned again");
+  add(postponed.tolerance, "the integrators' tolerance has not been lowered");
+  if (findings.CarriesError()) {
+    parts.push_back(absl::StrFormat(
+        "sums carried over may put estimates off by %.2g standard deviations of the fit, by which "
+        "the uncertainty has been widened",
+        findings.carried_shift));
+  }
+  if (parts.empty()) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kReplayPostponed,
+       absl::StrFormat(
+           "expansion.maxReplayRowCount = %d keeps the record from being propagated again: "
+           "%s; %sraise it, or narrow the priors so that the expansion moves early",
+           findings.problem->problem().expansion.max_replay_row_count.value_or(0),
+           absl::StrJoin(parts, ", "),
+           postponed.any() ? "no parameter is called IDENTIFIED until then; " : "")});
+}
+
 void AddEdge(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (!findings.leans) return;
   diagnostics.push_back(
@@ -258,6 +286,14 @@ void AddRegularization(const Findings& findings, std::vector<Diagnostic>& diagno
 
 }  // namespace
 
+double Findings::WideningForShift() const {
+  return shift > kInaccurateShift || CarriesError() ? std::sqrt(1 + shift * shift) : 1;
+}
+
+bool Findings::CarriesError() const {
+  return problem->problem().expansion.max_replay_row_count && carried_shift > kMaxCarriedShift;
+}
+
 const std::string& Findings::NameOf(int parameter) const {
   return problem->prior().parameters()[static_cast<size_t>(parameter)].name;
 }
@@ -268,6 +304,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddInaccuracy(findings, estimate, diagnostics);
   AddIntegrationError(findings, diagnostics);
   AddPopulation(findings, diagnostics);
+  AddPostponed(findings, diagnostics);
   AddEdge(findings, diagnostics);
   DiagnoseResiduals(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);

@@ -7,6 +7,7 @@
 
 #include "core/bayes/minimizer.h"
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/posterior/window_assessment.h"
 #include "core/estimator/record/record_summary.h"
 #include "polyest/estimate.h"
@@ -26,6 +27,15 @@ struct Findings {
   bool PopulationPrevails() const {
     return 2 * population_shift * population_shift > shift * shift;
   }
+  // Returns the factor of the uncertainty for the expansion's own error.
+  double WideningForShift() const;
+  // Whether sums were taken over with an error for which the record would have been propagated
+  // again without a limit.
+  bool CarriesError() const;
+  // Whether parameter i must not be called identified.
+  bool IsDoubtful(int i) const {
+    return postponed.any() || windows.doubtful[static_cast<size_t>(i)];
+  }
   const std::string& NameOf(int parameter) const;
 
   const ResolvedProblem* problem = nullptr;
@@ -39,6 +49,8 @@ struct Findings {
   double shift = 0;                  // bound on the error of a mean, in standard deviations
   double integration_shift = 0;      // the part of it that the integration causes
   double population_shift = 0;       // the part of it that ended runs of a population cause
+  double carried_shift = 0;          // the part of it that sums taken over cause
+  Postponed postponed;               // what the limit on rows propagated again has put off
   // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion

@@ -32,6 +32,8 @@ const char* NameOf(DiagnosticCode code) {
       return "SUSPICIOUS_DATA";
     case DiagnosticCode::kInconsistentOverTime:
       return "INCONSISTENT_OVER_TIME";
+    case DiagnosticCode::kReplayPostponed:
+      return "REPLAY_POSTPONED";
     case DiagnosticCode::kWindowsDisagree:
       return "WINDOWS_DISAGREE";
   }

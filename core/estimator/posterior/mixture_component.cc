@@ -55,7 +55,8 @@ MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleS
       store_(store),
       threads_(threads),
       learns_noise_(LearnsNoise(problem_.problem())),
-      particles_(0, problem_.dimension()) {}
+      particles_(0, problem_.dimension()),
+      allowance_(problem_.problem().expansion.max_replay_row_count) {}
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,
@@ -199,6 +200,8 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
   const bool short_of_trajectories = row == expansion_->fitted_rows();
   if (settled_row_ != taken_) settlements_at_row_ = 0;
   settled_row_ = taken_;
+  // There is no expansion to stay with.
+  if (short_of_trajectories) allowance_.ExemptAt(taken_);
   if (adaptive() && taken_ > 0 && settlements_at_row_ < kMaxSettlementsAtRow) {
     POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, !short_of_trajectories));
     ++settlements_at_row_;
@@ -280,7 +283,8 @@ absl::StatusOr<bool> MixtureComponent::SettleAhead(const Stop& stop) {
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   const double shift = LargestShift(*expansion_, cost);
   const bool is_short = taken_ <= RowsOfShortRecord(problem_);
-  if (shift < kAheadOfNeed * kMaxCarriedShift || (shift > kMaxCarriedShift && !is_short)) {
+  const bool may_carry = shift <= kMaxCarriedShift || is_short || IsReplayWithheld();
+  if (shift < kAheadOfNeed * kMaxCarriedShift || !may_carry) {
     ahead_row_ = taken_ + 1;
     return false;
   }
@@ -302,7 +306,10 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   // Each settlement may raise the order, so several may be needed.
   for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
     const bool follows = accurate();
-    if (follows && !Leans()) return moved;
+    if (follows && !Leans()) {
+      postponed_.expansion = 0;
+      return moved;
+    }
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
     if (must_divide()) return true;
     if (!settled) break;
@@ -338,6 +345,7 @@ absl::StatusOr<MixtureComponent::Settled> MixtureComponent::SettleOnce(SettleReq
   request.memory = memory_;
   request.seed = 1000 * (settlements_ + 1);
   request.threads = threads_;
+  request.allowance = allowance_;
   POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
                            polyest::internal::Settle(*expansion_, request, stop));
   ++settlements_;
@@ -346,6 +354,9 @@ absl::StatusOr<MixtureComponent::Settled> MixtureComponent::SettleOnce(SettleReq
   abandoned_rows_ += settlement.propagated_rows;
   reexpansions_ += settlement.reexpansions;
   const bool moved = settlement.expansion != nullptr;
+  allowance_ = settlement.allowance;
+  if (moved && !settlement.postponed) postponed_.expansion = 0;
+  if (settlement.postponed && postponed_.expansion == 0) postponed_.expansion = taken_;
   if (moved) Adopt(std::move(settlement.expansion));
   return Settled{moved, settlement.overlooked};
 }
@@ -379,6 +390,7 @@ AssessmentRequest MixtureComponent::RequestAssessment() const {
   request.reexpansions = reexpansions_;
   request.propagated_rows = propagated_rows();
   request.last_weight = weight_;
+  request.postponed = postponed_;
   return request;
 }
 

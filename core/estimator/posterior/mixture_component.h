@@ -13,6 +13,7 @@
 
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/expansion/run_elimination.h"
 #include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/posterior/assessment.h"
@@ -70,9 +71,9 @@ class MixtureComponent {
   // expanded; this component then continues undivided.
   absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> Divide(const Stop& stop);
   // Returns a component for all of Ω at the same row that begins in the piece, with this one's
-  // noise and windows. Returns null if its expansion does not follow the model there.
-  absl::StatusOr<std::unique_ptr<MixtureComponent>> Unite(const Piece& whole,
-                                                          const Stop& stop) const;
+  // noise and windows. Returns null if its expansion does not follow the model there, or if the
+  // record may not be propagated again.
+  absl::StatusOr<std::unique_ptr<MixtureComponent>> Unite(const Piece& whole, const Stop& stop);
   // Whether the division is a bisection. Its halves need no weighing before they have taken more.
   bool bisects() const { return halves_; }
   // The number of components that this one may become by divisions.
@@ -104,6 +105,8 @@ class MixtureComponent {
   bool automatic_order() const { return !problem_.problem().expansion.order; }
   bool LooksAtEdges() const { return adaptive() && taken_ >= edges_row_; }
   bool LooksAhead() const;
+  // Whether the limit forbids to propagate the record so far again.
+  bool IsReplayWithheld() const { return !allowance_.AllowsRecord(taken_); }
   bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
   absl::Status Recover(const Stop& stop);
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
@@ -130,7 +133,11 @@ class MixtureComponent {
   double ShiftOfControls() const;
   double ToleranceForControls(double shift) const;
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> WithNewTolerance(double shift,
-                                                                      const Stop& stop) const;
+                                                                      const Stop& stop);
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> RescaledTo(LearnedNoise noise,
+                                                                const Stop& stop);
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWith(const LearnedNoise& noise,
+                                                                  const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order, bool may_replay = true);
   struct Settled {
@@ -153,7 +160,7 @@ class MixtureComponent {
   absl::Status ExpandOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   ExpansionDesign DesignOn(const MixtureComponent& parent, const Piece& piece) const;
-  absl::Status Reweigh(LearnedNoise noise, const Stop& stop);
+  absl::StatusOr<bool> Reweigh(LearnedNoise noise, const Stop& stop);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
   ResolvedProblem problem_;  // own copy, because the tolerance follows the noise
@@ -185,6 +192,8 @@ class MixtureComponent {
   uint64_t settlements_ = 0;
   int reexpansions_ = 0;
   int64_t abandoned_rows_ = 0;  // propagated by expansions that were replaced
+  ReplayAllowance allowance_;   // of rows that are propagated again
+  Postponed postponed_;         // what it has put off
   RecordSummary summary_;
 };
 

@@ -8,6 +8,7 @@
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/noise_choice.h"
+#include "core/estimator/problem/process_noise.h"
 
 namespace polyest::internal {
 namespace {
@@ -334,7 +335,9 @@ std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel
   return scale;
 }
 
+// Filters handle outliers without the posterior, and learn no other noise.
 bool LearnsNoise(const Problem& problem) {
+  if (UsesFilters(problem)) return false;
   return std::ranges::any_of(problem.measured, [&problem](const MeasuredOutput& m) {
     return IsLearned(m.noise) || (problem.expansion.adaptive && IsOfPrediction(m.noise));
   });

@@ -16,6 +16,9 @@ namespace {
 // deviations and by a third.
 constexpr double kMisfitDeviations = 6;
 constexpr double kTooSmallRatio = 1.5;
+// As kTooSmallRatio, for Student's t noise of samples that filters take: Gaussian noise of the
+// stated size leaves χ² = 0.59 N to 0.69 N there.
+constexpr double kTooSmallRatioWithTails = 2.5;
 // Relative noise whose bias, if it is taken of the samples, is mentioned.
 constexpr double kLargeRelativeNoise = 0.05;
 // A record of fewer time constants than five hardly knows them: that of a random walk, which has
@@ -34,6 +37,11 @@ std::string WideningText(const Findings& findings) {
       findings.NameOf(static_cast<int>(widest)), factor);
 }
 
+double TooSmallRatio(const ResolvedProblem& problem, size_t channel) {
+  const bool tailed = problem.problem().measured[channel].noise.outliers != OutlierHandling::kNone;
+  return problem.uses_filters() && tailed ? kTooSmallRatioWithTails : kTooSmallRatio;
+}
+
 // A learned scale is skipped: it was learned from χ², which is therefore no test of it.
 void AddMisfit(const Findings& findings, const Estimate& estimate,
                std::vector<Diagnostic>& diagnostics) {
@@ -41,7 +49,8 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
     const ChannelEstimate& channel = estimate.channels[c];
     if (findings.problem->problem().measured[c].noise.unknown) continue;
     const auto samples = static_cast<double>(channel.samples);
-    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers)) {
+    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers,
+                     findings.problem->uses_filters())) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
@@ -51,7 +60,8 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
     }
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
-    if (channel.chi_squared < expected / kTooSmallRatio &&
+    const double ratio = TooSmallRatio(*findings.problem, c);
+    if (channel.chi_squared < expected / ratio &&
         channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,

@@ -9,6 +9,7 @@ namespace {
 constexpr double kExcessDeviations = 6;
 constexpr double kExcessRatio = 1.2;
 constexpr double kExcessRatioWithOutliers = 1.5;
+constexpr double kExcessRatioWithTails = 2;
 constexpr double kCorrelationDeviations = 4;
 constexpr double kCorrelated = 0.05;
 constexpr int64_t kMinForCorrelation = 20;
@@ -16,9 +17,11 @@ constexpr double kMaxLag1Correlation = 0.99;
 
 }  // namespace
 
-bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers) {
+bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers, bool filtered) {
   const auto samples = static_cast<double>(channel.samples);
-  const double ratio = outliers == OutlierHandling::kNone ? kExcessRatio : kExcessRatioWithOutliers;
+  const double ratio = outliers == OutlierHandling::kNone ? kExcessRatio
+                       : filtered                         ? kExcessRatioWithTails
+                                                          : kExcessRatioWithOutliers;
   return channel.chi_squared > ratio * samples &&
          channel.chi_squared > samples + kExcessDeviations * std::sqrt(2 * samples);
 }

@@ -11,8 +11,9 @@ namespace polyest::internal {
 // Returns whether χ² is too large for the noise assumed: for a right model it has mean N and
 // standard deviation √(2N). It must exceed N by six of them and by a fifth, which is noise that is
 // larger by a tenth; by a half if outliers are handled, because some of them are expected and their
-// weight is small but not 0.
-bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers);
+// weight is small but not 0; to twice N if filters do, whose χ² grows with the logarithm of an
+// outlier (bayes/noise.h).
+bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers, bool filtered);
 
 // Returns whether successive residuals are correlated: of independent ones the lag-1 correlation
 // has the standard deviation 1/√N. It must be four of them and 0.05, which changes the uncertainty

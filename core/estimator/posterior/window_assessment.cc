@@ -29,7 +29,9 @@ bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& re
                          const std::vector<ChannelEstimate>& channels) {
   for (size_t c = 0; c < channels.size(); ++c) {
     const NoiseModel& noise = NoiseOf(problem, c);
-    if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers)) return true;
+    if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers, problem.uses_filters())) {
+      return true;
+    }
     if (c < record.channels().size() && AreCorrelated(channels[c], record.channels()[c].Runs()) &&
         !AreSmall(channels[c], noise)) {
       return true;

@@ -154,7 +154,10 @@ absl::Status CheckSensor(size_t index, const MeasuredOutput& measured) {
   }
   if (noise.relative > 0) return refuse("relative");
   if (noise.correlation != NoiseCorrelation::kWhite) return refuse("correlation");
-  if (noise.outliers != OutlierHandling::kNone) return refuse("outliers");
+  if (noise.outliers == OutlierHandling::kHuber) {
+    return InvalidField(FieldPath{"measured", index, "noise", "outliers"},
+                        absl::StrCat("HUBER ", kRefusal, "; STUDENT_T is"));
+  }
   return absl::OkStatus();
 }
 

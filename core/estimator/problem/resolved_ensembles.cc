@@ -1,5 +1,6 @@
 // The ensembles and inputs of a problem (resolved_problem.h).
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -44,7 +45,20 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   specification.inputs_ahead_s = output_lead_s_;
   specification.integration = problem_.integration;
   specification.threads = threads;
+  if (uses_filters()) specification.heavy_tailed = AreHeavyTailed(specification.outputs);
   return specification;
+}
+
+// Whether outliers are handled in the samples of each output (a column of the model's).
+std::vector<bool> ResolvedProblem::AreHeavyTailed(const std::vector<int>& outputs) const {
+  std::vector<bool> tailed;
+  for (const int output : outputs) {
+    const auto channel = std::ranges::find(outputs_, output) - outputs_.begin();
+    tailed.push_back(channel < std::ssize(outputs_) &&
+                     problem_.measured[static_cast<size_t>(channel)].noise.outliers !=
+                         OutlierHandling::kNone);
+  }
+  return tailed;
 }
 
 // A derived value that is not finite makes the whole point fail.

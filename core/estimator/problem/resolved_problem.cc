@@ -53,6 +53,24 @@ absl::Status ValidatePriors(const Problem& problem) {
   return absl::OkStatus();
 }
 
+// A record of four intervals between checkpoints is always propagated again.
+absl::Status ValidateReplayLimit(const Problem& problem) {
+  const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
+  if (!limit) return absl::OkStatus();
+  const FieldPath field{"expansion", "max_replay_row_count"};
+  const int64_t least = 4 * int64_t{problem.integration.samples_between_checkpoints};
+  if (*limit < least) {
+    return InvalidField(field, absl::StrFormat("%d must be at least %d", *limit, least));
+  }
+  for (const UncertainParameter& parameter : problem.uncertain) {
+    if (!parameter.per_run) continue;
+    return InvalidField(
+        field, absl::StrCat("is not available with a parameter of each run, ", parameter.name,
+                            ": a new run propagates the whole record again"));
+  }
+  return absl::OkStatus();
+}
+
 // Returns the errors that can be found without examining the model.
 std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int first_run) {
   std::vector<absl::Status> refusals;
@@ -66,6 +84,7 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int fir
   }
   add(ValidateRegularization(problem));
   add(ValidatePopulations(problem));
+  add(ValidateReplayLimit(problem));
   if (const absl::Status priors = ValidatePriors(problem); !priors.ok()) {
     add(priors);
   } else if (!problem.uncertain.empty()) {

@@ -144,6 +144,7 @@ class ResolvedProblem {
   // the problem's, where there are any.
   void SetTargets(const std::vector<std::optional<int>>& found);
   void Derive(Matrix& values) const;
+  std::vector<bool> AreHeavyTailed(const std::vector<int>& outputs) const;
   Matrix ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const;
 
   Problem problem_;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/noise.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_score.h"
@@ -61,13 +62,18 @@ class OutputPrediction {
     result_.residual.setConstant(times, kNone);
     noise_ = subject.noise[static_cast<size_t>(channel_)];
     model_ = subject.problem->problem().measured[static_cast<size_t>(channel_)].noise;
-    kernel_ = model_.outliers == OutlierHandling::kStudentT ? NoiseKernel::kStudentT
-                                                            : NoiseKernel::kNormal;
+    const bool filters = subject.problem->uses_filters();
+    const bool tailed = model_.outliers == OutlierHandling::kStudentT;
+    kernel_ = tailed && !filters ? NoiseKernel::kStudentT : NoiseKernel::kNormal;
     if (noise_.scale <= 0 || options.smoothed) return;
     const int draws = static_cast<int>(subject.thetas.rows());
     factors_ = noise_.degrees_of_freedom > 0 ? ScaleFactors(noise_.degrees_of_freedom, draws)
                                              : Vector(Vector::Ones(draws));
     UseUncertainNoise(subject);
+    // Student's t beside the filters' own normal distribution: a scale mixture over the draws.
+    if (tailed && filters) {
+      factors_ = factors_.cwiseProduct(ScaleFactors(kStudentTDegreesOfFreedom, draws)).eval();
+    }
     sums_.emplace(options.lags);
     result_.sample_std_dev.resize(times);
     result_.sample_quantiles.resize(times, probabilities);

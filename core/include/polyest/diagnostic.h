@@ -22,6 +22,7 @@ enum class DiagnosticCode {
   kRegularizationNotDetermined,  // the rule asked for does not choose an α²; it stays 1
   kSuspiciousData,               // the data are allowed but probably not what was meant
   kInconsistentOverTime,         // a parameter differs between parts of the record
+  kReplayPostponed,              // max_replay_row_count has put off what the estimate needs
   kWindowsDisagree,              // windows of the record scatter by more than the noise explains
 };
 

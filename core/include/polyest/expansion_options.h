@@ -35,6 +35,12 @@ struct ExpansionOptions {
   double points_per_term = 2;  // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise
   PointSet points = PointSet::kHalton;  // where the model is run
   bool adaptive = true;  // expand again where the posterior is; false: over the prior only
+  // The most rows that an update propagates again, ≥ 4 · integration.samples_between_checkpoints;
+  // without a value there is no limit. While the record grows by B rows, each component of the
+  // posterior propagates at most as many rows again, and B: once the record is longer, the
+  // expansion moves only as far as its sums can be carried over. What is put off is said by
+  // DiagnosticCode::kReplayPostponed. Not available with parameters of each run.
+  std::optional<int64_t> max_replay_row_count = std::nullopt;
 
   // Returns OK for options that suit n = `dimension` uncertain parameters; INVALID_ARGUMENT or
   // RESOURCE_EXHAUSTED name the field, the value and the rule.

@@ -13,7 +13,8 @@
 //
 // With LikelihoodForm::kPredictionError a filter runs at each θ_d in place of a trajectory. It
 // predicts each row from the samples before it, and y(θ_d) is a normal distribution; times after
-// the last row are forecasts. Estimator::CurrentPrediction computes it.
+// the last row are forecasts. Student's t noise is then a normal one whose variance is drawn for
+// each θ_d. Estimator::CurrentPrediction computes it.
 
 #include <cstdint>
 #include <optional>

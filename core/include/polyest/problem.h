@@ -86,7 +86,8 @@ struct Problem {
   // Default: kPredictionError if there is process noise or a parameter drifts, else kOutputError.
   // With kPredictionError the model must have from 1 to 32 states, must be a StateSpaceModel whose
   // equations do not switch, and outputs have no delays; noise of the samples is known, white and
-  // not relative; uncertain parameters are shared by all runs; regularization_mode is kFixed.
+  // not relative, and its outliers are not kHuber; there are no populations; regularization_mode is
+  // kFixed.
   std::optional<LikelihoodForm> likelihood;
   ExpansionOptions expansion;  // how the outputs are expanded
   double regularization = 1;   // α² ≥ 0 of the cost J_mismatch + α² J_prior

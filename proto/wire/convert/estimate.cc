@@ -49,6 +49,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::SUSPICIOUS_DATA;
     case DiagnosticCode::kInconsistentOverTime:
       return v1::Diagnostic::INCONSISTENT_OVER_TIME;
+    case DiagnosticCode::kReplayPostponed:
+      return v1::Diagnostic::REPLAY_POSTPONED;
     case DiagnosticCode::kWindowsDisagree:
       return v1::Diagnostic::WINDOWS_DISAGREE;
   }

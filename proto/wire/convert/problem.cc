@@ -243,6 +243,7 @@ absl::StatusOr<ExpansionOptions> ToExpansion(const v1::ExpansionOptions& given) 
   if (given.has_hyperbolic_exponent()) options.hyperbolic_exponent = given.hyperbolic_exponent();
   if (given.points_per_term() != 0) options.points_per_term = given.points_per_term();
   if (given.has_adaptive()) options.adaptive = given.adaptive();
+  if (given.has_max_replay_row_count()) options.max_replay_row_count = given.max_replay_row_count();
   switch (given.points()) {
     case v1::ExpansionOptions::POINTS_UNSPECIFIED:
       return options;

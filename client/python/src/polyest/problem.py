@@ -164,10 +164,12 @@ class Problem:
     def expand(self, *, order: Optional[int] = None, points_per_term: Optional[float] = None,
                points: Optional[Literal["HALTON", "HAMMERSLEY", "GAUSS_TENSOR"]] = None,
                adaptive: Optional[bool] = None,
-               hyperbolic_exponent: Optional[float] = None) -> Problem:
+               hyperbolic_exponent: Optional[float] = None,
+               max_replay_row_count: Optional[int] = None) -> Problem:
         """Says how the outputs are expanded in polynomials; None leaves the daemon's default."""
         self._merge("expansion", order=order, pointsPerTerm=points_per_term, points=points,
-                    adaptive=adaptive, hyperbolicExponent=hyperbolic_exponent)
+                    adaptive=adaptive, hyperbolicExponent=hyperbolic_exponent,
+                    maxReplayRowCount=max_replay_row_count)
         return self
 
     def integrate(self, *, method: Optional[Literal["AUTO", "EXPLICIT", "STIFF"]] = None,

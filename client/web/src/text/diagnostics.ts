@@ -20,6 +20,12 @@ const EXPLANATIONS: Record<string, Explanation> = {
     remedy: 'Look at `polyest profile`: a flat or jagged cost says which parameter is the cause. Fix it, or give it a narrower prior.',
     severity: 'serious',
   },
+  REPLAY_POSTPONED: {
+    title: 'Limit on the work of an update reached',
+    meaning: 'expansion.maxReplayRowCount keeps the record from being propagated again although the estimate needs it. Nothing is called identified until that is made up for, and what it costs in accuracy has widened the uncertainty.',
+    remedy: 'Raise expansion.maxReplayRowCount as far as the time of an update allows, or narrow the priors so that the expansion moves early.',
+    severity: 'serious',
+  },
   POINTS_FAILED: {
     title: 'Some runs of the model failed',
     meaning: 'The model could not be integrated for some values of the unknowns, and these were left out.',

@@ -354,7 +354,7 @@ TEST(ProcessNoise, IsRefusedWithWhatFiltersCannotDo) {
   EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.relative = 0.1; }),
               HasSubstr("measured[0].noise.relative: is not available"));
   EXPECT_THAT(refusal([](Problem& p) { p.measured[0].noise.outliers = OutlierHandling::kHuber; }),
-              HasSubstr("measured[0].noise.outliers: is not available"));
+              HasSubstr("measured[0].noise.outliers: HUBER is not available"));
   EXPECT_THAT(
       refusal([](Problem& p) { p.measured[0].noise.correlation = NoiseCorrelation::kUnknown; }),
       HasSubstr("measured[0].noise.correlation: is not available"));

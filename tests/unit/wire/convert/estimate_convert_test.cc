@@ -171,6 +171,7 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kRegularizationNotDetermined, v1::Diagnostic::REGULARIZATION_NOT_DETERMINED},
       {DiagnosticCode::kSuspiciousData, v1::Diagnostic::SUSPICIOUS_DATA},
       {DiagnosticCode::kInconsistentOverTime, v1::Diagnostic::INCONSISTENT_OVER_TIME},
+      {DiagnosticCode::kReplayPostponed, v1::Diagnostic::REPLAY_POSTPONED},
       {DiagnosticCode::kWindowsDisagree, v1::Diagnostic::WINDOWS_DISAGREE}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;

@@ -38,6 +38,7 @@ TEST(ToProblem, FillsInTheDefaultsOfTheContract) {
   EXPECT_EQ(problem.model->description().name, "mass_spring_damper");
   EXPECT_EQ(problem.expansion.order, std::nullopt);
   EXPECT_EQ(problem.expansion.hyperbolic_exponent, 1);
+  EXPECT_EQ(problem.expansion.max_replay_row_count, std::nullopt);
   EXPECT_EQ(problem.expansion.points_per_term, 2);
   EXPECT_EQ(problem.expansion.points, PointSet::kHalton);
   EXPECT_TRUE(problem.expansion.adaptive);
@@ -52,7 +53,7 @@ TEST(ToProblem, TakesEveryOptionThatIsGiven) {
   v1::Problem given = SmallProblem();
   given.MergeFrom(ProblemFromJson(R"({
     "expansion": {"order": 5, "pointsPerTerm": 3, "points": "HAMMERSLEY", "adaptive": false,
-                  "hyperbolicExponent": 0.8},
+                  "hyperbolicExponent": 0.8, "maxReplayRowCount": 20000},
     "regularization": 0,
     "regularizationMode": "L_CURVE",
     "integration": {"method": "STIFF", "relativeTolerance": 1e-9, "maxSteps": 77}
@@ -63,6 +64,7 @@ TEST(ToProblem, TakesEveryOptionThatIsGiven) {
   EXPECT_EQ(problem.fixed.at("k"), 39.478);
   EXPECT_EQ(problem.expansion.order, 5);
   EXPECT_EQ(problem.expansion.hyperbolic_exponent, 0.8);
+  EXPECT_EQ(problem.expansion.max_replay_row_count, 20'000);
   EXPECT_EQ(problem.expansion.points_per_term, 3);
   EXPECT_EQ(problem.expansion.points, PointSet::kHammersley);
   EXPECT_FALSE(problem.expansion.adaptive);
