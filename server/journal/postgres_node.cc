@@ -40,6 +40,10 @@ constexpr char kRenewLapsed[] =
     "INSERT INTO node (node, name, address, lease_until) OVERRIDING SYSTEM VALUE VALUES ($1, $2, "
     "$3, clock_timestamp() + interval '3 s') ON CONFLICT (node) DO UPDATE SET lease_until = "
     "excluded.lease_until, address = excluded.address";
+constexpr char kEndEarlierRun[] =
+    "WITH gone AS (DELETE FROM node WHERE node <> $1 AND name = $2 RETURNING node) UPDATE owner "
+    "SET "
+    "node = NULL, epoch = epoch + 1 FROM gone WHERE owner.node = gone.node";
 // Sessions that were never shown, of nodes that do not live.
 constexpr char kDropHidden[] =
     "WITH gone AS (DELETE FROM session USING owner WHERE hidden AND owner.session = number AND NOT "
@@ -94,12 +98,6 @@ PostgresNode::~PostgresNode() {
 absl::Status PostgresNode::Register(PostgresConnection& connection) {
   // A lease that a crash of the database shortens harms nobody, so that no beat waits for the disk.
   POLYEST_RETURN_IF_ERROR(connection.Execute("SET synchronous_commit = off"));
-  if (!name_.empty()) {
-    POLYEST_RETURN_IF_ERROR(connection
-                                .Query("UPDATE node SET lease_until = '-infinity' WHERE name = $1",
-                                       PostgresParameters().AddText(name_))
-                                .status());
-  }
   const Clock::time_point sent = Clock::now();
   POLYEST_ASSIGN_OR_RETURN(
       const PostgresResult result,
@@ -177,7 +175,12 @@ absl::Status PostgresNode::Beat() {
     POLYEST_RETURN_IF_ERROR(Review(*connection_));
   }
   lease_until_ = (sent + kLease).time_since_epoch().count();
-  return absl::OkStatus();
+  if (succeeded_ || address.empty() || name_.empty()) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(
+      connection_->Query(kEndEarlierRun, PostgresParameters().Add(number_).AddText(name_))
+          .status());
+  succeeded_ = true;
+  return connection_->Query(kDropHidden).status();
 }
 
 absl::Status PostgresNode::Review(PostgresConnection& connection) {

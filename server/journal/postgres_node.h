@@ -37,7 +37,9 @@ class PostgresNode {
   };
 
   // Joins the nodes of a database whose schema is prepared. A node of the same `name`, if that is
-  // not empty, is taken for an earlier run of this one: its lease ends. The pool must outlive this.
+  // not empty, is taken for an earlier run of this one once this one is announced: it loses its
+  // sessions. Only then is it certain that no other daemon listens at the address. The pool must
+  // outlive this.
   static absl::StatusOr<std::unique_ptr<PostgresNode>> Join(PostgresPool& pool,
                                                             const PostgresTarget& target,
                                                             std::string name);
@@ -89,7 +91,8 @@ class PostgresNode {
   const PostgresTarget target_;
   const std::string name_;
   int64_t number_ = 0;
-  std::unique_ptr<PostgresConnection> connection_;       // of the thread; null while there is none
+  std::unique_ptr<PostgresConnection> connection_;  // of the thread; null while there is none
+  bool succeeded_ = false;  // whether an earlier run has lost its sessions; used by the thread
   std::atomic<Clock::time_point::rep> lease_until_ = 0;  // by the clock of this process
 
   mutable std::mutex mutex_;

@@ -1,5 +1,7 @@
 #include "server/security/method_roles.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <iterator>
 #include <set>
 
@@ -21,6 +23,16 @@ ServiceDescriptors Services() {
           v1::StartComputationRequest::descriptor()->file()->service(0),
           v1::DownloadBackupRequest::descriptor()->file()->service(0),
           v1::GetStatusRequest::descriptor()->file()->service(0)};
+}
+
+std::string PathOf(Method method) {
+  const std::string name(method.name());
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    if (service->FindMethodByName(name) != nullptr) {
+      return absl::StrCat("/", service->full_name(), "/", name);
+    }
+  }
+  return "";  // not reached, because the services have all methods of the table
 }
 
 bool CoversAllMethods(const ServiceDescriptors& services) {

@@ -4,6 +4,7 @@
 
 #include <google/protobuf/descriptor.h>
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -81,6 +82,9 @@ using ServiceDescriptors = std::vector<const google::protobuf::ServiceDescriptor
 
 // Returns the services of polyest.v1.
 ServiceDescriptors Services();
+
+// Returns the path by which gRPC calls a method: "/polyest.v1.SessionService/GetSession".
+std::string PathOf(Method method);
 
 // Returns whether the table has one entry for every method of the services, and no others.
 bool CoversAllMethods(const ServiceDescriptors& services);

@@ -49,6 +49,7 @@ void MeasurementFlow::OnFirstMessageDue() {
 
 void MeasurementFlow::OnRead(bool ok) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnRead(ok);
   reading_ = false;
   if (!ok) {
     half_closed_ = true;
@@ -110,14 +111,30 @@ void MeasurementFlow::Find(const std::string& tenant, const std::string& session
   std::lock_guard lock(mutex_);
   stage_ = Stage::kNone;
   if (!end_) {
+    if (PassOn(found.status())) return;
     const absl::Status joined = Join(std::move(found), writer);
     if (!joined.ok()) End(joined);
   }
   Advance();
 }
 
+bool MeasurementFlow::PassOn(const absl::Status& refusal) {
+  if (context_.nodes == nullptr || draining_ || refusal.ok()) return false;
+  std::optional<NodeForwarder::Passage> passage = context_.nodes->PassageFor(call_, refusal);
+  if (!passage) return false;
+  using Relay = StreamRelay<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse,
+                            MeasurementReactor>;
+  finished_ = true;
+  // Nothing is being read, and the first message is the only one that has been.
+  passed_on_ = Relay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_, reactor_,
+                            std::move(inbox_.front()));
+  inbox_.clear();
+  return true;
+}
+
 void MeasurementFlow::OnWritten(bool ok) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
   writing_ = false;
   outbox_.pop_front();
   if (!ok) Break(absl::CancelledError("the client does not read any more"));
@@ -126,6 +143,7 @@ void MeasurementFlow::OnWritten(bool ok) {
 
 void MeasurementFlow::OnCancelled() {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnCancelled();
   Break(absl::CancelledError("the call was cancelled"));
   Advance();
 }
@@ -145,6 +163,7 @@ void MeasurementFlow::OnReplaced() {
 
 void MeasurementFlow::Drain() {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->Drain();
   draining_ = true;
   if (session_ == nullptr) End(ShuttingDown());
   Advance();

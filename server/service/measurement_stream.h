@@ -7,7 +7,8 @@
 // numerics are computed on the session's strand, which never delays an acknowledgement. Reactions
 // only move messages between gRPC and bounded queues. The next message is read only while all
 // queues have room, so that HTTP/2's flow control holds back a client that is too fast for the
-// disk, far too fast for the numerics, or too slow to read.
+// disk, far too fast for the numerics, or too slow to read. A stream to a session of another daemon
+// is passed on to that.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -25,6 +26,7 @@
 #include "server/service/estimate_schedule.h"
 #include "server/service/first_message_timer.h"
 #include "server/service/service_context.h"
+#include "server/service/stream_relay.h"
 
 namespace polyest::internal {
 
@@ -86,6 +88,8 @@ class MeasurementFlow final : public SessionObserver,
   // The following are called with the mutex held.
   void Accept(v1::StreamMeasurementsRequest request);
   absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
+  // Passes the stream on to the owner of its session, if `refusal` names one that may be asked.
+  bool PassOn(const absl::Status& refusal);
   // Makes this the writer of the session.
   absl::Status Join(absl::StatusOr<std::shared_ptr<Session>> session, const std::string& writer);
   void End(const absl::Status& status);
@@ -126,8 +130,9 @@ class MeasurementFlow final : public SessionObserver,
 
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
-  std::shared_ptr<Session> session_;  // set once, before any work
-  uint64_t losses_ = 0;               // losses of the session when the stream began
+  std::shared_ptr<PassedOnStream> passed_on_;  // set if another daemon owns the session
+  std::shared_ptr<Session> session_;           // set once, before any work
+  uint64_t losses_ = 0;                        // losses of the session when the stream began
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;

@@ -42,13 +42,13 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   Unary* StartComputation(Context* call, const v1::StartComputationRequest* request,
                           v1::Operation* response) override {
-    return Soon(call, "StartComputation", response,
+    return Soon(call, "StartComputation", request, response,
                 [=, this](const Caller& caller) { return Start(caller, *request); });
   }
 
   Unary* GetOperation(Context* call, const v1::GetOperationRequest* request,
                       v1::Operation* response) override {
-    return Soon(call, "GetOperation", response,
+    return Soon(call, "GetOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
                   POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
                   return operations_.Get(caller.tenant, request->name());
@@ -57,14 +57,14 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   Unary* ListOperations(Context* call, const v1::ListOperationsRequest* request,
                         v1::ListOperationsResponse* response) override {
-    return Soon(call, "ListOperations", response, [=, this](const Caller& caller) {
+    return Soon(call, "ListOperations", request, response, [=, this](const Caller& caller) {
       return ListPage(operations_, caller.tenant, *request);
     });
   }
 
   Unary* CancelOperation(Context* call, const v1::CancelOperationRequest* request,
                          v1::Operation* response) override {
-    return Soon(call, "CancelOperation", response,
+    return Soon(call, "CancelOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
                   POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
                   return operations_.Cancel(caller.tenant, request->name());
@@ -73,7 +73,7 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   Unary* DeleteOperation(Context* call, const v1::DeleteOperationRequest* request,
                          google::protobuf::Empty* response) override {
-    return Soon(call, "DeleteOperation", response,
+    return Soon(call, "DeleteOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<google::protobuf::Empty> {
                   POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
                   POLYEST_RETURN_IF_ERROR(operations_.Delete(caller.tenant, request->name()));
@@ -104,9 +104,10 @@ class OperationService final : public v1::OperationService::CallbackService {
   }
 
   // Starts a call whose answer needs no computation.
-  template <typename Response, typename Answer>
-  Unary* Soon(Context* call, Method method, Response* response, const Answer& answer) {
-    return StartCall(context_, call, method, response, [&](const Caller& caller) {
+  template <typename Request, typename Response, typename Answer>
+  Unary* Soon(Context* call, Method method, const Request* request, Response* response,
+              const Answer& answer) {
+    return StartCall(context_, {call, method, request, response}, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, [=](const Caller& known, const Stop&) {
         return Deliver(absl::StatusOr<Response>(answer(known)), response);
       });
