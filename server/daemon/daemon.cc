@@ -142,8 +142,11 @@ absl::Status Daemon::OpenDatabase(OnCommit on_commit) {
 
 void Daemon::Advertise() {
   if (database_ == nullptr) return;
-  database_->Announce(options_.advertise.empty() ? addresses_.front().ToString()
-                                                 : options_.advertise);
+  database_->Announce(
+      options_.advertise.empty() ? addresses_.front().ToString() : options_.advertise, [this] {
+        return calls_.Count(OpenCalls::Kind::kWriter) + calls_.Count(OpenCalls::Kind::kWatcher);
+      });
+  handover_ = std::make_unique<Handover>(*sessions_, [this] { readiness_.Drain(); });
 }
 
 absl::Status Daemon::OpenSessions() {
@@ -307,10 +310,14 @@ bool Daemon::IsAlive(std::chrono::milliseconds timeout) {
 
 bool Daemon::Stop() {
   if (server_ == nullptr || closing_.joinable()) return true;
+  if (handover_ != nullptr) handover_->Stop();
   readiness_.Drain();
   if (audit_ != nullptr) audit_->Add("stopping", {});
   server_->GetHealthCheckService()->SetServingStatus(false);
-  calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
+  if (database_ != nullptr) database_->StartDraining();
+  const auto drained = std::chrono::steady_clock::now() + options_.drain_timeout;
+  calls_.Drain(drained);
+  if (handover_ != nullptr) handover_->LetGo(drained);
   stop_.request_stop();
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + kFlushTime);
   // gRPC waits for every call, also for those that do not look at their stop.
@@ -335,6 +342,7 @@ Daemon::~Daemon() {
   self_check_ = nullptr;
   server_ = nullptr;
   metrics_endpoint_ = nullptr;
+  handover_ = nullptr;
   housekeeper_ = nullptr;
 }
 

@@ -28,6 +28,7 @@
 #include "server/security/file_watch.h"
 #include "server/security/server_tls.h"
 #include "server/service/open_calls.h"
+#include "server/sessions/handover.h"
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
 #include "server/telemetry/audit_log.h"
@@ -143,6 +144,7 @@ class Daemon {
   std::unique_ptr<NodeForwarder> nodes_;  // null if calls are not passed on
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
+  std::unique_ptr<Handover> handover_;  // null without a database
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<Listener> listener_;
   std::unique_ptr<grpc::Server> server_;

@@ -7,6 +7,7 @@
 
 #include "polyest/v1/backup_service.pb.h"
 #include "polyest/v1/model_service.pb.h"
+#include "polyest/v1/node_service.pb.h"
 #include "polyest/v1/operation_service.pb.h"
 #include "polyest/v1/problem_service.pb.h"
 #include "polyest/v1/session_service.pb.h"
@@ -22,7 +23,8 @@ ServiceDescriptors Services() {
           v1::ComputeEstimateRequest::descriptor()->file()->service(0),
           v1::StartComputationRequest::descriptor()->file()->service(0),
           v1::DownloadBackupRequest::descriptor()->file()->service(0),
-          v1::GetStatusRequest::descriptor()->file()->service(0)};
+          v1::GetStatusRequest::descriptor()->file()->service(0),
+          v1::ListNodesRequest::descriptor()->file()->service(0)};
 }
 
 std::string PathOf(Method method) {

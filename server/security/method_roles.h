@@ -54,6 +54,8 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"CancelOperation", Role::kReader},
     {"DeleteOperation", Role::kReader},
     {"GetStatus", Role::kReader},
+    {"ListNodes", Role::kAdmin},
+    {"DrainNode", Role::kOperator},
     {"DownloadBackup", Role::kOperator},
 };
 

@@ -122,12 +122,10 @@ bool MeasurementFlow::PassOn(const absl::Status& refusal) {
   if (context_.nodes == nullptr || draining_ || refusal.ok()) return false;
   std::optional<NodeForwarder::Passage> passage = context_.nodes->PassageFor(call_, refusal);
   if (!passage) return false;
-  using Relay = StreamRelay<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse,
-                            MeasurementReactor>;
   finished_ = true;
   // Nothing is being read, and the first message is the only one that has been.
-  passed_on_ = Relay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_, reactor_,
-                            std::move(inbox_.front()));
+  passed_on_ = MeasurementRelay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_,
+                                       reactor_, std::move(inbox_.front()));
   inbox_.clear();
   return true;
 }
@@ -161,15 +159,16 @@ void MeasurementFlow::OnReplaced() {
   Advance();
 }
 
-void MeasurementFlow::Drain() {
+void MeasurementFlow::EndSoon(const absl::Status& reason) {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->Drain();
+  if (!draining_) drained_ = reason;
   draining_ = true;
-  if (session_ == nullptr) End(ShuttingDown());
+  if (session_ == nullptr) End(reason);
   Advance();
 }
 
-// Sets how the stream ends. The client has to send again what was received and not taken.
+// Sets how the stream ends. The client sends again what was received and not taken.
 void MeasurementFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
   inbox_.clear();
@@ -327,7 +326,7 @@ void MeasurementFlow::Compute() {
   std::unique_lock lock(mutex_);
   const std::vector<Uncomputed> turn = NextTurn();
   const bool last = uncomputed_.empty() && AllTaken();
-  const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
+  const absl::Status at_end = half_closed_ ? absl::OkStatus() : drained_;
   lock.unlock();
   const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
   lock.lock();

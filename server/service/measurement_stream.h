@@ -32,6 +32,8 @@ namespace polyest::internal {
 
 using MeasurementReactor =
     grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>;
+using MeasurementRelay =
+    StreamRelay<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse, MeasurementReactor>;
 
 // Holds the state of one stream. It outlives its reactor, because the strand may still hold it.
 class MeasurementFlow final : public SessionObserver,
@@ -57,9 +59,11 @@ class MeasurementFlow final : public SessionObserver,
   void OnClosed() override;
   // Ends the stream ABORTED, because the writer goes on with another connection.
   void OnReplaced() override;
+  // Ends the stream UNAVAILABLE after a last estimate, because the session moves.
+  void OnMoved() override { EndSoon(Moving()); }
   void OnEstimate(const SharedEstimate&) override {}
   // Ends the stream UNAVAILABLE after a last estimate, because the daemon shuts down.
-  void Drain() override;
+  void Drain() override { EndSoon(ShuttingDown()); }
 
  private:
   static constexpr size_t kLongestWriter = 64;
@@ -84,6 +88,8 @@ class MeasurementFlow final : public SessionObserver,
     int64_t sequence = 0;  // number of that batch
   };
   enum class Stage { kNone, kFinding, kLoading, kReady };
+
+  void EndSoon(const absl::Status& reason);
 
   // The following are called with the mutex held.
   void Accept(v1::StreamMeasurementsRequest request);
@@ -146,6 +152,7 @@ class MeasurementFlow final : public SessionObserver,
   bool computing_ = false;
   bool half_closed_ = false;
   bool draining_ = false;
+  absl::Status drained_;  // why draining_ is set
   bool finished_ = false;
   bool left_uncomputed_ = false;
   std::optional<absl::Status> end_;  // how the stream ends, once the outbox is empty

@@ -208,6 +208,12 @@ void WatchFlow::OnClosed() {
   Advance();
 }
 
+void WatchFlow::OnMoved() {
+  std::lock_guard lock(mutex_);
+  End(Moving());
+  Advance();
+}
+
 void WatchFlow::Drain() {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->Drain();

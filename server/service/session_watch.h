@@ -42,6 +42,7 @@ class WatchFlow final : public SessionObserver,
 
   void OnEstimate(const SharedEstimate& estimate) override;
   void OnClosed() override;
+  void OnMoved() override;
   void Drain() override;
 
  private:

@@ -92,6 +92,11 @@ void Session::Close() {
   if (const auto writer = writer_.Close(); writer != nullptr) writer->OnClosed();
 }
 
+void Session::SendAway() {
+  for (const auto& observer : observers_.All()) observer->OnMoved();
+  if (const auto writer = writer_.writer(); writer != nullptr) writer->OnMoved();
+}
+
 absl::Status Session::CheckOpen() const {
   if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   return absl::OkStatus();

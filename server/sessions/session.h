@@ -95,6 +95,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // and this daemon does not own the session.
   void Follow(const SessionPlace& place);
 
+  // Tells its observers and its writer that the session moves to another daemon.
+  void SendAway();
+
   // Ends the session for everybody: tells its observers and its writer. Calls on it are NOT_FOUND
   // from here on.
   void Close();
