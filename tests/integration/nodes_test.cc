@@ -163,5 +163,24 @@ TEST_F(NodesTest, FindsOperationsOfOtherDaemons) {
   EXPECT_EQ(get(*there).error_code(), StatusCode::NOT_FOUND);
 }
 
+TEST_F(NodesTest, RefusesOptionsThatWouldNotHold) {
+  const auto refuse = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--listen", "127.0.0.1:0"});
+    DaemonProcess daemon(std::move(arguments));
+    EXPECT_NE(daemon.Wait(), 0);
+    return daemon.Errors();
+  };
+  EXPECT_THAT(refuse({"--node-secret", secret_}),
+              HasSubstr("--node-secret: only daemons that share"));
+  EXPECT_THAT(refuse({"--journal", uri_, "--node-ca", secret_}),
+              HasSubstr("--node-ca: needs --node-secret"));
+  EXPECT_THAT(refuse({"--journal", uri_, "--node-secret", secret_, "--tls-certificate", secret_,
+                      "--tls-key", secret_}),
+              HasSubstr("which needs --node-ca"));
+  const std::string few = folder_.Write("few", "secret");
+  EXPECT_THAT(refuse({"--journal", uri_, "--node-secret", few}),
+              HasSubstr("--node-secret: " + few + " must have one line of 32 to 256"));
+}
+
 }  // namespace
 }  // namespace polyest::internal

@@ -129,11 +129,17 @@ TEST_F(PostgresTest, LetsADaemonThatWasStoppedPastItsLeaseWriteNothing) {
   const grpc::Status ended = stream.Finish();
   EXPECT_EQ(ended.error_code(), grpc::StatusCode::UNAVAILABLE) << ended.error_message();
   EXPECT_EQ(Batches(), 1);
-  const grpc::Status refused = first.Add(2);
-  EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNAVAILABLE) << refused.error_message();
   const grpc::Status added = second.Add(2);
   EXPECT_TRUE(added.ok()) << added.error_message();
   EXPECT_EQ(EstimateAt(second), Undisturbed(2));
+  second.process().Signal(SIGTERM);
+  EXPECT_EQ(second.process().Wait(), 0);
+  // The first one has the session in memory still, as it was.
+  v1::Session session;
+  const grpc::Status got = Insist([&] { return first.Get(session); });
+  EXPECT_TRUE(got.ok()) << got.error_message();
+  EXPECT_EQ(session.last_sequence(), 2);
+  EXPECT_EQ(EstimateAt(first), Undisturbed(2));
 }
 
 }  // namespace
