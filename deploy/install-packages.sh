@@ -12,7 +12,7 @@ packages=(
   build-essential cmake ninja-build ccache pkg-config
   libeigen3-dev libsundials-dev libnlopt-dev libnlopt-cxx-dev libabsl-dev libcereal-dev zlib1g-dev
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-  libsystemd-dev libspdlog-dev prometheus-cpp-dev libcpp-httplib-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libpq-dev libssl-dev
+  libsystemd-dev libspdlog-dev prometheus-cpp-dev libcpp-httplib-dev nlohmann-json3-dev libcli11-dev libzip-dev libpugixml-dev libsqlite3-dev libpq-dev libssl-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev clang-format curl openssl sqlite3 postgresql libfaketime haproxy

@@ -27,11 +27,12 @@ struct ServerAccess {
 
 // Place where a command computes: a daemon or this process.
 struct Place {
-  std::string server;     // HOST:PORT; empty: in this process
-  ServerAccess access;    // access to the server
-  double deadline_s = 0;  // longest duration, s; 0: no limit
-  int threads = 1;        // threads for computing in this process
-  std::string fmu_dir;    // folder of FMUs for this process; empty: none
+  std::string server;        // HOST:PORT; empty: in this process
+  ServerAccess access;       // access to the server
+  double deadline_s = 0;     // longest duration, s; 0: no limit
+  int threads = 1;           // threads for computing in this process
+  std::string fmu_dir;       // folder of FMUs for this process; empty: none
+  std::string umbridge_dir;  // likewise, of descriptions of models of UM-Bridge servers
 };
 
 struct EstimateArguments {

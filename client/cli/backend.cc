@@ -7,6 +7,7 @@
 
 #include "client/cli/progress_line.h"
 #include "core/common/status.h"
+#include "core/umbridge/open_models.h"
 #include "polyest/stop.h"
 #include "proto/wire/operations/operations.h"
 #include "proto/wire/refusal/refusal.h"
@@ -180,13 +181,10 @@ ClientOptions ToClientOptions(const Place& place) {
 }
 
 absl::StatusOr<ModelLibrary> OpenModels(const Place& place) {
-  if (place.fmu_dir.empty()) return ModelLibrary();
-  absl::StatusOr<FmuCatalogue> fmus = FmuCatalogue::Open(place.fmu_dir);
+  absl::StatusOr<ModelLibrary> models = OpenModels(ModelFolders{place.fmu_dir, place.umbridge_dir});
   // The error is one of the command line, whatever its code: it becomes INVALID_ARGUMENT.
-  if (!fmus.ok()) {
-    return absl::InvalidArgumentError(absl::StrCat("--fmu-dir: ", fmus.status().message()));
-  }
-  return ModelLibrary(*std::move(fmus));
+  if (!models.ok()) return absl::InvalidArgumentError(models.status().message());
+  return models;
 }
 
 std::unique_ptr<Backend> MakeBackend(const Place& place) {

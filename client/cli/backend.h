@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "client/cli/arguments.h"
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/client.h"
 #include "polyest/v1/model_service.pb.h"
 #include "polyest/v1/study_service.pb.h"
@@ -44,8 +44,8 @@ class Backend {
 // POLYEST_TOKEN or from the file of --token-file.
 ClientOptions ToClientOptions(const Place& place);
 
-// Returns the models of this process: the built-in ones and the FMUs of --fmu-dir. INVALID_ARGUMENT
-// if that folder cannot be used.
+// Returns the models of this process: the built-in ones and those of --fmu-dir and --umbridge-dir.
+// INVALID_ARGUMENT if such a folder cannot be used.
 absl::StatusOr<ModelLibrary> OpenModels(const Place& place);
 
 // Returns a backend that shows a line of progress on a terminal while it exists.

@@ -29,6 +29,8 @@ void AddUnits(const google::protobuf::RepeatedPtrField<v1::Model::Quantity>& qua
 
 }  // namespace
 
+bool IsInFolder(const v1::Problem::Model& model) { return model.has_fmu() || model.has_umbridge(); }
+
 DataColumns DataColumnsFor(const v1::Problem& problem, const ModelLibrary& models,
                            const DataFileOptions& options) {
   DataColumns columns = ColumnsOf(problem);
@@ -42,9 +44,10 @@ DataColumns DataColumnsFor(const v1::Problem& problem, const ModelLibrary& model
 
 absl::StatusOr<DataColumns> DataColumnsFor(const v1::Problem& problem, const Place& place,
                                            const DataFileOptions& options) {
-  if (problem.model().has_fmu() && !place.server.empty()) {
+  const v1::Problem::Model& source = problem.model();
+  if (IsInFolder(source) && !place.server.empty()) {
     v1::GetModelRequest request;
-    request.set_name(absl::StrCat("models/", problem.model().fmu()));
+    request.set_name(absl::StrCat("models/", source.has_fmu() ? source.fmu() : source.umbridge()));
     POLYEST_ASSIGN_OR_RETURN(const v1::Model model, MakeBackend(place)->GetModel(request));
     DataColumns columns = ColumnsOf(problem);
     columns.options = options;

@@ -7,12 +7,16 @@
 #include <string>
 
 #include "client/cli/arguments.h"
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/data_file.h"
 #include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
 
 namespace polyest::internal {
+
+// Whether the model is in a folder of the program that computes, so that a daemon's is unknown
+// here.
+bool IsInFolder(const v1::Problem::Model& model);
 
 // Returns the columns of data for a problem with the units of its model.
 DataColumns DataColumnsFor(const v1::Problem& problem, const ModelLibrary& models,

@@ -30,13 +30,11 @@ absl::StatusOr<std::string> Write(const ModelDescription& model, const char* sou
 absl::StatusOr<std::string> Text(const InitArguments& arguments, std::ostream& err) {
   if (arguments.equations) return kStartingEquations;
   const auto builtin = FindBuiltinModel(arguments.model);
-  if (builtin.ok() || arguments.place.fmu_dir.empty()) {
-    POLYEST_RETURN_IF_ERROR(builtin.status());
-    return Write((*builtin)->description(), "builtin", arguments, err);
-  }
+  if (builtin.ok()) return Write((*builtin)->description(), "builtin", arguments, err);
   POLYEST_ASSIGN_OR_RETURN(const ModelLibrary models, OpenModels(arguments.place));
-  POLYEST_ASSIGN_OR_RETURN(const auto fmu, models.FindFmu(arguments.model));
-  return Write(fmu->description(), "fmu", arguments, err);
+  POLYEST_ASSIGN_OR_RETURN(const auto model, models.Find(arguments.model));
+  const bool fmu = models.FindFmu(arguments.model).ok();
+  return Write(model->description(), fmu ? "fmu" : "umbridge", arguments, err);
 }
 
 // Lists the models with outputs that the columns of the data file may be.

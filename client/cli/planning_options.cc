@@ -39,7 +39,7 @@ void AddInit(CommandRegistry& registry) {
   AddDataOptions(command, arguments->data_options);
   command.add_option("-o,--output", arguments->output_file, "The file (default: standard output)");
   command.add_flag("--force", arguments->force, "Overwrite the file if it is there");
-  AddFmuFolder(command, arguments->place);
+  AddModelFolders(command, arguments->place);
 }
 
 void AddCheck(CommandRegistry& registry) {
@@ -52,7 +52,7 @@ void AddCheck(CommandRegistry& registry) {
   AddProblem(command, arguments->problem_file);
   command.add_option("data", arguments->data_file, "The measurements, a CSV file");
   AddDataOptions(command, arguments->data_options);
-  AddFmuFolder(command, arguments->place);
+  AddModelFolders(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json"});
 }
 

@@ -15,7 +15,7 @@ namespace polyest::internal {
 
 absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Place& place) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, ReadProblemFile(path));
-  if (problem.model().has_fmu() && !place.server.empty()) return problem;
+  if (IsInFolder(problem.model()) && !place.server.empty()) return problem;
   POLYEST_ASSIGN_OR_RETURN(const ModelLibrary models, OpenModels(place));
   const absl::Status checked = ToProblem(problem, models).status();
   if (!checked.ok()) return absl::InvalidArgumentError(absl::StrCat(path, ": ", checked.message()));

@@ -20,8 +20,8 @@
 namespace polyest::internal {
 
 // Reads a problem and checks it. An error of the file or of the problem is INVALID_ARGUMENT, and
-// its message begins with the file's name. A problem with an FMU for a server is not checked: only
-// the server knows its FMUs.
+// its message begins with the file's name. A problem with an FMU or a UM-Bridge model for a server
+// is not checked: only the server knows them.
 absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Place& place);
 
 // Refuses two files with INVALID_ARGUMENT when the first is CSV data and the second a problem.

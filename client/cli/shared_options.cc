@@ -60,8 +60,11 @@ CLI::Option* AddServer(CLI::App& command, Place& place) {
       ->check(CLI::Validator(CheckServer, "HOST:PORT"));
 }
 
-CLI::Option* AddFmuFolder(CLI::App& command, Place& place) {
-  return command.add_option("--fmu-dir", place.fmu_dir, "Folder with FMUs for local computations");
+std::vector<CLI::Option*> AddModelFolders(CLI::App& command, Place& place) {
+  return {
+      command.add_option("--fmu-dir", place.fmu_dir, "Folder with FMUs for local computations"),
+      command.add_option("--umbridge-dir", place.umbridge_dir,
+                         "Folder with descriptions of UM-Bridge models for local computations")};
 }
 
 void AddThreads(CLI::App& command, int& threads) {
@@ -75,7 +78,7 @@ CLI::Option* AddPlace(CLI::App& command, Place& place) {
   command.add_flag("--local")
       ->description("Compute in this process (the default)")
       ->excludes(server);
-  AddFmuFolder(command, place)->excludes(server);
+  for (CLI::Option* const folder : AddModelFolders(command, place)) folder->excludes(server);
   AddThreads(command, place.threads);
   return server;
 }

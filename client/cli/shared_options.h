@@ -12,10 +12,11 @@ namespace polyest::internal {
 
 // Adds --server, --deadline and the options for access to a daemon. Returns --server.
 CLI::Option* AddServer(CLI::App& command, Place& place);
-CLI::Option* AddFmuFolder(CLI::App& command, Place& place);
+// Adds --fmu-dir and --umbridge-dir and returns them.
+std::vector<CLI::Option*> AddModelFolders(CLI::App& command, Place& place);
 void AddThreads(CLI::App& command, int& threads);
-// Adds the choice between a daemon and this process: AddServer, --local, --fmu-dir and --threads.
-// Returns --server.
+// Adds the choice between a daemon and this process: AddServer, --local, AddModelFolders and
+// --threads. Returns --server.
 CLI::Option* AddPlace(CLI::App& command, Place& place);
 // AddProblem and AddData add the files as required arguments.
 void AddProblem(CLI::App& command, std::string& file);

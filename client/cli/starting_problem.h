@@ -9,11 +9,11 @@
 
 namespace polyest::internal {
 
-// Returns a problem for a model from `source`, "builtin" or "fmu": one or two unknowns within 30 %
-// of their defaults, the other parameters fixed at their defaults, a signal for each input, and all
-// outputs measured. Infinite defaults are left out, since JSON has no plain number for them. With
-// `proposed`, the inputs are streamed and the outputs measured, with noise of unknown size, that
-// have columns there; others are left out.
+// Returns a problem for a model from `source`, "builtin", "fmu" or "umbridge": one or two unknowns
+// within 30 % of their defaults, the other parameters fixed at their defaults, a signal for each
+// input, and all outputs measured. Infinite defaults are left out, since JSON has no plain number
+// for them. With `proposed`, the inputs are streamed and the outputs measured, with noise of
+// unknown size, that have columns there; others are left out.
 std::string StartingProblem(const ModelDescription& model, const char* source = "builtin",
                             const ProposedColumns* proposed = nullptr);
 

@@ -10,21 +10,18 @@
 #include <pugixml.hpp>
 
 #include "core/common/status.h"
-#include "core/fmu/clean_text.h"
+#include "core/external/clean_text.h"
 #include "core/fmu/variable_list.h"
 
 namespace polyest::internal {
 namespace {
 
-absl::Status Wrong(const std::string& what) {
-  return absl::FailedPreconditionError(absl::StrCat("modelDescription.xml: ", what));
-}
-
 absl::StatusOr<int> Version(const pugi::xml_node& root) {
   const std::string version = root.attribute("fmiVersion").value();
   if (absl::StartsWith(version, "2.0")) return 2;
   if (absl::StartsWith(version, "3.0")) return 3;
-  return Wrong(absl::StrFormat("fmiVersion \"%s\" is not supported; 2.0 and 3.0 are", version));
+  return WrongDescription(
+      absl::StrFormat("fmiVersion \"%s\" is not supported; 2.0 and 3.0 are", version));
 }
 
 bool IsIdentifier(const std::string& name) {
@@ -39,17 +36,17 @@ absl::Status ReadKind(const pugi::xml_node& root, FmuInterface& interface) {
   const pugi::xml_node exchange = root.child("ModelExchange");
   const pugi::xml_node simulation = root.child("CoSimulation");
   if (!exchange && !simulation) {
-    return Wrong("the FMU offers neither Model Exchange nor Co-Simulation");
+    return WrongDescription("the FMU offers neither Model Exchange nor Co-Simulation");
   }
   interface.kind = exchange ? FmuKind::kModelExchange : FmuKind::kCoSimulation;
   const pugi::xml_node element = exchange ? exchange : simulation;
   interface.identifier = element.attribute("modelIdentifier").value();
   if (!IsIdentifier(interface.identifier)) {
-    return Wrong(absl::StrFormat("modelIdentifier \"%s\" must be a C identifier",
-                                 interface.identifier.substr(0, 64)));
+    return WrongDescription(absl::StrFormat("modelIdentifier \"%s\" must be a C identifier",
+                                            interface.identifier.substr(0, 64)));
   }
   if (element.attribute("needsExecutionTool").as_bool()) {
-    return Wrong("the FMU needs the tool that it was made with, which is not supported");
+    return WrongDescription("the FMU needs the tool that it was made with, which is not supported");
   }
   const bool is_2 = interface.version == 2;
   interface.needs_completed_step =
@@ -70,7 +67,7 @@ absl::Status ReadCommunicationStep(const pugi::xml_node& root, FmuInterface& int
   if (step) interface.communication_step_s = step.as_double();
   if (!step && fixed) interface.communication_step_s = fixed.as_double();
   if (!(interface.communication_step_s > 1e-12 && interface.communication_step_s < 1e12)) {
-    return Wrong(absl::StrFormat("stepSize \"%s\" must be above 0", step.value()));
+    return WrongDescription(absl::StrFormat("stepSize \"%s\" must be above 0", step.value()));
   }
   return absl::OkStatus();
 }
@@ -110,10 +107,10 @@ absl::StatusOr<FmuDescription> ParseFmuDescription(const std::string& name,
   pugi::xml_document document;
   const pugi::xml_parse_result parsed = document.load_buffer(xml.data(), xml.size());
   if (!parsed) {
-    return Wrong(absl::StrFormat("%s at byte %d", parsed.description(), parsed.offset));
+    return WrongDescription(absl::StrFormat("%s at byte %d", parsed.description(), parsed.offset));
   }
   const pugi::xml_node root = document.child("fmiModelDescription");
-  if (!root) return Wrong("the root must be fmiModelDescription");
+  if (!root) return WrongDescription("the root must be fmiModelDescription");
   FmuDescription description;
   FmuInterface& interface = description.interface;
   interface.name = name;

@@ -9,17 +9,13 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "core/fmu/clean_text.h"
+#include "core/external/clean_text.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr size_t kMaxVariables = 200'000;
-constexpr size_t kLongestName = 1'000;
-
-absl::Status Wrong(const std::string& what) {
-  return absl::FailedPreconditionError(absl::StrCat("modelDescription.xml: ", what));
-}
+constexpr size_t kLongestVariableName = 1'000;
 
 // Returns the units of the declared types by the type's name.
 absl::flat_hash_map<std::string, std::string> TypeUnits(const pugi::xml_node& root, int version) {
@@ -33,13 +29,17 @@ absl::flat_hash_map<std::string, std::string> TypeUnits(const pugi::xml_node& ro
 
 }  // namespace
 
+absl::Status WrongDescription(const std::string& what) {
+  return absl::FailedPreconditionError(absl::StrCat("modelDescription.xml: ", what));
+}
+
 absl::StatusOr<VariableList> VariableList::Read(const pugi::xml_node& root, int version) {
   VariableList list;
   const Units units = TypeUnits(root, version);
   for (const pugi::xml_node node : root.child("ModelVariables").children()) {
     if (node.type() != pugi::node_element) continue;
     if (list.variables_.size() == kMaxVariables) {
-      return Wrong(absl::StrFormat("there are more than %d variables", kMaxVariables));
+      return WrongDescription(absl::StrFormat("there are more than %d variables", kMaxVariables));
     }
     POLYEST_RETURN_IF_ERROR(version == 2 ? list.Add2(node, units) : list.Add3(node, units));
   }
@@ -47,7 +47,8 @@ absl::StatusOr<VariableList> VariableList::Read(const pugi::xml_node& root, int 
   POLYEST_RETURN_IF_ERROR(version == 2 ? list.FindStates2(structure) : list.FindStates3(structure));
   if (version == 2) list.event_indicators_ = root.attribute("numberOfEventIndicators").as_int();
   if (list.event_indicators_ < 0 || list.event_indicators_ > static_cast<int>(kMaxVariables)) {
-    return Wrong(absl::StrFormat("%d event indicators are not supported", list.event_indicators_));
+    return WrongDescription(
+        absl::StrFormat("%d event indicators are not supported", list.event_indicators_));
   }
   return list;
 }
@@ -78,10 +79,10 @@ absl::Status VariableList::Add3(const pugi::xml_node& node, const Units& units) 
 absl::Status VariableList::AddCommon(const pugi::xml_node& node, const pugi::xml_node& type,
                                      const Units& units, Variable variable) {
   Quantity& quantity = variable.quantity;
-  quantity.name = CleanText(node.attribute("name").value(), kLongestName + 1);
-  if (quantity.name.empty() || quantity.name.size() > kLongestName) {
-    return Wrong(absl::StrFormat("variable %d must have a name of 1 to %d characters",
-                                 variables_.size() + 1, kLongestName));
+  quantity.name = CleanText(node.attribute("name").value(), kLongestVariableName + 1);
+  if (quantity.name.empty() || quantity.name.size() > kLongestVariableName) {
+    return WrongDescription(absl::StrFormat("variable %d must have a name of 1 to %d characters",
+                                            variables_.size() + 1, kLongestVariableName));
   }
   quantity.meaning = CleanText(node.attribute("description").value());
   quantity.unit = type.attribute("unit").value();
@@ -99,8 +100,9 @@ absl::Status VariableList::AddCommon(const pugi::xml_node& node, const pugi::xml
     variable.has_start = true;
     if (!absl::SimpleAtod(start.value(), &quantity.default_value) ||
         !std::isfinite(quantity.default_value)) {
-      return Wrong(absl::StrFormat("the start value \"%s\" of %s must be a finite number",
-                                   std::string(start.value()).substr(0, 64), quantity.name));
+      return WrongDescription(
+          absl::StrFormat("the start value \"%s\" of %s must be a finite number",
+                          std::string(start.value()).substr(0, 64), quantity.name));
     }
   }
   variables_.push_back(std::move(variable));
@@ -109,7 +111,7 @@ absl::Status VariableList::AddCommon(const pugi::xml_node& node, const pugi::xml
 
 absl::Status VariableList::AddState(const Variable& derivative, size_t state) {
   if (!derivative.is_derivative || state >= variables_.size() || !variables_[state].is_real) {
-    return Wrong(absl::StrFormat(
+    return WrongDescription(absl::StrFormat(
         "%s must be the derivative of a single real variable; arrays are not supported",
         derivative.quantity.name));
   }
@@ -122,7 +124,8 @@ absl::Status VariableList::FindStates2(const pugi::xml_node& structure) {
   for (const pugi::xml_node unknown : structure.child("Derivatives").children("Unknown")) {
     const size_t index = unknown.attribute("index").as_uint();
     if (index < 1 || index > variables_.size()) {
-      return Wrong(absl::StrFormat("ModelStructure.Derivatives: there is no variable %d", index));
+      return WrongDescription(
+          absl::StrFormat("ModelStructure.Derivatives: there is no variable %d", index));
     }
     const Variable derivative = variables_[index - 1];
     POLYEST_RETURN_IF_ERROR(
@@ -144,7 +147,7 @@ absl::Status VariableList::FindStates3(const pugi::xml_node& structure) {
     const uint32_t reference = node.attribute("valueReference").as_uint();
     const size_t index = find(reference);
     if (index == variables_.size()) {
-      return Wrong(absl::StrFormat(
+      return WrongDescription(absl::StrFormat(
           "ModelStructure.ContinuousStateDerivative: there is no variable with valueReference %d",
           reference));
     }
@@ -166,7 +169,7 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
   for (const Variable& variable : variables_) {
     const Quantity& quantity = variable.quantity;
     if (!names.insert(quantity.name).second) {
-      return Wrong(absl::StrFormat("the variable %s is there twice", quantity.name));
+      return WrongDescription(absl::StrFormat("the variable %s is there twice", quantity.name));
     }
     const bool is_parameter = variable.causality == "parameter";
     const bool is_input = variable.causality == "input";

@@ -14,6 +14,9 @@
 
 namespace polyest::internal {
 
+// Returns FailedPrecondition that says what is wrong with a modelDescription.xml.
+absl::Status WrongDescription(const std::string& what);
+
 class VariableList {
  public:
   // Reads the variables below `root`, the fmiModelDescription element. Returns FailedPrecondition

@@ -8,7 +8,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "core/fmu/clean_text.h"
+#include "core/external/clean_text.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest::internal {

@@ -23,7 +23,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "core/fmu/clean_text.h"
+#include "core/external/clean_text.h"
 #include "core/fmu/messages.h"
 
 namespace polyest::internal {

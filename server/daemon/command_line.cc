@@ -252,6 +252,9 @@ void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
       ->capture_default_str();
   app.add_option("--fmu-dir", daemon.fmu_dir,
                  "Folder of the FMUs that problems may name; put in it only what you would run");
+  app.add_option(
+      "--umbridge-dir", daemon.umbridge_dir,
+      "Folder of descriptions of the models of UM-Bridge servers that problems may name");
   app.add_option("--threads", daemon.threads, "Threads of the numerics; 0: one a core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

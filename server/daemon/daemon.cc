@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "core/common/status.h"
+#include "core/umbridge/open_models.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
 #include "server/security/in_process_caller.h"
@@ -169,15 +170,8 @@ absl::Status Daemon::OpenSessions() {
 }
 
 absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& options) {
-  ModelLibrary models;
-  if (!options.fmu_dir.empty()) {
-    absl::StatusOr<FmuCatalogue> fmus = FmuCatalogue::Open(options.fmu_dir);
-    if (!fmus.ok()) {
-      return absl::Status(fmus.status().code(),
-                          absl::StrFormat("--fmu-dir: %s", fmus.status().message()));
-    }
-    models = ModelLibrary(*std::move(fmus));
-  }
+  POLYEST_ASSIGN_OR_RETURN(ModelLibrary models,
+                           OpenModels(ModelFolders{options.fmu_dir, options.umbridge_dir}));
   std::unique_ptr<Daemon> daemon(new Daemon(options, std::move(models)));
   if (!options.audit_log.empty()) {
     POLYEST_ASSIGN_OR_RETURN(daemon->audit_, AuditLog::Open(options.audit_log, Now));

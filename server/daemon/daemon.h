@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "server/daemon/daemon_gauges.h"
 #include "server/daemon/listen_address.h"
 #include "server/daemon/listener.h"
@@ -55,6 +55,7 @@ struct DaemonOptions {
   int max_message_mb = 64;
   int64_t max_computing_s = 3'600;  // computing time of one call, or of one batch of a stream
   std::string fmu_dir{};            // folder of the FMUs that problems may name; empty: none
+  std::string umbridge_dir{};       // likewise, of descriptions of models of UM-Bridge servers
   std::chrono::seconds drain_timeout{10};
   std::string token_file{};  // empty: no tokens are asked for
   TlsFiles tls{};            // without a certificate: no TLS

@@ -7,7 +7,7 @@
 #include <functional>
 #include <stop_token>
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "server/execution/executor.h"
 #include "server/forwarding/node_forwarder.h"
 #include "server/security/access_control.h"

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/estimator.h"
 #include "polyest/stop.h"
 #include "polyest/v1/estimate.pb.h"

@@ -13,7 +13,7 @@
 #include <optional>
 #include <string>
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/stop.h"
 #include "polyest/v1/session_service.pb.h"
 #include "server/execution/executor.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/v1/problem_service.pb.h"
 #include "proto/wire/convert/problem_limits.h"
 

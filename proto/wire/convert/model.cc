@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/fmu/fmu_model.h"
+#include "core/umbridge/umbridge_model.h"
 
 namespace polyest::internal {
 namespace {
@@ -26,14 +27,18 @@ void AddParameters(const std::vector<Quantity>& parameters,
   }
 }
 
+std::string KindOf(const Model& model) {
+  if (const auto* fmu = dynamic_cast<const FmuModel*>(&model)) return KindInWords(fmu->interface());
+  return dynamic_cast<const UmBridgeModel*>(&model) == nullptr ? "built-in" : "UM-Bridge";
+}
+
 }  // namespace
 
 v1::Model ToProto(const Model& model) {
   const ModelDescription& description = model.description();
-  const auto* const fmu = dynamic_cast<const FmuModel*>(&model);
   v1::Model proto;
   proto.set_name(absl::StrCat("models/", description.name));
-  proto.set_kind(fmu == nullptr ? "built-in" : KindInWords(fmu->interface()));
+  proto.set_kind(KindOf(model));
   proto.set_summary(description.summary);
   proto.set_equations(description.equations);
   proto.set_source(description.source);

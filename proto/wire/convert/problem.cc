@@ -76,6 +76,12 @@ std::shared_ptr<const Model> ToModel(const v1::Problem& problem, const ModelLibr
       refusals.push_back(InvalidField("model.fmu", model.status().message()));
       return nullptr;
     }
+    case v1::Problem::Model::kUmbridge: {
+      auto model = models.FindUmBridge(problem.model().umbridge());
+      if (model.ok()) return *std::move(model);
+      refusals.push_back(InvalidField("model.umbridge", model.status().message()));
+      return nullptr;
+    }
     case v1::Problem::Model::SOURCE_NOT_SET:
       break;
   }

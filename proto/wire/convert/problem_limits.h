@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "core/estimator/problem/resolved_problem.h"
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
 

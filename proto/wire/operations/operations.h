@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/fmu/model_library.h"
+#include "core/external/model_library.h"
 #include "polyest/estimator.h"
 #include "polyest/samples.h"
 #include "polyest/stop.h"

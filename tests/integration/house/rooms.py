@@ -11,7 +11,8 @@ import tempfile
 
 # The core's rooms, from the first to the last.
 CORE = [
-    "core/common", "core/chaos", "core/model", "core/propagation", "core/fmu", "core/bayes",
+    "core/common", "core/chaos", "core/model", "core/propagation", "core/external",
+    "core/fmu", "core/umbridge", "core/bayes",
     "core/estimator/problem", "core/estimator/record", "core/estimator/expansion",
     "core/estimator/posterior", "core/estimator/studies", "core/estimator",
 ]

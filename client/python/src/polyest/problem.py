@@ -52,6 +52,11 @@ class Problem:
         return cls({"model": {"fmu": name}})
 
     @classmethod
+    def umbridge(cls, name: str) -> Problem:
+        """Returns a problem of a model of UM-Bridge servers, described in the daemon's folder."""
+        return cls({"model": {"umbridge": name}})
+
+    @classmethod
     def equations(cls, *, states: Mapping[str, str], outputs: Mapping[str, str],
                   parameters: Optional[Mapping[str, float]] = None, inputs: Sequence[str] = (),
                   units: Optional[Mapping[str, str]] = None,

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "core/common/check.h"
-#include "core/fmu/catalogue.h"
+#include "core/fmu/fmu_folder.h"
 #include "core/propagation/ensemble_propagator.h"
 #include "polyest/catalogue.h"
 
 namespace polyest::internal {
 
-inline FmuCatalogue TestFmus(const WorkerLimits& limits = {}) {
-  return *FmuCatalogue::Open(POLYEST_TEST_FMUS, limits);
+inline ModelFolder TestFmus(const WorkerLimits& limits = {}) {
+  return *ModelFolder::Open(POLYEST_TEST_FMUS, FmuFiles(limits));
 }
 
 inline std::vector<double> TimesUntil(double end_s, double step_s) {

@@ -1,6 +1,6 @@
 // Tests which FMUs of a folder are offered, and which are refused.
 
-#include "core/fmu/catalogue.h"
+#include "core/fmu/fmu_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "core/fmu/archive.h"
+#include "core/fmu/fmu_description.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
 namespace polyest::internal {
@@ -53,7 +54,7 @@ class FmuFolder : public testing::Test {
     EXPECT_EQ(zip_close(archive), 0);
     return path;
   }
-  FmuCatalogue Open() { return *FmuCatalogue::Open(folder_); }
+  ModelFolder Open() { return *ModelFolder::Open(folder_, FmuFiles()); }
   std::string Reason(const std::string& name) {
     return std::string(Open().Find(name).status().message());
   }
@@ -88,7 +89,7 @@ TEST_F(FmuFolder, ShowsWhatAnFmuHas) {
 }
 
 TEST_F(FmuFolder, SaysWhatKindAnFmuIsAndWhatOfItIsNotSettable) {
-  const FmuCatalogue fmus = TestFmus();
+  const ModelFolder fmus = TestFmus();
   EXPECT_THAT(
       (*fmus.Find("oscillator_me2"))->description().equations,
       AllOf(HasSubstr("FMI 2.0 Model Exchange"), HasSubstr("keep their start values: steps")));
@@ -117,7 +118,7 @@ TEST_F(FmuFolder, RefusesNamesThatLeaveIt) {
 }
 
 TEST_F(FmuFolder, SeesFilesThatComeChangeAndGo) {
-  const FmuCatalogue fmus = Open();
+  const ModelFolder fmus = Open();
   EXPECT_THAT(fmus.Models(), IsEmpty());
   Copy("oscillator_me2", "one");
   ASSERT_THAT(fmus.Models(), SizeIs(1));
@@ -132,7 +133,7 @@ TEST_F(FmuFolder, SeesFilesThatComeChangeAndGo) {
 TEST_F(FmuFolder, ReportsABrokenFileAndServesTheOthers) {
   Copy("oscillator_me2", "good");
   std::ofstream(folder_ / "bad.fmu") << "not a zip archive";
-  const FmuCatalogue fmus = Open();
+  const ModelFolder fmus = Open();
   EXPECT_THAT(fmus.Models(), SizeIs(1));
   ASSERT_THAT(fmus.Broken(), SizeIs(1));
   EXPECT_EQ(fmus.Broken()[0].name, "bad");
@@ -140,7 +141,8 @@ TEST_F(FmuFolder, ReportsABrokenFileAndServesTheOthers) {
 }
 
 TEST_F(FmuFolder, MustBeThere) {
-  EXPECT_EQ(FmuCatalogue::Open(folder_ / "nowhere").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(ModelFolder::Open(folder_ / "nowhere", FmuFiles()).status().code(),
+            absl::StatusCode::kNotFound);
 }
 
 TEST_F(FmuFolder, RefusesArchivesThatWouldWriteElsewhere) {

@@ -1,4 +1,4 @@
-#include "core/fmu/clean_text.h"
+#include "core/external/clean_text.h"
 
 #include <pugixml.hpp>
 

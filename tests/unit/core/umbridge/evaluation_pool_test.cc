@@ -1,0 +1,196 @@
+// Tests that evaluations survive servers that fail, and end where none is left.
+
+#include "core/umbridge/evaluation_pool.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <stop_token>
+
+#include "tests/unit/core/umbridge/model_server.h"
+
+namespace polyest::internal {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using Json = nlohmann::json;
+
+// A port of the loopback on which nobody listens, since it needs rights to listen there and no
+// service uses it.
+constexpr char kNobody[] = "http://127.0.0.1:1";
+
+void Square(const Json& request, httplib::Response& answer) {
+  const double x = request["input"][0][0];
+  ModelServer::Answer({{x * x}}, answer);
+}
+
+std::vector<std::string> Requests(int count) {
+  std::vector<std::string> requests;
+  for (int i = 0; i < count; ++i) {
+    requests.push_back(EvaluateRequest("square", {{i / 10.0}}, "{}", {}));
+  }
+  return requests;
+}
+
+void ExpectSquares(const absl::StatusOr<std::vector<Evaluation>>& evaluations, int count) {
+  ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+  ASSERT_THAT(*evaluations, SizeIs(count));
+  for (int i = 0; i < count; ++i) {
+    const Evaluation& evaluation = (*evaluations)[static_cast<size_t>(i)];
+    EXPECT_THAT(evaluation.failure, IsEmpty());
+    // The numbers go there and back without loss of a bit.
+    EXPECT_THAT(evaluation.outputs, ElementsAre(ElementsAre(i / 10.0 * (i / 10.0))));
+  }
+}
+
+TEST(EvaluationPool, DealsPointsOutToAllServers) {
+  // Neither server answers its first request before both have one.
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::set<int> reached;
+  const auto handler = [&](int server) {
+    return [&, server](const Json& request, httplib::Response& answer) {
+      std::unique_lock lock(mutex);
+      reached.insert(server);
+      changed.notify_all();
+      changed.wait(lock, [&] { return reached.size() == 2; });
+      Square(request, answer);
+    };
+  };
+  ModelServer one(handler(1)), two(handler(2));
+  EvaluationPool pool({.urls = {one.url(), two.url()}});
+  ExpectSquares(pool.Evaluate(Requests(30), Stop()), 30);
+  EXPECT_GE(one.requests() + two.requests(), 30);
+}
+
+TEST(EvaluationPool, DoesWithoutAServerThatCannotBeReached) {
+  ModelServer good(Square);
+  EvaluationPool pool({.urls = {kNobody, good.url()}});
+  ExpectSquares(pool.Evaluate(Requests(20), Stop()), 20);
+}
+
+TEST(EvaluationPool, ComputesThePointsOfAServerThatDies) {
+  ModelServer good(Square);
+  std::optional<ModelServer> dying;
+  // Breaks off each answer after its header.
+  dying.emplace([](const Json&, httplib::Response& answer) {
+    answer.set_content_provider(100, "application/json",
+                                [](size_t, size_t, httplib::DataSink&) { return false; });
+  });
+  EvaluationPool pool({.urls = {dying->url(), good.url()}});
+  ExpectSquares(pool.Evaluate(Requests(40), Stop()), 40);
+}
+
+TEST(EvaluationPool, FailsAPointThatEndsEachConnection) {
+  ModelServer server([](const Json& request, httplib::Response& answer) {
+    if (request["input"][0][0] != 0.1) return Square(request, answer);
+    answer.set_content_provider(100, "application/json",
+                                [](size_t, size_t, httplib::DataSink&) { return false; });
+  });
+  // Two servers that are one, so that fewer pauses are needed.
+  EvaluationPool pool({.urls = std::vector<std::string>(10, server.url())});
+  const auto evaluations = pool.Evaluate(Requests(3), Stop());
+  ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+  EXPECT_THAT((*evaluations)[0].failure, IsEmpty());
+  EXPECT_EQ((*evaluations)[1].failure, "10 connections were lost while it was computed");
+  EXPECT_THAT((*evaluations)[2].failure, IsEmpty());
+}
+
+TEST(EvaluationPool, TakesTheModelsWordThatAPointFails) {
+  ModelServer server([](const Json& request, httplib::Response& answer) {
+    if (request["input"][0][0] != 0.1) return Square(request, answer);
+    ModelServer::Refuse("the spring\nbreaks", answer);
+  });
+  EvaluationPool pool({.urls = {server.url()}});
+  const auto evaluations = pool.Evaluate(Requests(3), Stop());
+  ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+  EXPECT_EQ((*evaluations)[1].failure, "InvalidInput: the spring breaks");
+  EXPECT_EQ(server.requests(), 3);
+}
+
+TEST(EvaluationPool, AsksThreeTimesWhereTheAnswerIsNone) {
+  const std::vector<std::string> answers = {
+      "", "oops", "[1]", "{}", R"({"output": 1})", R"({"output": [1]})", R"({"output": [["a"]]})"};
+  for (const std::string& text : answers) {
+    SCOPED_TRACE(text);
+    ModelServer server([&](const Json&, httplib::Response& answer) {
+      answer.set_content(text, "application/json");
+    });
+    EvaluationPool pool({.urls = {server.url()}});
+    const auto evaluations = pool.Evaluate(Requests(1), Stop());
+    ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+    EXPECT_THAT((*evaluations)[0].failure, HasSubstr("the answer"));
+    EXPECT_EQ(server.requests(), 3);
+  }
+}
+
+TEST(EvaluationPool, FailsAPointThatTakesTooLong) {
+  std::promise<void> end;
+  const std::shared_future<void> ended = end.get_future().share();
+  ModelServer server([&](const Json& request, httplib::Response& answer) {
+    if (request["input"][0][0] == 0.1) ended.wait();
+    Square(request, answer);
+  });
+  {
+    EvaluationPool pool({.urls = {server.url()}, .requests_per_server = 4, .timeout_s = 0.05});
+    const auto evaluations = pool.Evaluate(Requests(2), Stop());
+    ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+    EXPECT_EQ((*evaluations)[1].failure, "no answer within 0.05 s");
+  }
+  end.set_value();
+}
+
+TEST(EvaluationPool, ComputesASlowPointElsewhereToo) {
+  // The first server never answers its last request while the test asks.
+  std::promise<void> end;
+  const std::shared_future<void> ended = end.get_future().share();
+  std::atomic<bool> stuck = false;
+  ModelServer slow([&](const Json& request, httplib::Response& answer) {
+    if (!stuck.exchange(true)) ended.wait();
+    Square(request, answer);
+  });
+  ModelServer fast(Square);
+  {
+    EvaluationPool pool({.urls = {slow.url(), fast.url()}});
+    ExpectSquares(pool.Evaluate(Requests(10), Stop()), 10);
+    // Otherwise the stuck server ends before the pool does, which waits for nothing.
+    end.set_value();
+  }
+}
+
+TEST(EvaluationPool, SaysWhichServersCannotBeReached) {
+  EvaluationPool pool({.urls = {kNobody}, .give_up_after_s = 0});
+  const absl::Status status = pool.Evaluate(Requests(1), Stop()).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(status.message()),
+              AllOf(HasSubstr("no server could be reached for 0 s (giveUpAfterS)"),
+                    HasSubstr("http://127.0.0.1:1: no connection")));
+}
+
+TEST(EvaluationPool, EndsOnAStopRequestAndServesTheNextCaller) {
+  std::stop_source source;
+  std::promise<void> end;
+  const std::shared_future<void> ended = end.get_future().share();
+  ModelServer server([&](const Json& request, httplib::Response& answer) {
+    if (source.request_stop()) ended.wait();
+    Square(request, answer);
+  });
+  EvaluationPool pool({.urls = {server.url()}, .requests_per_server = 2});
+  EXPECT_EQ(pool.Evaluate(Requests(5), Stop(source.get_token())).status().code(),
+            absl::StatusCode::kCancelled);
+  ExpectSquares(pool.Evaluate(Requests(5), Stop()), 5);
+  end.set_value();
+}
+
+}  // namespace
+}  // namespace polyest::internal
