@@ -227,6 +227,13 @@ struct ListArguments {
   Format format = Format::kTable;
 };
 
+struct NodesArguments {
+  Place place;
+  std::string action;  // "drain"; empty: the nodes are listed
+  std::string node;    // the one to drain: its number, its name or its address
+  Format format = Format::kTable;
+};
+
 struct WatchArguments {
   Place place;
   std::string session;  // its id
@@ -251,7 +258,7 @@ using Command =
                  SensitivityArguments, DesignArguments, PosteriorArguments, FitArguments,
                  CompareArguments, ReportArguments, ProfileArguments, RegularizationArguments,
                  ExplainArguments, ExportArguments, ImportArguments, DeleteArguments, ListArguments,
-                 WatchArguments, TopArguments, BackupArguments, PaperOptions>;
+                 WatchArguments, TopArguments, BackupArguments, NodesArguments, PaperOptions>;
 
 struct CommandLine {
   Command command;

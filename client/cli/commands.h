@@ -32,6 +32,7 @@ int RunCommand(const DeleteArguments& arguments, std::ostream& out, std::ostream
 int RunCommand(const ListArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const BackupArguments& arguments, std::ostream& out, std::ostream& err);
+int RunCommand(const NodesArguments& arguments, std::ostream& out, std::ostream& err);
 int RunCommand(const TopArguments& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace polyest::internal

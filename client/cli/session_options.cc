@@ -122,6 +122,26 @@ void AddBackup(CommandRegistry& registry) {
   command.add_option("-o,--output", arguments->output_file, "The file to write")->required();
 }
 
+void AddNodes(CommandRegistry& registry) {
+  const auto arguments = std::make_shared<NodesArguments>();
+  CLI::App& command = registry.Add(
+      {.name = "nodes",
+       .summary = "List the daemons that share a database, or drain one of them",
+       .examples = {"nodes --server rig:50051", "nodes drain 3 --server rig:50051"},
+       .notes = "Needs the role admin, and to drain a node the role operator. A node that is\n"
+                "drained hands its sessions over to the others, one after the other, and takes\n"
+                "no others until it is started again; its clients go on where they are."},
+      arguments);
+  CLI::Option* const action =
+      command.add_option("action", arguments->action, "drain: have a node hand its sessions over")
+          ->check(CLI::IsMember({"drain"}));
+  CLI::Option* const node = command.add_option(
+      "node", arguments->node, "The node to drain: its number, or its address HOST:PORT");
+  action->needs(node);
+  AddServer(command, arguments->place)->required();
+  AddFormat(command, arguments->format, {"table", "json"});
+}
+
 }  // namespace
 
 void AddSessionCommands(CommandRegistry& registry) {
@@ -154,6 +174,7 @@ void AddDaemonCommands(CommandRegistry& registry) {
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   AddBackup(registry);
+  AddNodes(registry);
 }
 
 }  // namespace polyest::internal

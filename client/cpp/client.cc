@@ -83,6 +83,7 @@ Client::Client(const std::string& server, ClientOptions options)
   operations_ = v1::OperationService::NewStub(channel);
   statuses_ = v1::StatusService::NewStub(channel);
   backups_ = v1::BackupService::NewStub(channel);
+  nodes_ = v1::NodeService::NewStub(channel);
 }
 
 void Client::Prepare(grpc::ClientContext& call) const {
@@ -223,6 +224,14 @@ absl::StatusOr<v1::GetHistoryResponse> Client::GetHistory(const v1::GetHistoryRe
 
 absl::StatusOr<v1::DaemonStatus> Client::GetStatus(const v1::GetStatusRequest& request) {
   return Call(statuses_.get(), &v1::StatusService::Stub::GetStatus, request);
+}
+
+absl::StatusOr<v1::ListNodesResponse> Client::ListNodes(const v1::ListNodesRequest& request) {
+  return Call(nodes_.get(), &v1::NodeService::Stub::ListNodes, request);
+}
+
+absl::StatusOr<v1::Node> Client::DrainNode(const v1::DrainNodeRequest& request) {
+  return Call(nodes_.get(), &v1::NodeService::Stub::DrainNode, request);
 }
 
 absl::Status Client::WatchSession(

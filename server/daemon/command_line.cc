@@ -234,6 +234,13 @@ void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
   app.add_option("--advertise", daemon.advertise,
                  "HOST:PORT at which clients reach this daemon, for other daemons of the same "
                  "database; by default the first of --listen");
+  app.add_option("--node-secret", daemon.node_secret,
+                 "File with a line of 32 to 256 characters, the same at all daemons of the "
+                 "database: pass calls about sessions of another daemon on to it, and believe "
+                 "what the others say of the callers whose calls they pass on");
+  app.add_option("--node-ca", daemon.node_ca,
+                 "PEM file of the CAs of the other daemons' certificates: calls are passed on by "
+                 "TLS. Needs --node-secret");
   app.add_option("--durability", texts.durability,
                  "disk: a batch is acknowledged when it is on disk; memory: sessions end with the "
                  "daemon")
@@ -277,9 +284,29 @@ absl::Status ApplyJournal(const Texts& texts, DaemonOptions& daemon) {
   return absl::OkStatus();
 }
 
+// Checks that what daemons of one database tell each other goes by TLS if clients' calls do.
+absl::Status CheckNodes(const DaemonOptions& daemon) {
+  if (daemon.node_secret.empty()) {
+    if (daemon.node_ca.empty()) return absl::OkStatus();
+    return absl::FailedPreconditionError("--node-ca: needs --node-secret");
+  }
+  if (daemon.database.empty()) {
+    return absl::FailedPreconditionError(
+        "--node-secret: only daemons that share a database (--journal postgresql://…) pass calls "
+        "on");
+  }
+  if (!daemon.tls.certificate.empty() && daemon.node_ca.empty()) {
+    return absl::FailedPreconditionError(
+        "--node-secret: a daemon with --tls-certificate passes calls on by TLS, which needs "
+        "--node-ca, the CA of the other daemons' certificates");
+  }
+  return absl::OkStatus();
+}
+
 // Sets what follows from the texts. INVALID_ARGUMENT or FAILED_PRECONDITION, naming the option.
 absl::Status Apply(const Texts& texts, DaemonOptions& daemon) {
   POLYEST_RETURN_IF_ERROR(ApplyJournal(texts, daemon));
+  POLYEST_RETURN_IF_ERROR(CheckNodes(daemon));
   if (texts.durability == "memory" || !daemon.database.empty()) {
     daemon.data_dir.clear();
   } else if (daemon.data_dir.empty()) {

@@ -9,7 +9,6 @@
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -52,9 +51,6 @@ constexpr int kBusyLanes = 8;
 constexpr int kNiceness = 5;
 // Number of threads that take batches. They wait for nothing but, now and then, the journal.
 constexpr int kIntakeThreads = 4;
-// Time between two looks at the files of tokens and certificates. A change is acted on when a
-// second look finds that it has settled.
-constexpr std::chrono::seconds kWatchInterval{1};
 // Longest time until a new connection has ended its handshakes, TLS's and HTTP/2's.
 constexpr int kHandshakeTimeoutMs = 20'000;
 // Longest time that the last bytes of ended calls may take.
@@ -147,8 +143,11 @@ absl::Status Daemon::OpenDatabase(OnCommit on_commit) {
 
 void Daemon::Advertise() {
   if (database_ == nullptr) return;
-  database_->Announce(options_.advertise.empty() ? addresses_.front().ToString()
-                                                 : options_.advertise);
+  database_->Announce(
+      options_.advertise.empty() ? addresses_.front().ToString() : options_.advertise, [this] {
+        return calls_.Count(OpenCalls::Kind::kWriter) + calls_.Count(OpenCalls::Kind::kWatcher);
+      });
+  handover_ = std::make_unique<Handover>(*sessions_, [this] { readiness_.Drain(); });
 }
 
 absl::Status Daemon::OpenSessions() {
@@ -157,8 +156,16 @@ absl::Status Daemon::OpenSessions() {
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
-  services_ = MakeServices({executor_, intake_, *sessions_, calls_, *access_, stop_.get_token(),
-                            models_, std::chrono::seconds(options_.max_computing_s), Now});
+  services_ = MakeServices({.executor = executor_,
+                            .intake = intake_,
+                            .sessions = *sessions_,
+                            .calls = calls_,
+                            .access = *access_,
+                            .stop = stop_.get_token(),
+                            .models = models_,
+                            .max_computing = std::chrono::seconds(options_.max_computing_s),
+                            .wall_clock = Now,
+                            .nodes = nodes_.get()});
   return absl::OkStatus();
 }
 
@@ -181,56 +188,6 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
   POLYEST_RETURN_IF_ERROR(daemon->OpenWeb());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
   return daemon;
-}
-
-void Daemon::WarnOfReadableSecrets() const {
-  for (const std::string& file : {options_.token_file, options_.tls.key}) {
-    struct stat status {};
-    if (file.empty() || stat(file.c_str(), &status) != 0 || (status.st_mode & S_IRWXO) == 0) {
-      continue;
-    }
-    spdlog::warn("{} is open to all users of this machine (mode {:04o}); chmod 0640 it", file,
-                 static_cast<unsigned>(status.st_mode & 07777));
-  }
-}
-
-absl::Status Daemon::Secure() {
-  std::vector<std::string> files;
-  for (const std::string& file :
-       {options_.token_file, options_.tls.certificate, options_.tls.key, options_.tls.client_ca}) {
-    if (!file.empty()) files.push_back(file);
-  }
-  FileChanges changes(files);
-  AccessOptions access{options_.token_file, !options_.tls.client_ca.empty(), options_.behind_edge};
-  POLYEST_ASSIGN_OR_RETURN(access_, AccessControl::Open(std::move(access)));
-  if (!options_.tls.certificate.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(tls_, ServerTls::Open(options_.tls));
-  }
-  if (!files.empty()) {
-    watch_ = std::make_unique<FileWatch>(std::move(changes), kWatchInterval, [this] { Reload(); });
-  }
-  WarnOfReadableSecrets();
-  return absl::OkStatus();
-}
-
-void Daemon::Reload() {
-  const std::lock_guard lock(reloading_);
-  WarnOfReadableSecrets();
-  if (audit_ != nullptr) audit_->Reopen();
-  const auto report = [this](const char* what, const absl::Status& status) {
-    if (audit_ != nullptr) {
-      audit_->Add(absl::StrCat(what, " read again"),
-                  {{"code", absl::StatusCodeToString(status.code())}});
-    }
-    if (status.ok()) {
-      spdlog::info("{} read again", what);
-    } else {
-      spdlog::warn("{} not read again, the old ones stay: {}", what, std::string(status.message()));
-    }
-  };
-  if (!options_.token_file.empty()) report("tokens", access_->Reload());
-  if (tls_ != nullptr) report("certificates", tls_->Reload());
-  if (tls_ != nullptr && web_ != nullptr) report("certificates of --web", web_->ReloadTls());
 }
 
 // Returns how much memory gRPC may have for what clients send, before anybody knows whose it is.
@@ -347,10 +304,14 @@ bool Daemon::IsAlive(std::chrono::milliseconds timeout) {
 
 bool Daemon::Stop() {
   if (server_ == nullptr || closing_.joinable()) return true;
+  if (handover_ != nullptr) handover_->Stop();
   readiness_.Drain();
   if (audit_ != nullptr) audit_->Add("stopping", {});
   server_->GetHealthCheckService()->SetServingStatus(false);
-  calls_.Drain(std::chrono::steady_clock::now() + options_.drain_timeout);
+  if (database_ != nullptr) database_->StartDraining();
+  const auto drained = std::chrono::steady_clock::now() + options_.drain_timeout;
+  calls_.Drain(drained);
+  if (handover_ != nullptr) handover_->LetGo(drained);
   stop_.request_stop();
   if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + kFlushTime);
   // gRPC waits for every call, also for those that do not look at their stop.
@@ -375,6 +336,7 @@ Daemon::~Daemon() {
   self_check_ = nullptr;
   server_ = nullptr;
   metrics_endpoint_ = nullptr;
+  handover_ = nullptr;
   housekeeper_ = nullptr;
 }
 

@@ -22,11 +22,13 @@
 #include "server/daemon/readiness.h"
 #include "server/daemon/self_check.h"
 #include "server/execution/executor.h"
+#include "server/forwarding/node_forwarder.h"
 #include "server/journal/postgres_journal.h"
 #include "server/security/access_control.h"
 #include "server/security/file_watch.h"
 #include "server/security/server_tls.h"
 #include "server/service/open_calls.h"
+#include "server/sessions/handover.h"
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
 #include "server/telemetry/audit_log.h"
@@ -58,6 +60,10 @@ struct DaemonOptions {
   std::string token_file{};  // empty: no tokens are asked for
   TlsFiles tls{};            // without a certificate: no TLS
   bool behind_edge = false;  // callers on loopback are an edge (AccessOptions)
+  // File of the secret that the daemons of the database share; empty: calls about sessions of
+  // others are not passed on.
+  std::string node_secret{};
+  std::string node_ca{};  // PEM file of the CAs of their certificates; empty: they have no TLS
   // Connections that are open at a time, in all and of one peer; 0: as LimitConnections says.
   int64_t max_connections = 0;
   int64_t max_connections_per_peer = 0;
@@ -136,8 +142,10 @@ class Daemon {
   PostgresJournal* database_ = nullptr;  // the journal, if it is one
   Executor executor_;
   Executor intake_;
+  std::unique_ptr<NodeForwarder> nodes_;  // null if calls are not passed on
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
+  std::unique_ptr<Handover> handover_;  // null without a database
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<Listener> listener_;
   std::unique_ptr<grpc::Server> server_;

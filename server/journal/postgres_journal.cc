@@ -57,6 +57,12 @@ std::pair<PostgresOwner, std::string> PostgresJournal::HoldOf(int64_t session) c
   return {{node_->number(), hold.epoch}, hold.epoch == 0 ? "" : "tenant " + hold.tenant};
 }
 
+void PostgresJournal::Release(int64_t session) {
+  // The points of its history that nobody waits for still carry the epoch.
+  queue_->Flush();
+  node_->Release(session);
+}
+
 absl::Status PostgresJournal::CheckWritable() {
   const int64_t node = node_->number();
   return queue_->Run([node](PostgresWriter& writer) {
@@ -94,6 +100,7 @@ absl::StatusOr<std::vector<SessionHead>> PostgresJournal::HeadsAfter(const std::
 
 absl::StatusOr<int64_t> PostgresJournal::Create(const SessionHead& head, const v1::Problem& problem,
                                                 bool hidden) {
+  POLYEST_RETURN_IF_ERROR(node_->CheckTakes());
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult next, pool_->Query(kNextNumber));
   SessionHead created = head;
   created.number = next.Integer(0, 0);

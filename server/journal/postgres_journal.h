@@ -3,13 +3,16 @@
 // Keeps sessions in a PostgreSQL database, which several daemons may share: each session belongs to
 // one of them at a time (postgres_node.h).
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/journal/commit_queue.h"
 #include "server/journal/postgres_node.h"
+#include "server/journal/postgres_nodes.h"
 #include "server/journal/postgres_pool.h"
 #include "server/journal/postgres_target.h"
 #include "server/journal/postgres_writer.h"
@@ -37,16 +40,25 @@ class PostgresJournal final : public SessionJournal, public SharedJournal {
   // Writes everything appended, then ends.
   ~PostgresJournal() override;
 
-  // Says at which address clients reach this daemon.
-  void Announce(const std::string& address) { node_->Announce(address); }
+  // Says at which address clients reach this daemon, and how to count its open streams.
+  void Announce(const std::string& address, std::function<int64_t()> streams = nullptr) {
+    node_->Announce(address, std::move(streams));
+  }
 
   bool durable() const override { return true; }
   SharedJournal* shared() override { return this; }
   absl::StatusOr<SessionPlace> Claim(int64_t session) override { return node_->Claim(session); }
-  void Release(int64_t session) override { node_->Release(session); }
+  void Release(int64_t session) override;
   bool Owns(int64_t session) const override { return node_->Owns(session); }
   absl::StatusOr<std::optional<SessionHead>> HeadOf(const std::string& tenant,
                                                     const std::string& name) const override;
+  int64_t node() const override { return node_->number(); }
+  absl::StatusOr<std::vector<JournalNode>> Nodes() const override { return ReadNodes(*pool_); }
+  absl::Status DrainNode(int64_t node) override {
+    return polyest::internal::DrainNode(*pool_, node);
+  }
+  void StartDraining() override { node_->StartDraining(); }
+  bool AwaitDraining(std::stop_token stop) override { return node_->AwaitDraining(stop); }
   absl::Status CheckWritable() override;
   absl::StatusOr<std::unique_ptr<JournalBackup>> BackUp(const Stop& stop) override;
   absl::StatusOr<std::vector<SessionHead>> Heads() const override;

@@ -5,10 +5,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <ctime>
 #include <utility>
 
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
+#include "server/journal/postgres_nodes.h"
 #include "server/journal/postgres_status.h"
 
 namespace polyest::internal {
@@ -34,12 +36,17 @@ constexpr char kLastPlace[] =
     "SELECT sequence, place_samples, place_rows, place_run, place_time_s FROM batch WHERE session "
     "= $1 ORDER BY sequence DESC LIMIT 1";
 constexpr char kRenew[] =
-    "UPDATE node SET lease_until = clock_timestamp() + interval '3 s', address = $2 WHERE node = "
-    "$1 AND lease_until > clock_timestamp()";
+    "UPDATE node SET lease_until = clock_timestamp() + interval '3 s', address = $2, streams = $3, "
+    "busy_cores = $4 WHERE node = $1 AND lease_until > clock_timestamp() RETURNING draining";
 constexpr char kRenewLapsed[] =
-    "INSERT INTO node (node, name, address, lease_until) OVERRIDING SYSTEM VALUE VALUES ($1, $2, "
-    "$3, clock_timestamp() + interval '3 s') ON CONFLICT (node) DO UPDATE SET lease_until = "
+    "INSERT INTO node (node, name, address, draining, lease_until) OVERRIDING SYSTEM VALUE VALUES "
+    "($1, $2, $3, $4, clock_timestamp() + interval '3 s') ON CONFLICT (node) DO UPDATE SET "
+    "lease_until = "
     "excluded.lease_until, address = excluded.address";
+constexpr char kEndEarlierRun[] =
+    "WITH gone AS (DELETE FROM node WHERE node <> $1 AND name = $2 RETURNING node) UPDATE owner "
+    "SET "
+    "node = NULL, epoch = epoch + 1 FROM gone WHERE owner.node = gone.node";
 // Sessions that were never shown, of nodes that do not live.
 constexpr char kDropHidden[] =
     "WITH gone AS (DELETE FROM session USING owner WHERE hidden AND owner.session = number AND NOT "
@@ -94,12 +101,6 @@ PostgresNode::~PostgresNode() {
 absl::Status PostgresNode::Register(PostgresConnection& connection) {
   // A lease that a crash of the database shortens harms nobody, so that no beat waits for the disk.
   POLYEST_RETURN_IF_ERROR(connection.Execute("SET synchronous_commit = off"));
-  if (!name_.empty()) {
-    POLYEST_RETURN_IF_ERROR(connection
-                                .Query("UPDATE node SET lease_until = '-infinity' WHERE name = $1",
-                                       PostgresParameters().AddText(name_))
-                                .status());
-  }
   const Clock::time_point sent = Clock::now();
   POLYEST_ASSIGN_OR_RETURN(
       const PostgresResult result,
@@ -116,10 +117,37 @@ absl::Status PostgresNode::Register(PostgresConnection& connection) {
       .status();
 }
 
-void PostgresNode::Announce(const std::string& address) {
+void PostgresNode::Announce(const std::string& address, std::function<int64_t()> streams) {
   const std::lock_guard lock(mutex_);
   address_ = address;
-  waiting_.notify_one();
+  streams_ = std::move(streams);
+  waiting_.notify_all();
+}
+
+void PostgresNode::StartDraining() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+    waiting_.notify_all();
+  }
+  // Whoever cannot be told finds a node that passes calls on.
+  pool_.Query("UPDATE node SET draining = true WHERE node = $1", PostgresParameters().Add(number_))
+      .status()
+      .IgnoreError();
+}
+
+bool PostgresNode::AwaitDraining(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  return waiting_.wait(lock, stop, [this] { return draining_.load(); });
+}
+
+absl::Status PostgresNode::CheckTakes() const {
+  if (!draining_) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(const std::string taker, FindTaker(pool_, number_));
+  if (taker.empty()) return absl::OkStatus();
+  return Refuse(absl::StatusCode::kUnavailable,
+                absl::StrFormat("this daemon hands its sessions over; ask the daemon at %s", taker),
+                {.reason = kOwnedElsewhere, .retry_delay = kBeat, .owner = taker});
 }
 
 void PostgresNode::Run(std::stop_token stop) {
@@ -160,24 +188,50 @@ absl::Status PostgresNode::Beat() {
     POLYEST_RETURN_IF_ERROR(connection_->Execute("SET synchronous_commit = off"));
   }
   std::string address;
+  int64_t streams = 0;
   {
     const std::lock_guard lock(mutex_);
     address = address_;
+    if (streams_) streams = streams_();
   }
+  const double busy_cores = BusyCores();
   const Clock::time_point sent = Clock::now();
   POLYEST_ASSIGN_OR_RETURN(
       const PostgresResult renewed,
-      connection_->Query(kRenew, PostgresParameters().Add(number_).AddText(address)));
-  if (renewed.changes() == 0) {
+      connection_->Query(
+          kRenew, PostgresParameters().Add(number_).AddText(address).Add(streams).Add(busy_cores)));
+  if (renewed.rows() > 0 && renewed.Flag(0, 0)) {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+    waiting_.notify_all();
+  }
+  if (renewed.rows() == 0) {
     spdlog::warn("this node's lease was over: others may have taken its sessions");
     POLYEST_RETURN_IF_ERROR(
         connection_
-            ->Query(kRenewLapsed, PostgresParameters().Add(number_).AddText(name_).AddText(address))
+            ->Query(kRenewLapsed,
+                    PostgresParameters().Add(number_).AddText(name_).AddText(address).AddFlag(
+                        draining_))
             .status());
     POLYEST_RETURN_IF_ERROR(Review(*connection_));
   }
   lease_until_ = (sent + kLease).time_since_epoch().count();
-  return absl::OkStatus();
+  if (succeeded_ || address.empty() || name_.empty()) return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(
+      connection_->Query(kEndEarlierRun, PostgresParameters().Add(number_).AddText(name_))
+          .status());
+  succeeded_ = true;
+  return connection_->Query(kDropHidden).status();
+}
+
+double PostgresNode::BusyCores() {
+  timespec used{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  const auto before = std::exchange(
+      used_, std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec));
+  const Clock::time_point now = Clock::now();
+  const std::chrono::duration<double> elapsed = now - std::exchange(measured_, now);
+  return (used_ - before) / elapsed;
 }
 
 absl::Status PostgresNode::Review(PostgresConnection& connection) {
@@ -209,13 +263,14 @@ bool PostgresNode::Tidy() {
 void PostgresNode::RemoveDeleted() {
   const std::lock_guard lock(mutex_);
   deleted_ = true;
-  waiting_.notify_one();
+  waiting_.notify_all();
 }
 
 absl::StatusOr<SessionPlace> PostgresNode::Claim(int64_t session) {
   if (Clock::now().time_since_epoch().count() >= lease_until_) {
     return DatabaseAway("this daemon's lease is over");
   }
+  if (draining_) POLYEST_RETURN_IF_ERROR(CheckOwner(session));
   POLYEST_RETURN_IF_ERROR(Take(session));
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult last,
                            pool_.Query(kLastPlace, PostgresParameters().Add(session)));
@@ -247,8 +302,9 @@ absl::Status PostgresNode::CheckOwner(int64_t session) const {
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult owner,
                            pool_.Query(kOwnerOf, PostgresParameters().Add(session)));
   if (owner.rows() == 0) return NoSuchSession();
-  if (owner.Flag(0, 2) && owner.Integer(0, 0) != number_) return OwnedBy(owner.Bytes(0, 1));
-  return absl::OkStatus();
+  if (owner.Flag(0, 2) && owner.Integer(0, 0) == number_) return absl::OkStatus();
+  if (owner.Flag(0, 2)) return OwnedBy(owner.Bytes(0, 1));
+  return CheckTakes();
 }
 
 void PostgresNode::Release(int64_t session) {

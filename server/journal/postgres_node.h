@@ -15,10 +15,12 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -37,7 +39,9 @@ class PostgresNode {
   };
 
   // Joins the nodes of a database whose schema is prepared. A node of the same `name`, if that is
-  // not empty, is taken for an earlier run of this one: its lease ends. The pool must outlive this.
+  // not empty, is taken for an earlier run of this one once this one is announced: it loses its
+  // sessions. Only then is it certain that no other daemon listens at the address. The pool must
+  // outlive this.
   static absl::StatusOr<std::unique_ptr<PostgresNode>> Join(PostgresPool& pool,
                                                             const PostgresTarget& target,
                                                             std::string name);
@@ -47,15 +51,24 @@ class PostgresNode {
   PostgresNode& operator=(const PostgresNode&) = delete;
 
   int64_t number() const { return number_; }
-  // Says at which address clients reach this node.
-  void Announce(const std::string& address);
+  // Says at which address clients reach this node. `streams` returns the number of its open
+  // streams, to be shown.
+  void Announce(const std::string& address, std::function<int64_t()> streams);
+
+  // As SharedJournal does.
+  void StartDraining();
+  bool AwaitDraining(const std::stop_token& stop);
+  // Returns UNAVAILABLE, naming another node that could take sessions, when this one is to take
+  // none.
+  absl::Status CheckTakes() const;
 
   // Takes the session and returns its place. UNAVAILABLE, naming the owner, when it belongs to
   // another node that lives, and while this node's own lease is over; NOT_FOUND when there is no
   // such session. No write that was under way, of this node or another, is kept afterwards unless
   // the place tells of it.
   absl::StatusOr<SessionPlace> Claim(int64_t session);
-  // Returns UNAVAILABLE, naming the owner, when another node that lives owns the session.
+  // Returns UNAVAILABLE, naming the owner, when another node that lives owns the session, or, while
+  // this node hands its sessions over, shall own it.
   absl::Status CheckOwner(int64_t session) const;
   // Lets others take the session.
   void Release(int64_t session);
@@ -80,6 +93,8 @@ class PostgresNode {
   void Run(std::stop_token stop);
   // Renews the lease.
   absl::Status Beat();
+  // Returns the processor time that this process has used a second since the last call.
+  double BusyCores();
   // Forgets the sessions that other nodes have taken while the lease was over.
   absl::Status Review(PostgresConnection& connection);
   // Removes what deleted sessions have left, a piece at a time. Returns whether there may be more.
@@ -89,14 +104,19 @@ class PostgresNode {
   const PostgresTarget target_;
   const std::string name_;
   int64_t number_ = 0;
-  std::unique_ptr<PostgresConnection> connection_;       // of the thread; null while there is none
+  std::unique_ptr<PostgresConnection> connection_;  // of the thread; null while there is none
+  std::chrono::duration<double> used_{0};  // processor time at the last beat; used by the thread
+  Clock::time_point measured_;             // time of that beat
+  bool succeeded_ = false;  // whether an earlier run has lost its sessions; used by the thread
   std::atomic<Clock::time_point::rep> lease_until_ = 0;  // by the clock of this process
 
   mutable std::mutex mutex_;
   std::condition_variable_any waiting_;
   std::string address_;
-  std::map<int64_t, Hold> holds_;  // by session
-  bool deleted_ = true;            // whether deleted sessions may have left something
+  std::function<int64_t()> streams_;
+  std::atomic<bool> draining_ = false;  // set with the mutex held
+  std::map<int64_t, Hold> holds_;       // by session
+  bool deleted_ = true;                 // whether deleted sessions may have left something
   std::jthread thread_;
 };
 

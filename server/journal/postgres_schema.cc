@@ -62,6 +62,8 @@ constexpr const char* kPostgresMigrations[] = {
          node bigint,
          epoch bigint NOT NULL) WITH (fillfactor = 50);
        CREATE INDEX owner_by_node ON owner (node);)",
+    "ALTER TABLE node ADD streams bigint NOT NULL DEFAULT 0, ADD busy_cores double precision NOT "
+    "NULL DEFAULT 0, ADD draining boolean NOT NULL DEFAULT false;",
 };
 
 absl::Status Refused(const absl::Status& status, const char* doing) {

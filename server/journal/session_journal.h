@@ -16,6 +16,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -82,6 +83,17 @@ inline absl::Status NoSuchSession() {
   return absl::NotFoundError("the journal has no such session");
 }
 
+// A daemon that shares a journal.
+struct JournalNode {
+  int64_t number = 0;      // given to no other
+  std::string address;     // HOST:PORT at which clients reach it; empty while it starts
+  int64_t sessions = 0;    // that it owns
+  int64_t streams = 0;     // that were open when it renewed its lease
+  double busy_cores = 0;   // processor time a second that it used before that
+  double lease_age_s = 0;  // time since it renewed its lease
+  bool draining = false;   // whether it hands its sessions over
+};
+
 // A journal that several daemons share. Each session belongs to one of them, its owner, and
 // sessions come and go without the others. Thread-safe; all but Owns wait for the database.
 class SharedJournal {
@@ -92,7 +104,7 @@ class SharedJournal {
   // UNAVAILABLE, naming the owner, when it belongs to another daemon that lives. Whatever was
   // appended before is either kept, and the place tells of it, or never will be.
   virtual absl::StatusOr<SessionPlace> Claim(int64_t session) = 0;
-  // Lets other daemons have a session that this one no longer uses.
+  // Lets other daemons have a session that this one no longer uses, when all writes of it are done.
   virtual void Release(int64_t session) = 0;
   // Returns whether this daemon owns a session, as far as it knows. One that has lost a session to
   // another finds it out at the latest when it appends.
@@ -106,6 +118,19 @@ class SharedJournal {
   virtual absl::StatusOr<std::vector<SessionHead>> HeadsAfter(const std::string& tenant,
                                                               const std::string& after,
                                                               int64_t count) const = 0;
+
+  // Returns the number of this daemon, which is given to no other.
+  virtual int64_t node() const = 0;
+  // Returns the daemons that live, and those that own sessions all the same, in the order in which
+  // they have started.
+  virtual absl::StatusOr<std::vector<JournalNode>> Nodes() const = 0;
+  // Asks a daemon to hand its sessions over. NOT_FOUND when it does not live, FAILED_PRECONDITION
+  // when no other daemon that lives could take them.
+  virtual absl::Status DrainNode(int64_t node) = 0;
+  // Takes no sessions from here on, as long as there is another daemon that could.
+  virtual void StartDraining() = 0;
+  // Waits until this daemon is to hand its sessions over; returns false if `stop` comes first.
+  virtual bool AwaitDraining(std::stop_token stop) = 0;
 };
 
 // Thread-safe. Errors: NOT_FOUND for a session that does not exist, RESOURCE_EXHAUSTED for a full

@@ -18,30 +18,26 @@ namespace polyest::internal {
 namespace {
 
 constexpr absl::string_view kScheme = "Bearer ";
+constexpr char kAuthorizationKey[] = "authorization";
 
-Identification IdentificationOf(const grpc::ServerContextBase& call, bool behind_edge) {
-  Identification identification;
-  const auto& metadata = call.client_metadata();
-  if (metadata.count("authorization") == 1) {
-    const grpc::string_ref value = metadata.find("authorization")->second;
-    identification.authorization.emplace(value.data(), value.size());
-  }
+// Returns the common name of the certificate of the caller, or of the client for whom the HTTP port
+// or the edge calls; none without a certificate.
+std::optional<std::string> CertificateNameOf(const grpc::ServerContextBase& call,
+                                             bool behind_edge) {
+  std::optional<std::string> name;
   const std::string web_certificate = WebCertificateOf(call);
-  if (!web_certificate.empty()) identification.certificate_name = web_certificate;
-  if (behind_edge && IsFromEdge(call)) {
-    identification.certificate_name = EdgeHeader(call, kCertificateNameKey);
-  }
+  if (!web_certificate.empty()) name = web_certificate;
+  if (behind_edge && IsFromEdge(call)) name = EdgeHeader(call, kCertificateNameKey);
   const auto transport = call.auth_context();
   if (transport != nullptr) {
     const auto names = transport->FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME);
     if (!names.empty()) {
       // The name is escaped because it goes into logs, and its signer may not have looked at it
       // closely.
-      identification.certificate_name =
-          absl::CEscape(absl::string_view(names.front().data(), names.front().size()));
+      name = absl::CEscape(absl::string_view(names.front().data(), names.front().size()));
     }
   }
-  return identification;
+  return name;
 }
 
 }  // namespace
@@ -69,6 +65,23 @@ absl::Status AccessControl::Reload() {
 std::shared_ptr<const TokenTable> AccessControl::tokens() const {
   const std::lock_guard lock(mutex_);
   return tokens_;
+}
+
+Identification AccessControl::IdentificationOf(const grpc::ServerContextBase& call) const {
+  Identification identification;
+  const auto& metadata = call.client_metadata();
+  if (metadata.count(kAuthorizationKey) == 1) {
+    const grpc::string_ref value = metadata.find(kAuthorizationKey)->second;
+    identification.authorization.emplace(value.data(), value.size());
+  }
+  if (IsPassedOn(call)) {
+    // The certificate of the connection is the other daemon's.
+    const std::string name = CallerPassedOn(call).certificate_name;
+    if (!name.empty()) identification.certificate_name = name;
+  } else {
+    identification.certificate_name = CertificateNameOf(call, options_.behind_edge);
+  }
+  return identification;
 }
 
 absl::StatusOr<Caller> AccessControl::Identify(const Identification& identification) const {
@@ -103,10 +116,32 @@ absl::StatusOr<Caller> AccessControl::Authorize(const Identification& identifica
 
 absl::StatusOr<Caller> AccessControl::Authorize(const grpc::ServerContextBase& call,
                                                 Method method) const {
-  return Authorize(IdentificationOf(call, options_.behind_edge), method);
+  if (ClaimsToBePassedOn(call) && !IsPassedOn(call)) {
+    return absl::UnauthenticatedError(
+        "the call was passed on with a secret that is not that of this daemon (--node-secret)");
+  }
+  return Authorize(IdentificationOf(call), method);
+}
+
+bool AccessControl::IsPassedOn(const grpc::ServerContextBase& call) const {
+  return options_.nodes && polyest::internal::IsPassedOn(call, *options_.nodes);
+}
+
+std::vector<std::pair<std::string, std::string>> AccessControl::PassOn(
+    const grpc::ServerContextBase& call) const {
+  std::vector<std::pair<std::string, std::string>> metadata =
+      MetadataOf(NodeCaller{PeerOf(call), IdentificationOf(call).certificate_name.value_or("")},
+                 *options_.nodes);
+  const auto [first, last] = call.client_metadata().equal_range(kAuthorizationKey);
+  for (auto value = first; value != last; ++value) {
+    metadata.emplace_back(kAuthorizationKey,
+                          std::string(value->second.data(), value->second.size()));
+  }
+  return metadata;
 }
 
 std::string AccessControl::PeerOf(const grpc::ServerContextBase& call) const {
+  if (IsPassedOn(call)) return CallerPassedOn(call).peer;
   const std::optional<std::string> forwarded =
       options_.behind_edge && IsFromEdge(call) ? EdgeHeader(call, kForwardedForKey) : std::nullopt;
   return forwarded ? absl::StrCat("edge:", *forwarded) : polyest::internal::PeerOf(call);

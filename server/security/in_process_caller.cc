@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "server/security/metadata.h"
 #include "server/security/token.h"
 
 namespace polyest::internal {
@@ -22,19 +23,11 @@ const Secret& ProcessSecret() {
   return secret;
 }
 
-// Returns the value of a key; empty unless the call has exactly one.
-std::string Value(const grpc::ServerContextBase& call, const char* key) {
-  const auto& metadata = call.client_metadata();
-  if (metadata.count(key) != 1) return "";
-  const grpc::string_ref value = metadata.find(key)->second;
-  return {value.data(), value.size()};
-}
-
 // Returns the value of a key that the HTTP port has set; empty for a call that is not its own.
 std::string BelievedValue(const grpc::ServerContextBase& call, const char* key) {
-  const std::string secret = Value(call, kSecretKey);
+  const std::string secret = OnlyValue(call, kSecretKey);
   const bool own = !secret.empty() && SameDigest(DigestOf(secret), ProcessSecret().digest);
-  return own ? Value(call, key) : "";
+  return own ? OnlyValue(call, key) : "";
 }
 
 }  // namespace

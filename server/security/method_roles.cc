@@ -1,10 +1,13 @@
 #include "server/security/method_roles.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <iterator>
 #include <set>
 
 #include "polyest/v1/backup_service.pb.h"
 #include "polyest/v1/model_service.pb.h"
+#include "polyest/v1/node_service.pb.h"
 #include "polyest/v1/operation_service.pb.h"
 #include "polyest/v1/problem_service.pb.h"
 #include "polyest/v1/session_service.pb.h"
@@ -20,7 +23,18 @@ ServiceDescriptors Services() {
           v1::ComputeEstimateRequest::descriptor()->file()->service(0),
           v1::StartComputationRequest::descriptor()->file()->service(0),
           v1::DownloadBackupRequest::descriptor()->file()->service(0),
-          v1::GetStatusRequest::descriptor()->file()->service(0)};
+          v1::GetStatusRequest::descriptor()->file()->service(0),
+          v1::ListNodesRequest::descriptor()->file()->service(0)};
+}
+
+std::string PathOf(Method method) {
+  const std::string name(method.name());
+  for (const google::protobuf::ServiceDescriptor* const service : Services()) {
+    if (service->FindMethodByName(name) != nullptr) {
+      return absl::StrCat("/", service->full_name(), "/", name);
+    }
+  }
+  return "";  // not reached, because the services have all methods of the table
 }
 
 bool CoversAllMethods(const ServiceDescriptors& services) {

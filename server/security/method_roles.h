@@ -4,6 +4,7 @@
 
 #include <google/protobuf/descriptor.h>
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -53,6 +54,8 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"CancelOperation", Role::kReader},
     {"DeleteOperation", Role::kReader},
     {"GetStatus", Role::kReader},
+    {"ListNodes", Role::kAdmin},
+    {"DrainNode", Role::kOperator},
     {"DownloadBackup", Role::kOperator},
 };
 
@@ -81,6 +84,9 @@ using ServiceDescriptors = std::vector<const google::protobuf::ServiceDescriptor
 
 // Returns the services of polyest.v1.
 ServiceDescriptors Services();
+
+// Returns the path by which gRPC calls a method: "/polyest.v1.SessionService/GetSession".
+std::string PathOf(Method method);
 
 // Returns whether the table has one entry for every method of the services, and no others.
 bool CoversAllMethods(const ServiceDescriptors& services);

@@ -80,14 +80,14 @@ absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& ca
 }
 
 grpc::ServerUnaryReactor* StartCall(
-    const ServiceContext& context, grpc::CallbackServerContext* call, Method method,
-    const google::protobuf::Message* answer,
+    const ServiceContext& context, const UnaryCall::Call& call,
     const std::function<absl::StatusOr<Job>(const Caller&)>& make_job) {
-  const auto caller = context.access.Authorize(*call, method);
-  if (!caller.ok()) return FinishAtOnce(call, caller.status());
+  const auto caller = context.access.Authorize(*call.context, call.method);
+  if (!caller.ok()) return FinishAtOnce(call.context, caller.status());
   auto job = make_job(*caller);
-  if (!job.ok()) return FinishAtOnce(call, job.status());
-  return UnaryCall::Start(context, caller->tenant, call, answer, job->submit, std::move(job->work));
+  if (!job.ok()) return FinishAtOnce(call.context, job.status());
+  return UnaryCall::Start(context, caller->tenant, call, std::move(job->submit),
+                          std::move(job->work));
 }
 
 }  // namespace polyest::internal

@@ -41,11 +41,10 @@ absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& ca
                                  const std::string& field, const std::string& name,
                                  SessionWork work);
 
-// Starts a unary call with the job that is made for its caller and fills `answer`. A caller who may
-// not call the method is refused before anything else.
+// Starts a unary call with the job that is made for its caller and fills the answer. A caller who
+// may not call the method is refused before anything else.
 grpc::ServerUnaryReactor* StartCall(
-    const ServiceContext& context, grpc::CallbackServerContext* call, Method method,
-    const google::protobuf::Message* answer,
+    const ServiceContext& context, const UnaryCall::Call& call,
     const std::function<absl::StatusOr<Job>(const Caller&)>& make_job);
 
 }  // namespace polyest::internal

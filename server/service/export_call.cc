@@ -31,11 +31,24 @@ absl::StatusOr<ExportFlow::Next> RecordsOf(const ServiceContext& context, const 
   };
 }
 
+ExportFlow::PassOn PassOnFor(const ServiceContext& context, grpc::CallbackServerContext& call,
+                             const v1::ExportSessionRequest& request) {
+  if (context.nodes == nullptr) return nullptr;
+  return
+      [&context, &call, request](ExportFlow::Reactor* reactor,
+                                 const absl::Status& refusal) -> std::shared_ptr<PassedOnStream> {
+        std::optional<NodeForwarder::Passage> passage = context.nodes->PassageFor(call, refusal);
+        if (!passage) return nullptr;
+        using Relay = StreamRelay<v1::ExportSessionRequest, v1::SessionRecord, ExportFlow::Reactor>;
+        return Relay::Start(*std::move(passage), PathOf("ExportSession"), call, reactor, request);
+      };
+}
+
 }  // namespace
 
-ExportCall::ExportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
-                       const std::string& session)
-    : flow_(std::make_shared<ExportFlow>(context.executor)) {
+ExportCall::ExportCall(ServiceContext& context, grpc::CallbackServerContext& call,
+                       const v1::ExportSessionRequest& request)
+    : flow_(std::make_shared<ExportFlow>(context.executor, PassOnFor(context, call, request))) {
   absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ExportSession");
   if (admitted.ok()) {
     auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, admitted->tenant, flow_);
@@ -50,7 +63,7 @@ ExportCall::ExportCall(ServiceContext& context, const grpc::CallbackServerContex
     return;
   }
   flow_->OnStart(this, absl::StrCat(admitted->tenant, "/calls"),
-                 RecordsOf(context, *admitted, session));
+                 RecordsOf(context, *admitted, request.name()));
 }
 
 void ExportCall::OnDone() {

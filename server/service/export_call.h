@@ -15,8 +15,8 @@ namespace polyest::internal {
 
 class ExportCall final : public grpc::ServerWriteReactor<v1::SessionRecord> {
  public:
-  ExportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
-             const std::string& session);
+  ExportCall(ServiceContext& context, grpc::CallbackServerContext& call,
+             const v1::ExportSessionRequest& request);
 
   void OnWriteDone(bool ok) override { flow_->OnWritten(ok); }
   void OnCancel() override { flow_->OnCancelled(); }

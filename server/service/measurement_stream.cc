@@ -49,6 +49,7 @@ void MeasurementFlow::OnFirstMessageDue() {
 
 void MeasurementFlow::OnRead(bool ok) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnRead(ok);
   reading_ = false;
   if (!ok) {
     half_closed_ = true;
@@ -110,14 +111,28 @@ void MeasurementFlow::Find(const std::string& tenant, const std::string& session
   std::lock_guard lock(mutex_);
   stage_ = Stage::kNone;
   if (!end_) {
+    if (PassOn(found.status())) return;
     const absl::Status joined = Join(std::move(found), writer);
     if (!joined.ok()) End(joined);
   }
   Advance();
 }
 
+bool MeasurementFlow::PassOn(const absl::Status& refusal) {
+  if (context_.nodes == nullptr || draining_ || refusal.ok()) return false;
+  std::optional<NodeForwarder::Passage> passage = context_.nodes->PassageFor(call_, refusal);
+  if (!passage) return false;
+  finished_ = true;
+  // Nothing is being read, and the first message is the only one that has been.
+  passed_on_ = MeasurementRelay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_,
+                                       reactor_, std::move(inbox_.front()));
+  inbox_.clear();
+  return true;
+}
+
 void MeasurementFlow::OnWritten(bool ok) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
   writing_ = false;
   outbox_.pop_front();
   if (!ok) Break(absl::CancelledError("the client does not read any more"));
@@ -126,6 +141,7 @@ void MeasurementFlow::OnWritten(bool ok) {
 
 void MeasurementFlow::OnCancelled() {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnCancelled();
   Break(absl::CancelledError("the call was cancelled"));
   Advance();
 }
@@ -143,14 +159,16 @@ void MeasurementFlow::OnReplaced() {
   Advance();
 }
 
-void MeasurementFlow::Drain() {
+void MeasurementFlow::EndSoon(const absl::Status& reason) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->Drain();
+  if (!draining_) drained_ = reason;
   draining_ = true;
-  if (session_ == nullptr) End(ShuttingDown());
+  if (session_ == nullptr) End(reason);
   Advance();
 }
 
-// Sets how the stream ends. The client has to send again what was received and not taken.
+// Sets how the stream ends. The client sends again what was received and not taken.
 void MeasurementFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
   inbox_.clear();
@@ -308,7 +326,7 @@ void MeasurementFlow::Compute() {
   std::unique_lock lock(mutex_);
   const std::vector<Uncomputed> turn = NextTurn();
   const bool last = uncomputed_.empty() && AllTaken();
-  const absl::Status at_end = half_closed_ ? absl::OkStatus() : ShuttingDown();
+  const absl::Status at_end = half_closed_ ? absl::OkStatus() : drained_;
   lock.unlock();
   const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
   lock.lock();

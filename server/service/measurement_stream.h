@@ -7,7 +7,8 @@
 // numerics are computed on the session's strand, which never delays an acknowledgement. Reactions
 // only move messages between gRPC and bounded queues. The next message is read only while all
 // queues have room, so that HTTP/2's flow control holds back a client that is too fast for the
-// disk, far too fast for the numerics, or too slow to read.
+// disk, far too fast for the numerics, or too slow to read. A stream to a session of another daemon
+// is passed on to that.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -25,11 +26,14 @@
 #include "server/service/estimate_schedule.h"
 #include "server/service/first_message_timer.h"
 #include "server/service/service_context.h"
+#include "server/service/stream_relay.h"
 
 namespace polyest::internal {
 
 using MeasurementReactor =
     grpc::ServerBidiReactor<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse>;
+using MeasurementRelay =
+    StreamRelay<v1::StreamMeasurementsRequest, v1::StreamMeasurementsResponse, MeasurementReactor>;
 
 // Holds the state of one stream. It outlives its reactor, because the strand may still hold it.
 class MeasurementFlow final : public SessionObserver,
@@ -55,9 +59,11 @@ class MeasurementFlow final : public SessionObserver,
   void OnClosed() override;
   // Ends the stream ABORTED, because the writer goes on with another connection.
   void OnReplaced() override;
+  // Ends the stream UNAVAILABLE after a last estimate, because the session moves.
+  void OnMoved() override { EndSoon(Moving()); }
   void OnEstimate(const SharedEstimate&) override {}
   // Ends the stream UNAVAILABLE after a last estimate, because the daemon shuts down.
-  void Drain() override;
+  void Drain() override { EndSoon(ShuttingDown()); }
 
  private:
   static constexpr size_t kLongestWriter = 64;
@@ -83,9 +89,13 @@ class MeasurementFlow final : public SessionObserver,
   };
   enum class Stage { kNone, kFinding, kLoading, kReady };
 
+  void EndSoon(const absl::Status& reason);
+
   // The following are called with the mutex held.
   void Accept(v1::StreamMeasurementsRequest request);
   absl::Status Attach(const Caller& caller, const v1::StreamMeasurementsRequest& request);
+  // Passes the stream on to the owner of its session, if `refusal` names one that may be asked.
+  bool PassOn(const absl::Status& refusal);
   // Makes this the writer of the session.
   absl::Status Join(absl::StatusOr<std::shared_ptr<Session>> session, const std::string& writer);
   void End(const absl::Status& status);
@@ -126,8 +136,9 @@ class MeasurementFlow final : public SessionObserver,
 
   std::mutex mutex_;
   MeasurementReactor* reactor_ = nullptr;
-  std::shared_ptr<Session> session_;  // set once, before any work
-  uint64_t losses_ = 0;               // losses of the session when the stream began
+  std::shared_ptr<PassedOnStream> passed_on_;  // set if another daemon owns the session
+  std::shared_ptr<Session> session_;           // set once, before any work
+  uint64_t losses_ = 0;                        // losses of the session when the stream began
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;
@@ -141,6 +152,7 @@ class MeasurementFlow final : public SessionObserver,
   bool computing_ = false;
   bool half_closed_ = false;
   bool draining_ = false;
+  absl::Status drained_;  // why draining_ is set
   bool finished_ = false;
   bool left_uncomputed_ = false;
   std::optional<absl::Status> end_;  // how the stream ends, once the outbox is empty

@@ -16,19 +16,21 @@ class ModelService final : public v1::ModelService::CallbackService {
   // A folder of FMUs may have to be read, which may take long.
   Unary* ListModels(Context* call, const v1::ListModelsRequest* request,
                     v1::ListModelsResponse* response) override {
-    return StartCall(context_, call, "ListModels", response, [=, this](const Caller& caller) {
-      return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
-        return Deliver(polyest::internal::ListModels(*request, context_.models), response);
-      });
-    });
+    return StartCall(
+        context_, {call, "ListModels", request, response}, [=, this](const Caller& caller) {
+          return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
+            return Deliver(polyest::internal::ListModels(*request, context_.models), response);
+          });
+        });
   }
 
   Unary* GetModel(Context* call, const v1::GetModelRequest* request, v1::Model* response) override {
-    return StartCall(context_, call, "GetModel", response, [=, this](const Caller& caller) {
-      return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
-        return Deliver(polyest::internal::GetModel(*request, context_.models), response);
-      });
-    });
+    return StartCall(
+        context_, {call, "GetModel", request, response}, [=, this](const Caller& caller) {
+          return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
+            return Deliver(polyest::internal::GetModel(*request, context_.models), response);
+          });
+        });
   }
 
  private:

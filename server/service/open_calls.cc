@@ -24,6 +24,12 @@ absl::Status ShuttingDown() {
                 {.reason = kShuttingDown, .retry_delay = kRetryDelay});
 }
 
+absl::Status Moving() {
+  return Refuse(absl::StatusCode::kUnavailable,
+                "the session moves to another daemon; ask for it again",
+                {.reason = kOwnedElsewhere, .retry_delay = std::chrono::milliseconds(100)});
+}
+
 absl::Status OpenCalls::CheckRoom(Kind kind, const std::string& tenant) const {
   const auto full = [](const std::string& why) {
     return Refuse(absl::StatusCode::kResourceExhausted, why,

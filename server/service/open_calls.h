@@ -94,5 +94,7 @@ class OpenCalls {
 // Returns the refusal of a daemon that shuts down: UNAVAILABLE, with the time after which to try
 // again.
 absl::Status ShuttingDown();
+// Returns why streams end whose session another daemon of the database takes: UNAVAILABLE likewise.
+absl::Status Moving();
 
 }  // namespace polyest::internal

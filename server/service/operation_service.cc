@@ -1,3 +1,4 @@
+#include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
@@ -5,6 +6,7 @@
 #include "polyest/v1/operation_service.grpc.pb.h"
 #include "proto/wire/operations/names.h"
 #include "proto/wire/operations/pages.h"
+#include "proto/wire/refusal/refusal.h"
 #include "server/service/operation_store.h"
 #include "server/service/services.h"
 #include "server/service/study_jobs.h"
@@ -31,6 +33,13 @@ absl::StatusOr<v1::ListOperationsResponse> ListPage(OperationStore& operations,
   return response;
 }
 
+// Returns how the names of a daemon's operations begin, so that any daemon of the database knows
+// whose they are.
+std::string PrefixOf(int64_t node) { return absl::StrCat("node", node, "-"); }
+std::string PrefixOf(const SharedJournal* journal) {
+  return journal == nullptr ? "" : PrefixOf(journal->node());
+}
+
 class OperationService final : public v1::OperationService::CallbackService {
  public:
   using Unary = grpc::ServerUnaryReactor;
@@ -38,56 +47,79 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   explicit OperationService(const ServiceContext& context)
       : context_(context),
-        operations_({.max_computing = context.max_computing}, context.wall_clock) {}
+        operations_({.max_computing = context.max_computing,
+                     .prefix = PrefixOf(context.sessions.services().journal.shared())},
+                    context.wall_clock) {}
 
   Unary* StartComputation(Context* call, const v1::StartComputationRequest* request,
                           v1::Operation* response) override {
-    return Soon(call, "StartComputation", response,
+    return Soon(call, "StartComputation", request, response,
                 [=, this](const Caller& caller) { return Start(caller, *request); });
   }
 
   Unary* GetOperation(Context* call, const v1::GetOperationRequest* request,
                       v1::Operation* response) override {
-    return Soon(call, "GetOperation", response,
+    return Soon(call, "GetOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
-                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  POLYEST_RETURN_IF_ERROR(CheckIsHere(request->name()));
                   return operations_.Get(caller.tenant, request->name());
                 });
   }
 
   Unary* ListOperations(Context* call, const v1::ListOperationsRequest* request,
                         v1::ListOperationsResponse* response) override {
-    return Soon(call, "ListOperations", response, [=, this](const Caller& caller) {
+    return Soon(call, "ListOperations", request, response, [=, this](const Caller& caller) {
       return ListPage(operations_, caller.tenant, *request);
     });
   }
 
   Unary* CancelOperation(Context* call, const v1::CancelOperationRequest* request,
                          v1::Operation* response) override {
-    return Soon(call, "CancelOperation", response,
+    return Soon(call, "CancelOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<v1::Operation> {
-                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  POLYEST_RETURN_IF_ERROR(CheckIsHere(request->name()));
                   return operations_.Cancel(caller.tenant, request->name());
                 });
   }
 
   Unary* DeleteOperation(Context* call, const v1::DeleteOperationRequest* request,
                          google::protobuf::Empty* response) override {
-    return Soon(call, "DeleteOperation", response,
+    return Soon(call, "DeleteOperation", request, response,
                 [=, this](const Caller& caller) -> absl::StatusOr<google::protobuf::Empty> {
-                  POLYEST_RETURN_IF_ERROR(CheckName(request->name()));
+                  POLYEST_RETURN_IF_ERROR(CheckIsHere(request->name()));
                   POLYEST_RETURN_IF_ERROR(operations_.Delete(caller.tenant, request->name()));
                   return google::protobuf::Empty();
                 });
   }
 
  private:
-  static absl::Status CheckName(const std::string& name) {
-    return ResourceId("name", "operations", name).status();
+  // Checks the name of an operation. UNAVAILABLE, naming the daemon, for one of another daemon that
+  // shares the database.
+  absl::Status CheckIsHere(const std::string& name) const {
+    POLYEST_RETURN_IF_ERROR(ResourceId("name", "operations", name).status());
+    SharedJournal* const journal = context_.sessions.services().journal.shared();
+    if (journal == nullptr || absl::StartsWith(name, "operations/" + PrefixOf(journal))) {
+      return absl::OkStatus();
+    }
+    POLYEST_ASSIGN_OR_RETURN(const std::vector<JournalNode> nodes, journal->Nodes());
+    for (const JournalNode& node : nodes) {
+      if (!absl::StartsWith(name, "operations/" + PrefixOf(node.number))) continue;
+      return Refuse(absl::StatusCode::kUnavailable,
+                    absl::StrCat("the operation is one of the daemon at ", node.address),
+                    {.reason = kOwnedElsewhere,
+                     .retry_delay = std::chrono::seconds(1),
+                     .owner = node.address});
+    }
+    return absl::OkStatus();
   }
 
   absl::StatusOr<v1::Operation> Start(const Caller& caller,
                                       const v1::StartComputationRequest& given) {
+    // The session's owner computes; it also keeps the operation.
+    const std::string session = SessionOf(given);
+    if (context_.sessions.shared() && !session.empty()) {
+      POLYEST_RETURN_IF_ERROR(FindSession(context_, caller, "subject.session", session).status());
+    }
     // The operation needs a copy, because the call's own request is destroyed with the call.
     const auto request = std::make_shared<v1::StartComputationRequest>(given);
     return operations_.Start(caller.tenant, MethodOf(*request),
@@ -104,9 +136,10 @@ class OperationService final : public v1::OperationService::CallbackService {
   }
 
   // Starts a call whose answer needs no computation.
-  template <typename Response, typename Answer>
-  Unary* Soon(Context* call, Method method, Response* response, const Answer& answer) {
-    return StartCall(context_, call, method, response, [&](const Caller& caller) {
+  template <typename Request, typename Response, typename Answer>
+  Unary* Soon(Context* call, Method method, const Request* request, Response* response,
+              const Answer& answer) {
+    return StartCall(context_, {call, method, request, response}, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, [=](const Caller& known, const Stop&) {
         return Deliver(absl::StatusOr<Response>(answer(known)), response);
       });

@@ -180,8 +180,8 @@ absl::Status OperationStore::MakeRoom(const std::string& tenant) {
 absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
                                                     const std::string& method,
                                                     const MakeJob& make_job) {
-  const auto entry = std::make_shared<Entry>(absl::StrCat("operations/", MakeRequestId()), method,
-                                             wall_clock_(), now_());
+  const auto entry = std::make_shared<Entry>(
+      absl::StrCat("operations/", limits_.prefix, MakeRequestId()), method, wall_clock_(), now_());
   POLYEST_ASSIGN_OR_RETURN(const Job job, make_job(entry->result()));
   Key key;
   {

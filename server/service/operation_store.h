@@ -25,6 +25,7 @@ struct OperationLimits {
   size_t per_tenant = 64;                // largest number of operations, done or under way
   std::chrono::seconds kept_for{3'600};  // time that they are kept after their end
   std::chrono::seconds max_computing;    // longest computing time of one
+  std::string prefix{};                  // of their names, behind "operations/"
 };
 
 // Keeps the operations of all tenants in memory, while they run and for an hour after their end.

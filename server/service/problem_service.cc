@@ -16,26 +16,28 @@ class ProblemService final : public v1::ProblemService::CallbackService {
 
   Unary* CheckProblem(Context* call, const v1::CheckProblemRequest* request,
                       v1::CheckProblemResponse* response) override {
-    return StartCall(context_, call, "CheckProblem", response, [=, this](const Caller& caller) {
-      return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
-        const SessionServices& services = context_.sessions.services();
-        const absl::Status room = services.memory.Check();
-        if (!room.ok()) return room;
-        *response =
-            polyest::internal::CheckProblem(*request, context_.models, services.limits.problem);
-        return absl::OkStatus();
-      });
-    });
+    return StartCall(
+        context_, {call, "CheckProblem", request, response}, [=, this](const Caller& caller) {
+          return JobOfCaller(context_, caller, [=, this](const Caller&, const Stop&) {
+            const SessionServices& services = context_.sessions.services();
+            const absl::Status room = services.memory.Check();
+            if (!room.ok()) return room;
+            *response =
+                polyest::internal::CheckProblem(*request, context_.models, services.limits.problem);
+            return absl::OkStatus();
+          });
+        });
   }
 
-  Unary* GetProblemSchema(Context* call, const v1::GetProblemSchemaRequest*,
+  Unary* GetProblemSchema(Context* call, const v1::GetProblemSchemaRequest* request,
                           v1::GetProblemSchemaResponse* response) override {
-    return StartCall(context_, call, "GetProblemSchema", response, [=, this](const Caller& caller) {
-      return ShortJobOfCaller(context_, caller, [=](const Caller&, const Stop&) {
-        response->set_json_schema(kProblemSchema);
-        return absl::OkStatus();
-      });
-    });
+    return StartCall(context_, {call, "GetProblemSchema", request, response},
+                     [=, this](const Caller& caller) {
+                       return ShortJobOfCaller(context_, caller, [=](const Caller&, const Stop&) {
+                         response->set_json_schema(kProblemSchema);
+                         return absl::OkStatus();
+                       });
+                     });
   }
 
  private:

@@ -23,6 +23,7 @@
 #include "server/service/guarded.h"
 #include "server/service/open_calls.h"
 #include "server/service/status_mapping.h"
+#include "server/service/stream_relay.h"
 
 namespace polyest::internal {
 
@@ -34,7 +35,12 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
   // Returns the next records; none at the end. Runs on the executor, once at a time.
   using Next = std::function<absl::StatusOr<std::vector<Record>>(const Stop&)>;
 
-  explicit RecordFlow(Executor& executor) : executor_(executor) {}
+  // Passes the call on to another daemon if the first records are refused because they are that
+  // one's; returns null if they are not.
+  using PassOn = std::function<std::shared_ptr<PassedOnStream>(Reactor*, const absl::Status&)>;
+
+  explicit RecordFlow(Executor& executor, PassOn pass_on = nullptr)
+      : executor_(executor), pass_on_(std::move(pass_on)) {}
 
   // Begins to send what `next` returns, in a lane of the executor, or ends the call at once.
   void OnStart(Reactor* reactor, std::string lane, absl::StatusOr<Next> next) {
@@ -52,6 +58,7 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
 
   void OnWritten(bool ok) {
     const std::lock_guard lock(mutex_);
+    if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
     writing_ = false;
     records_.pop_front();
     if (!ok) {
@@ -63,6 +70,7 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
 
   void OnCancelled() {
     const std::lock_guard lock(mutex_);
+    if (passed_on_ != nullptr) return passed_on_->OnCancelled();
     End(absl::CancelledError("the call was cancelled"));
     Advance();
   }
@@ -74,6 +82,7 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
 
   void Drain() override {
     const std::lock_guard lock(mutex_);
+    if (passed_on_ != nullptr) return passed_on_->Drain();
     End(ShuttingDown());
     Advance();
   }
@@ -124,6 +133,12 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
     });
     const std::lock_guard lock(mutex_);
     reading_ = false;
+    const PassOn pass_on = std::exchange(pass_on_, nullptr);
+    if (!read.ok() && !end_ && pass_on != nullptr) {
+      passed_on_ = pass_on(reactor_, read);
+      finished_ = passed_on_ != nullptr;
+      if (finished_) return;
+    }
     if (!read.ok()) {
       End(read);
     } else if (next->empty()) {
@@ -142,7 +157,9 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
 
   std::mutex mutex_;
   Reactor* reactor_ = nullptr;
-  std::deque<Record> records_;  // the first one is being written or is the next
+  PassOn pass_on_;                             // until the first records have been read
+  std::shared_ptr<PassedOnStream> passed_on_;  // set if another daemon has the records
+  std::deque<Record> records_;                 // the first one is being written or is the next
   bool reading_ = false;
   bool writing_ = false;
   bool finished_ = false;

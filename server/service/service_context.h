@@ -9,6 +9,7 @@
 
 #include "core/external/model_library.h"
 #include "server/execution/executor.h"
+#include "server/forwarding/node_forwarder.h"
 #include "server/security/access_control.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
@@ -35,6 +36,8 @@ struct ServiceContext {
   // Bytes of the batches of a stream that wait, to be taken or to be computed, from which on no
   // further message of it is read.
   int64_t held_bytes = 32 << 20;
+  // Passes calls on to other daemons of the database; null: they are refused.
+  const NodeForwarder* nodes = nullptr;
 };
 
 }  // namespace polyest::internal

@@ -6,7 +6,7 @@ std::vector<std::unique_ptr<grpc::Service>> MakeServices(const ServiceContext& c
   std::vector<std::unique_ptr<grpc::Service>> services;
   for (const auto make :
        {MakeModelService, MakeProblemService, MakeSessionService, MakeStudyService,
-        MakeOperationService, MakeBackupService, MakeStatusService}) {
+        MakeOperationService, MakeBackupService, MakeNodeService, MakeStatusService}) {
     services.push_back(make(context));
   }
   return services;

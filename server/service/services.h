@@ -19,6 +19,7 @@ std::unique_ptr<grpc::Service> MakeStudyService(const ServiceContext& context);
 // their ends.
 std::unique_ptr<grpc::Service> MakeOperationService(const ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeBackupService(const ServiceContext& context);
+std::unique_ptr<grpc::Service> MakeNodeService(const ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeStatusService(const ServiceContext& context);
 
 // Makes all services. They must be destroyed before what the context refers to.

@@ -51,7 +51,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 
   grpc::ServerWriteReactor<v1::SessionRecord>* ExportSession(
       Context* call, const v1::ExportSessionRequest* request) override {
-    return new ExportCall(context_, *call, request->name());
+    return new ExportCall(context_, *call, *request);
   }
   grpc::ServerReadReactor<v1::ImportSessionRequest>* ImportSession(Context* call,
                                                                    v1::Session* response) override {
@@ -64,7 +64,7 @@ class SessionService final : public v1::SessionService::CallbackService {
                      v1::Estimate* response) override;
   Unary* GetHistory(Context* call, const v1::GetHistoryRequest* request,
                     v1::GetHistoryResponse* response) override {
-    return OnStrand(call, "GetHistory", response, request->session(),
+    return OnStrand({call, "GetHistory", request, response}, request->session(),
                     [=](const std::shared_ptr<Session>& session, const Stop&) -> absl::Status {
                       POLYEST_ASSIGN_OR_RETURN(*response->mutable_history(), session->History());
                       return absl::OkStatus();
@@ -81,15 +81,13 @@ class SessionService final : public v1::SessionService::CallbackService {
 
  private:
   // Starts a call that is soon done.
-  Unary* ForCaller(Context* call, Method method, const google::protobuf::Message* answer,
-                   CallerWork work) {
-    return StartCall(context_, call, method, answer, [&](const Caller& caller) {
+  Unary* ForCaller(const UnaryCall::Call& call, CallerWork work) {
+    return StartCall(context_, call, [&](const Caller& caller) {
       return ShortJobOfCaller(context_, caller, std::move(work));
     });
   }
-  Unary* OnStrand(Context* call, Method method, const google::protobuf::Message* answer,
-                  const std::string& session, SessionWork work) {
-    return StartCall(context_, call, method, answer, [&](const Caller& caller) {
+  Unary* OnStrand(const UnaryCall::Call& call, const std::string& session, SessionWork work) {
+    return StartCall(context_, call, [&](const Caller& caller) {
       return JobOfSession(context_, caller, "session", session, std::move(work));
     });
   }
@@ -100,7 +98,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::Session* response) {
-  return ForCaller(call, "CreateSession", response,
+  return ForCaller({call, "CreateSession", request, response},
                    [=, this](const Caller& caller, const Stop&) -> absl::Status {
                      const v1::Problem& problem = request->session().problem();
                      POLYEST_ASSIGN_OR_RETURN(
@@ -116,23 +114,25 @@ SessionService::Unary* SessionService::CreateSession(Context* call,
 SessionService::Unary* SessionService::GetSession(Context* call,
                                                   const v1::GetSessionRequest* request,
                                                   v1::Session* response) {
-  return ForCaller(
-      call, "GetSession", response, [=, this](const Caller& caller, const Stop&) -> absl::Status {
-        POLYEST_ASSIGN_OR_RETURN(const auto session,
-                                 FindSession(context_, caller, "name", request->name()));
-        *response = session->Describe();
-        POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
-        return absl::OkStatus();
-      });
+  return ForCaller({call, "GetSession", request, response},
+                   [=, this](const Caller& caller, const Stop&) -> absl::Status {
+                     POLYEST_ASSIGN_OR_RETURN(
+                         const auto session,
+                         FindSession(context_, caller, "name", request->name()));
+                     *response = session->Describe();
+                     POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
+                     return absl::OkStatus();
+                   });
 }
 
 SessionService::Unary* SessionService::ListSessions(Context* call,
                                                     const v1::ListSessionsRequest* request,
                                                     v1::ListSessionsResponse* response) {
   if (context_.sessions.shared()) {
-    return ForCaller(call, "ListSessions", response, [=, this](const Caller& caller, const Stop&) {
-      return Deliver(ListPage(context_.sessions, caller.tenant, *request), response);
-    });
+    return ForCaller(
+        {call, "ListSessions", request, response}, [=, this](const Caller& caller, const Stop&) {
+          return Deliver(ListPage(context_.sessions, caller.tenant, *request), response);
+        });
   }
   const auto caller = context_.access.Authorize(*call, "ListSessions");
   if (!caller.ok()) return FinishAtOnce(call, caller.status());
@@ -144,7 +144,7 @@ SessionService::Unary* SessionService::DeleteSession(Context* call,
                                                      const v1::DeleteSessionRequest* request,
                                                      google::protobuf::Empty* response) {
   return ForCaller(
-      call, "DeleteSession", response,
+      {call, "DeleteSession", request, response},
       [=, this](const Caller& caller, const Stop&) -> absl::Status {
         POLYEST_RETURN_IF_ERROR(ResourceId("name", "sessions", request->name()).status());
         return context_.sessions.Delete(caller.tenant, request->name());
@@ -155,7 +155,7 @@ SessionService::Unary* SessionService::AddMeasurements(Context* call,
                                                        const v1::AddMeasurementsRequest* request,
                                                        v1::AddMeasurementsResponse* response) {
   return OnStrand(
-      call, "AddMeasurements", response, request->session(),
+      {call, "AddMeasurements", request, response}, request->session(),
       [=, this](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
         POLYEST_RETURN_IF_ERROR(session->Load(stop));
         POLYEST_ASSIGN_OR_RETURN(*response->mutable_acknowledgement(),
@@ -169,7 +169,7 @@ SessionService::Unary* SessionService::AddMeasurements(Context* call,
 SessionService::Unary* SessionService::GetEstimate(Context* call,
                                                    const v1::GetEstimateRequest* request,
                                                    v1::Estimate* response) {
-  return OnStrand(call, "GetEstimate", response, request->session(),
+  return OnStrand({call, "GetEstimate", request, response}, request->session(),
                   [=](const std::shared_ptr<Session>& session, const Stop& stop) -> absl::Status {
                     POLYEST_ASSIGN_OR_RETURN(const SharedEstimate estimate,
                                              session->CurrentEstimate(stop));

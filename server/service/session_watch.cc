@@ -74,20 +74,21 @@ void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
   }
   absl::Status attached = admitted;
   if (attached.ok()) attached = CheckPolicy(request.prediction());
-  if (attached.ok()) attached = Attach(request.session());
+  if (attached.ok()) attached = Attach(request);
   if (!attached.ok()) End(attached);
   Advance();
 }
 
-absl::Status WatchFlow::Attach(const std::string& session) {
+absl::Status WatchFlow::Attach(const v1::WatchSessionRequest& request) {
+  const std::string& session = request.session();
   POLYEST_ASSIGN_OR_RETURN(const Caller caller, Authorize());
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", session).status());
   registering_ = true;
   if (context_.sessions.shared()) {
     const absl::Status looking =
         context_.executor.Submit(absl::StrCat(caller.tenant, "/sessions"),
-                                 [flow = shared_from_this(), tenant = caller.tenant, session] {
-                                   flow->Find(tenant, session);
+                                 [flow = shared_from_this(), tenant = caller.tenant, request] {
+                                   flow->Find(tenant, request);
                                  });
     if (!looking.ok()) registering_ = false;
     return looking;
@@ -102,8 +103,8 @@ absl::Status WatchFlow::Attach(const std::string& session) {
 }
 
 // Looks for the session where a thread may wait for that.
-void WatchFlow::Find(const std::string& tenant, const std::string& session) {
-  auto found = context_.sessions.Find(tenant, session);
+void WatchFlow::Find(const std::string& tenant, const v1::WatchSessionRequest& request) {
+  auto found = context_.sessions.Find(tenant, request.session());
   std::lock_guard lock(mutex_);
   absl::Status accepted = found.status();
   if (accepted.ok()) {
@@ -112,8 +113,19 @@ void WatchFlow::Find(const std::string& tenant, const std::string& session) {
   }
   if (accepted.ok()) return;
   registering_ = false;
+  if (!end_ && PassOn(accepted, request)) return;
   End(accepted);
   Advance();
+}
+
+bool WatchFlow::PassOn(const absl::Status& refusal, const v1::WatchSessionRequest& request) {
+  if (context_.nodes == nullptr) return false;
+  std::optional<NodeForwarder::Passage> passage = context_.nodes->PassageFor(call_, refusal);
+  if (!passage) return false;
+  using Relay = StreamRelay<v1::WatchSessionRequest, v1::WatchSessionResponse, WatchReactor>;
+  finished_ = true;
+  passed_on_ = Relay::Start(*std::move(passage), PathOf("WatchSession"), call_, reactor_, request);
+  return true;
 }
 
 void WatchFlow::Register() {
@@ -170,6 +182,7 @@ void WatchFlow::Predict() {
 
 void WatchFlow::OnWritten(bool ok) {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
   writing_ = false;
   if (!ok) {
     End(absl::CancelledError("the client does not read any more"));
@@ -181,6 +194,7 @@ void WatchFlow::OnWritten(bool ok) {
 
 void WatchFlow::OnCancelled() {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->OnCancelled();
   stop_source_.request_stop();
   End(absl::CancelledError("the call was cancelled"));
   pending_ = nullptr;
@@ -194,8 +208,15 @@ void WatchFlow::OnClosed() {
   Advance();
 }
 
+void WatchFlow::OnMoved() {
+  std::lock_guard lock(mutex_);
+  End(Moving());
+  Advance();
+}
+
 void WatchFlow::Drain() {
   std::lock_guard lock(mutex_);
+  if (passed_on_ != nullptr) return passed_on_->Drain();
   End(ShuttingDown());
   Advance();
 }

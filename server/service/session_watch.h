@@ -17,6 +17,7 @@
 #include "polyest/v1/session_service.pb.h"
 #include "server/service/call_stop.h"
 #include "server/service/service_context.h"
+#include "server/service/stream_relay.h"
 
 namespace polyest::internal {
 
@@ -41,13 +42,14 @@ class WatchFlow final : public SessionObserver,
 
   void OnEstimate(const SharedEstimate& estimate) override;
   void OnClosed() override;
+  void OnMoved() override;
   void Drain() override;
 
  private:
   using Clock = std::chrono::steady_clock;
 
   // The following are called with the mutex held.
-  absl::Status Attach(const std::string& session);
+  absl::Status Attach(const v1::WatchSessionRequest& request);
   void End(const absl::Status& status);
   void Advance();
   void PredictIfDue();
@@ -55,7 +57,10 @@ class WatchFlow final : public SessionObserver,
   // Computes a prediction; runs on the strand.
   void Predict();
   // Makes the watch an observer of the session; runs on the strand.
-  void Find(const std::string& tenant, const std::string& session);
+  void Find(const std::string& tenant, const v1::WatchSessionRequest& request);
+  // Passes the watch on to the owner of its session, if `refusal` names one that may be asked.
+  // Called with the mutex held.
+  bool PassOn(const absl::Status& refusal, const v1::WatchSessionRequest& request);
   void Register();
 
   ServiceContext& context_;
@@ -65,6 +70,7 @@ class WatchFlow final : public SessionObserver,
 
   std::mutex mutex_;
   WatchReactor* reactor_ = nullptr;
+  std::shared_ptr<PassedOnStream> passed_on_;  // set if another daemon owns the session
   std::shared_ptr<Session> session_;
   SharedEstimate pending_, last_;
   std::optional<v1::PredictRequest> wanted_;   // the prediction that is asked for, if any

@@ -11,14 +11,15 @@ class StatusService final : public v1::StatusService::CallbackService {
   explicit StatusService(const ServiceContext& context) : context_(context) {}
 
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* call,
-                                      const v1::GetStatusRequest*,
+                                      const v1::GetStatusRequest* request,
                                       v1::DaemonStatus* response) override {
-    return StartCall(context_, call, "GetStatus", response, [=, this](const Caller& caller) {
-      return ShortJobOfCaller(context_, caller, [=, this](const Caller& known, const Stop&) {
-        *response = DescribeDaemon(context_, known.tenant);
-        return absl::OkStatus();
-      });
-    });
+    return StartCall(
+        context_, {call, "GetStatus", request, response}, [=, this](const Caller& caller) {
+          return ShortJobOfCaller(context_, caller, [=, this](const Caller& known, const Stop&) {
+            *response = DescribeDaemon(context_, known.tenant);
+            return absl::OkStatus();
+          });
+        });
   }
 
  private:

@@ -206,12 +206,30 @@ absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& 
   return InvalidField("computation", "one must be given, such as estimate or posterior");
 }
 
-std::string MethodOf(const v1::StartComputationRequest& request) {
-  const auto* const given = v1::StartComputationRequest::GetReflection()->GetOneofFieldDescriptor(
+namespace {
+
+// Returns the field with the request of the study; null if there is none.
+const google::protobuf::FieldDescriptor* StudyIn(const v1::StartComputationRequest& request) {
+  return v1::StartComputationRequest::GetReflection()->GetOneofFieldDescriptor(
       request, v1::StartComputationRequest::descriptor()->FindOneofByName("computation"));
-  if (given == nullptr) return "";
-  const std::string& message = given->message_type()->name();
+}
+
+}  // namespace
+
+std::string MethodOf(const v1::StartComputationRequest& request) {
+  const auto* const study = StudyIn(request);
+  if (study == nullptr) return "";
+  const std::string& message = study->message_type()->name();
   return message.substr(0, message.size() - std::string("Request").size());
+}
+
+std::string SessionOf(const v1::StartComputationRequest& request) {
+  const auto* const field = StudyIn(request);
+  if (field == nullptr) return "";
+  const auto& study = v1::StartComputationRequest::GetReflection()->GetMessage(request, field);
+  const auto* const subject = study.GetDescriptor()->FindFieldByName("subject");
+  return static_cast<const v1::Subject&>(study.GetReflection()->GetMessage(study, subject))
+      .session();
 }
 
 }  // namespace polyest::internal

@@ -27,4 +27,7 @@ absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& 
 // names no computation.
 std::string MethodOf(const v1::StartComputationRequest& request);
 
+// Returns the name of the session of which it is computed; empty if it is none.
+std::string SessionOf(const v1::StartComputationRequest& request);
+
 }  // namespace polyest::internal

@@ -53,7 +53,7 @@ class StudyService final : public v1::StudyService::CallbackService {
  private:
   template <typename Request, typename Response>
   Unary* Compute(Context* call, Method method, const Request* request, Response* response) {
-    return StartCall(context_, call, method, response, [&](const Caller& caller) {
+    return StartCall(context_, {call, method, request, response}, [&](const Caller& caller) {
       return StudyJob(context_, caller, request, response);
     });
   }

@@ -1,45 +1,75 @@
 #include "server/service/unary_call.h"
 
 #include "core/common/status.h"
-#include "server/service/call_stop.h"
 #include "server/service/guarded.h"
+#include "server/service/passed_on.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest::internal {
+namespace {
+
+// Number of times that the database is asked who owns the session.
+constexpr int kAttempts = 3;
+
+}  // namespace
 
 grpc::ServerUnaryReactor* UnaryCall::Start(const ServiceContext& service, const std::string& tenant,
-                                           grpc::CallbackServerContext* context,
-                                           const google::protobuf::Message* answer,
-                                           const Submit& submit, Work work) {
+                                           const Call& call, UnaryCall::Submit submit, Work work) {
   auto ticket = service.calls.Enter(OpenCalls::Kind::kUnary, tenant);
-  if (!ticket.ok()) return FinishAtOnce(context, ticket.status());
-  auto* call = new UnaryCall;
-  call->ticket_ = *std::move(ticket);
-  call->state_->reactor = call;
-  call->state_->answer = answer;
-  auto run = [state = call->state_, work = std::move(work),
-              call_stop =
-                  CallStop(*context, call->state_->stop.get_token(), service.max_computing)] {
-    const Stop stop = call_stop.Begin();
-    const auto finish = [state, call_stop](const absl::Status& outcome) {
-      Finish(*state, call_stop.Name(outcome));
-    };
-    absl::Status status = stop.Check();
-    if (status.ok()) status = Guarded([&] { return work(stop, finish); });
-    if (!status.ok()) finish(status);
-  };
-  const absl::Status accepted = submit(std::move(run));
-  if (!accepted.ok()) Finish(*call->state_, accepted);
-  return call;
+  if (!ticket.ok()) return FinishAtOnce(call.context, ticket.status());
+  const std::shared_ptr<State> state(new State{
+      .service = service, .call = call, .submit = std::move(submit), .work = std::move(work)});
+  auto* const reactor = new UnaryCall(state);
+  reactor->ticket_ = *std::move(ticket);
+  state->reactor = reactor;
+  SubmitWork(state);
+  return reactor;
 }
 
-void UnaryCall::Finish(State& state, const absl::Status& status) {
+void UnaryCall::SubmitWork(const std::shared_ptr<State>& state) {
+  const absl::Status accepted = state->submit([state] { Run(state); });
+  if (!accepted.ok()) Finish(*state, ToGrpc(accepted));
+}
+
+void UnaryCall::Run(const std::shared_ptr<State>& state) {
+  ++state->attempts;
+  const Stop stop = state->call_stop.Begin();
+  const auto finish = [state](const absl::Status& outcome) {
+    End(state, state->call_stop.Name(outcome));
+  };
+  absl::Status status = stop.Check();
+  if (status.ok()) status = Guarded([&] { return state->work(stop, finish); });
+  if (!status.ok()) finish(status);
+}
+
+void UnaryCall::End(const std::shared_ptr<State>& state, const absl::Status& status) {
+  if (const NodeForwarder* const nodes = state->service.nodes; nodes != nullptr && !status.ok()) {
+    std::optional<NodeForwarder::Passage> passage = nodes->PassageFor(*state->call.context, status);
+    if (passage) return PassOn(state, *std::move(passage));
+  }
+  Finish(*state, ToGrpc(status));
+}
+
+void UnaryCall::PassOn(const std::shared_ptr<State>& state, NodeForwarder::Passage passage) {
+  const auto on_end = [state, owner = passage.owner](const grpc::ClientContext& context,
+                                                     const grpc::Status& outcome) {
+    // The owner has let go of the session: the database knows the next one.
+    if (IsOwnedElsewhere(outcome) && state->attempts < kAttempts) return SubmitWork(state);
+    PassOnTrailers(context, *state->call.context);
+    Finish(*state, OutcomeFrom(owner, context, outcome));
+  };
+  NodeForwarder::Call(std::move(passage), PathOf(state->call.method), state->call.request,
+                      state->call.answer, on_end);
+}
+
+void UnaryCall::Finish(State& state, const grpc::Status& status) {
   const std::lock_guard lock(state.mutex);
   if (std::exchange(state.finished, true)) return;
   if (status.ok()) {
-    state.reactor->ticket_->HoldAnswer(static_cast<int64_t>(state.answer->ByteSizeLong()));
+    const size_t bytes = state.call.answer->ByteSizeLong();
+    state.reactor->ticket_->HoldAnswer(static_cast<int64_t>(bytes));
   }
-  state.reactor->grpc::ServerUnaryReactor::Finish(ToGrpc(status));
+  state.reactor->grpc::ServerUnaryReactor::Finish(status);
 }
 
 void UnaryCall::OnCancel() { state_->stop.request_stop(); }

@@ -1,6 +1,7 @@
 #pragma once
 
-// Runs the work of a unary call on the executor or on a session's strand.
+// Runs the work of a unary call on the executor or on a session's strand, or passes the call on to
+// the daemon that owns the session.
 
 #include <absl/status/statusor.h>
 #include <google/protobuf/message.h>
@@ -15,6 +16,8 @@
 
 #include "polyest/stop.h"
 #include "server/execution/executor.h"
+#include "server/security/method_roles.h"
+#include "server/service/call_stop.h"
 #include "server/service/open_calls.h"
 #include "server/service/service_context.h"
 
@@ -29,13 +32,20 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
   // the finisher, before it returns or later, from any thread.
   using Work = std::function<absl::Status(const Stop&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
+  // Names what gRPC calls, and owns until the call is finished.
+  struct Call {
+    grpc::CallbackServerContext* context;
+    Method method;
+    const google::protobuf::Message* request;
+    google::protobuf::Message* answer;
+  };
 
-  // Starts a call of a tenant whose work is handed to `submit` and fills `answer`, which gRPC owns.
-  // Refuses it once the daemon shuts down, and as OpenCalls::Enter does.
+  // Starts a call of a tenant whose work is handed to `submit` and fills the answer. Work that is
+  // refused because another daemon owns the session is that daemon's; if it has let go meanwhile,
+  // the work is submitted again. Refuses the call once the daemon shuts down, and as
+  // OpenCalls::Enter does.
   static grpc::ServerUnaryReactor* Start(const ServiceContext& service, const std::string& tenant,
-                                         grpc::CallbackServerContext* context,
-                                         const google::protobuf::Message* answer,
-                                         const Submit& submit, Work work);
+                                         const Call& call, Submit submit, Work work);
 
   void OnCancel() override;
   void OnDone() override;
@@ -43,16 +53,28 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
  private:
   // Holds what outlives the reactor: the work may still be returning from Finish when OnDone comes.
   struct State {
-    std::mutex mutex;
+    std::mutex mutex{};
     UnaryCall* reactor = nullptr;
-    const google::protobuf::Message* answer = nullptr;
     bool finished = false;
-    std::stop_source stop;
+    const ServiceContext& service;
+    const Call call;
+    const Submit submit;
+    const Work work;
+    std::stop_source stop{};
+    const CallStop call_stop{*call.context, stop.get_token(), service.max_computing};
+    int attempts = 0;  // to run the work; used by one thread at a time
   };
 
-  static void Finish(State& state, const absl::Status& status);
+  explicit UnaryCall(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
-  std::shared_ptr<State> state_ = std::make_shared<State>();
+  static void SubmitWork(const std::shared_ptr<State>& state);
+  static void Run(const std::shared_ptr<State>& state);
+  // Ends the work: finishes the call, or passes it on.
+  static void End(const std::shared_ptr<State>& state, const absl::Status& status);
+  static void PassOn(const std::shared_ptr<State>& state, NodeForwarder::Passage passage);
+  static void Finish(State& state, const grpc::Status& status);
+
+  const std::shared_ptr<State> state_;
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };
 

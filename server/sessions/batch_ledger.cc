@@ -91,14 +91,14 @@ void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& 
   for (const auto& [waited_for, done] : settled) done(kept);
 }
 
-void BatchLedger::Restart(const SessionPlace& place) {
+void BatchLedger::Restart(const SessionPlace& place, bool anew) {
   std::multimap<int64_t, Done> lost;
   const absl::Status loss = absl::UnavailableError(
       "the session has been taken anew from the journal; send what was not acknowledged again");
   {
     const std::lock_guard lock(mutex_);
     kept_ = taken_ = place;
-    if (under_way_.empty()) return;
+    if (under_way_.empty() && !anew) return;
     ++losses_;
     last_loss_ = loss;
     under_way_.clear();

@@ -55,8 +55,9 @@ class BatchLedger {
   // for a batch that is lost already.
   void Settle(uint64_t losses, int64_t sequence, const absl::Status& kept);
   // Goes on from another place that the journal has told. Batches under way are lost: the place
-  // tells of those that are kept all the same.
-  void Restart(const SessionPlace& place);
+  // tells of those that are kept all the same. With `anew`, whoever has seen the losses until now
+  // must begin anew, too, because what he holds lacks batches.
+  void Restart(const SessionPlace& place, bool anew = false);
   // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
   // when one of them is lost. If there were more losses since the caller saw `losses` of them,
   // calls it with the reason of the last one, because another batch may have the number now.

@@ -23,13 +23,13 @@ size_t ObserverList::size() const {
   return observers_.size();
 }
 
+std::vector<std::shared_ptr<SessionObserver>> ObserverList::All() const {
+  const std::lock_guard lock(mutex_);
+  return observers_;
+}
+
 void ObserverList::OnEstimate(const SharedEstimate& estimate) const {
-  std::vector<std::shared_ptr<SessionObserver>> observers;
-  {
-    const std::lock_guard lock(mutex_);
-    observers = observers_;
-  }
-  for (const auto& observer : observers) observer->OnEstimate(estimate);
+  for (const auto& observer : All()) observer->OnEstimate(estimate);
 }
 
 std::vector<std::shared_ptr<SessionObserver>> ObserverList::Close() {

@@ -24,6 +24,7 @@ class ObserverList {
   absl::Status Add(std::shared_ptr<SessionObserver> observer);
   void Remove(const SessionObserver* observer);
   size_t size() const;
+  std::vector<std::shared_ptr<SessionObserver>> All() const;
 
   // Passes the estimate to all observers, one after the other, without holding the lock.
   void OnEstimate(const SharedEstimate& estimate) const;

@@ -92,6 +92,11 @@ void Session::Close() {
   if (const auto writer = writer_.Close(); writer != nullptr) writer->OnClosed();
 }
 
+void Session::SendAway() {
+  for (const auto& observer : observers_.All()) observer->OnMoved();
+  if (const auto writer = writer_.writer(); writer != nullptr) writer->OnMoved();
+}
+
 absl::Status Session::CheckOpen() const {
   if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
   return absl::OkStatus();
@@ -164,16 +169,17 @@ absl::Status Session::Own() {
   return absl::OkStatus();
 }
 
-void Session::GoOnFrom(const SessionPlace& place) {
+void Session::GoOnFrom(const SessionPlace& place, bool anew) {
   const int64_t more = place.rows - ledger_.kept().rows;
   if (services_.stored != nullptr) services_.stored->Count(number(), tenant(), {more, 0});
-  ledger_.Restart(place);
+  ledger_.Restart(place, anew);
 }
 
 void Session::Follow(const SessionPlace& place) {
   SharedJournal* const shared = services_.journal.shared();
-  if (loaded() || shared == nullptr || shared->Owns(number())) return;
-  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) GoOnFrom(place);
+  if (shared == nullptr || shared->Owns(number())) return;
+  // An estimator that is still in memory, because this daemon was the owner once, lacks batches.
+  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) GoOnFrom(place, loaded());
 }
 
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,

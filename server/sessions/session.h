@@ -95,6 +95,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // and this daemon does not own the session.
   void Follow(const SessionPlace& place);
 
+  // Tells its observers and its writer that the session moves to another daemon.
+  void SendAway();
+
   // Ends the session for everybody: tells its observers and its writer. Calls on it are NOT_FOUND
   // from here on.
   void Close();
@@ -164,8 +167,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status CheckOpen() const;
   // Makes this daemon the session's owner if it may be another one's.
   absl::Status Own();
-  // Goes on from the place that the journal has told.
-  void GoOnFrom(const SessionPlace& place);
+  // Goes on from the place that the journal has told; as BatchLedger::Restart does.
+  void GoOnFrom(const SessionPlace& place, bool anew = false);
   // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
                         int64_t bytes) const;

@@ -18,6 +18,8 @@ class SessionObserver {
   virtual void OnEstimate(const SharedEstimate& estimate) = 0;
   // The session has been deleted. An estimate that is just being passed on may still follow.
   virtual void OnClosed() = 0;
+  // The session moves to another daemon of the database, where the client is to go on.
+  virtual void OnMoved() {}
   // The writer goes on with another connection. Called for a writer only; no other call follows.
   virtual void OnReplaced() {}
 };

@@ -29,6 +29,11 @@ bool WriterLease::Release(const SessionObserver* writer) {
   return true;
 }
 
+std::shared_ptr<SessionObserver> WriterLease::writer() const {
+  const std::lock_guard lock(mutex_);
+  return writer_;
+}
+
 bool WriterLease::is_held() const {
   const std::lock_guard lock(mutex_);
   return writer_ != nullptr;

@@ -25,6 +25,8 @@ class WriterLease {
   // Takes the lease back from a writer. Returns false if this writer does not hold it (any more).
   bool Release(const SessionObserver* writer);
   bool is_held() const;
+  // Returns the writer; null if there is none.
+  std::shared_ptr<SessionObserver> writer() const;
 
   // Refuses every claim from here on. Returns the writer, for the caller to tell it of the end;
   // null if there is none.

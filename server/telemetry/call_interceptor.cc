@@ -131,10 +131,13 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void ChooseId(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
+  // Leaves the id in the metadata, from which it is passed on to other daemons.
+  void ChooseId(std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
     const auto given = metadata.find(kRequestIdKey);
     if (given != metadata.end()) id_.assign(given->second.data(), given->second.size());
     if (!IsRequestId(id_)) id_ = MakeRequestId();
+    metadata.erase(kRequestIdKey);
+    metadata.emplace(kRequestIdKey, id_);
   }
 
   // Notes the session that a message names. Every message of the services is a protobuf message; it

@@ -77,27 +77,6 @@ TEST_F(AuthenticationTest, LetsAnOperatorDoEverything) {
   ExpectByRole(operator_.secret, Role::kOperator);
 }
 
-// Returns a request about sessions/rig, as bytes; nothing if the method is not about a session.
-std::optional<std::string> AboutTheRig(const std::string& method) {
-  const auto& descriptor = *FindMethod(method).input_type();
-  const bool by_name =
-      method == "GetSession" || method == "DeleteSession" || method == "ExportSession";
-  const std::unique_ptr<google::protobuf::Message> request(
-      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&descriptor)->New());
-  if (const auto* const subject = descriptor.FindFieldByName("subject"); subject != nullptr) {
-    v1::Subject rig;
-    rig.set_session("sessions/rig");
-    request->GetReflection()->MutableMessage(request.get(), subject)->CopyFrom(rig);
-    return request->SerializeAsString();
-  }
-  const auto* const field = descriptor.FindFieldByName(by_name ? "name" : "session");
-  if (field == nullptr || field->type() != google::protobuf::FieldDescriptor::TYPE_STRING) {
-    return std::nullopt;
-  }
-  request->GetReflection()->SetString(request.get(), field, "sessions/rig");
-  return request->SerializeAsString();
-}
-
 TEST_F(AuthenticationTest, HidesTheSessionsOfATenantFromOthers) {
   const auto channel = Connect();
   v1::CreateSessionRequest create;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/common/check.h"
+#include "polyest/v1/study_service.pb.h"
 #include "server/security/method_roles.h"
 #include "server/security/token_table.h"
 #include "tests/integration/daemon_process.h"
@@ -84,6 +85,27 @@ inline std::vector<std::string> AllMethods() {
     for (int k = 0; k < service->method_count(); ++k) names.push_back(service->method(k)->name());
   }
   return names;
+}
+
+// Returns a request about sessions/rig, as bytes; nothing if the method is not about a session.
+inline std::optional<std::string> AboutTheRig(const std::string& method) {
+  const auto& descriptor = *FindMethod(method).input_type();
+  const bool by_name =
+      method == "GetSession" || method == "DeleteSession" || method == "ExportSession";
+  const std::unique_ptr<google::protobuf::Message> request(
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&descriptor)->New());
+  if (const auto* const subject = descriptor.FindFieldByName("subject"); subject != nullptr) {
+    v1::Subject rig;
+    rig.set_session("sessions/rig");
+    request->GetReflection()->MutableMessage(request.get(), subject)->CopyFrom(rig);
+    return request->SerializeAsString();
+  }
+  const auto* const field = descriptor.FindFieldByName(by_name ? "name" : "session");
+  if (field == nullptr || field->type() != google::protobuf::FieldDescriptor::TYPE_STRING) {
+    return std::nullopt;
+  }
+  request->GetReflection()->SetString(request.get(), field, "sessions/rig");
+  return request->SerializeAsString();
 }
 
 class SecureDaemonTest : public testing::Test {

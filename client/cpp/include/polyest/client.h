@@ -14,6 +14,7 @@
 #include "polyest/connection.h"
 #include "polyest/v1/backup_service.grpc.pb.h"
 #include "polyest/v1/model_service.grpc.pb.h"
+#include "polyest/v1/node_service.grpc.pb.h"
 #include "polyest/v1/operation_service.grpc.pb.h"
 #include "polyest/v1/problem_service.grpc.pb.h"
 #include "polyest/v1/session_service.grpc.pb.h"
@@ -98,6 +99,10 @@ class Client {
   absl::StatusOr<v1::Estimate> GetEstimate(const v1::GetEstimateRequest& request);
   // Returns the daemon's version, load and memory.
   absl::StatusOr<v1::DaemonStatus> GetStatus(const v1::GetStatusRequest& request);
+  // Lists the daemons that share the daemon's database.
+  absl::StatusOr<v1::ListNodesResponse> ListNodes(const v1::ListNodesRequest& request);
+  // Asks one of them to hand its sessions over to the others.
+  absl::StatusOr<v1::Node> DrainNode(const v1::DrainNodeRequest& request);
   // Calls `estimate` with the session's present estimate and then with new ones, until it returns
   // false (the answer is then OK) or the daemon ends the watch. `call`, if given, is a new context
   // for this call: another thread may cancel it, which ends the watch with CANCELLED.
@@ -150,6 +155,7 @@ class Client {
   std::unique_ptr<v1::OperationService::Stub> operations_;
   std::unique_ptr<v1::StatusService::Stub> statuses_;
   std::unique_ptr<v1::BackupService::Stub> backups_;
+  std::unique_ptr<v1::NodeService::Stub> nodes_;
 };
 
 }  // namespace polyest

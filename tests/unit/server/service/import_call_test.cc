@@ -130,7 +130,9 @@ TEST_F(ImportCallTest, OccupiesNothingForAStranger) {
   const NewToken token = *MakeTokenFor("anna:chassis:admin");
   ServiceContext context = Context(folder.Write("tokens", token.line + "\n"));
   auto* const import = new ImportCall(context, call_, &imported_);
-  auto* const exported = new ExportCall(context, call_, "sessions/a");
+  v1::ExportSessionRequest request;
+  request.set_name("sessions/a");
+  auto* const exported = new ExportCall(context, call_, request);
   EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWriter), 0);
   EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWatcher), 0);
   import->OnDone();

@@ -117,6 +117,16 @@ TEST_F(BatchLedgerTest, LosesWithABatchAllThatCameAfterIt) {
   EXPECT_EQ(ledger_.kept().sequence, 5);
 }
 
+TEST_F(BatchLedgerTest, SendsThoseAwayWhoLackBatchesOfOthers) {
+  const uint64_t losses = ledger_.losses();
+  ledger_.Restart(At(5), /*anew=*/true);
+  EXPECT_EQ(ledger_.kept().sequence, 5);
+  EXPECT_EQ(ledger_.losses(), losses + 1);
+  std::vector<absl::StatusCode> told;
+  ledger_.WhenKept(5, losses, [&](const absl::Status& kept) { told.push_back(kept.code()); });
+  EXPECT_EQ(told, std::vector{absl::StatusCode::kUnavailable});
+}
+
 TEST_F(BatchLedgerTest, GoesOnFromThePlaceThatTheJournalTells) {
   const uint64_t losses = ledger_.losses();
   ledger_.Restart(At(5));

@@ -1,0 +1,54 @@
+#include "server/forwarding/node_forwarder.h"
+
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/impl/codegen/proto_utils.h>
+
+#include <utility>
+
+#include "proto/wire/refusal/refusal.h"
+#include "server/security/metadata.h"
+#include "server/telemetry/request_id.h"
+
+namespace polyest::internal {
+namespace {
+
+using Message = google::protobuf::MessageLite;
+
+// What a unary call needs until it ends.
+struct UnderWay {
+  std::unique_ptr<grpc::ClientContext> context;
+  grpc::TemplatedGenericStub<Message, Message> stub;
+  NodeForwarder::Done done;
+};
+
+}  // namespace
+
+std::optional<NodeForwarder::Passage> NodeForwarder::PassageFor(
+    const grpc::CallbackServerContext& call, const absl::Status& refusal) const {
+  const std::optional<Refusal> reason = RefusalOf(refusal);
+  if (!reason || reason->reason != kOwnedElsewhere || reason->owner.empty()) return std::nullopt;
+  if (access_.IsPassedOn(call)) return std::nullopt;
+  Passage passage;
+  // The deadline and the cancellation of the call hold for this one, too.
+  passage.context = grpc::ClientContext::FromCallbackServerContext(call);
+  for (const auto& [key, value] : access_.PassOn(call)) passage.context->AddMetadata(key, value);
+  const std::string id = OnlyValue(call, kRequestIdKey);
+  if (IsRequestId(id)) passage.context->AddMetadata(kRequestIdKey, id);
+  passage.channel = channels_->To(reason->owner);
+  passage.owner = reason->owner;
+  return passage;
+}
+
+void NodeForwarder::Call(Passage passage, const std::string& path, const Message* request,
+                         Message* answer, Done done) {
+  auto* const call =
+      new UnderWay{std::move(passage.context),
+                   grpc::TemplatedGenericStub<Message, Message>(passage.channel), std::move(done)};
+  call->stub.UnaryCall(call->context.get(), path, grpc::StubOptions(), request, answer,
+                       [owned = call](const grpc::Status& outcome) {
+                         const std::unique_ptr<UnderWay> ended(owned);
+                         ended->done(*ended->context, outcome);
+                       });
+}
+
+}  // namespace polyest::internal

@@ -1,0 +1,24 @@
+#pragma once
+
+// Reads and changes the table of the nodes that share a database.
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/journal/postgres_pool.h"
+#include "server/journal/session_journal.h"
+
+namespace polyest::internal {
+
+// As SharedJournal does.
+absl::StatusOr<std::vector<JournalNode>> ReadNodes(PostgresPool& pool);
+absl::Status DrainNode(PostgresPool& pool, int64_t node);
+
+// Returns the address of the node with the fewest sessions that may take those of `node`; empty if
+// there is none.
+absl::StatusOr<std::string> FindTaker(PostgresPool& pool, int64_t node);
+
+}  // namespace polyest::internal

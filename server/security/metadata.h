@@ -1,0 +1,17 @@
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <string>
+
+namespace polyest::internal {
+
+// Returns the value of a key in the metadata of a call; empty unless the call has exactly one.
+inline std::string OnlyValue(const grpc::ServerContextBase& call, const char* key) {
+  const auto& metadata = call.client_metadata();
+  if (metadata.count(key) != 1) return "";
+  const grpc::string_ref value = metadata.find(key)->second;
+  return {value.data(), value.size()};
+}
+
+}  // namespace polyest::internal
