@@ -39,8 +39,20 @@ void PrintNodes(const v1::ListNodesResponse& list, std::ostream& out) {
   table.Print(out);
 }
 
-absl::StatusOr<v1::Node> Drain(Client& client, const std::string& wanted) {
-  POLYEST_ASSIGN_OR_RETURN(const v1::ListNodesResponse list, client.ListNodes({}));
+// Returns the nodes of all pages.
+absl::StatusOr<v1::ListNodesResponse> ListAll(Client& client) {
+  v1::ListNodesResponse all;
+  v1::ListNodesRequest request;
+  do {
+    POLYEST_ASSIGN_OR_RETURN(const v1::ListNodesResponse page, client.ListNodes(request));
+    all.mutable_nodes()->MergeFrom(page.nodes());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return all;
+}
+
+absl::StatusOr<v1::DrainNodeResponse> Drain(Client& client, const std::string& wanted) {
+  POLYEST_ASSIGN_OR_RETURN(const v1::ListNodesResponse list, ListAll(client));
   for (const v1::Node& node : list.nodes()) {
     if (wanted != NumberOf(node) && wanted != node.name() && wanted != node.address()) continue;
     v1::DrainNodeRequest request;
@@ -57,13 +69,13 @@ int RunCommand(const NodesArguments& arguments, std::ostream& out, std::ostream&
   Client client(arguments.place.server, ToClientOptions(arguments.place));
   v1::ListNodesResponse list;
   if (arguments.action.empty()) {
-    auto nodes = client.ListNodes({});
+    auto nodes = ListAll(client);
     if (!nodes.ok()) return Report(nodes.status(), arguments.place.server, err);
     list = *std::move(nodes);
   } else {
-    auto node = Drain(client, arguments.node);
-    if (!node.ok()) return Report(node.status(), arguments.place.server, err);
-    *list.add_nodes() = *std::move(node);
+    auto drained = Drain(client, arguments.node);
+    if (!drained.ok()) return Report(drained.status(), arguments.place.server, err);
+    *list.add_nodes() = *std::move(*drained).mutable_node();
   }
   if (arguments.format == Format::kJson) {
     out << ToJson(list, /*several_lines=*/true) << '\n';

@@ -230,7 +230,7 @@ absl::StatusOr<v1::ListNodesResponse> Client::ListNodes(const v1::ListNodesReque
   return Call(nodes_.get(), &v1::NodeService::Stub::ListNodes, request);
 }
 
-absl::StatusOr<v1::Node> Client::DrainNode(const v1::DrainNodeRequest& request) {
+absl::StatusOr<v1::DrainNodeResponse> Client::DrainNode(const v1::DrainNodeRequest& request) {
   return Call(nodes_.get(), &v1::NodeService::Stub::DrainNode, request);
 }
 

@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "polyest/v1/node_service.grpc.pb.h"
 #include "proto/wire/operations/names.h"
+#include "proto/wire/operations/pages.h"
 #include "server/service/calls.h"
 #include "server/service/services.h"
 
@@ -44,13 +45,13 @@ class NodeService final : public v1::NodeService::CallbackService {
     return StartCall(
         context_, {call, "ListNodes", request, response}, [=, this](const Caller& one) {
           return ShortJobOfCaller(context_, one, [=, this](const Caller&, const Stop&) {
-            return Deliver(List(), response);
+            return Deliver(List(*request), response);
           });
         });
   }
 
   Unary* DrainNode(Context* call, const v1::DrainNodeRequest* request,
-                   v1::Node* response) override {
+                   v1::DrainNodeResponse* response) override {
     return StartCall(
         context_, {call, "DrainNode", request, response}, [=, this](const Caller& one) {
           return ShortJobOfCaller(context_, one, [=, this](const Caller&, const Stop&) {
@@ -60,15 +61,30 @@ class NodeService final : public v1::NodeService::CallbackService {
   }
 
  private:
-  absl::StatusOr<v1::ListNodesResponse> List() const {
+  absl::StatusOr<v1::ListNodesResponse> List(const v1::ListNodesRequest& request) const {
+    POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+    // The token is a node's number, so that it outlives the node.
+    int64_t after = 0;
+    if (!request.page_token().empty() &&
+        !(absl::SimpleAtoi(request.page_token(), &after) && after > 0)) {
+      return UnknownPageToken(request.page_token());
+    }
     POLYEST_ASSIGN_OR_RETURN(SharedJournal* const journal, SharedJournalOf(context_));
     POLYEST_ASSIGN_OR_RETURN(const std::vector<JournalNode> nodes, journal->Nodes());
     v1::ListNodesResponse response;
-    for (const JournalNode& node : nodes) *response.add_nodes() = ToNode(node);
+    for (const JournalNode& node : nodes) {
+      if (node.number <= after) continue;
+      if (response.nodes_size() == static_cast<int>(page_size)) {
+        response.set_next_page_token(absl::StrCat(after));
+        break;
+      }
+      *response.add_nodes() = ToNode(node);
+      after = node.number;
+    }
     return response;
   }
 
-  absl::StatusOr<v1::Node> Drain(const std::string& name) const {
+  absl::StatusOr<v1::DrainNodeResponse> Drain(const std::string& name) const {
     POLYEST_ASSIGN_OR_RETURN(SharedJournal* const journal, SharedJournalOf(context_));
     POLYEST_ASSIGN_OR_RETURN(const std::string id, ResourceId("name", "nodes", name));
     const auto no_such_node = [&] {
@@ -79,7 +95,10 @@ class NodeService final : public v1::NodeService::CallbackService {
     POLYEST_RETURN_IF_ERROR(journal->DrainNode(number));
     POLYEST_ASSIGN_OR_RETURN(const std::vector<JournalNode> nodes, journal->Nodes());
     for (const JournalNode& node : nodes) {
-      if (node.number == number) return ToNode(node);
+      if (node.number != number) continue;
+      v1::DrainNodeResponse response;
+      *response.mutable_node() = ToNode(node);
+      return response;
     }
     return no_such_node();
   }

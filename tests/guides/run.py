@@ -18,7 +18,7 @@ Markdown files if none is given. Fails with "guide:line" when
 
 Blocks fenced ```console need root, another machine, an hour or the tests' own programs; they are not
 run, and are few.
-deploy/runbook.md has a test of its own, tests/integration/runbook.
+deploy/runbook.md and deploy/cluster/README.md have tests of their own in tests/integration.
 """
 import re
 import sys
@@ -30,7 +30,7 @@ MAX_FIRST_PAGE_LINES = 180
 # 5 of them are of tests/README.md: a reader of the other guides does not build the programs of tests.
 MAX_CONSOLE_BLOCKS = 12
 NOT_COMMANDS = {"cmake", "cpp", "csv", "text", "toml"}
-OWN_TEST = {"deploy/runbook.md"}
+OWN_TEST = {"deploy/runbook.md", "deploy/cluster/README.md"}
 SECONDS_PER_BLOCK = 300  # ends a command that hangs
 
 # A program that the reader saves: its first line names the file.

@@ -19,11 +19,11 @@ class NodesTest : public PostgresTest {
     arguments.insert(arguments.end(), {"--node-secret", secret_});
     return arguments;
   }
-  static v1::ListNodesResponse Nodes(Node& node) {
+  static v1::ListNodesResponse Nodes(Node& node, const v1::ListNodesRequest& request = {}) {
     grpc::ClientContext context;
     v1::ListNodesResponse response;
     const auto stub = v1::NodeService::NewStub(node.channel());
-    const grpc::Status listed = stub->ListNodes(&context, v1::ListNodesRequest(), &response);
+    const grpc::Status listed = stub->ListNodes(&context, request, &response);
     EXPECT_TRUE(listed.ok()) << listed.error_message();
     return response;
   }
@@ -39,7 +39,7 @@ class NodesTest : public PostgresTest {
     grpc::ClientContext context;
     v1::DrainNodeRequest request;
     request.set_name(name);
-    v1::Node drained;
+    v1::DrainNodeResponse drained;
     return v1::NodeService::NewStub(node.channel())->DrainNode(&context, request, &drained);
   }
 
@@ -60,7 +60,18 @@ TEST_F(NodesTest, TellsWhatEachDaemonHas) {
   EXPECT_FALSE(told.draining());
   EXPECT_GE(told.busy_core_count(), 0);
   EXPECT_GE(told.lease_age_s(), 0);
-  EXPECT_EQ(Nodes(second).nodes_size(), 2);
+  const v1::ListNodesResponse all = Nodes(second);
+  ASSERT_EQ(all.nodes_size(), 2);
+  EXPECT_EQ(all.next_page_token(), "");
+  v1::ListNodesRequest page;
+  page.set_page_size(1);
+  for (const v1::Node& one : all.nodes()) {
+    const v1::ListNodesResponse answer = Nodes(second, page);
+    ASSERT_EQ(answer.nodes_size(), 1);
+    EXPECT_EQ(answer.nodes(0).name(), one.name());
+    page.set_page_token(answer.next_page_token());
+  }
+  EXPECT_EQ(page.page_token(), "");
 }
 
 TEST_F(NodesTest, RefusesToDrainWhereNobodyWouldTakeTheSessions) {

@@ -102,7 +102,7 @@ class Client {
   // Lists the daemons that share the daemon's database.
   absl::StatusOr<v1::ListNodesResponse> ListNodes(const v1::ListNodesRequest& request);
   // Asks one of them to hand its sessions over to the others.
-  absl::StatusOr<v1::Node> DrainNode(const v1::DrainNodeRequest& request);
+  absl::StatusOr<v1::DrainNodeResponse> DrainNode(const v1::DrainNodeRequest& request);
   // Calls `estimate` with the session's present estimate and then with new ones, until it returns
   // false (the answer is then OK) or the daemon ends the watch. `call`, if given, is a new context
   // for this call: another thread may cancel it, which ends the watch with CANCELLED.
