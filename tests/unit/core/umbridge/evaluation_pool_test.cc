@@ -97,7 +97,7 @@ TEST(EvaluationPool, FailsAPointThatEndsEachConnection) {
     answer.set_content_provider(100, "application/json",
                                 [](size_t, size_t, httplib::DataSink&) { return false; });
   });
-  // Two servers that are one, so that fewer pauses are needed.
+  // The same server ten times: each rests after a lost connection, and ten losses are needed.
   EvaluationPool pool({.urls = std::vector<std::string>(10, server.url())});
   const auto evaluations = pool.Evaluate(Requests(3), Stop());
   ASSERT_TRUE(evaluations.ok()) << evaluations.status();
@@ -151,7 +151,7 @@ TEST(EvaluationPool, FailsAPointThatTakesTooLong) {
 }
 
 TEST(EvaluationPool, ComputesASlowPointElsewhereToo) {
-  // The first server never answers its last request while the test asks.
+  // The first server does not answer its first request while the points are computed.
   std::promise<void> end;
   const std::shared_future<void> ended = end.get_future().share();
   std::atomic<bool> stuck = false;
@@ -163,8 +163,7 @@ TEST(EvaluationPool, ComputesASlowPointElsewhereToo) {
   {
     EvaluationPool pool({.urls = {slow.url(), fast.url()}});
     ExpectSquares(pool.Evaluate(Requests(10), Stop()), 10);
-    // Otherwise the stuck server ends before the pool does, which waits for nothing.
-    end.set_value();
+    end.set_value();  // lets the server end
   }
 }
 
