@@ -23,8 +23,9 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 constexpr double kMaxErrorOfRaised = 0.05;
 // The error of an order of which no expansion can be made.
 constexpr double kMostError = std::numeric_limits<double>::max();
-// In at most so many dimensions the particles of an earlier settlement stand for new ones.
-constexpr int kMaxDimensionToTrust = 3;
+// In at most so many dimensions elements reliably find the pieces of a posterior that particles
+// overlook.
+constexpr int kFewDimensions = 3;
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
@@ -89,10 +90,10 @@ class Settler {
   }
 
   // Whether the particles of the last settlement say that this one would leave all as it is. In
-  // more dimensions, where no elements are bisected, drawing them again is the only search for
-  // pieces of the posterior that they overlooked.
+  // more dimensions, where elements are few, drawing them again is the surer search for pieces of
+  // the posterior that they overlooked.
   bool IsInVain() const {
-    if (request_.problem->dimension() > kMaxDimensionToTrust) return false;
+    if (request_.problem->dimension() > kFewDimensions) return false;
     const ExpansionDesign& design = present_.design();
     if (MayRaiseOrder(TrustedRegion(design))) return false;
     Cost cost = present_.MakeCost(request_.problem->problem().regularization);
@@ -144,10 +145,21 @@ class Settler {
     return discount / std::max(samples - discount, std::numeric_limits<double>::min());
   }
 
+  // Returns the power at which a contraction keeps what the next samples can still make likely.
+  // While there are fewer than 2 (n + 2) samples, one that comes may weigh as much as all before,
+  // and raise a piece of the posterior from a thousandth to several per cent. In few dimensions
+  // elements follow such pieces.
+  double PowerOfFirstSamples() const {
+    const ResolvedProblem& problem = *request_.problem;
+    if (problem.dimension() <= kFewDimensions) return 1;
+    const auto samples = static_cast<double>(request_.rows * problem.channels());
+    return std::min(1.0, samples / (2 * (problem.dimension() + 2.0)));
+  }
+
   // Returns false when the sampler finds no starting point.
   absl::StatusOr<bool> Sample(int attempt) {
     Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
-    power_ = LikelihoodPower(expansion(), cost);
+    power_ = std::min(LikelihoodPower(expansion(), cost), PowerOfFirstSamples());
     cost.set_power(power_);
     absl::StatusOr<Particles> particles =
         SampleForSettlement(cost, expansion().design(), result_.particles,

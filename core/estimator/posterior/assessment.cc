@@ -352,13 +352,17 @@ class Assessment {
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
   }
 
-  // Widens the draws' scores about their mean by a factor for each parameter, but not beyond Ω.
+  // Widens the draws' scores about their mean by a factor for each parameter, but not beyond Ω, and
+  // to no larger standard deviation than the prior's.
   void WidenPosterior(const Vector& factors) {
+    const Vector most = prior_.GermStandardDeviation();
     for (int i = 0; i < prior_.dimension(); ++i) {
-      const double widening = factors[i];
-      if (!(widening > 1)) continue;
       auto scores = posterior_.scores.col(i).array();
       const double centre = WeightedMean(posterior_.scores.col(i), posterior_.weights);
+      const double deviation =
+          std::sqrt(posterior_.weights.dot((scores - centre).square().matrix()));
+      const double widening = std::min(factors[i], most[i] / deviation);
+      if (!(widening > 1)) continue;
       scores =
           (centre + widening * (scores - centre)).max(prior_.lower()[i]).min(prior_.upper()[i]);
     }

@@ -23,7 +23,7 @@ constexpr double kMostTrajectories = 2048;
 constexpr int kPiecesAtLeast = 4;
 // An element is bisected in at most so many dimensions: the number of halves that a posterior
 // touches doubles with each of them.
-constexpr int kMaxDimensionToBisect = 3;
+constexpr int kMaxDimensionToBisect = 4;
 
 // Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
 PosteriorSummary SummaryOf(const Matrix& particles) {

@@ -279,22 +279,46 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   return whole;
 }
 
+// What a component has done counts for the next one.
+void AddWork(const AssessmentRequest& component, AssessmentRequest& next) {
+  next.reexpansions += component.reexpansions;
+  next.propagated_rows += component.propagated_rows;
+}
+
+// Takes out of both lists the components in which no cost is finite, such as elements that the
+// regions of their expansions hardly touch: they have no weight. Returns the first one's error if
+// none has any.
 absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& requests,
-                                                const Stop& stop) {
+                                                std::vector<size_t>& places, const Stop& stop) {
   std::vector<Assessed> components;
+  std::vector<AssessmentRequest> with_weight;
+  const std::vector<size_t> all = std::exchange(places, {});
+  absl::Status failed;
   const double power = CommonPower(requests);
   for (size_t k = 0; k < requests.size(); ++k) {
     requests[k].weigh = true;
     requests[k].power = power;
     // All components use the α² of the first.
-    if (k > 0) requests[k].regularization = components.front().estimate.regularization;
-    POLYEST_ASSIGN_OR_RETURN(Assessed assessed, Assess(requests[k], stop));
-    if (k > 0) {
-      assessed.findings.regularization_not_determined =
+    if (!components.empty()) {
+      requests[k].regularization = components.front().estimate.regularization;
+    }
+    absl::StatusOr<Assessed> assessed = Assess(requests[k], stop);
+    if (absl::IsFailedPrecondition(assessed.status())) {
+      failed.Update(assessed.status());
+      if (k + 1 < requests.size()) AddWork(requests[k], requests[k + 1]);
+      continue;
+    }
+    if (!assessed.ok()) return assessed.status();
+    if (!components.empty()) {
+      assessed->findings.regularization_not_determined =
           components.front().findings.regularization_not_determined;
     }
-    components.push_back(std::move(assessed));
+    components.push_back(*std::move(assessed));
+    with_weight.push_back(requests[k]);
+    places.push_back(all[k]);
   }
+  if (components.empty()) return failed;
+  requests = std::move(with_weight);
   return components;
 }
 
@@ -339,15 +363,15 @@ absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest
 absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> requests,
                                               double left_out, const Stop& stop) {
   AssessedMixture mixture;
-  const std::vector<size_t> places = KeepSameProblem(requests);
+  std::vector<size_t> places = KeepSameProblem(requests);
   if (requests.size() == 1) {
     mixture.order = places;
     POLYEST_ASSIGN_OR_RETURN(mixture.whole, Assess(requests.front(), stop));
     return mixture;
   }
+  POLYEST_ASSIGN_OR_RETURN(std::vector<Assessed> assessed, AssessAll(requests, places, stop));
   mixture.order.resize(requests.size());
   std::iota(mixture.order.begin(), mixture.order.end(), size_t{0});
-  POLYEST_ASSIGN_OR_RETURN(std::vector<Assessed> assessed, AssessAll(requests, stop));
   const std::vector<double> weights = WeightsNow(requests, assessed);
   std::ranges::stable_sort(mixture.order,
                            [&](size_t a, size_t b) { return weights[a] > weights[b]; });
