@@ -52,6 +52,7 @@ attacks() {
   for attack in connections descriptors continuation; do
     python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20
   done
+  python3 -B tests/attack/tenants.py build/release/bin/polyestd --seconds 20
   for attack in connections resets continuation; do
     python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20 \
       --edge deploy/edge/edge.cfg

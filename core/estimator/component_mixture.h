@@ -41,6 +41,7 @@ class ComponentMixture {
 
   // The misfit (posterior/misfit.h) of the component that the residuals contradict least.
   double Misfit() const;
+  size_t size() const { return components_.size(); }
   const MixtureComponent& component(size_t i) const { return *components_[i]; }
   // Counts the work that the other mixture has done as done for this one.
   void AddWorkOf(const ComponentMixture& other);

@@ -11,6 +11,7 @@
 #include "core/common/status.h"
 #include "core/estimator/component_mixture.h"
 #include "core/estimator/estimator_access.h"
+#include "core/estimator/memory_use.h"
 #include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/record/checkpoints.h"
 #include "core/estimator/record/known_inputs_store.h"
@@ -60,6 +61,14 @@ class Estimator::Implementation {
   const ResolvedProblem& problem() const { return problem_; }
   int64_t rows_appended() const { return store_->rows(); }
   int64_t rows_processed() const { return mixture_->rows_taken(); }
+  int64_t memory_bytes() const {
+    int64_t bytes = 0;
+    for (size_t i = 0; i < mixture_->size(); ++i) {
+      const MixtureComponent& component = mixture_->component(i);
+      bytes += BytesOf(component.problem(), component.expansion());
+    }
+    return bytes;
+  }
 
   absl::Status Append(const Samples& samples);
   absl::Status Process(const Stop& stop);
@@ -313,6 +322,10 @@ absl::StatusOr<std::unique_ptr<Estimator>> EstimatorAccess::Make(ResolvedProblem
 
 const ResolvedProblem& EstimatorAccess::ProblemOf(const Estimator& estimator) {
   return estimator.implementation_->problem();
+}
+
+int64_t EstimatorAccess::MemoryBytes(const Estimator& estimator) {
+  return estimator.implementation_->memory_bytes();
 }
 
 }  // namespace polyest::internal

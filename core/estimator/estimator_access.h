@@ -4,6 +4,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <memory>
 
 #include "core/estimator/problem/resolved_problem.h"
@@ -18,6 +19,8 @@ class EstimatorAccess {
                                                          EstimatorOptions options = {});
   // Returns the estimator's problem, resolved for the runs appended so far.
   static const ResolvedProblem& ProblemOf(const Estimator& estimator);
+  // Returns about how many bytes of memory the estimator holds, without its rows.
+  static int64_t MemoryBytes(const Estimator& estimator);
 };
 
 }  // namespace polyest::internal

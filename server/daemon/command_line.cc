@@ -56,6 +56,11 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
                  "Size of all sessions of a tenant, MiB of problems and measurements; 0: no limit")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
+  app.add_option("--max-tenant-memory-mb", limits.memory_mb_per_tenant,
+                 "Memory in MiB that the loaded sessions of a tenant hold, beyond which its idle "
+                 "sessions leave the memory or its new work is refused; 0: no limit")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
+      ->capture_default_str();
   ProblemLimits& problem = limits.problem;
   AddLimit(app, "--max-parameters", problem.parameters,
            "Uncertain parameters of a problem, those of all its runs together", kMaxTerms);

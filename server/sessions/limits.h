@@ -17,6 +17,7 @@ struct SessionLimits {
   int64_t rows_per_tenant = 1'000'000'000;  // --max-tenant-rows: of all sessions of a tenant
   int64_t total_rows = 10'000'000'000;      // --max-total-rows: of all sessions of all tenants
   int64_t disk_mb_per_tenant = 0;           // --max-tenant-disk-mb, MiB of its sessions; 0: none
+  int64_t memory_mb_per_tenant = 0;  // --max-tenant-memory-mb, MiB of loaded sessions; 0: none
   // Limits of a problem that comes with a request, for a session or without one. Sessions that
   // exist already stay, whatever the limits are now.
   ProblemLimits problem{.parameters = 64, .states = 1'000};

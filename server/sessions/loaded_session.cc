@@ -9,15 +9,22 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/estimator/estimator_access.h"
+#include "core/estimator/memory_use.h"
 #include "proto/wire/convert/estimate.h"
 
 namespace polyest::internal {
+namespace {
 
-absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
-                                                                   const ModelLibrary& models,
-                                                                   const ProblemLimits& limits,
-                                                                   double reorder_window_s) {
+// A problem is held as it came, as the core's structs, and by the estimator's parts.
+constexpr int64_t kCopiesOfProblem = 4;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(
+    v1::Problem problem, const ModelLibrary& models, const ProblemLimits& limits,
+    double reorder_window_s, const CheckMemory& check_memory) {
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved, ToProblem(problem, models, limits));
+  if (check_memory) POLYEST_RETURN_IF_ERROR(check_memory(ExpectedBytes(resolved)));
   std::unique_ptr<LoadedSession> loaded(
       new LoadedSession(std::move(problem), resolved, reorder_window_s));
   POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin({}));
@@ -68,14 +75,12 @@ std::pair<RunCuts, EstimatorSnapshot> LoadedSession::Snapshot() const {
   return {*std::move(cuts), std::move(snapshot)};
 }
 
-absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const SessionJournal& journal,
-                                                                   const SessionHead& head,
-                                                                   const SessionPlace& place,
-                                                                   const ModelLibrary& models,
-                                                                   const Stop& stop) {
+absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(
+    const SessionJournal& journal, const SessionHead& head, const SessionPlace& place,
+    const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(head.number));
-  POLYEST_ASSIGN_OR_RETURN(auto loaded,
-                           Make(std::move(problem), models, {}, head.reorder_window_s));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto loaded, Make(std::move(problem), models, {}, head.reorder_window_s, check_memory));
   loaded->ReadFrom(journal, head.number);
   auto [cuts, snapshot] = loaded->Snapshot();
   const bool any_cut = !cuts.empty();
@@ -120,6 +125,16 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
   computed_ = std::move(anew);
   latest_ = nullptr;
   return absl::OkStatus();
+}
+
+int64_t LoadedSession::memory_bytes() const {
+  const ResolvedProblem& problem = intake_.problem();
+  const auto columns =
+      std::ssize(problem.problem().measured) + std::ssize(problem.streamed_inputs());
+  // Each column has a value and a standard deviation.
+  const auto row_bytes = static_cast<int64_t>(sizeof(SampleRow) + 2 * sizeof(double) * columns);
+  return EstimatorAccess::MemoryBytes(*computed_.estimator) + rows_in_memory() * row_bytes +
+         kCopiesOfProblem * static_cast<int64_t>(problem_.ByteSizeLong());
 }
 
 absl::Status LoadedSession::Store(int64_t sequence) {

@@ -28,20 +28,23 @@ namespace polyest::internal {
 // Any thread may give it batches; the estimator is for one thread at a time.
 class LoadedSession {
  public:
+  // Checks whether there is memory for about so many bytes.
+  using CheckMemory = std::function<absl::Status(int64_t bytes)>;
+
   // Makes a session without batches, whose rows may arrive out of order within
   // `reorder_window_s`. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one beyond the
-  // limits; other errors are those of Estimator::Make.
+  // limits; other errors are those of `check_memory`, if it is given, and of Estimator::Make.
   static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
                                                              const ModelLibrary& models,
                                                              const ProblemLimits& limits = {},
-                                                             double reorder_window_s = 0);
+                                                             double reorder_window_s = 0,
+                                                             const CheckMemory& check_memory = {});
   // Rebuilds a session from the batches that the journal keeps. The latest snapshot in the journal,
-  // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`.
-  static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
-                                                             const SessionHead& head,
-                                                             const SessionPlace& place,
-                                                             const ModelLibrary& models,
-                                                             const Stop& stop);
+  // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`;
+  // the errors of `check_memory`.
+  static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(
+      const SessionJournal& journal, const SessionHead& head, const SessionPlace& place,
+      const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop);
 
   // From here on, gives the estimator's snapshots to the journal, as those of this session, and
   // reads rows that are no longer in memory from it. The journal must outlive this.
@@ -67,6 +70,8 @@ class LoadedSession {
   int64_t rows_in_memory() const {
     return intake_.waiting_rows() + computed_.store->rows_in_memory();
   }
+  // Returns about how many bytes of memory the session holds.
+  int64_t memory_bytes() const;
   // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes
   // them. FAILED_PRECONDITION when the model cannot be computed at a row; EndFailedRun then lets
   // the session go on.

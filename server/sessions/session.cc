@@ -27,6 +27,7 @@ class Session::Computing {
       session_.services_.metrics->CountComputing(std::chrono::duration<double>(spent).count());
     }
     session_.activity_.OnComputed(spent, loaded_.sequence(), loaded_.measured_s());
+    session_.Weigh();
   }
   Computing(const Computing&) = delete;
   Computing& operator=(const Computing&) = delete;
@@ -48,6 +49,10 @@ Session::Session(const SessionServices& services, SessionHead head,
   if (loaded == nullptr) return;
   loaded->Attach(services.journal, number());
   Replace({std::move(loaded), 0});
+}
+
+Session::~Session() {
+  if (services_.tenant_memory != nullptr) services_.tenant_memory->Forget(number());
 }
 
 v1::Session Session::Describe() const {
@@ -107,6 +112,18 @@ Session::InMemory Session::Present() const {
   return in_memory_;
 }
 
+void Session::Weigh() {
+  if (services_.tenant_memory == nullptr) return;
+  const std::shared_ptr<LoadedSession> loaded = Present().loaded;
+  if (loaded == nullptr) return services_.tenant_memory->Forget(number());
+  services_.tenant_memory->Set(number(), tenant(), loaded->memory_bytes(), weak_from_this());
+}
+
+absl::Status Session::CheckMemory(int64_t bytes) const {
+  if (services_.tenant_memory == nullptr) return absl::OkStatus();
+  return services_.tenant_memory->MakeRoom(tenant(), bytes);
+}
+
 // Exchanges what is in memory. The parameter then holds what was there before, and destroys it
 // after the lock is released.
 void Session::Replace(InMemory in_memory) {
@@ -130,15 +147,18 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   }
   POLYEST_RETURN_IF_ERROR(services_.memory.Check());
   Replace({nullptr, present.losses});
+  Weigh();
   // No batch is taken until the session is loaded again below.
-  POLYEST_ASSIGN_OR_RETURN(
-      std::shared_ptr<LoadedSession> loaded,
-      LoadedSession::Load(services_.journal, head_, ledger_.kept(), services_.models, stop));
+  POLYEST_ASSIGN_OR_RETURN(std::shared_ptr<LoadedSession> loaded,
+                           LoadedSession::Load(
+                               services_.journal, head_, ledger_.kept(), services_.models,
+                               [this](int64_t bytes) { return CheckMemory(bytes); }, stop));
   loaded->Attach(services_.journal, number());
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;
   history_.reset();
   Replace({loaded, losses});
+  Weigh();
   return loaded;
 }
 
@@ -214,6 +234,8 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     const SessionPlace before = intake.place();
     const double measured_s = intake.measured_s();
     const auto bytes = static_cast<int64_t>(entry.measurements.size());
+    // A rig whose batches are computed as fast as they come needs no more memory.
+    if (intake.waiting_rows() > 0) POLYEST_RETURN_IF_ERROR(CheckMemory(bytes));
     POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch, bytes));
     absl::Cleanup release_room = [&] { ReleaseRoom({batch.time_s_size(), bytes}); };
     const auto record = [&](const SessionPlace& place) {
@@ -223,6 +245,7 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem, record));
     const int64_t values = entry.place.samples - before.samples;
     std::move(release_room).Cancel();
+    if (services_.tenant_memory != nullptr) services_.tenant_memory->Add(number(), bytes);
     Keep(std::move(entry), present.losses, batch.time_s_size(), values,
          intake.measured_s() - measured_s);
   }
@@ -348,6 +371,7 @@ absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const S
 // Takes what is computed out of memory.
 void Session::Drop() {
   Replace({nullptr, Present().losses});
+  Weigh();
   passed_on_ = nullptr;
   history_.reset();
 }
@@ -358,7 +382,7 @@ void Session::Unobserve(const SessionObserver* observer) {
 }
 
 void Session::Unload() {
-  if (!IdleTime()) return;
+  if (!IdleTime()) return Weigh();
   Drop();
   if (SharedJournal* const shared = services_.journal.shared()) shared->Release(number());
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});

@@ -27,6 +27,7 @@
 #include "server/sessions/session_activity.h"
 #include "server/sessions/session_observer.h"
 #include "server/sessions/stored_data.h"
+#include "server/sessions/tenant_memory.h"
 #include "server/sessions/writer_lease.h"
 
 namespace polyest::internal {
@@ -43,6 +44,8 @@ struct SessionServices {
   MemoryLimit memory = MemoryLimit();
   // Counts what is stored; null: it is not counted. The registry sets it.
   std::shared_ptr<StoredData> stored = nullptr;
+  // Weighs what is loaded; null: it is not weighed. The registry sets it.
+  std::shared_ptr<TenantMemory> tenant_memory = nullptr;
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -53,6 +56,7 @@ class Session : public std::enable_shared_from_this<Session> {
   // created or imported.
   Session(const SessionServices& services, SessionHead head,
           std::unique_ptr<LoadedSession> loaded = nullptr);
+  ~Session();
 
   const std::string& tenant() const { return head_.tenant; }
   const std::string& name() const { return head_.name; }
@@ -151,6 +155,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // Removes an observer. May be called from any thread, as may the next.
   void Unobserve(const SessionObserver* observer);
   bool observed() const { return observers_.size() > 0; }
+  // Weighs what is in memory of the session. May be called on the strand, or before others know
+  // the session.
+  void Weigh();
   // Takes the estimator out of memory if the session is not in use. May be called on the strand
   // only.
   void Unload();
@@ -173,6 +180,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
                         int64_t bytes) const;
   void ReleaseRoom(const StoredAmount& amount) const;
+  // Checks whether the tenant may hold about so many bytes of memory more.
+  absl::Status CheckMemory(int64_t bytes) const;
   // Returns the loaded session; loads it first if need be. Batches taken may wait in it for the
   // numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);

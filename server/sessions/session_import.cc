@@ -29,6 +29,7 @@ SessionImport::~SessionImport() {
   if (loaded_ == nullptr) return;
   registry_.services().journal.Delete(head_.number).IgnoreError();
   registry_.services().stored->Forget(head_.number);
+  registry_.services().tenant_memory->Forget(head_.number);
 }
 
 absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
@@ -72,12 +73,16 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   }
   problem.clear_schema();
   const SessionServices& services = registry_.services();
+  const auto check_memory = [&](int64_t bytes) {
+    return services.tenant_memory->MakeRoom(head_.tenant, bytes);
+  };
   POLYEST_ASSIGN_OR_RETURN(auto loaded,
                            LoadedSession::Make(problem, services.models, services.limits.problem,
-                                               head_.reorder_window_s));
+                                               head_.reorder_window_s, check_memory));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
   loaded->Attach(services.journal, head_.number);
   loaded_ = std::move(loaded);
+  services.tenant_memory->Set(head_.number, head_.tenant, loaded_->memory_bytes());
   const auto bytes = static_cast<int64_t>(DeterministicBytes(problem).size());
   return services.stored->Take(head_.number, head_.tenant, {0, bytes});
 }

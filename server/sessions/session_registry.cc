@@ -37,6 +37,7 @@ absl::Status CheckSessionId(const std::string& id) {
 SessionRegistry::SessionRegistry(const SessionServices& services, WallClock clock)
     : services_(services), clock_(std::move(clock)) {
   services_.stored = std::make_shared<StoredData>(services.limits);
+  services_.tenant_memory = std::make_shared<TenantMemory>(services.limits.memory_mb_per_tenant);
 }
 
 absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
@@ -70,8 +71,10 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   // The mutex is not held here, because a large problem takes its time, and so does the journal.
   // The journal checks again whether the name is free.
   POLYEST_ASSIGN_OR_RETURN(
-      auto loaded,
-      LoadedSession::Make(problem, services_.models, services_.limits.problem, reorder_window_s));
+      auto loaded, LoadedSession::Make(problem, services_.models, services_.limits.problem,
+                                       reorder_window_s, [&](int64_t bytes) {
+                                         return services_.tenant_memory->MakeRoom(tenant, bytes);
+                                       }));
   head.create_time = clock_();
   // The address of the schema is for editors, and may be of any length.
   v1::Problem kept = problem;
@@ -104,6 +107,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(
     SessionHead head, std::unique_ptr<LoadedSession> loaded) {
   const Key key(head.tenant, head.name);
   auto session = std::make_shared<Session>(services_, std::move(head), std::move(loaded));
+  session->Weigh();
   auto added = Add(key, session);
   if (added.ok()) return added;
   services_.journal.Delete(session->number()).IgnoreError();

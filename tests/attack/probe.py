@@ -30,11 +30,17 @@ def messages():
     return lambda name: factory.GetPrototype(pool.FindMessageTypeByName(f"polyest.v1.{name}"))
 
 
+def call_credentials(token):
+    """Returns the metadata with which a caller shows a token; nothing without one."""
+    return (("authorization", f"Bearer {token}"),) if token else ()
+
+
 class Probe:
     """A session with its open stream."""
 
-    def __init__(self, address, certificate=None):
-        """`certificate`: PEM file of the one that the server at `address` has; none without TLS."""
+    def __init__(self, address, certificate=None, token=None):
+        """`certificate`: PEM file of the one that the server at `address` has; none without TLS.
+        `token`: of a writer; none if the server has no tokens."""
         message = messages()
         self.request = message("StreamMeasurementsRequest")
         create = message("CreateSessionRequest")
@@ -48,14 +54,15 @@ class Probe:
         request.session_id = self.name.removeprefix("sessions/")
         channel.unary_unary("/polyest.v1.SessionService/CreateSession",
                             request_serializer=create.SerializeToString,
-                            response_deserializer=bytes)(request, timeout=30)
+                            response_deserializer=bytes)(request, timeout=30,
+                                                         metadata=call_credentials(token))
         self.queue = queue.Queue()
         self.sequence = 0
         self.answers = channel.stream_stream(
             "/polyest.v1.SessionService/StreamMeasurements",
             request_serializer=self.request.SerializeToString,
             response_deserializer=message("StreamMeasurementsResponse").FromString)(
-                iter(self.queue.get, None))
+                iter(self.queue.get, None), metadata=call_credentials(token))
         self.channel = channel
 
     def one(self):
