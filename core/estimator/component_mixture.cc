@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/posterior/mixture_weighing.h"
 
 namespace polyest::internal {
 

@@ -249,7 +249,7 @@ class Assessment {
 
   void WidenForShift() {
     shift_widening_ = findings_.WideningForShift();
-    WidenPosterior(Vector::Constant(prior_.dimension(), shift_widening_));
+    Widen(Vector::Constant(prior_.dimension(), shift_widening_), prior_, posterior_);
   }
 
   // The windows' ratios are relative to the standard deviations at the stated noise. Those of a
@@ -332,7 +332,7 @@ class Assessment {
       const double curved = shift_widening_ * contraction[i] * most;
       factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));
     }
-    WidenPosterior(factors);
+    Widen(factors, prior_, posterior_);
   }
 
   // Returns the ratio of posterior to prior standard deviation of the scores that is due to the
@@ -350,22 +350,6 @@ class Assessment {
     spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
     return CovarianceFromCurvature(curved, prior_, xi)
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
-  }
-
-  // Widens the draws' scores about their mean by a factor for each parameter, but not beyond Ω, and
-  // to no larger standard deviation than the prior's.
-  void WidenPosterior(const Vector& factors) {
-    const Vector most = prior_.GermStandardDeviation();
-    for (int i = 0; i < prior_.dimension(); ++i) {
-      auto scores = posterior_.scores.col(i).array();
-      const double centre = WeightedMean(posterior_.scores.col(i), posterior_.weights);
-      const double deviation =
-          std::sqrt(posterior_.weights.dot((scores - centre).square().matrix()));
-      const double widening = std::min(factors[i], most[i] / deviation);
-      if (!(widening > 1)) continue;
-      scores =
-          (centre + widening * (scores - centre)).max(prior_.lower()[i]).min(prior_.upper()[i]);
-    }
   }
 
   const ResolvedProblem& problem_;

@@ -1,12 +1,14 @@
 #include "core/estimator/posterior/posterior_draws.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
 #include "core/bayes/markov_chains.h"
 #include "core/bayes/newton_starts.h"
 #include "core/bayes/posterior.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/guarded_importance.h"
 #include "core/estimator/expansion/search_domain.h"
@@ -151,6 +153,18 @@ void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws) {
   draws.weights.array() *= (log_factors.array() - log_factors.maxCoeff()).exp();
   draws.weights /= draws.weights.sum();
   draws.effective_size *= std::min(1.0, 1 / draws.weights.squaredNorm() / before);
+}
+
+void Widen(const Vector& factors, const Prior& prior, PosteriorDraws& draws) {
+  const Vector most = prior.GermStandardDeviation();
+  for (int i = 0; i < prior.dimension(); ++i) {
+    auto scores = draws.scores.col(i).array();
+    const double centre = WeightedMean(draws.scores.col(i), draws.weights);
+    const double deviation = std::sqrt(draws.weights.dot((scores - centre).square().matrix()));
+    const double widening = std::min(factors[i], most[i] / deviation);
+    if (!(widening > 1)) continue;
+    scores = (centre + widening * (scores - centre)).max(prior.lower()[i]).min(prior.upper()[i]);
+  }
 }
 
 absl::StatusOr<PosteriorDraws> DrawPosterior(const Cost& cost, const ExpansionDesign& design,

@@ -42,6 +42,10 @@ struct PosteriorDraws {
 // Multiplies the weights by factors whose logarithms are given, up to a common constant.
 void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws);
 
+// Widens the draws' scores about their mean by a factor for each parameter, but not beyond Ω, and
+// to no larger standard deviation than the prior's.
+void Widen(const Vector& factors, const Prior& prior, PosteriorDraws& draws);
+
 // Draws from the posterior. `guesses` (any number × n, may be empty; germ coordinates) tells where
 // the posterior was before. Returns FailedPrecondition when the cost is nowhere finite; otherwise
 // only a stop request returns an error.

@@ -1,0 +1,135 @@
+#include "core/estimator/posterior/mixture_weighing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <utility>
+
+#include "core/bayes/weighted_samples.h"
+#include "core/common/status.h"
+#include "core/estimator/posterior/most_evidence.h"
+
+namespace polyest::internal {
+namespace {
+
+// Effort for weights that only decide which components to continue with.
+constexpr PosteriorEffort kWeighingEffort = {
+    .importance_points = 4'096, .chain_effective_size = 2'000, .max_sweeps = 64};
+
+constexpr int kParticlesKept = 1'000;
+// Up to this many components are all weighed by draws.
+constexpr size_t kFew = 4;
+
+// The posterior of one component, as far as its weight needs it.
+struct Weighed {
+  double log_evidence = -kInfinity;
+  Matrix particles;
+};
+
+class Weighing {
+ public:
+  Weighing(const std::vector<AssessmentRequest>& requests, size_t most)
+      : requests_(requests),
+        most_(most),
+        power_(CommonPower(requests)),
+        weighed_(requests.size()) {}
+
+  absl::StatusOr<MixtureWeighing> Run(const Stop& stop) {
+    POLYEST_RETURN_IF_ERROR(WeighHeaviest(stop));
+    MixtureWeighing weighing;
+    std::vector<double> evidences;
+    for (const Weighed& one : weighed_) evidences.push_back(one.log_evidence);
+    const std::vector<double> weights = WeightsOf(evidences);
+    double light = 0;
+    const double least = LeastWeight(weights);
+    for (size_t k = 0; k < weights.size(); ++k) {
+      if (weights[k] < least) {
+        light = std::max(light, weights[k]);
+        continue;
+      }
+      weighing.kept.push_back(k);
+      weighing.weights.push_back(weights[k]);
+      weighing.particles.push_back(std::move(weighed_[k].particles));
+    }
+    if (least > kMinWeight) weighing.left_out = light;
+    const double all = std::accumulate(weighing.weights.begin(), weighing.weights.end(), 0.0);
+    for (double& weight : weighing.weights) weight /= all;
+    return weighing;
+  }
+
+ private:
+  // The weight from which on a component is kept: kMinWeight, or what leaves no more than the most
+  // components allowed.
+  double LeastWeight(std::vector<double> weights) const {
+    if (weights.size() <= most_) return kMinWeight;
+    std::ranges::sort(weights, std::greater());
+    return std::max(kMinWeight, weights[most_ - 1]);
+  }
+
+  // Draws from the components in the order of the most that their evidence can be, until the rest
+  // can no longer matter.
+  absl::Status WeighHeaviest(const Stop& stop) {
+    std::vector<double> most;
+    for (const AssessmentRequest& request : requests_) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      const Cost cost = CostOf(request);
+      most.push_back(requests_.size() > kFew
+                         ? MostEvidence(*request.expansion, cost, *request.guesses)
+                         : kInfinity);
+    }
+    std::vector<size_t> order(requests_.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return most[a] > most[b]; });
+    double heaviest = -kInfinity;
+    for (const size_t k : order) {
+      if (most[k] < heaviest + std::log(kMinWeight)) break;
+      POLYEST_RETURN_IF_ERROR(Weigh(k, stop));
+      heaviest = std::max(heaviest, weighed_[k].log_evidence);
+    }
+    return absl::OkStatus();
+  }
+
+  // The cost with the power of the component that the residuals contradict least: the others'
+  // residuals speak against them.
+  Cost CostOf(const AssessmentRequest& request) const {
+    Cost cost = request.expansion->MakeCost(request.problem->problem().regularization);
+    cost.set_power(power_);
+    return cost;
+  }
+
+  absl::Status Weigh(size_t k, const Stop& stop) {
+    const AssessmentRequest& request = requests_[k];
+    const Cost cost = CostOf(request);
+    absl::StatusOr<PosteriorDraws> draws =
+        DrawPosterior(cost, request.expansion->design(), *request.guesses, kWeighingEffort, stop);
+    if (absl::IsFailedPrecondition(draws.status())) return absl::OkStatus();  // a cost of +∞
+    if (!draws.ok()) return draws.status();
+    weighed_[k].log_evidence = ShareOf(*request.expansion, cost, *draws).log_evidence;
+    weighed_[k].particles =
+        draws->Germs(cost.prior())(EquallyWeighted(draws->weights, kParticlesKept), Eigen::all);
+    return absl::OkStatus();
+  }
+
+  const std::vector<AssessmentRequest>& requests_;
+  const size_t most_;
+  const double power_;
+  std::vector<Weighed> weighed_;
+};
+
+}  // namespace
+
+double CommonPower(const std::vector<AssessmentRequest>& requests) {
+  double misfit = kInfinity;
+  for (const AssessmentRequest& request : requests) {
+    misfit = std::min(misfit, request.expansion->noise().misfit);
+  }
+  return 1 / misfit;
+}
+
+absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
+                                             size_t most, const Stop& stop) {
+  return Weighing(requests, most).Run(stop);
+}
+
+}  // namespace polyest::internal

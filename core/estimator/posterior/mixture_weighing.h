@@ -1,0 +1,32 @@
+#pragma once
+
+// The weights of the components of the posterior, and the choice of those to continue with.
+
+#include <absl/status/statusor.h>
+
+#include <vector>
+
+#include "core/estimator/posterior/assessment.h"
+#include "polyest/stop.h"
+
+namespace polyest::internal {
+
+// A component of smaller weight is dropped, because it no longer affects any result.
+inline constexpr double kMinWeight = 1e-6;
+
+struct MixtureWeighing {
+  std::vector<size_t> kept;       // indices of the requests, ascending; at least one
+  std::vector<double> weights;    // weights of those kept, Σ = 1
+  std::vector<Matrix> particles;  // of those kept, equally weighted, germ coordinates
+  double left_out = 0;            // share of those dropped for lack of room
+};
+
+// Weighs the components and keeps at most the `most` heaviest. Takes one request per component, at
+// least one, all at the same row. Returns an error only on a stop request.
+absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
+                                             size_t most, const Stop& stop);
+
+// Returns the power of the likelihood of the component that the residuals contradict least.
+double CommonPower(const std::vector<AssessmentRequest>& requests);
+
+}  // namespace polyest::internal
