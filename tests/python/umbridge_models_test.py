@@ -44,8 +44,8 @@ def session(served, problem, record):
     with client.session("run7", problem) as session:
         session.append(record)
         session.estimate()
-    yield url
-    client.delete("run7")
+        yield url
+        session.delete()
 
 
 def post(url, path, token=None, host=None, **message):
@@ -96,8 +96,8 @@ def test_later_measurements_count(served, problem, rows):
         before = post(url, "/Evaluate", name="growing", input=[POINT])[1]["output"]
         session.append(rows(100, 200))
         session.estimate()
-    after = post(url, "/Evaluate", name="growing", input=[POINT])[1]["output"]
-    client.delete("growing")
+        after = post(url, "/Evaluate", name="growing", input=[POINT])[1]["output"]
+        session.delete()
     assert before != after
 
 

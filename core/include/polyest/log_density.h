@@ -27,9 +27,9 @@ struct LogDensityOptions {
 
 // A function of the parameters at one point.
 struct LogDensityValue {
-  double value = 0;
-  Vector gradient;  // with respect to the parameters; empty unless asked for
-  Matrix hessian;   // likewise
+  double value = 0;  // a pure number
+  Vector gradient;   // with respect to the parameters; empty unless asked for
+  Matrix hessian;    // likewise
 };
 
 // The densities at several points.
