@@ -3,10 +3,10 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
-#include <chrono>
 #include <utility>
 #include <vector>
 
+#include "core/common/check.h"
 #include "polyest/v1/session_service.pb.h"
 #include "server/security/method_roles.h"
 #include "server/service/status_mapping.h"
@@ -26,8 +26,6 @@ constexpr char kPathOfInfo[] = "/Info";
 constexpr int kPageOfSessions = 200;
 // Longest request: one point and a direction.
 constexpr size_t kMaxBody = size_t{1} << 20;
-// Longest time of a call without a limit of its own; its client is watched all the time.
-constexpr std::chrono::hours kLongestCall{24 * 365};
 
 // Returns the protocol's type of an error.
 std::string_view TypeOf(int code) {
@@ -108,14 +106,11 @@ std::optional<HttpAnswer> UmBridgeGateway::Call(const std::string& method, const
   if (!set.ok()) return UmError(set);
   sent.message = message.SerializeAsString();
   WebCall call(channel_, sent);
-  const WebCall::Clock::time_point deadline = WebCall::Clock::now() + kLongestCall;
-  WebCall::Event event = call.Await(request.client, deadline);
-  if (event == WebCall::Event::kMessage) {
-    response.ParseFromString(call.TakeMessage());
-    event = call.Await(request.client, deadline);
-  }
-  if (event != WebCall::Event::kEnd) return Refusal(499, "the client has closed the connection");
-  if (!call.status().ok()) return UmError(ToRpcStatus(call.status()));
+  std::string answer;
+  const std::optional<grpc::Status> status = call.AwaitOnly(request.client, answer);
+  if (!status) return Refusal(499, "the client has closed the connection");
+  if (!status->ok()) return UmError(ToRpcStatus(*status));
+  POLYEST_CHECK(response.ParseFromString(answer));  // the daemon's own server wrote it
   return std::nullopt;
 }
 
