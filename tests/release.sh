@@ -83,7 +83,7 @@ calibration() {
 properties() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target properties
-  build/release/bin/properties 2000 1 1 0  # see tests/README.md for the limit
+  build/release/bin/properties 2000
 }
 
 adversary() {

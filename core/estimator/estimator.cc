@@ -11,6 +11,7 @@
 #include "core/common/status.h"
 #include "core/estimator/component_mixture.h"
 #include "core/estimator/estimator_access.h"
+#include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/memory_use.h"
 #include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/record/checkpoints.h"
@@ -20,6 +21,7 @@
 #include "core/estimator/second_search.h"
 #include "core/estimator/snapshot.h"
 #include "core/estimator/studies/cost_profile.h"
+#include "core/estimator/studies/log_density.h"
 #include "core/estimator/studies/posterior_study.h"
 #include "core/estimator/studies/prediction.h"
 #include "core/estimator/studies/regularization_sweep.h"
@@ -78,6 +80,8 @@ class Estimator::Implementation {
                                              const Stop& stop) const;
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
                                                const Stop& stop) const;
+  absl::StatusOr<LogDensity> CurrentLogDensity(const LogDensityOptions& options,
+                                               const Stop& stop) const;
   absl::StatusOr<RegularizationSweep> CurrentRegularizationSweep(
       const RegularizationOptions& options, const Stop& stop) const;
   absl::StatusOr<Prediction> CurrentPrediction(const PredictionOptions& options,
@@ -87,6 +91,7 @@ class Estimator::Implementation {
   absl::StatusOr<int64_t> SettledRows() const;
   absl::StatusOr<Prediction> PredictOther(PredictionSubject subject,
                                           const PredictionOptions& options, const Stop& stop) const;
+  absl::StatusOr<DensityBasis> MakeDensityBasis(const Stop& stop) const;
   void MakeSnapshot(int64_t rows);
 
   ResolvedProblem problem_;
@@ -97,6 +102,9 @@ class Estimator::Implementation {
   Checkpoints checkpoints_;
   std::unique_ptr<ComponentMixture> mixture_;
   SecondSearch search_;
+  // What densities of the processed rows are computed from, once they have been asked for: a
+  // function of the rows, kept because such calls come by the thousand.
+  mutable std::optional<DensityBasis> density_;
 };
 
 absl::Status Estimator::Implementation::Append(const Samples& samples) {
@@ -122,11 +130,13 @@ absl::StatusOr<int64_t> Estimator::Implementation::SettledRows() const {
 
 absl::Status Estimator::Implementation::Process(const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const int64_t settled, SettledRows());
+  if (settled != rows_processed()) density_.reset();
   while (true) {
     const int64_t checkpoint = checkpoints_.next().value_or(kNever);
     const int64_t rows = std::min({settled, checkpoint, search_.row()});
     POLYEST_RETURN_IF_ERROR(mixture_->TakeUpTo(rows, stop));
     if (rows == search_.row()) {
+      density_.reset();
       POLYEST_RETURN_IF_ERROR(search_.Look(problem_, store_.get(), threads_, stop, mixture_));
     } else if (rows == checkpoint) {
       MakeSnapshot(rows);
@@ -158,6 +168,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
       mixture_, ComponentMixture::FromState(problem_, std::move(state.mixture), snapshot.rows,
                                             store_.get(), threads_));
   search_.Restore(state.search);
+  density_.reset();
   checkpoints_.Pass(snapshot.rows);
   return absl::OkStatus();
 }
@@ -196,6 +207,33 @@ absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
   CostProfiles lowest = LowestOf(profiles, heights);
   lowest.diagnostics = assessed.whole.estimate.diagnostics;
   return lowest;
+}
+
+absl::StatusOr<DensityBasis> Estimator::Implementation::MakeDensityBasis(const Stop& stop) const {
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
+                           mixture_->Assess(PosteriorEffort(), stop));
+  DensityBasis basis;
+  for (size_t k = 0; k < assessed.order.size(); ++k) {
+    const Assessed& one = assessed.components.empty() ? assessed.whole : assessed.components[k];
+    const RegionalExpansion& expansion = mixture_->component(assessed.order[k]).expansion();
+    Cost cost = expansion.MakeCost(one.estimate.regularization);
+    const MinimizationProblem search = SearchOf(cost, expansion.design());
+    basis.components.push_back({std::move(cost), search.lower, search.upper, one.share.height});
+  }
+  for (const ParameterEstimate& parameter : assessed.whole.estimate.parameters) {
+    basis.units.push_back(parameter.unit);
+  }
+  basis.diagnostics = assessed.whole.estimate.diagnostics;
+  return basis;
+}
+
+absl::StatusOr<LogDensity> Estimator::Implementation::CurrentLogDensity(
+    const LogDensityOptions& options, const Stop& stop) const {
+  if (!density_) {
+    POLYEST_ASSIGN_OR_RETURN(density_, MakeDensityBasis(stop));
+  }
+  POLYEST_RETURN_IF_ERROR(Validate(options, density_->components.front().cost.prior().Names()));
+  return EvaluateLogDensity(*density_, options);
 }
 
 absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegularizationSweep(
@@ -282,6 +320,10 @@ absl::StatusOr<Posterior> Estimator::CurrentPosterior(const PosteriorOptions& op
 absl::StatusOr<CostProfiles> Estimator::CurrentProfiles(const ProfileOptions& options,
                                                         const Stop& stop) const {
   return implementation_->CurrentProfiles(options, stop);
+}
+absl::StatusOr<LogDensity> Estimator::CurrentLogDensity(const LogDensityOptions& options,
+                                                        const Stop& stop) const {
+  return implementation_->CurrentLogDensity(options, stop);
 }
 absl::StatusOr<RegularizationSweep> Estimator::CurrentRegularizationSweep(
     const RegularizationOptions& options, const Stop& stop) const {

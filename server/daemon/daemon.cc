@@ -197,27 +197,35 @@ int64_t Daemon::BufferBytes() const {
   return std::max(least, mb) << 20;
 }
 
-// Takes the HTTP port, but answers nobody yet.
+// Takes the HTTP ports, but answers nobody yet.
 absl::Status Daemon::OpenWeb() {
-  if (!options_.web) return absl::OkStatus();
-  POLYEST_ASSIGN_OR_RETURN(
-      web_, WebPort::Open({.host = options_.web->host,
-                           .port = options_.web->port,
-                           .names = options_.web_hosts,
-                           .tls = options_.tls,
-                           .max_message_mb = options_.max_message_mb,
-                           .body_memory_bytes = BufferBytes(),
-                           .knows =
-                               [this](auto authorization, auto certificate) {
-                                 return access_
-                                     ->Authorize({std::move(authorization), std::move(certificate)},
-                                                 "GetStatus")
-                                     .ok();
-                               },
-                           .count = [this](int status) { metrics_.CountWebRequest(status); }}));
   web_address_ = options_.web;
-  web_address_->port = web_->port();
+  umbridge_address_ = options_.umbridge;
+  POLYEST_ASSIGN_OR_RETURN(web_, OpenHttp(WebPort::Protocol::kCallsAndPage, web_address_));
+  POLYEST_ASSIGN_OR_RETURN(umbridge_, OpenHttp(WebPort::Protocol::kUmBridge, umbridge_address_));
   return absl::OkStatus();
+}
+
+// Takes the port of `address` and sets the number chosen; null without an address.
+absl::StatusOr<std::unique_ptr<WebPort>> Daemon::OpenHttp(WebPort::Protocol protocol,
+                                                          std::optional<ListenAddress>& address) {
+  if (!address) return nullptr;
+  const auto knows = [this](auto authorization, auto certificate) {
+    return access_->Authorize({std::move(authorization), std::move(certificate)}, "GetStatus").ok();
+  };
+  POLYEST_ASSIGN_OR_RETURN(
+      auto port,
+      WebPort::Open({.protocol = protocol,
+                     .host = address->host,
+                     .port = address->port,
+                     .names = options_.web_hosts,
+                     .tls = options_.tls,
+                     .max_message_mb = options_.max_message_mb,
+                     .body_memory_bytes = BufferBytes(),
+                     .knows = knows,
+                     .count = [this](int status) { metrics_.CountWebRequest(status); }}));
+  address->port = port->port();
+  return port;
 }
 
 absl::Status Daemon::Listen() {
@@ -263,10 +271,11 @@ absl::Status Daemon::Listen() {
 
 // Answers those who call over HTTP.
 void Daemon::ServeWeb() {
-  if (web_ == nullptr) return;
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);  // an answer is as large as it is
-  web_->Serve(server_->InProcessChannel(arguments));
+  for (WebPort* const port : {web_.get(), umbridge_.get()}) {
+    if (port != nullptr) port->Serve(server_->InProcessChannel(arguments));
+  }
 }
 
 LogFields Daemon::Described() const {
@@ -277,6 +286,7 @@ LogFields Daemon::Described() const {
                                    })},
           {"metrics", metrics_address_ ? metrics_address_->ToString() : ""},
           {"web", web_address_ ? web_address_->ToString() : ""},
+          {"umbridge", umbridge_address_ ? umbridge_address_->ToString() : ""},
           {"tls", tls_ == nullptr ? "no" : "yes"},
           {"connections", absl::StrCat("at most ", listener_->limits().total, ", ",
                                        listener_->limits().per_peer, " of a peer")}};
@@ -313,7 +323,9 @@ bool Daemon::Stop() {
   calls_.Drain(drained);
   if (handover_ != nullptr) handover_->LetGo(drained);
   stop_.request_stop();
-  if (web_ != nullptr) web_->Stop(std::chrono::steady_clock::now() + kFlushTime);
+  for (WebPort* const port : {web_.get(), umbridge_.get()}) {
+    if (port != nullptr) port->Stop(std::chrono::steady_clock::now() + kFlushTime);
+  }
   // gRPC waits for every call, also for those that do not look at their stop.
   std::promise<void> closed;
   const std::future<void> is_closed = closed.get_future();
@@ -333,6 +345,7 @@ Daemon::~Daemon() {
   Stop();
   if (closing_.joinable()) closing_.join();
   web_ = nullptr;
+  umbridge_ = nullptr;
   self_check_ = nullptr;
   server_ = nullptr;
   metrics_endpoint_ = nullptr;

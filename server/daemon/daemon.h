@@ -67,10 +67,11 @@ struct DaemonOptions {
   // Connections that are open at a time, in all and of one peer; 0: as LimitConnections says.
   int64_t max_connections = 0;
   int64_t max_connections_per_peer = 0;
-  std::string audit_log{};                 // file of the audit log; empty: none
-  std::optional<ListenAddress> metrics{};  // address of the metrics' endpoint; none: no endpoint
-  std::optional<ListenAddress> web{};      // address of the HTTP port; none: no such port
-  std::vector<std::string> web_hosts{};    // other names by which HTTP clients may call the daemon
+  std::string audit_log{};                  // file of the audit log; empty: none
+  std::optional<ListenAddress> metrics{};   // address of the metrics' endpoint; none: no endpoint
+  std::optional<ListenAddress> web{};       // address of the HTTP port; none: no such port
+  std::optional<ListenAddress> umbridge{};  // address of the UM-Bridge port; none: no such port
+  std::vector<std::string> web_hosts{};     // other names by which HTTP clients may call the daemon
 };
 
 class Daemon {
@@ -89,6 +90,8 @@ class Daemon {
   const std::optional<ListenAddress>& metrics_address() const { return metrics_address_; }
   // Returns the address of its HTTP port, if there is one, with the port chosen.
   const std::optional<ListenAddress>& web_address() const { return web_address_; }
+  // Returns the address of its UM-Bridge port, if there is one, with the port chosen.
+  const std::optional<ListenAddress>& umbridge_address() const { return umbridge_address_; }
   // Returns whether its ports are encrypted.
   bool encrypts() const { return tls_ != nullptr; }
 
@@ -118,6 +121,8 @@ class Daemon {
   void WarnOfReadableSecrets() const;
   absl::Status Secure();
   absl::Status OpenWeb();
+  absl::StatusOr<std::unique_ptr<WebPort>> OpenHttp(WebPort::Protocol protocol,
+                                                    std::optional<ListenAddress>& address);
   void ServeWeb();
   absl::Status Listen();
   int64_t BufferBytes() const;
@@ -151,6 +156,8 @@ class Daemon {
   std::unique_ptr<grpc::Server> server_;
   std::optional<ListenAddress> web_address_;
   std::unique_ptr<WebPort> web_;
+  std::optional<ListenAddress> umbridge_address_;
+  std::unique_ptr<WebPort> umbridge_;
   std::jthread closing_;  // closes the server during Stop
   std::unique_ptr<SelfCheck> self_check_;
   std::unique_ptr<FileWatch> watch_;  // null without files to watch

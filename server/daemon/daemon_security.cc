@@ -84,6 +84,9 @@ void Daemon::Reload() {
   if (tls_ != nullptr) report("certificates", tls_->Reload());
   if (!options_.node_ca.empty()) report("certificates of --node-ca", nodes_->Reload());
   if (tls_ != nullptr && web_ != nullptr) report("certificates of --web", web_->ReloadTls());
+  if (tls_ != nullptr && umbridge_ != nullptr) {
+    report("certificates of --umbridge", umbridge_->ReloadTls());
+  }
 }
 
 }  // namespace polyest::internal

@@ -66,6 +66,10 @@ void Announce(const polyest::internal::Daemon& daemon) {
     std::printf("web page on %s://%s/\n", daemon.encrypts() ? "https" : "http",
                 web->ToString().c_str());
   }
+  if (const auto& umbridge = daemon.umbridge_address()) {
+    std::printf("UM-Bridge models on %s://%s/\n", daemon.encrypts() ? "https" : "http",
+                umbridge->ToString().c_str());
+  }
   std::fflush(stdout);
   polyest::internal::ReportReady("listening on " + addresses);
 }

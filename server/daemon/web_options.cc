@@ -21,6 +21,23 @@ bool IsHostName(const std::string& text) {
   });
 }
 
+// Returns the address of a port; none if the text is empty.
+absl::StatusOr<std::optional<ListenAddress>> HttpAddress(const std::string& text,
+                                                         const char* option, bool insecure,
+                                                         const DaemonOptions& daemon) {
+  if (text.empty()) return std::optional<ListenAddress>();
+  POLYEST_ASSIGN_OR_RETURN(ListenAddress address, ListenAddress::Parse(text, option));
+  POLYEST_RETURN_IF_ERROR(
+      CheckExposure({.host = address.host,
+                     .tls = !daemon.tls.certificate.empty(),
+                     .authentication = !daemon.token_file.empty() || !daemon.tls.client_ca.empty(),
+                     .insecure = insecure,
+                     .option = option}));
+  // A port is on one address, and browsers find this one under both names.
+  if (address.host == "localhost") address.host = "127.0.0.1";
+  return std::optional(std::move(address));
+}
+
 }  // namespace
 
 void AddWebOptions(CLI::App& app, WebTexts& texts) {
@@ -28,11 +45,16 @@ void AddWebOptions(CLI::App& app, WebTexts& texts) {
                  "HOST:PORT of the live page and of the calls as JSON over HTTP; port 0 picks a "
                  "free one. Encrypted, and open to the same callers, as --listen. By default "
                  "nowhere");
+  app.add_option("--umbridge", texts.umbridge,
+                 "HOST:PORT at which each session is a model of the UM-Bridge protocol: the log "
+                 "posterior and the log likelihood over its parameters, with derivatives; port 0 "
+                 "picks a free one. Encrypted, and open to the same callers, as --listen. By "
+                 "default nowhere");
   app.add_option(
          "--web-host", texts.hosts,
-         "Another name by which browsers may call --web, such as that of a proxy; repeat "
-         "the option, or separate by commas, for several. Loopback and the address of --web "
-         "need none")
+         "Another name by which clients may call --web and --umbridge, such as that of a proxy; "
+         "repeat the option, or separate by commas, for several. Loopback and the address of "
+         "either need none")
       ->delimiter(',')
       ->allow_extra_args(false);
 }
@@ -44,21 +66,13 @@ absl::Status ApplyWebOptions(const WebTexts& texts, bool insecure, DaemonOptions
           "--web-host: \"", host, "\" must be a host without a port, as in rig.example.org"));
     }
   }
-  if (texts.address.empty()) {
-    if (texts.hosts.empty()) return absl::OkStatus();
-    return absl::InvalidArgumentError("--web-host: needs --web");
+  if (texts.address.empty() && texts.umbridge.empty() && !texts.hosts.empty()) {
+    return absl::InvalidArgumentError("--web-host: needs --web or --umbridge");
   }
-  POLYEST_ASSIGN_OR_RETURN(ListenAddress address, ListenAddress::Parse(texts.address, "--web"));
-  POLYEST_RETURN_IF_ERROR(
-      CheckExposure({.host = address.host,
-                     .tls = !daemon.tls.certificate.empty(),
-                     .authentication = !daemon.token_file.empty() || !daemon.tls.client_ca.empty(),
-                     .insecure = insecure,
-                     .option = "--web"}));
-  // A port is on one address, and browsers find this one under both names.
-  if (address.host == "localhost") address.host = "127.0.0.1";
-  daemon.web = std::move(address);
   daemon.web_hosts = texts.hosts;
+  POLYEST_ASSIGN_OR_RETURN(daemon.web, HttpAddress(texts.address, "--web", insecure, daemon));
+  POLYEST_ASSIGN_OR_RETURN(daemon.umbridge,
+                           HttpAddress(texts.umbridge, "--umbridge", insecure, daemon));
   return absl::OkStatus();
 }
 

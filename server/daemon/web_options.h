@@ -1,6 +1,6 @@
 #pragma once
 
-// The options of the HTTP port.
+// The options of the HTTP ports.
 
 #include <absl/status/status.h>
 
@@ -14,7 +14,8 @@ namespace polyest::internal {
 
 // The options as they are given.
 struct WebTexts {
-  std::string address;  // empty: no such port
+  std::string address;   // of --web; empty: no such port
+  std::string umbridge;  // likewise
   std::vector<std::string> hosts;
 };
 

@@ -46,6 +46,7 @@ inline constexpr MethodRole kMethodRoles[] = {
     {"ComputeExperimentDesign", Role::kReader},
     {"ComputePosterior", Role::kReader},
     {"ComputeCostProfiles", Role::kReader},
+    {"ComputeLogDensity", Role::kReader},
     {"ComputeRegularizationSweep", Role::kReader},
     {"Predict", Role::kReader},
     {"StartComputation", Role::kReader},

@@ -39,6 +39,9 @@ auto Run(const v1::ComputePosteriorRequest& request, auto&&... of) {
 auto Run(const v1::ComputeCostProfilesRequest& request, auto&&... of) {
   return ComputeCostProfiles(request, of...);
 }
+auto Run(const v1::ComputeLogDensityRequest& request, auto&&... of) {
+  return ComputeLogDensity(request, of...);
+}
 auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
   return ComputeRegularizationSweep(request, of...);
 }
@@ -169,6 +172,9 @@ template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
 template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
                                       const v1::ComputeCostProfilesRequest*,
                                       v1::ComputeCostProfilesResponse*);
+template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
+                                      const v1::ComputeLogDensityRequest*,
+                                      v1::ComputeLogDensityResponse*);
 template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
                                       const v1::ComputeRegularizationSweepRequest*,
                                       v1::ComputeRegularizationSweepResponse*);

@@ -40,6 +40,10 @@ class StudyService final : public v1::StudyService::CallbackService {
                              v1::ComputeCostProfilesResponse* response) override {
     return Compute(call, "ComputeCostProfiles", request, response);
   }
+  Unary* ComputeLogDensity(Context* call, const v1::ComputeLogDensityRequest* request,
+                           v1::ComputeLogDensityResponse* response) override {
+    return Compute(call, "ComputeLogDensity", request, response);
+  }
   Unary* ComputeRegularizationSweep(Context* call,
                                     const v1::ComputeRegularizationSweepRequest* request,
                                     v1::ComputeRegularizationSweepResponse* response) override {

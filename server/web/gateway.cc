@@ -25,8 +25,6 @@ constexpr char kEvents[] = "text/event-stream";
 constexpr size_t kLargeRequest = size_t{1} << 20;
 // Time that a stream has to fail under the status of HTTP rather than by an event.
 constexpr std::chrono::milliseconds kFirstEvent{500};
-// Longest time of a call without a limit of its own; its client is watched all the time.
-constexpr std::chrono::hours kForever{24 * 365};
 
 bool IsJson(absl::string_view content_type) {
   const absl::string_view type = content_type.substr(0, content_type.find(';'));
@@ -164,21 +162,16 @@ std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpReque
 
 HttpAnswer Gateway::AnswerOnce(WebCall& call, const WebMethod& method,
                                const HttpRequest& request) const {
-  const Clock::time_point deadline = Clock::now() + kForever;
   std::string message;
-  WebCall::Event event = call.Await(request.client, deadline);
-  if (event == WebCall::Event::kMessage) {
-    message = call.TakeMessage();
-    event = call.Await(request.client, deadline);
-  }
-  if (event != WebCall::Event::kEnd) {
+  const std::optional<grpc::Status> status = call.AwaitOnly(request.client, message);
+  if (!status) {
     return ErrorAnswer(499, StatusCode::CANCELLED, "the client has closed the connection");
   }
   HttpAnswer answer{.content_type = kJson};
-  if (call.status().ok()) {
+  if (status->ok()) {
     answer.body = ToJsonText(message, *method.method->output_type());
   } else {
-    answer = ErrorAnswer(ToRpcStatus(call.status()));
+    answer = ErrorAnswer(ToRpcStatus(*status));
   }
   if (const std::string id = call.request_id(); !id.empty()) {
     answer.headers.emplace_back(kRequestIdKey, id);

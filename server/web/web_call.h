@@ -40,9 +40,14 @@ class WebCall {
   WebCall(const WebCall&) = delete;
   WebCall& operator=(const WebCall&) = delete;
 
-  // Waits for what happens next, at most until `deadline`. The next message is asked for only here,
-  // so that a server does not send more than the client takes. `client` is the client's socket.
+  // Waits for what happens next, at most until `deadline`. Every message but the first is asked for
+  // only here, so that a server does not send more than the client takes. `client` is the client's
+  // socket.
   Event Await(int client, Clock::time_point deadline);
+  // Waits for the only message of a unary call and for the call's end. Returns how the call has
+  // ended; INTERNAL if it has ended well without a message, nothing if the client has closed its
+  // connection.
+  std::optional<grpc::Status> AwaitOnly(int client, std::string& message);
 
   // Returns the message that has come, serialized, and forgets it.
   std::string TakeMessage();

@@ -4,7 +4,9 @@
 
 #include "core/common/status.h"
 #include "server/security/method_roles.h"
+#include "server/web/gateway.h"
 #include "server/web/tls_context.h"
+#include "server/web/umbridge_gateway.h"
 
 namespace polyest::internal {
 
@@ -18,18 +20,28 @@ absl::StatusOr<std::unique_ptr<WebPort>> WebPort::Open(const Options& options) {
   return port;
 }
 
-void WebPort::Serve(std::shared_ptr<grpc::Channel> channel) {
-  Gateway::Options gateway{.message_bytes = static_cast<size_t>(options_.max_message_mb) << 20,
-                           .count = options_.count};
-  gateway.knows = [this](const HttpRequest& request) {
+std::unique_ptr<HttpHandler> WebPort::MakeHandler(std::shared_ptr<grpc::Channel> channel) const {
+  const auto knows = [this](const HttpRequest& request) {
     std::optional<std::string> certificate;
     if (!request.certificate_name.empty()) certificate = request.certificate_name;
     return options_.knows(request.Header("Authorization"), std::move(certificate));
   };
-  gateway_ =
-      std::make_unique<Gateway>(std::move(channel), MethodTable(Services()),
-                                HostCheck(options_.host, options_.names), std::move(gateway));
-  server_->Serve(*gateway_);
+  HostCheck hosts(options_.host, options_.names);
+  if (options_.protocol == Protocol::kUmBridge) {
+    return std::make_unique<UmBridgeGateway>(
+        std::move(channel), std::move(hosts),
+        UmBridgeGateway::Options{.knows = knows, .count = options_.count});
+  }
+  Gateway::Options gateway{.message_bytes = static_cast<size_t>(options_.max_message_mb) << 20,
+                           .count = options_.count};
+  gateway.knows = knows;
+  return std::make_unique<Gateway>(std::move(channel), MethodTable(Services()), std::move(hosts),
+                                   std::move(gateway));
+}
+
+void WebPort::Serve(std::shared_ptr<grpc::Channel> channel) {
+  handler_ = MakeHandler(std::move(channel));
+  server_->Serve(*handler_);
 }
 
 absl::Status WebPort::ReloadTls() {

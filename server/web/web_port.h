@@ -1,6 +1,6 @@
 #pragma once
 
-// The HTTP port of the daemon, from its address to its end.
+// An HTTP port of the daemon, from its address to its end.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/channel.h>
@@ -13,14 +13,20 @@
 #include <vector>
 
 #include "server/security/tls_material.h"
-#include "server/web/gateway.h"
+#include "server/web/http_message.h"
 #include "server/web/web_server.h"
 
 namespace polyest::internal {
 
 class WebPort {
  public:
+  // What the port speaks.
+  enum class Protocol {
+    kCallsAndPage,  // calls as JSON, and the live page (gateway.h)
+    kUmBridge,      // umbridge_gateway.h
+  };
   struct Options {
+    Protocol protocol = Protocol::kCallsAndPage;
     std::string host;                  // IPv6 in brackets
     int port = 0;                      // 0: any free one
     std::vector<std::string> names{};  // other hosts by which clients may call it
@@ -51,8 +57,10 @@ class WebPort {
       : options_(std::move(options)), server_(std::move(server)) {}
 
   const Options options_;
-  std::unique_ptr<Gateway> gateway_;
-  const std::unique_ptr<WebServer> server_;  // goes first, because its threads use the gateway
+  std::unique_ptr<HttpHandler> MakeHandler(std::shared_ptr<grpc::Channel> channel) const;
+
+  std::unique_ptr<HttpHandler> handler_;
+  const std::unique_ptr<WebServer> server_;  // goes first, because its threads use the handler
 };
 
 }  // namespace polyest::internal

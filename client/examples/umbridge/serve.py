@@ -91,6 +91,8 @@ def describe(urls):
 
 
 def main(folder, *command):
+    if not os.path.isdir(folder):
+        sys.exit(f"serve.py: {folder} is not a folder; make it first, or name another")
     server = Server(("127.0.0.1", 0), Handler)
     file = pathlib.Path(folder, f"{NAME}.umbridge.json")
     draft = file.with_suffix(".new")

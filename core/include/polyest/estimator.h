@@ -21,6 +21,7 @@
 
 #include "polyest/cost_profile.h"
 #include "polyest/estimate.h"
+#include "polyest/log_density.h"
 #include "polyest/posterior.h"
 #include "polyest/prediction.h"
 #include "polyest/problem.h"
@@ -98,6 +99,14 @@ class Estimator {
   // Returns the profiles of the cost of the same samples. INVALID_ARGUMENT names the option, its
   // value and the rule; otherwise as CurrentEstimate.
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
+                                               const Stop& stop = {}) const;
+
+  // Returns the posterior density and the likelihood of the same samples at given parameters, from
+  // the expansion: as often as wanted, since only the first call after new samples takes the time
+  // of an estimate. INVALID_ARGUMENT names the option, its value and the rule, or the point outside
+  // of the prior's support or too far from the posterior; RESOURCE_EXHAUSTED for an answer that is
+  // too large; otherwise as CurrentEstimate.
+  absl::StatusOr<LogDensity> CurrentLogDensity(const LogDensityOptions& options,
                                                const Stop& stop = {}) const;
 
   // Returns the minima of the same samples' cost for several α². INVALID_ARGUMENT names the option,

@@ -17,6 +17,7 @@
 #include "proto/wire/convert/annotate.h"
 #include "proto/wire/convert/estimate.h"
 #include "proto/wire/convert/experiment_design.h"
+#include "proto/wire/convert/log_density.h"
 #include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/model.h"
 #include "proto/wire/convert/posterior.h"
@@ -246,6 +247,30 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
                            TakeAll(*experiment, threads, models, limits, std::move(store)));
   return ComputeCostProfiles(request, *estimator, stop);
+}
+
+absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
+    const v1::ComputeLogDensityRequest& request, Estimator& estimator, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
+  // Only the estimator knows the parameters of all runs.
+  LogDensityOptions none;
+  none.derivatives = request.derivatives();
+  POLYEST_ASSIGN_OR_RETURN(LogDensity density, WireFields(estimator.CurrentLogDensity(none, stop)));
+  if (!request.values().empty()) {
+    POLYEST_ASSIGN_OR_RETURN(const LogDensityOptions options,
+                             ToLogDensityOptions(request, density.parameters));
+    POLYEST_ASSIGN_OR_RETURN(density, WireFields(estimator.CurrentLogDensity(options, stop)));
+  }
+  return ToProto(density);
+}
+
+absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
+    const v1::ComputeLogDensityRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
+  POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+  return ComputeLogDensity(request, *estimator, stop);
 }
 
 absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(

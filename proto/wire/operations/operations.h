@@ -49,6 +49,10 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
     const v1::ComputeCostProfilesRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models = {}, const ProblemLimits& limits = {},
     std::shared_ptr<SampleStore> store = nullptr);
+absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
+    const v1::ComputeLogDensityRequest& request, int threads, const Stop& stop,
+    const ModelLibrary& models = {}, const ProblemLimits& limits = {},
+    std::shared_ptr<SampleStore> store = nullptr);
 absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
     const v1::ComputeRegularizationSweepRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models = {}, const ProblemLimits& limits = {},
@@ -66,6 +70,8 @@ absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
     const v1::ComputePosteriorRequest& request, Estimator& estimator, const Stop& stop);
 absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
     const v1::ComputeCostProfilesRequest& request, Estimator& estimator, const Stop& stop);
+absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
+    const v1::ComputeLogDensityRequest& request, Estimator& estimator, const Stop& stop);
 absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
     const v1::ComputeRegularizationSweepRequest& request, Estimator& estimator, const Stop& stop);
 absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, Estimator& estimator,

@@ -28,8 +28,8 @@ PUBLIC = {
     "core/estimator/record": ["samples"],
     "core/estimator/posterior": ["posterior"],
     "core/estimator/studies": [
-        "cost_grid", "cost_profile", "experiment_design", "prediction", "prior_propagation",
-        "sensitivity"],
+        "cost_grid", "cost_profile", "experiment_design", "log_density", "prediction",
+        "prior_propagation", "sensitivity"],
     "core/estimator": ["estimator"],
 }
 
