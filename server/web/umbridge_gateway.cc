@@ -137,7 +137,7 @@ HttpAnswer UmBridgeGateway::AnswerModel(const HttpRequest& request, const std::s
   v1::ComputeLogDensityRequest asked;
   asked.mutable_subject()->set_session(absl::StrCat(kSessions, read->model));
   asked.mutable_values()->Add(read->input.begin(), read->input.end());
-  asked.set_derivatives(read->Derivatives());
+  asked.set_derivative_order(read->DerivativeOrder());
   v1::ComputeLogDensityResponse density;
   std::optional<HttpAnswer> failed = Call(PathOf("ComputeLogDensity"), asked, request, density);
   if (failed) return *std::move(failed);

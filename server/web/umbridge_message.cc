@@ -121,7 +121,7 @@ std::vector<double> Bend(const v1::ComputeLogDensityResponse::Function& function
 
 }  // namespace
 
-int UmBridgeRequest::Derivatives() const {
+int UmBridgeRequest::DerivativeOrder() const {
   if (kind == Kind::kApplyHessian) return 2;
   return kind == Kind::kGradient || kind == Kind::kApplyJacobian ? 1 : 0;
 }

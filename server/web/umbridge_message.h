@@ -32,7 +32,7 @@ struct UmBridgeRequest {
   std::vector<double> vec{};    // a direction of the parameters
 
   // The highest derivatives that the answer needs.
-  int Derivatives() const;
+  int DerivativeOrder() const;
 };
 
 // Returns whether the protocol has a request of this path that is about a model.

@@ -28,9 +28,11 @@ done
 stop-daemon
 arguments=(--listen 127.0.0.1:0 --metrics 127.0.0.1:0 --web 127.0.0.1:0)
 [[ " $* " == *" --data-dir "* ]] || arguments+=(--data-dir "$ROOT/sessions")
+serves_models=
+[[ " $* " != *" --umbridge "* ]] || { serves_models=1; arguments+=(--umbridge 127.0.0.1:0); }
 while (($#)); do
   case "$1" in
-    --listen | --metrics | --web) shift ;;
+    --listen | --metrics | --web | --umbridge) shift ;;
     *) arguments+=("$1") ;;
   esac
   shift
@@ -44,6 +46,7 @@ echo "${line#listening on }" >"$ROOT/address"
 echo "$line"
 read -r _ <&3 && read -r page <&3
 sed 's|.*//||; s|/$||' <<<"$page" >"$ROOT/page"
+[[ ! $serves_models ]] || sed --quiet '1{s|.*//||; s|/$||; p; q}' <&3 >"$ROOT/models"
 """
 
 # Runs a program for which HOST:PORT is the daemon of the test, port 50051 the one that the guide has
@@ -61,9 +64,12 @@ done
 exec PROGRAM "${arguments[@]}"
 """
 
-# Runs curl, for which localhost:8080 is the page of the daemon that the guide has started.
+# Runs curl, for which localhost:8080 is the page of the daemon that the guide has started, and
+# localhost:4242 its UM-Bridge models.
 CURL = r"""#!/usr/bin/env bash
-exec /usr/bin/curl "${@//localhost:8080/$(<"$ROOT/page")}"
+set -- "${@//localhost:8080/$(<"$ROOT/page")}"
+[[ ! -e $ROOT/models ]] || set -- "${@//localhost:4242/$(<"$ROOT/models")}"
+exec /usr/bin/curl "$@"
 """
 
 STOP_DAEMON = r"""#!/usr/bin/env bash

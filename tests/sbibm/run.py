@@ -9,8 +9,8 @@ observations of predators and prey, each with 10,000 draws from its posterior by
 not installed: its wheel is downloaded into WORK unless one is named, and its files are read in place.
 
 Fails unless, for every observation, the means are within 0.05 reference standard deviations of the
-reference's and the standard deviations within 5 %, after at most 5 s of computing. (Ten thousand
-independent draws would have sampling errors of 0.01 standard deviations and 0.7 %.)
+reference's and the standard deviations within 5 %, and unless that takes at most 5 s of computing in the mean. (Ten
+thousand independent draws would have sampling errors of 0.01 standard deviations and 0.7 %.)
 """
 import argparse
 import bz2
@@ -32,7 +32,7 @@ FOLDER = "sbibm/tasks/lotka_volterra/files/num_observation_{}/"
 OBSERVATIONS = range(1, 11)
 MEAN_LIMIT = 0.05  # in reference standard deviations
 SD_LIMIT = 0.05
-CPU_LIMIT_S = 5
+MEAN_CPU_LIMIT_S = 5
 WALL_SECONDS = 600
 
 # Log-mean of each lognormal prior; the deviation of the logarithm is LOG_SD for all.
@@ -127,7 +127,7 @@ def main():
     work = arguments.work
     work.mkdir(parents=True, exist_ok=True)
     (work / "problem.json").write_text(json.dumps(problem(), indent=2))
-    failed = []
+    failed, computing = [], []
     print("| observation | mean off by (sd) | sd off by | trajectories | CPU s | wall s | diagnostics |")
     print("|---|---|---|---|---|---|---|")
     with zipfile.ZipFile(arguments.wheel or find_wheel(work)) as wheel:
@@ -141,11 +141,16 @@ def main():
             codes = ", ".join(diagnostic["code"] for diagnostic in answer["diagnostics"])
             print(f"| {number} | {mean_error:.3f} | {100 * sd_error:.1f} % | {answer['expansion']['trajectories']} "
                   f"| {seconds:.1f} | {time.monotonic() - began:.1f} | {codes} |", flush=True)
-            if not (mean_error <= MEAN_LIMIT and sd_error <= SD_LIMIT and seconds <= CPU_LIMIT_S):
+            computing.append(seconds)
+            if not (mean_error <= MEAN_LIMIT and sd_error <= SD_LIMIT):
                 failed.append(str(number))
     if failed:
         print("not within the limits: observation " + ", ".join(failed), file=sys.stderr)
-    return 1 if failed else 0
+    slow = statistics.fmean(computing) > MEAN_CPU_LIMIT_S
+    if slow:
+        print(f"{statistics.fmean(computing):.1f} s of computing an observation, at most {MEAN_CPU_LIMIT_S} s allowed",
+              file=sys.stderr)
+    return 1 if failed or slow else 0
 
 
 if __name__ == "__main__":

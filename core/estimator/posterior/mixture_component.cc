@@ -316,7 +316,9 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
     moved = true;
   }
   if (accurate()) return moved;
-  return LookForPieces() || (shift() > kMinShiftToBisect && BisectElement()) || moved;
+  if (LookForPieces()) return true;
+  const bool waits = moved && problem_.dimension() >= kDimensionToMoveFirst;
+  return (!waits && shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
 // Returns true when the expansion moved or must be divided. Where the sampler has overlooked

@@ -98,6 +98,8 @@ class MixtureComponent {
   // At the end of a window an element is bisected when the posterior's means may be wrong by so
   // many standard deviations and moving has not helped.
   static constexpr double kMinShiftToBisect = 0.25;
+  // With so many dimensions, in which a posterior touches many halves, only when it has not moved.
+  static constexpr int kDimensionToMoveFirst = 4;
 
   MixtureComponent(const ResolvedProblem& problem, const SampleStore* store, int threads);
 

@@ -63,7 +63,7 @@ struct InScores {
 // Returns −f as a function of θ, with t″ = t′ (log t′)′:
 //   ∂f/∂θ_i = f_i/t_i′,   ∂²f/∂θ_i∂θ_j = f_ij/(t_i′ t_j′) − δ_ij f_i (log t_i′)′/t_i′².
 LogDensityValue NegativeInParameters(const InScores& f, const std::vector<Stretch>& stretch,
-                                     int derivatives) {
+                                     int derivative_order) {
   LogDensityValue density{.value = -f.value, .gradient = {}, .hessian = {}};
   const auto n = static_cast<Eigen::Index>(stretch.size());
   Vector inverse(n), bend(n);
@@ -72,8 +72,8 @@ LogDensityValue NegativeInParameters(const InScores& f, const std::vector<Stretc
     inverse[i] = 1 / one.slope;
     bend[i] = one.first;
   }
-  if (derivatives > 0) density.gradient = -f.gradient.cwiseProduct(inverse);
-  if (derivatives > 1) {
+  if (derivative_order > 0) density.gradient = -f.gradient.cwiseProduct(inverse);
+  if (derivative_order > 1) {
     density.hessian = -(inverse.asDiagonal() * f.hessian * inverse.asDiagonal());
     density.hessian.diagonal() +=
         f.gradient.cwiseProduct(bend).cwiseProduct(inverse).cwiseProduct(inverse);
@@ -97,7 +97,7 @@ class PointOfComponent {
   double total() const { return total_; }
 
   // Writes both densities, whose constants are those of the cost without `height`.
-  void Describe(int derivatives, double height, LogDensityValue& posterior,
+  void Describe(int derivative_order, double height, LogDensityValue& posterior,
                 LogDensityValue& likelihood) const {
     const Prior& prior = cost_.prior();
     const Vector z = prior.ToScores(xi_);
@@ -106,20 +106,20 @@ class PointOfComponent {
     InScores whole{total_ - height, {}, {}};
     const double alpha2 = cost_.regularization();
     InScores data{whole.value - alpha2 * value_.prior, {}, {}};
-    if (derivatives > 0) Differentiate(derivatives, whole, data);
+    if (derivative_order > 0) Differentiate(derivative_order, whole, data);
     for (int i = 0; i < prior.dimension(); ++i) {
       const Stretch& one = stretch[static_cast<size_t>(i)];
       whole.value += one.log;
-      if (derivatives > 0) whole.gradient[i] += one.first;
-      if (derivatives > 1) whole.hessian(i, i) += one.second;
+      if (derivative_order > 0) whole.gradient[i] += one.first;
+      if (derivative_order > 1) whole.hessian(i, i) += one.second;
     }
-    posterior = NegativeInParameters(whole, stretch, derivatives);
-    likelihood = NegativeInParameters(data, stretch, derivatives);
+    posterior = NegativeInParameters(whole, stretch, derivative_order);
+    likelihood = NegativeInParameters(data, stretch, derivative_order);
   }
 
  private:
   // Sets the derivatives with respect to the scores z = F (centre + axes η), ξ = F⁻¹ z.
-  void Differentiate(int derivatives, InScores& whole, InScores& data) const {
+  void Differentiate(int derivative_order, InScores& whole, InScores& data) const {
     const Prior& prior = cost_.prior();
     const double alpha2 = cost_.regularization();
     const Matrix to_eta = Inverse(prior.factor() * cost_.region().axes());
@@ -128,7 +128,7 @@ class PointOfComponent {
     cost_.EvaluateWithGradient(eta_, gradient);
     whole.gradient = to_eta.transpose() * gradient;
     data.gradient = whole.gradient - alpha2 * (to_xi.transpose() * prior.Gradient(xi_));
-    if (derivatives < 2) return;
+    if (derivative_order < 2) return;
     whole.hessian = to_eta.transpose() * cost_.Hessian(eta_) * to_eta;
     data.hessian =
         whole.hessian - alpha2 * (to_xi.transpose() * prior.Curvature(xi_).asDiagonal() * to_xi);
@@ -169,16 +169,16 @@ std::optional<Vector> GermsOf(const Prior& prior, const Vector& theta) {
 }  // namespace
 
 absl::Status Validate(const LogDensityOptions& options, const std::vector<std::string>& names) {
-  POLYEST_RETURN_IF_ERROR(CheckRange("derivatives", options.derivatives, 0, 2));
+  POLYEST_RETURN_IF_ERROR(CheckRange("derivative_order", options.derivative_order, 0, 2));
   const auto n = static_cast<Eigen::Index>(names.size());
   if (options.points.rows() == 0) return absl::OkStatus();
   if (options.points.cols() != n) {
     return InvalidField(
         "values", absl::StrFormat("points need %d values each: %s", n, absl::StrJoin(names, ", ")));
   }
-  const double each = options.derivatives == 0   ? 1.0
-                      : options.derivatives == 1 ? 1.0 + n
-                                                 : 1.0 + n + n * n;
+  const double each = options.derivative_order == 0   ? 1.0
+                      : options.derivative_order == 1 ? 1.0 + n
+                                                      : 1.0 + n + n * n;
   if (2 * each * static_cast<double>(options.points.rows()) > kMaxLogDensityValues) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("values: %d points would give an answer of more than %d numbers",
@@ -206,7 +206,7 @@ absl::StatusOr<LogDensity> EvaluateLogDensity(const DensityBasis& basis,
       return NoValue(row, result.parameters, theta,
                      "is too far from the posterior: the expansion is not trusted there");
     }
-    lowest->Describe(options.derivatives, basis.components.front().height,
+    lowest->Describe(options.derivative_order, basis.components.front().height,
                      result.posterior.emplace_back(), result.likelihood.emplace_back());
   }
   return result;

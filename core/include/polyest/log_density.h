@@ -22,7 +22,7 @@ inline constexpr int kMaxLogDensityValues = 5'000'000;
 // What to compute.
 struct LogDensityOptions {
   Matrix points;  // points × uncertain parameters, in the parameters' units; may have no rows
-  int derivatives = 0;  // the highest derivatives wanted: 0, 1 (gradients) or 2 (Hessians, too)
+  int derivative_order = 0;  // the highest wanted: 0, 1 (gradients) or 2 (Hessians, too)
 };
 
 // A function of the parameters at one point.

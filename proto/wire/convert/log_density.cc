@@ -30,7 +30,7 @@ absl::StatusOr<LogDensityOptions> ToLogDensityOptions(const v1::ComputeLogDensit
                                   request.values_size(), columns, absl::StrJoin(parameters, ", ")));
   }
   LogDensityOptions options;
-  options.derivatives = request.derivatives();
+  options.derivative_order = request.derivative_order();
   options.points.resize(request.values_size() / columns, columns);
   for (int i = 0; i < request.values_size(); ++i) {
     options.points(i / columns, i % columns) = request.values(i);

@@ -254,7 +254,7 @@ absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
   POLYEST_RETURN_IF_ERROR(estimator.Process(stop));
   // Only the estimator knows the parameters of all runs.
   LogDensityOptions none;
-  none.derivatives = request.derivatives();
+  none.derivative_order = request.derivative_order();
   POLYEST_ASSIGN_OR_RETURN(LogDensity density, WireFields(estimator.CurrentLogDensity(none, stop)));
   if (!request.values().empty()) {
     POLYEST_ASSIGN_OR_RETURN(const LogDensityOptions options,

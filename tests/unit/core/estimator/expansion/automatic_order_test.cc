@@ -17,7 +17,7 @@ constexpr double kNoise = 0.4;
 // Makes a problem with so few and poor samples of exp(sin(3 a)) that the posterior stays as wide as
 // the prior. No cubic follows the output over that width. Other parameters, which change nothing,
 // make so many dimensions that elements are not bisected.
-Problem WideProblem(std::optional<int> order, int others = 3) {
+Problem WideProblem(std::optional<int> order, int others = 4) {
   std::vector<UncertainParameter> parameters = {UncertainParameter::Uniform("a", -0.5, 1).value()};
   std::string output = "exp(sin(3*a))";
   for (int i = 0; i < others; ++i) {

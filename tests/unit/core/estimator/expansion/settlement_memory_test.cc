@@ -109,10 +109,10 @@ class CountingStore final : public SampleStore {
 // in all of them. There are too many dimensions to bisect elements.
 Problem HopelessProblem() {
   std::vector<UncertainParameter> parameters;
-  for (const char* name : {"a", "b", "c", "d"}) {
+  for (const char* name : {"a", "b", "c", "d", "e"}) {
     parameters.push_back(UncertainParameter::Uniform(name, -1, 1).value());
   }
-  return TextProblem("sin(40*a) + 0*(b + c + d)", parameters, 0.2);
+  return TextProblem("sin(40*a) + 0*(b + c + d + e)", parameters, 0.2);
 }
 
 struct HopelessRun {
@@ -147,10 +147,10 @@ TEST(SettlementMemory, HigherOrdersAreTriedInVainOnceWhileTheRecordDoubles) {
   EXPECT_LT(run.rows_read, (4 + 1 + 1) * kHopelessRows);
 }
 
-// The trajectories of the estimate are all that were run: of the orders 5 and 7 with 126 and 330
+// The trajectories of the estimate are all that were run: of the orders 5 and 7 with 252 and 792
 // terms, two points a term, at least over the first of two rows.
 TEST(SettlementMemory, TrajectoriesOfOrdersTriedInVainCount) {
-  EXPECT_GE(RunHopelessly(2).estimate.expansion.trajectories, (2 * 126 + 2 * 330) / 2);
+  EXPECT_GE(RunHopelessly(2).estimate.expansion.trajectories, (2 * 252 + 2 * 792) / 2);
 }
 
 }  // namespace

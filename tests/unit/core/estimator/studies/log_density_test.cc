@@ -10,8 +10,8 @@
 namespace polyest::internal {
 namespace {
 
-LogDensityOptions At(const Matrix& points, int derivatives) {
-  return {.points = points, .derivatives = derivatives};
+LogDensityOptions At(const Matrix& points, int derivative_order) {
+  return {.points = points, .derivative_order = derivative_order};
 }
 
 // The oracle is a Gaussian posterior with precision P = I + h hᵀ/σ² about P m = h z/σ².
