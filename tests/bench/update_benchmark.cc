@@ -6,27 +6,20 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
-#include <random>
 
 #include "core/common/check.h"
 #include "polyest/equation_model.h"
 #include "polyest/estimator.h"
+#include "tests/bench/driven_oscillator.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr double kStiffness = 41.3, kDamping = 0.83, kCubic = 20;  // N/m, N s/m, N/m³, for 1 kg
-constexpr double kNoise = 0.01;                                    // m
-constexpr double kStepS = 1e-3;
-constexpr int kBatch = 100;
-
+using Rig = DrivenOscillator;
 using Clock = std::chrono::steady_clock;
-
-double Force(double t) { return 4 * std::sin(5.1 * t) + 3 * std::sin(8.7 * t); }
 
 Problem Oscillator(LikelihoodForm likelihood, std::optional<int64_t> limit) {
   Problem problem;
@@ -34,11 +27,11 @@ Problem Oscillator(LikelihoodForm likelihood, std::optional<int64_t> limit) {
       MakeEquationModel(
           {.states = {{"x", "v"}, {"v", "-k*x - c*v - d*x^3 + 4*sin(5.1*t) + 3*sin(8.7*t)"}},
            .outputs = {{"x", "x"}},
-           .parameters = {{"k", kStiffness}, {"c", kDamping}, {"d", kCubic}}})
+           .parameters = {{"k", Rig::kStiffness}, {"c", Rig::kDamping}, {"d", Rig::kCubic}}})
           .value();
   problem.uncertain = {UncertainParameter::Uniform("k", 30, 50).value(),
                        UncertainParameter::Uniform("c", 0.3, 2).value()};
-  problem.measured = {{"x", {.absolute = kNoise}}};
+  problem.measured = {{"x", {.absolute = Rig::kNoise}}};
   problem.likelihood = likelihood;
   if (likelihood == LikelihoodForm::kPredictionError) {
     problem.process_noise = {{.state = "v", .spectral_density = 1e-6}};
@@ -46,41 +39,6 @@ Problem Oscillator(LikelihoodForm likelihood, std::optional<int64_t> limit) {
   problem.expansion.max_replay_row_count = limit;
   return problem;
 }
-
-// The oscillator by the classical Runge–Kutta method, with noise.
-class Rig {
- public:
-  Samples Next() {
-    Samples samples;
-    samples.columns = {{"x", {}, {}}};
-    for (int i = 0; i < kBatch; ++i) {
-      Step();
-      samples.time_s.push_back(kStepS * static_cast<double>(rows_));
-      samples.columns[0].value.push_back(x_ + kNoise * normal_(random_));
-    }
-    return samples;
-  }
-
- private:
-  static double Acceleration(double t, double x, double v) {
-    return -kStiffness * x - kDamping * v - kCubic * x * x * x + Force(t);
-  }
-  void Step() {
-    const double t = kStepS * static_cast<double>(rows_), h = kStepS;
-    const double a1 = Acceleration(t, x_, v_), v2 = v_ + h / 2 * a1;
-    const double a2 = Acceleration(t + h / 2, x_ + h / 2 * v_, v2), v3 = v_ + h / 2 * a2;
-    const double a3 = Acceleration(t + h / 2, x_ + h / 2 * v2, v3), v4 = v_ + h * a3;
-    const double a4 = Acceleration(t + h, x_ + h * v3, v4);
-    x_ += h / 6 * (v_ + 2 * v2 + 2 * v3 + v4);
-    v_ += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
-    ++rows_;
-  }
-
-  double x_ = 0, v_ = 0;
-  int64_t rows_ = 0;
-  std::mt19937_64 random_{3};
-  std::normal_distribution<double> normal_;
-};
 
 void Measure(const char* name, LikelihoodForm likelihood, std::optional<int64_t> limit,
              int minutes) {
@@ -103,8 +61,8 @@ void Measure(const char* name, LikelihoodForm likelihood, std::optional<int64_t>
   std::printf("%-16s  %9lld  %7.2f s at row %8lld  %8.0f rows/s  %9.1e (sd %.1e)  %9.1e (sd %.1e)",
               name, static_cast<long long>(limit.value_or(0)), longest_s,
               static_cast<long long>(longest_at),
-              static_cast<double>(estimator->rows_processed()) / all_s, k.mean - kStiffness,
-              k.posterior_std_dev, c.mean - kDamping, c.posterior_std_dev);
+              static_cast<double>(estimator->rows_processed()) / all_s, k.mean - Rig::kStiffness,
+              k.posterior_std_dev, c.mean - Rig::kDamping, c.posterior_std_dev);
   for (const Diagnostic& diagnostic : estimate.diagnostics) {
     std::printf("  %s", NameOf(diagnostic.code));
   }

@@ -22,7 +22,7 @@ namespace {
 constexpr int64_t kBlockRows = 64;
 // At the end of a window the expansion is compared with the model. It is settled again when the
 // posterior's means may be wrong by this many standard deviations.
-constexpr double kMaxShift = 0.07;
+constexpr double kMaxShift = 0.08;
 constexpr double kWindowGrowth = 1.3;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
