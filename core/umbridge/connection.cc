@@ -4,6 +4,7 @@
 #include <httplib.h>
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace polyest::internal {
@@ -12,6 +13,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kConnectWithin(5);
+
+// Whether the connection broke before the end of an answer. An answer without a length ends with
+// its connection, so that only its JSON tells.
+bool BrokeOff(const httplib::Response& answer) {
+  const bool has_length =
+      answer.has_header("Content-Length") || answer.has_header("Transfer-Encoding");
+  return !has_length && !nlohmann::json::accept(answer.body);
+}
 
 }  // namespace
 
@@ -37,7 +46,9 @@ Connection::~Connection() = default;
 HttpReply Connection::Post(const std::string& path, const std::string& json) {
   const Clock::time_point begin = Clock::now();
   httplib::Result result = client_->http.Post(path.c_str(), json, "application/json");
+  const HttpReply lost{HttpReply::Kind::kLost, 0, "the connection was lost"};
   if (result) {
+    if (BrokeOff(*result)) return lost;
     return {HttpReply::Kind::kAnswered, result->status, std::move(result->body)};
   }
   const std::string reason = httplib::to_string(result.error());
@@ -49,7 +60,7 @@ HttpReply Connection::Post(const std::string& path, const std::string& json) {
         return {HttpReply::Kind::kTimedOut, 0,
                 absl::StrFormat("no answer within %g s", timeout_s_)};
       }
-      return {HttpReply::Kind::kLost, 0, "the connection was lost"};
+      return lost;
     default:
       return {HttpReply::Kind::kUnreachable, 0, "no connection (" + reason + ")"};
   }

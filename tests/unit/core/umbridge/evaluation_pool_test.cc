@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <condition_variable>
@@ -12,6 +15,9 @@
 #include <optional>
 #include <set>
 #include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
 
 #include "tests/unit/core/umbridge/model_server.h"
 
@@ -89,6 +95,65 @@ TEST(EvaluationPool, ComputesThePointsOfAServerThatDies) {
   });
   EvaluationPool pool({.urls = {dying->url(), good.url()}});
   ExpectSquares(pool.Evaluate(Requests(40), Stop()), 40);
+}
+
+// Speaks HTTP by hand: the library's own server always tells the length of an answer.
+class Abrupt {
+ public:
+  // Answers each request with the beginning of an answer that tells no length, and hangs up.
+  explicit Abrupt(std::string beginning) : beginning_(std::move(beginning)) {
+    listener_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    EXPECT_EQ(bind(listener_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    EXPECT_EQ(listen(listener_, SOMAXCONN), 0);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { Serve(); });
+  }
+  ~Abrupt() {
+    shutdown(listener_, SHUT_RDWR);
+    thread_.join();
+    close(listener_);
+  }
+  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  int answers() const { return answers_; }
+
+ private:
+  void Serve() {
+    for (int client; (client = accept(listener_, nullptr, nullptr)) >= 0; close(client)) {
+      std::string request(65536, '\0');
+      if (recv(client, request.data(), request.size(), 0) <= 0) continue;
+      const std::string answer = "HTTP/1.1 200 OK\r\n\r\n" + beginning_;
+      ++answers_;
+      send(client, answer.data(), answer.size(), MSG_NOSIGNAL);
+    }
+  }
+
+  std::string beginning_;
+  int listener_ = -1;
+  int port_ = 0;
+  std::atomic<int> answers_ = 0;
+  std::thread thread_;
+};
+
+TEST(EvaluationPool, TakesAnAnswerWithoutLengthThatBreaksOffForALostConnection) {
+  for (const std::string beginning : {"", R"({"output": [[0.)"}) {
+    SCOPED_TRACE(beginning);
+    Abrupt dying(beginning);
+    EvaluationPool pool({.urls = std::vector<std::string>(10, dying.url())});
+    const auto evaluations = pool.Evaluate(Requests(1), Stop());
+    ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+    EXPECT_EQ((*evaluations)[0].failure, "10 connections were lost while it was computed");
+    EXPECT_EQ(dying.answers(), 10);
+  }
+  Abrupt brief(R"({"output": [[25]]})");
+  EvaluationPool pool({.urls = {brief.url()}});
+  const auto evaluations = pool.Evaluate(Requests(1), Stop());
+  ASSERT_TRUE(evaluations.ok()) << evaluations.status();
+  EXPECT_THAT((*evaluations)[0].outputs, ElementsAre(ElementsAre(25)));
 }
 
 TEST(EvaluationPool, FailsAPointThatEndsEachConnection) {
