@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "core/fmu/archive.h"
+#include "core/fmu/fmu_equations.h"
 #include "core/fmu/worker_ensemble.h"
 
 namespace polyest::internal {
@@ -68,6 +69,27 @@ std::shared_ptr<const UnpackedFmu> FmuModel::Unpack() const {
 std::unique_ptr<TrajectoryEnsemble> FmuModel::StartEnsemble(EnsembleSpecification specification,
                                                             const InputSignals* inputs) const {
   return std::make_unique<WorkerEnsemble>(Unpack(), std::move(specification), inputs, limits_);
+}
+
+std::string FmuModel::WhyNotFiltered() const {
+  const FmuInterface& interface = description_.interface;
+  if (interface.kind == FmuKind::kCoSimulation) {
+    return "is an FMU for Co-Simulation, whose states cannot be set; export it for Model Exchange";
+  }
+  if (interface.event_indicators > 0) {
+    return absl::StrCat("is an FMU with ", interface.event_indicators,
+                        " event indicators; filters need a model without events");
+  }
+  if (interface.needs_completed_step) {
+    return "is an FMU that must be told of completed steps, at which it may have events";
+  }
+  return "";
+}
+
+std::shared_ptr<PointEquations> FmuModel::StartEquations(const EnsembleSpecification& specification,
+                                                         const InputSignals* inputs,
+                                                         int points_together) const {
+  return std::make_shared<FmuEquations>(Unpack(), specification, inputs, points_together, limits_);
 }
 
 }  // namespace polyest::internal

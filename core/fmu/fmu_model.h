@@ -37,6 +37,10 @@ class FmuModel final : public SelfPropagatingModel {
   // FailedPrecondition.
   std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
                                                     const InputSignals* inputs) const override;
+  std::string WhyNotFiltered() const override;
+  std::shared_ptr<PointEquations> StartEquations(const EnsembleSpecification& specification,
+                                                 const InputSignals* inputs,
+                                                 int points_together) const override;
 
  private:
   FmuModel(std::filesystem::path file, FmuDescription description, const WorkerLimits& limits)

@@ -1,11 +1,12 @@
 #pragma once
 
 // The messages between a daemon and its workers over a socket. Each is preceded by its length in 8
-// bytes. The daemon sends one StartMessage, then AdvanceMessages; the worker answers each of the
+// bytes. The daemon sends one StartMessage, then RequestMessages; the worker answers each of the
 // latter with a ResultMessage.
 
 #include <cstdint>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/common/types.h"
@@ -47,10 +48,28 @@ struct AdvanceMessage {
   std::vector<double> times_s;
 };
 
+// Asks for values of the equations of an FMU for Model Exchange.
+struct EvaluateMessage {
+  enum class Values : uint8_t { kInitialStates, kDerivatives, kOutputs };
+
+  Values values = Values::kDerivatives;
+  double time_s = 0;
+  std::vector<int> points;  // by row of the matrices: a row of StartMessage
+  Matrix states;            // rows × states; not used for initial states
+  Matrix inputs;            // rows × inputs
+};
+
+// A worker gets messages of one kind only.
+using RequestMessage = std::variant<AdvanceMessage, EvaluateMessage>;
+
 struct ResultMessage {
   std::string error;  // an error that ended the whole simulation, or empty
-  Matrix outputs;     // rows as in StartMessage, columns as in TrajectoryEnsemble::Advance
-  std::vector<PointFailure> failures;  // all so far; `point` is a row of StartMessage
+  // Of AdvanceMessage: rows as in StartMessage, columns as in TrajectoryEnsemble::Advance. Of
+  // EvaluateMessage: the values, rows as there.
+  Matrix outputs;
+  // Of AdvanceMessage: all so far; of EvaluateMessage: of rows without values. `point` is a row of
+  // StartMessage.
+  std::vector<PointFailure> failures;
 };
 
 template <class Archive>
@@ -116,8 +135,20 @@ void Fields(Archive& archive, AdvanceMessage& advance) {
   archive(advance.knots, advance.times_s);
 }
 template <class Archive>
+void Fields(Archive& archive, EvaluateMessage& evaluate) {
+  archive(evaluate.values, evaluate.time_s, evaluate.points, evaluate.states, evaluate.inputs);
+}
+template <class Archive>
 void Fields(Archive& archive, ResultMessage& result) {
   archive(result.error, result.outputs, result.failures);
+}
+
+// Returns a message as bytes.
+template <class Message>
+std::string Encode(const Message& message) {
+  Encoder encoder;
+  encoder(message);
+  return encoder.TakeBytes();
 }
 
 }  // namespace polyest::internal

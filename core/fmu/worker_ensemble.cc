@@ -1,32 +1,15 @@
 #include "core/fmu/worker_ensemble.h"
 
-#include <absl/strings/str_cat.h>
-#include <poll.h>
-
 #include <algorithm>
 #include <utility>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "core/external/clean_text.h"
+#include "core/fmu/conversation.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest::internal {
 namespace {
-
-// Interval between two checks of the stop request and of the workers' progress.
-constexpr int kLookMs = 20;
-
-template <class Message>
-std::string Encode(const Message& message) {
-  Encoder encoder;
-  encoder(message);
-  return encoder.TakeBytes();
-}
-
-Matrix Rows(const Matrix& matrix, const std::vector<int>& rows) {
-  return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
-}
 
 // Returns the signal's specification with a table's knots restored.
 InputSpecification Specification(const InputSignal& signal) {
@@ -70,24 +53,12 @@ absl::Status WorkerEnsemble::StartWorkers() {
 
 StartMessage WorkerEnsemble::MakeStart(const std::vector<int>& block_points,
                                        const std::vector<int>& rows) const {
-  const FmuDescription& description = fmu_->description;
-  StartMessage start;
-  const std::filesystem::path& folder = fmu_->folder->path();
-  start.library = (folder / LibraryPath(description.interface)).string();
-  start.resources = (folder / "resources").string();
-  start.interface = description.interface;
-  start.parameters = description.parameters;
-  start.inputs = description.inputs;
-  for (const int output : specification_.outputs) {
-    start.outputs.push_back(description.outputs[static_cast<size_t>(output)]);
-  }
+  StartMessage start = StartOf(*fmu_, specification_, rows);
   start.block_points = block_points;
-  start.parameter_values = Rows(specification_.parameters, rows);
-  start.amplitudes = Rows(specification_.amplitudes, rows);
-  start.input_delays_s = Rows(specification_.input_delays_s, rows);
-  start.input_offsets = Rows(specification_.input_offsets, rows);
+  start.amplitudes = RowsOf(specification_.amplitudes, rows);
+  start.input_delays_s = RowsOf(specification_.input_delays_s, rows);
+  start.input_offsets = RowsOf(specification_.input_offsets, rows);
   for (const InputSignal& signal : *inputs_) start.signals.push_back(Specification(signal));
-  start.integration = specification_.integration;
   return start;
 }
 
@@ -116,14 +87,16 @@ absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef 
   POLYEST_RETURN_IF_ERROR(fmu_->status);
   if (points() == 0) return absl::OkStatus();
   if (workers_.empty()) POLYEST_RETURN_IF_ERROR(StartWorkers());
-  const std::string message = Encode(MakeAdvance(times_s));
+  const std::string message = Encode(RequestMessage(MakeAdvance(times_s)));
+  std::vector<WorkerProcess*> processes;
   for (Worker& worker : workers_) {
     worker.process->Send(message);
     worker.process->AwaitAnswer();
+    processes.push_back(worker.process.get());
   }
-  absl::Status status = Converse(stop);
+  absl::Status status = Converse(processes, stop);
   for (Worker& worker : workers_) {
-    if (status.ok()) status = ReadResult(worker, outputs);
+    if (status.ok()) status = TakeResult(worker, outputs);
   }
   if (!status.ok()) {
     KillAll();
@@ -138,47 +111,20 @@ absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef 
   return absl::OkStatus();
 }
 
-// Exchanges data until each worker has answered.
-absl::Status WorkerEnsemble::Converse(const Stop& stop) {
-  for (;;) {
-    std::vector<pollfd> waiting;
-    for (Worker& worker : workers_) {
-      if (!worker.process->awaits_answer()) continue;
-      POLYEST_RETURN_IF_ERROR(worker.process->Exchange());
-      if (!worker.process->awaits_answer()) continue;
-      const int events = POLLIN | (worker.process->has_to_send() ? POLLOUT : 0);
-      waiting.push_back({worker.process->socket(), static_cast<short>(events), 0});
-    }
-    if (waiting.empty()) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    poll(waiting.data(), waiting.size(), kLookMs);
-  }
-}
-
-absl::Status WorkerEnsemble::ReadResult(Worker& worker, MatrixRef outputs) {
-  Decoder decoder(worker.process->TakeAnswer());
-  ResultMessage result;
-  decoder(result);
+absl::Status WorkerEnsemble::TakeResult(Worker& worker, MatrixRef outputs) {
   const std::string& name = fmu_->description.interface.name;
-  const auto damaged = [&name] {
-    return absl::FailedPreconditionError(
-        absl::StrCat("fmu ", name, ": its worker's answer is damaged"));
-  };
-  if (!decoder.complete()) return damaged();
-  if (!result.error.empty()) {
-    return absl::FailedPreconditionError(absl::StrCat("fmu ", name, ": ", CleanText(result.error)));
-  }
   const auto rows = static_cast<Eigen::Index>(worker.rows.size());
+  POLYEST_ASSIGN_OR_RETURN(ResultMessage result, ReadResult(name, *worker.process, rows));
   if (outputs.cols() > 0) {
-    if (result.outputs.rows() != rows || result.outputs.cols() != outputs.cols()) return damaged();
+    if (result.outputs.rows() != rows || result.outputs.cols() != outputs.cols()) {
+      return DamagedAnswer(name);
+    }
     for (Eigen::Index i = 0; i < rows; ++i) {
       outputs.row(worker.rows[static_cast<size_t>(i)]) = result.outputs.row(i);
     }
   }
   for (PointFailure& failure : result.failures) {
-    if (failure.point < 0 || failure.point >= rows) return damaged();
     failure.point = worker.rows[static_cast<size_t>(failure.point)];
-    failure.reason = CleanText(failure.reason);
   }
   worker.failures = std::move(result.failures);
   return absl::OkStatus();

@@ -38,8 +38,7 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
   absl::Status StartWorkers();
   StartMessage MakeStart(const std::vector<int>& block_points, const std::vector<int>& rows) const;
   AdvanceMessage MakeAdvance(std::span<const double> times_s);
-  absl::Status Converse(const Stop& stop);
-  absl::Status ReadResult(Worker& worker, MatrixRef outputs);
+  absl::Status TakeResult(Worker& worker, MatrixRef outputs);
   void KillAll();
 
   std::shared_ptr<const UnpackedFmu> fmu_;

@@ -24,43 +24,54 @@ namespace polyest::internal {
 
 class FilterBank {
  public:
-  // Starts the filters at t = 0. The specification must have no output delays, and a
-  // StateSpaceModel with states. `inputs` as for EnsemblePropagator.
+  // Starts the filters at t = 0. The specification must have no output delays, and a model with
+  // states that is a StateSpaceModel or has equations (trajectory_ensemble.h). `inputs` as for
+  // EnsemblePropagator.
   FilterBank(EnsembleSpecification specification, const InputSignals* inputs);
 
+  int states() const { return static_cast<int>(specification_.process_noise.cols()); }
   int members() const { return static_cast<int>(specification_.parameters.rows()); }
   Eigen::Index outputs() const { return std::ssize(specification_.outputs); }
 
   // As FilterBlock::Advance, for all members: innovations and log variances are members × (m ·
-  // times).
+  // times). All that advances fails on a stop request, or if the model's code is lost.
   absl::Status Advance(const FilterSamples& samples, MatrixRef innovations, MatrixRef log_variances,
                        const Stop& stop);
 
   // As FilterBlock::PredictOutputs and TakeStatesOf, for all members.
   absl::Status Predict(double time_s, MatrixRef means, MatrixRef deviations, const Stop& stop);
   void TakeStatesOf(const FilterBank& other);
-  // As those of FilterBlock, for all members.
+  // As those of FilterBlock, for all members; ReadMarked fails if the model's code is lost.
   void StartBackward();
   absl::Status Mark(double time_s, const Stop& stop);
   void FinishBackward();
-  void ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations);
+  absl::Status ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations);
+  void ReadJumpScores(size_t mark, MatrixRef scores) const;
 
   // Writes the means and the standard deviations of the states at the time reached, as the samples
   // up to there tell them (members × states each).
   void ReadStates(Matrix& means, Matrix& deviations) const;
 
   // The failures so far, ordered by member.
-  const std::vector<PointFailure>& failures() const { return blocks_.failures(); }
+  const std::vector<PointFailure>& failures() const { return failures_; }
 
   // As those of TrajectoryEnsemble.
-  std::optional<EnsembleState> State() const { return blocks_.State(); }
-  bool Restore(const EnsembleState& state) { return blocks_.Restore(state); }
+  std::optional<EnsembleState> State() const;
+  bool Restore(const EnsembleState& state);
 
  private:
-  std::vector<std::unique_ptr<FilterBlock>> MakeBlocks(const InputSignals* inputs) const;
+  std::vector<std::unique_ptr<FilterBlock>> MakeBlocks() const;
+  void Begin(const Stop& stop);
+  absl::Status Settle(const absl::Status& status);
+  const std::vector<std::unique_ptr<FilterBlock>>& blocks() const { return blocks_->blocks(); }
 
   EnsembleSpecification specification_;
-  EnsembleBlocks<FilterBlock> blocks_;
+  const InputSignals* inputs_;
+  std::shared_ptr<PointEquations> equations_;  // of a model whose code runs elsewhere, else null
+  // Equations need the first values of streamed inputs, so that their blocks are made at first use.
+  std::optional<EnsembleBlocks<FilterBlock>> blocks_;
+  bool backward_ = false;
+  std::vector<PointFailure> failures_;
 };
 
 }  // namespace polyest::internal

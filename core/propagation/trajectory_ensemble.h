@@ -9,10 +9,12 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/common/types.h"
 #include "core/model/input_signal.h"
+#include "core/propagation/point_equations.h"
 #include "polyest/integration_options.h"
 #include "polyest/model.h"
 #include "polyest/stop.h"
@@ -104,6 +106,18 @@ class SelfPropagatingModel : public Model {
   // Advance.
   virtual std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
                                                             const InputSignals* inputs) const = 0;
+
+  // Returns why filters, which set states, cannot use the model: a phrase about it that begins with
+  // a verb. Empty if they can. By default, a model tells nothing but its outputs.
+  virtual std::string WhyNotFiltered() const { return "tells its outputs only"; }
+  // Starts the model's equations for the points of an ensemble; only if WhyNotFiltered is empty. A
+  // call evaluates points n·i … n·i + n − 1 at most, with n = `points_together`. `inputs` must
+  // outlive them and have their first values at the first evaluation.
+  virtual std::shared_ptr<PointEquations> StartEquations(
+      const EnsembleSpecification& /*specification*/, const InputSignals* /*inputs*/,
+      int /*points_together*/) const {
+    return nullptr;
+  }
 };
 
 }  // namespace polyest::internal

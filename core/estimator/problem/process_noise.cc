@@ -16,6 +16,7 @@
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/model/list_names.h"
 #include "core/model/switching_model.h"
+#include "core/propagation/trajectory_ensemble.h"
 
 namespace polyest::internal {
 namespace {
@@ -113,6 +114,11 @@ absl::Status CheckDrift(const Problem& problem, size_t index) {
                                                "drift",
                                                parameter.name, model.name));
   }
+  if (dynamic_cast<const StateSpaceModel*>(problem.model.get()) == nullptr) {
+    return InvalidField(field, absl::StrFormat("%s cannot drift: model %s takes its parameters at "
+                                               "the start of a run only",
+                                               parameter.name, model.name));
+  }
   return absl::OkStatus();
 }
 
@@ -122,8 +128,12 @@ absl::Status CheckModel(const Problem& problem) {
     return InvalidField("likelihood", absl::StrFormat("PREDICTION_ERROR %s, unlike model %s", why,
                                                       model.description().name));
   };
-  if (dynamic_cast<const StateSpaceModel*>(&model) == nullptr) {
-    return refuse("needs a model whose states can be set: a built-in one or equations");
+  if (const auto* own = dynamic_cast<const SelfPropagatingModel*>(&model);
+      own != nullptr && !own->WhyNotFiltered().empty()) {
+    return InvalidField("likelihood",
+                        absl::StrFormat("PREDICTION_ERROR needs a model whose states can be set, "
+                                        "but %s %s",
+                                        model.description().name, own->WhyNotFiltered()));
   }
   const auto walks = std::ranges::count_if(
       problem.uncertain,

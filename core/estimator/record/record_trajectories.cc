@@ -195,12 +195,14 @@ absl::Status RecordTrajectories::MarkAll(std::span<const TrajectoryInstant> inst
 
 absl::Status RecordTrajectories::VisitMarked(Visit visit, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(smoothers_->Finish(stop));
-  Matrix means(thetas_.rows(), std::ssize(outputs_)), deviations = means;
+  Matrix means(thetas_.rows(), std::ssize(outputs_)), deviations = means, jump_scores = means;
   for (size_t i = 0; i < marked_.size(); ++i) {
     TrajectoryInstant instant = marked_[i].instant;
     instant.samples = marked_[i].samples;
     instant.noise = marked_[i].noise;
-    smoothers_->Read(i, means, deviations);
+    POLYEST_RETURN_IF_ERROR(smoothers_->Read(i, means, deviations));
+    smoothers_->ReadJumpScores(i, jump_scores);
+    instant.jump_scores = &jump_scores;
     POLYEST_RETURN_IF_ERROR(visit(instant, means, deviations));
   }
   marked_.clear();

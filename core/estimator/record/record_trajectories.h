@@ -28,6 +28,8 @@ struct TrajectoryInstant {
   // The row's samples, one for each measured output, NaN where missing; empty for a time asked for.
   std::span<const double> samples;
   std::span<const double> noise;  // standard deviations of their noise
+  // Of smoothers, RunSmoothers::ReadJumpScores (trajectories × outputs); else null.
+  const Matrix* jump_scores = nullptr;
 };
 
 // How filters are used, if there are any.

@@ -28,13 +28,17 @@ class RunSmoothers {
   // Ends the run. Fails on a stop request only.
   absl::Status Finish(const Stop& stop);
   // Writes the means and standard deviations of the outputs at the i-th mark (filters × outputs);
-  // NaN for filters that failed anywhere in the run.
-  void Read(size_t mark, MatrixRef means, MatrixRef deviations);
+  // NaN for filters that failed anywhere in the run. Fails if the model's code is lost.
+  absl::Status Read(size_t mark, MatrixRef means, MatrixRef deviations);
+  // Writes the scores of abrupt changes (backward_pass.h) at the i-th mark of outputs that are
+  // parameters that drift (filters × outputs); 0 for other outputs.
+  void ReadJumpScores(size_t mark, MatrixRef scores) const;
 
   const std::vector<PointFailure>& failures() const { return filters_.failures(); }
 
  private:
   const Eigen::Index asked_;
+  std::vector<int> walks_;  // the state of each output asked for that drifts, else −1
   FilterBank filters_;
   PendingSamples pending_;
   std::vector<double> marks_s_;

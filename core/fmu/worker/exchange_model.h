@@ -4,6 +4,7 @@
 // same integrators as the built-in models. The only parameter is the index of the instance.
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/fmu/worker/instance.h"
@@ -15,6 +16,14 @@ namespace polyest::internal {
 class ExchangeModel final : public StateSpaceModel {
  public:
   ExchangeModel(const InstanceFactory& factory, std::vector<std::unique_ptr<Instance>> instances);
+  // So many instances that are still to be set.
+  ExchangeModel(const InstanceFactory& factory, int points)
+      : ExchangeModel(factory,
+                      std::vector<std::unique_ptr<Instance>>(static_cast<size_t>(points))) {}
+  bool Has(int point) const { return instances_[static_cast<size_t>(point)] != nullptr; }
+  void Set(int point, std::unique_ptr<Instance> instance) {
+    instances_[static_cast<size_t>(point)] = std::move(instance);
+  }
 
   const ModelDescription& description() const override { return description_; }
   void InitialStates(const ConstBlock& parameters, Block states) const override;

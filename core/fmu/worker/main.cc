@@ -16,6 +16,7 @@
 #include <exception>
 #include <memory>
 #include <string>
+#include <variant>
 
 #include "core/common/sanitizer.h"
 #include "core/fmu/worker/simulation.h"
@@ -122,11 +123,14 @@ void LimitAll(int64_t memory_bytes, int64_t file_bytes) {
 }
 
 ResultMessage Answer(Simulation* simulation, const absl::Status& started,
-                     const AdvanceMessage& message) {
+                     const RequestMessage& request) {
   ResultMessage result;
   absl::Status status = started;
   try {
-    if (status.ok()) status = simulation->Advance(message, result);
+    if (status.ok()) {
+      status = std::visit([&](const auto& message) { return simulation->Answer(message, result); },
+                          request);
+    }
   } catch (const std::exception& exception) {
     status = absl::ResourceExhaustedError(exception.what());
   }
@@ -146,9 +150,9 @@ int Serve(StatusPage* page) {
   } catch (const std::exception& exception) {
     simulation = absl::ResourceExhaustedError(exception.what());
   }
-  for (AdvanceMessage message; Receive(message);) {
+  for (RequestMessage request; Receive(request);) {
     Simulation* const running = simulation.ok() ? simulation->get() : nullptr;
-    if (!Send(Answer(running, simulation.status(), message))) break;
+    if (!Send(Answer(running, simulation.status(), request))) break;
   }
   return 0;
 }

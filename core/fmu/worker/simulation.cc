@@ -1,6 +1,7 @@
 #include "core/fmu/worker/simulation.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <cmath>
 #include <limits>
@@ -9,7 +10,6 @@
 #include "core/common/status.h"
 #include "core/fmu/worker/co_simulation.h"
 #include "core/fmu/worker/event_trajectory.h"
-#include "core/fmu/worker/exchange_model.h"
 
 namespace polyest::internal {
 namespace {
@@ -81,14 +81,12 @@ absl::Status Simulation::AppendKnots(const AdvanceMessage& message) {
   return absl::OkStatus();
 }
 
-std::unique_ptr<Instance> Simulation::MakeInstance(int row, BlockInputs& inputs) {
+std::unique_ptr<Instance> Simulation::MakeInstance(int row, const Vector& inputs) {
   const Vector parameters = start_.parameter_values.row(row).transpose();
-  Vector values(static_cast<Eigen::Index>(signals_.size()));
-  if (values.size() > 0) values = inputs.At(0).row(0).matrix().transpose();
   const auto span = [](const Vector& vector) {
     return std::span(vector.data(), static_cast<size_t>(vector.size()));
   };
-  return std::make_unique<Instance>(&factory_, row, span(parameters), span(values));
+  return std::make_unique<Instance>(&factory_, row, span(parameters), span(inputs));
 }
 
 // Called after the first knots of streamed inputs have arrived: initialization needs the inputs'
@@ -108,7 +106,9 @@ std::unique_ptr<TrajectoryEnsemble> Simulation::MakeBlock(int first, int points)
   bool events = interface.event_indicators > 0 || interface.needs_completed_step;
   for (int row = first; row < first + points; ++row) {
     inputs.emplace_back(channels_, &signals_, std::vector<int>{row});
-    instances.push_back(MakeInstance(row, inputs.back()));
+    Vector values(static_cast<Eigen::Index>(signals_.size()));
+    if (values.size() > 0) values = inputs.back().At(0).row(0).matrix().transpose();
+    instances.push_back(MakeInstance(row, values));
     events = events || std::isfinite(instances.back()->next_event_s());
   }
   if (interface.kind == FmuKind::kModelExchange && !events) {
@@ -136,7 +136,7 @@ std::unique_ptr<TrajectoryEnsemble> Simulation::MakeBlock(int first, int points)
   return std::make_unique<PointwiseEnsemble>(std::move(trajectories), outputs);
 }
 
-absl::Status Simulation::Advance(const AdvanceMessage& message, ResultMessage& result) {
+absl::Status Simulation::Answer(const AdvanceMessage& message, ResultMessage& result) {
   POLYEST_RETURN_IF_ERROR(AppendKnots(message));
   if (blocks_.empty()) MakeBlocks();
   const Eigen::Index columns = std::ssize(message.times_s) * std::ssize(start_.outputs);
@@ -153,6 +153,57 @@ absl::Status Simulation::Advance(const AdvanceMessage& message, ResultMessage& r
       result.failures.push_back(std::move(failure));
     }
     first += block->points();
+  }
+  return absl::OkStatus();
+}
+
+// Makes the instances of the points whose initial states are asked for.
+absl::Status Simulation::MakeInstances(const EvaluateMessage& message) {
+  const auto points = static_cast<int>(start_.parameter_values.rows());
+  if (equations_ == nullptr) equations_ = std::make_unique<ExchangeModel>(factory_, points);
+  for (size_t row = 0; row < message.points.size(); ++row) {
+    const int point = message.points[row];
+    if (equations_->Has(point)) continue;
+    auto instance = MakeInstance(point, message.inputs.row(static_cast<Eigen::Index>(row)));
+    if (std::isfinite(instance->next_event_s())) {
+      return absl::FailedPreconditionError(
+          absl::StrFormat("filters need a model without events, but the FMU has one at t = %g s",
+                          instance->next_event_s()));
+    }
+    equations_->Set(point, std::move(instance));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Simulation::Answer(const EvaluateMessage& message, ResultMessage& result) {
+  using Values = EvaluateMessage::Values;
+  const auto rows = static_cast<Eigen::Index>(message.points.size());
+  Matrix points(rows, 1);
+  for (Eigen::Index row = 0; row < rows; ++row) points(row, 0) = message.points[row];
+  const Eigen::Index columns = message.values == Values::kOutputs
+                                   ? std::ssize(start_.outputs)
+                                   : Eigen::Index{start_.interface.states};
+  Eigen::ArrayXXd values(rows, columns);
+  switch (message.values) {
+    case Values::kInitialStates:
+      POLYEST_RETURN_IF_ERROR(MakeInstances(message));
+      equations_->InitialStates(points.array(), values);
+      break;
+    case Values::kDerivatives:
+      equations_->Derivatives(message.time_s, message.states.array(), points.array(),
+                              message.inputs.array(), values);
+      break;
+    case Values::kOutputs:
+      equations_->Outputs(message.time_s, message.states.array(), points.array(),
+                          message.inputs.array(), values);
+      break;
+  }
+  result.outputs = values.matrix();
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    const Instance& instance = equations_->instance(message.points[row]);
+    if (values.row(row).isFinite().all() || instance.failure().empty()) continue;
+    result.failures.push_back(
+        {message.points[row], message.time_s, instance.failure_status(), instance.failure()});
   }
   return absl::OkStatus();
 }

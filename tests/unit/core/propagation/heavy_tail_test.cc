@@ -186,7 +186,7 @@ TEST(HeavyTail, IsTakenBySmoothersAsByFilters) {
     ASSERT_TRUE(smoother.Advance({{&t, 1}, value, noise}, w, l, Stop()).ok());
     ASSERT_TRUE(filter.Advance({{&t, 1}, value, noise}, w, l, Stop()).ok());
     smoother.FinishBackward();
-    smoother.ReadMarked(0, t, means, deviations);
+    ASSERT_TRUE(smoother.ReadMarked(0, t, means, deviations).ok());
     filter.ReadStates(expected, expected_deviations);
     for (Eigen::Index i = 0; i < 2; ++i) {
       EXPECT_NEAR(means(i, 0), expected(i, 0), 1e-9);

@@ -102,8 +102,8 @@ void ExpectExact(int stride) {
   for (const Oscillator& oscillator : kOscillators) exact.push_back(Exact(oscillator, record));
   Matrix means(bank.members(), 2), deviations = means;
   for (int k = 0; k < kRows; k += stride) {
-    bank.ReadMarked(static_cast<size_t>(k / stride), record.times_s[static_cast<size_t>(k)], means,
-                    deviations);
+    const double time_s = record.times_s[static_cast<size_t>(k)];
+    EXPECT_TRUE(bank.ReadMarked(static_cast<size_t>(k / stride), time_s, means, deviations).ok());
     for (size_t i = 0; i < kOscillators.size(); ++i) {
       for (int c = 0; c < 2; ++c) {
         const auto member = static_cast<Eigen::Index>(i);
@@ -138,7 +138,7 @@ TEST(Smoother, IsTheFilterAfterTheLastSample) {
   Matrix means(filter.members(), 2), deviations = means, expected_means = means,
                                      expected_deviations = means;
   ASSERT_TRUE(filter.Predict(later_s, expected_means, expected_deviations, Stop()).ok());
-  smoother.ReadMarked(0, later_s, means, deviations);
+  ASSERT_TRUE(smoother.ReadMarked(0, later_s, means, deviations).ok());
   EXPECT_EQ(means, expected_means);
   EXPECT_EQ(deviations, expected_deviations);
 }
