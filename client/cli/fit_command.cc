@@ -3,6 +3,7 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "client/cli/answer.h"
@@ -86,6 +87,20 @@ void PrintCourses(const v1::PredictResponse& prediction, std::ostream& out) {
   table.Print(out);
 }
 
+// Says which parameters that drift have changed more suddenly than they walk.
+void PrintAbruptChanges(const v1::PredictResponse& prediction, std::ostream& out) {
+  for (const Output& output : prediction.outputs()) {
+    if (!output.has_abrupt_change()) continue;
+    const v1::PredictResponse::AbruptChange& change = output.abrupt_change();
+    out << absl::StrFormat(
+        "%s has %s abruptly at t = %s s%s, which its random walk does not explain: score %.1f, "
+        "limit %.1f\n",
+        output.output(), change.score() > 0 ? "risen" : "fallen", FormatNumber(change.time_s()),
+        change.run() > 0 ? absl::StrFormat(" of run %d", change.run()) : "",
+        std::abs(change.score()), change.limit());
+  }
+}
+
 void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
   const bool scored = std::ranges::any_of(prediction.outputs(), &Output::has_score);
   if (scored) PrintScores(prediction, out);
@@ -99,6 +114,7 @@ void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
                              ? ""
                              : absl::StrFormat(", of which %d could not be integrated to the end",
                                                prediction.failed_draw_count()));
+  PrintAbruptChanges(prediction, out);
   PrintDiagnostics(prediction.diagnostics(), out);
 }
 

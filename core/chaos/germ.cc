@@ -10,7 +10,6 @@
 #include "core/common/check.h"
 
 namespace polyest::internal {
-namespace {}  // namespace
 
 Germ::Germ(GermFamily family, double first_shape, double second_shape)
     : family_(family), first_shape_(first_shape), second_shape_(second_shape) {

@@ -110,7 +110,7 @@ void BackwardPass::AddSample(const Eigen::ArrayXd& outputs, const Eigen::ArrayXd
 void BackwardPass::Mark(const GaussianStates& states) {
   Map map = std::exchange(map_, Identity());
   if (!marks_.empty()) marks_.back().map = std::move(map);
-  marks_.push_back({{states.mean(), states.factor()}, {}});
+  marks_.push_back({{states.mean(), states.factor(), {}}, {}});
 }
 
 void BackwardPass::Finish() {
@@ -140,7 +140,31 @@ void BackwardPass::Finish() {
     epsilon.swap(map.a);
     M.swap(map.B);
     map = {};
+    ScoreJumps(marks_[mark].states, epsilon, M);
     Correct(marks_[mark].states, epsilon, M);
+  }
+}
+
+// With L v = e_i, r_i = vᵀ ε and N_ii = vᵀ M v; the first i elements of v are 0.
+void BackwardPass::ScoreJumps(Marked& states, const Eigen::ArrayXXd& epsilon,
+                              const Eigen::ArrayXXd& M) const {
+  states.jump_scores.setZero(members_, n_);
+  Eigen::ArrayXXd v(members_, n_);
+  for (Eigen::Index state = 0; state < n_; ++state) {
+    Eigen::ArrayXd r = Eigen::ArrayXd::Zero(members_), N = r;
+    for (Eigen::Index i = state; i < n_; ++i) {
+      v.col(i).setConstant(i == state ? 1 : 0);
+      for (Eigen::Index k = state; k < i; ++k) {
+        v.col(i) -= states.factor.col(Packed(n_, i, k)) * v.col(k);
+      }
+      const auto pivot = states.factor.col(Packed(n_, i, i));
+      v.col(i) = (pivot.abs() > 0).select(v.col(i) / pivot, 0).eval();
+      r += v.col(i) * epsilon.col(i);
+    }
+    for (Eigen::Index i = state; i < n_; ++i) {
+      for (Eigen::Index k = state; k < n_; ++k) N += v.col(i) * Full(M, i, k) * v.col(k);
+    }
+    states.jump_scores.col(state) = (N > 0).select(r / N.sqrt(), 0);
   }
 }
 

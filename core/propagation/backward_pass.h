@@ -23,6 +23,13 @@
 //
 // so that memory is needed for the instants asked for, and not for every sample between them.
 //
+// ε and M also tell whether a state has changed abruptly: had something else than the process noise
+// added δ to state i at a mark, with all else as the model says, the log likelihood of the samples
+// after it would be greater by δ r_i − δ² N_ii/2, with r = L⁻ᵀ ε and N = L⁻ᵀ M L⁻¹. The score of an
+// abrupt change is r_i/√N_ii, which is ~ N(0, 1) if there was none; its square is twice the
+// greatest gain. (De Jong and Penzer, Diagnosing Shocks in Time Series, Journal of the American
+// Statistical Association 93 (1998) 796–806.)
+//
 // Sources: Rauch, Tung and Striebel, Maximum Likelihood Estimates of Linear Dynamic Systems, AIAA
 // Journal 3 (1965) 1445–1450; Särkkä, Bayesian Filtering and Smoothing (2013), ch. 8–10.
 
@@ -54,6 +61,7 @@ class BackwardPass {
   // The states at the i-th mark: before Finish from the samples before, afterwards from all.
   struct Marked {
     Eigen::ArrayXXd mean, factor;  // as those of GaussianStates
+    Eigen::ArrayXXd jump_scores;  // members × n, after Finish; 0 for a state that is known exactly
   };
   const Marked& marked(size_t i) const { return marks_[i].states; }
 
@@ -70,6 +78,7 @@ class BackwardPass {
   Map Identity() const;
   void Solve(const Eigen::ArrayXXd& factor, Eigen::ArrayXXd& matrix) const;
   void Compose(const Eigen::ArrayXXd& matrix, bool transposed);
+  void ScoreJumps(Marked& states, const Eigen::ArrayXXd& epsilon, const Eigen::ArrayXXd& M) const;
   void Correct(Marked& states, const Eigen::ArrayXXd& epsilon, const Eigen::ArrayXXd& M) const;
   auto Full(Eigen::ArrayXXd& matrix, Eigen::Index i, Eigen::Index j) const {
     return matrix.col(i * n_ + j);

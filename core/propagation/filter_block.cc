@@ -6,6 +6,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/propagation/block_rows.h"
 
 namespace polyest::internal {
 namespace {
@@ -50,8 +51,9 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       block_(&specification_, inputs, 0, static_cast<int>(specification_.parameters.rows()), exact),
       gaussians_(members, spectral_densities_.cols()),
       points_(block_.state_values()),
-      rates_(points_),
-      moved_rates_(points_),
+      moved_(std::ssize(PaddedRows(static_cast<int>(points_.cols()) + 1)), points_.cols()),
+      moved_rates_(moved_),
+      steps_(points_.cols()),
       jacobian_(points_.cols(), points_.cols()),
       square_(points_.cols(), points_.cols()),
       outputs_(specification_.parameters.rows()),
@@ -147,26 +149,24 @@ int FilterBlock::Parts(double interval_s) {
 
 // Writes ∂f/∂x at the mean of the first member, by differences.
 void FilterBlock::Differentiate(double interval_s) {
-  const Eigen::Index n = gaussians_.states(), members = gaussians_.members();
-  for (Eigen::Index s = 0; s < 2 * n; ++s) {
-    points_.middleRows(s * members, members) = gaussians_.mean();
-  }
-  block_.SetStates(points_);
-  const Eigen::ArrayXXd& states = block_.state_values();
-  block_.Derivatives(time_s_, states, rates_);
+  const Eigen::Index n = gaussians_.states();
+  const auto mean = gaussians_.mean().row(0);
+  moved_ = mean.replicate(moved_.rows(), 1);
+  block_.FirstDerivatives(time_s_, moved_, moved_rates_);
   const double root_epsilon = std::sqrt(std::numeric_limits<double>::epsilon());
   for (Eigen::Index j = 0; j < n; ++j) {
     // A state that is still 0 is as large as it becomes in the interval.
-    double size = states.col(j).abs().maxCoeff();
-    if (size == 0) size = interval_s * rates_.col(j).abs().maxCoeff();
-    const double step = root_epsilon * size;
-    points_ = states;
-    points_.col(j) += step;
-    block_.Derivatives(time_s_, points_, moved_rates_);
+    const double size =
+        mean[j] == 0 ? interval_s * std::abs(moved_rates_(0, j)) : std::abs(mean[j]);
+    steps_[j] = root_epsilon * size;
+    moved_(j, j) += steps_[j];
+  }
+  block_.FirstDerivatives(time_s_, moved_, moved_rates_);
+  for (Eigen::Index j = 0; j < n; ++j) {
     jacobian_.col(j).setZero();
-    if (step > 0) {
-      jacobian_.col(j) = ((moved_rates_.row(0) - rates_.row(0)) / step).matrix().transpose();
-    }
+    if (!(steps_[j] > 0)) continue;
+    jacobian_.col(j) =
+        ((moved_rates_.row(j) - moved_rates_.row(n)) / steps_[j]).matrix().transpose();
   }
 }
 
@@ -248,6 +248,10 @@ void FilterBlock::ReadMarked(size_t mark, double time_s, MatrixRef means, Matrix
   gaussians_.factor() = backward_->marked(mark).factor;
   block_.SetTime(time_s);
   WriteOutputs(means, deviations);
+}
+
+void FilterBlock::ReadJumpScores(size_t mark, MatrixRef scores) const {
+  scores.middleRows(first_member_, member_count()) = backward_->marked(mark).jump_scores.matrix();
 }
 
 void FilterBlock::TakeStatesOf(const FilterBlock& other) {

@@ -83,6 +83,9 @@ class FilterBlock {
   absl::Status Mark(double time_s, const Stop& stop);
   void FinishBackward() { backward_->Finish(); }
   void ReadMarked(size_t mark, double time_s, MatrixRef means, MatrixRef deviations);
+  // Writes the scores of abrupt changes at the i-th mark for the block's members (all members ×
+  // states).
+  void ReadJumpScores(size_t mark, MatrixRef scores) const;
 
   // Returns the members' failures, in the order in which they failed; points are numbers of
   // members.
@@ -129,7 +132,8 @@ class FilterBlock {
   GaussianStates gaussians_;
   double time_s_ = 0;
   Eigen::ArrayXXd points_;                        // rows of the block × n
-  Eigen::ArrayXXd rates_, moved_rates_;           // rows of the block × n
+  Eigen::ArrayXXd moved_, moved_rates_;           // row j < n: moved in state j; below: not moved
+  Eigen::ArrayXd steps_;                          // n
   Matrix jacobian_, square_;                      // n × n
   const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
   Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;

@@ -100,6 +100,13 @@ void TrajectoryBlock::Derivatives(double time_s, const ConstBlock& states, Block
   model_->Derivatives(time_s, states, parameters_, inputs_.At(time_s), derivatives);
 }
 
+void TrajectoryBlock::FirstDerivatives(double time_s, const Eigen::ArrayXXd& states,
+                                       Block derivatives) {
+  first_parameters_ = parameters_.row(0).replicate(states.rows(), 1);
+  first_inputs_ = inputs_.At(time_s).row(0).replicate(states.rows(), 1);
+  model_->Derivatives(time_s, states, first_parameters_, first_inputs_, derivatives);
+}
+
 bool TrajectoryBlock::StateJacobian(double time_s, const ConstBlock& states, Block jacobian) {
   if (!model_->has_state_jacobian()) return false;
   model_->StateJacobian(time_s, states, parameters_, inputs_.At(time_s), jacobian);
@@ -204,8 +211,10 @@ void TrajectoryBlock::SelectOutputs() {
 }
 
 void TrajectoryBlock::SetStates(const Eigen::ArrayXXd& states) {
-  for (Eigen::Index row = 0; row < states_.rows(); ++row) {
-    states_.row(row) = states.row(source_[row]);
+  for (Eigen::Index column = 0; column < states_.cols(); ++column) {
+    for (Eigen::Index row = 0; row < states_.rows(); ++row) {
+      states_(row, column) = states(source_[row], column);
+    }
   }
   FailRowsBeyond(states_, time_s_, "a state");
 }
@@ -246,7 +255,7 @@ void TrajectoryBlock::LeaveOut(std::span<const int> points, const char* reason) 
 
 void TrajectoryBlock::FailRowsBeyond(const Eigen::ArrayXXd& values, double time_s,
                                      const char* what) {
-  if ((values.abs() <= kMaxOutput).all()) return;
+  if (values.abs().maxCoeff<Eigen::PropagateNaN>() <= kMaxOutput) return;
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
     if (!point_alive_[row] || (values.row(row).abs() <= kMaxOutput).all()) continue;
     const bool finite = values.row(row).isFinite().all();

@@ -36,6 +36,8 @@ class TrajectoryBlock final : public BlockSystem {
   Eigen::Index points() const override { return states_.rows(); }
   Eigen::Index states() const override { return states_.cols(); }
   void Derivatives(double time_s, const ConstBlock& states, Block derivatives) override;
+  // Writes dx/dt of the first row's trajectory at each of some states (a multiple of kLanes rows).
+  void FirstDerivatives(double time_s, const Eigen::ArrayXXd& states, Block derivatives);
   bool StateJacobian(double time_s, const ConstBlock& states, Block jacobian) override;
 
   // As EnsemblePropagator::Advance, for this block's rows of outputs.
@@ -107,6 +109,7 @@ class TrajectoryBlock final : public BlockSystem {
   Eigen::ArrayXXd modes_;  // as EnsembleState::OfBlock::modes
   Eigen::ArrayXXd model_outputs_;
   Eigen::ArrayXXd selected_outputs_;
+  Eigen::ArrayXXd first_parameters_, first_inputs_;  // the first row's, once for each state
 
   std::vector<bool> point_alive_;
   int alive_points_;

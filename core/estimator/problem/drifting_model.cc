@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <cstring>
+#include <map>
 #include <vector>
 
 #include "core/chaos/germ.h"
@@ -22,22 +24,41 @@ double Drifted(const UncertainParameter& parameter, double theta, double departu
 
 namespace {
 
-// The normal scores of a parameter's values, which a trajectory needs again and again. The values
-// tell whether they are still those of the same block of trajectories.
-class ScoreMemory {
+using ConstColumn = Eigen::Ref<const Eigen::ArrayXd>;
+
+bool HaveSameBits(const ConstColumn& a, const Eigen::ArrayXd& b) {
+  return a.size() == b.size() &&
+         std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<size_t>(a.size())) == 0;
+}
+
+// What a drifting parameter's values in a block of trajectories are. A walk stands still between
+// two instants of process noise, so that an integrator asks for the same values at all its stages;
+// the values and departures tell whether they are still those of the same block and the same
+// instant.
+class PresentMemory {
  public:
-  const Eigen::ArrayXd& ScoresOf(const UncertainParameter& prior, const Eigen::ArrayXd& thetas) {
+  // Returns θ(t) where the walk has departed by `departures` from the values `thetas`.
+  const Eigen::ArrayXd& Values(const UncertainParameter& prior, const ConstColumn& thetas,
+                               const ConstColumn& departures) {
     const Germ germ(prior.germ);
-    if (thetas.size() != thetas_.size() || (thetas != thetas_).any()) {
+    const bool same_thetas = HaveSameBits(thetas, thetas_);
+    if (same_thetas && HaveSameBits(departures, departures_)) return values_;
+    if (!same_thetas) {
       thetas_ = thetas;
       scores_ =
           thetas.unaryExpr([&](double theta) { return germ.NormalScore(prior.ToGerm(theta)); });
     }
-    return scores_;
+    departures_ = departures;
+    values_ = thetas;
+    for (Eigen::Index row = 0; row < values_.size(); ++row) {
+      if (departures_[row] == 0) continue;
+      values_[row] = prior.ToParameter(germ.OfNormalScore(scores_[row] + departures_[row]));
+    }
+    return values_;
   }
 
  private:
-  Eigen::ArrayXd thetas_, scores_;
+  Eigen::ArrayXd thetas_, departures_, scores_, values_;
 };
 
 int64_t NextNumber() {
@@ -45,13 +66,16 @@ int64_t NextNumber() {
   return ++number;
 }
 
-// Returns the thread's memory for each walk of the model with this number.
-std::vector<ScoreMemory>& MemoryOf(int64_t model, size_t walks) {
+// Returns the thread's memory for each walk of the model with this number, of blocks of so many
+// rows.
+std::vector<PresentMemory>& MemoryOf(int64_t model, Eigen::Index rows, size_t walks) {
   thread_local int64_t present = 0;
-  thread_local std::vector<ScoreMemory> memory;
-  if (present != model) memory.assign(walks, {});
+  thread_local std::map<Eigen::Index, std::vector<PresentMemory>> memory;
+  if (present != model) memory.clear();
   present = model;
-  return memory;
+  std::vector<PresentMemory>& of_rows = memory[rows];
+  of_rows.resize(walks);
+  return of_rows;
 }
 
 }  // namespace
@@ -120,12 +144,7 @@ const Eigen::ArrayXXd& DriftingModel::Present(const ConstBlock& states,
     } else if (prior.germ.family == GermFamily::kNormal) {
       theta *= (prior.scale * departure).exp();
     } else {
-      const Germ germ(prior.germ);
-      const Eigen::ArrayXd& scores = MemoryOf(number_, walks_.size())[j].ScoresOf(prior, theta);
-      for (Eigen::Index row = 0; row < theta.size(); ++row) {
-        if (departure[row] == 0) continue;
-        theta[row] = prior.ToParameter(germ.OfNormalScore(scores[row] + departure[row]));
-      }
+      theta = MemoryOf(number_, theta.size(), walks_.size())[j].Values(prior, theta, departure);
     }
   }
   return present;

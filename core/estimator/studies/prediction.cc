@@ -202,7 +202,7 @@ Eigen::Index DrawsOfBatch(const ResolvedProblem& problem, int64_t instants) {
 struct SmoothedInstant {
   TrajectoryInstant instant;
   std::vector<double> samples;
-  Matrix means, deviations;  // draws × outputs
+  Matrix means, deviations, jump_scores;  // draws × outputs
 };
 
 // Smooths batch by batch. A batch visits the same instants as the others.
@@ -228,9 +228,11 @@ absl::StatusOr<Prediction> PredictSmoothed(const PredictionSubject& subject,
         instants.push_back({instant,
                             {instant.samples.begin(), instant.samples.end()},
                             Matrix(draws, means.cols()),
+                            Matrix(draws, means.cols()),
                             Matrix(draws, means.cols())});
       }
       instants[next].means.middleRows(first, count) = means;
+      instants[next].jump_scores.middleRows(first, count) = *instant.jump_scores;
       instants[next++].deviations.middleRows(first, count) = deviations;
       return absl::OkStatus();
     };
@@ -241,6 +243,7 @@ absl::StatusOr<Prediction> PredictSmoothed(const PredictionSubject& subject,
   }
   for (SmoothedInstant& smoothed : instants) {
     smoothed.instant.samples = smoothed.samples;
+    smoothed.instant.jump_scores = &smoothed.jump_scores;
     POLYEST_RETURN_IF_ERROR(builder.Add(smoothed.instant, smoothed.means, smoothed.deviations));
   }
   return builder.Take(failed);

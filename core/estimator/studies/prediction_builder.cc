@@ -10,6 +10,7 @@
 
 #include "core/bayes/noise.h"
 #include "core/bayes/weighted_samples.h"
+#include "core/chaos/germ.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_score.h"
 
@@ -43,12 +44,38 @@ absl::Status TooFewTrajectories(const TrajectoryInstant& instant, size_t alive,
 
 }  // namespace
 
+// Finds the most certain abrupt change of a parameter that drifts.
+class JumpSearch {
+ public:
+  // `scores`: of all draws that can be integrated to here.
+  void Add(const SampleRow& place, const ConstVectorRef& scores) {
+    const double score = scores.mean();
+    ++times_;
+    if (std::abs(score) <= std::abs(found_.score)) return;
+    found_ = {place, score, 0};
+  }
+  std::optional<AbruptChange> Take() {
+    if (times_ == 0) return std::nullopt;
+    // One of so many normal scores is beyond the limit, on either side, with this probability at
+    // most (Bonferroni).
+    constexpr double kChance = 0.01;
+    found_.limit = Germ::Uniform().NormalScore(1 - kChance / static_cast<double>(times_));
+    if (std::abs(found_.score) > found_.limit) return found_;
+    return std::nullopt;
+  }
+
+ private:
+  int64_t times_ = 0;
+  AbruptChange found_;
+};
+
 // Predicts one output at the times of an answer, and scores it on the record.
 class OutputPrediction {
  public:
-  OutputPrediction(const PredictionSubject& subject, const PredictionOptions& options, int column,
-                   int64_t times)
-      : options_(options), channel_(ChannelOf(*subject.problem, column)) {
+  // `index`: of the output in the answer; `column`: among the model's.
+  OutputPrediction(const PredictionSubject& subject, const PredictionOptions& options,
+                   Eigen::Index index, int column, int64_t times)
+      : options_(options), index_(index), channel_(ChannelOf(*subject.problem, column)) {
     const Quantity& quantity =
         subject.problem->model()->description().outputs[static_cast<size_t>(column)];
     result_.output = quantity.name;
@@ -91,6 +118,9 @@ class OutputPrediction {
     }
     const double mean = values.mean();
     if (place >= 0) Describe(values, deviations, mean, place);
+    if (instant.jump_scores != nullptr) {
+      jumps_.Add(instant.place, instant.jump_scores->col(index_)(alive));
+    }
     if (channel_ < 0) return;
     const double z = instant.row >= 0 ? instant.samples[static_cast<size_t>(channel_)] : kNone;
     if (!std::isnan(z)) noise_.largest = std::max(noise_.largest, std::abs(z));
@@ -111,6 +141,7 @@ class OutputPrediction {
 
   PredictedOutput Take() {
     if (sums_) result_.score = sums_->Score();
+    result_.abrupt_change = jumps_.Take();
     return std::move(result_);
   }
 
@@ -170,12 +201,14 @@ class OutputPrediction {
   }
 
   const PredictionOptions& options_;
+  Eigen::Index index_;
   int channel_;
   PredictedNoise noise_;
   NoiseModel model_;
   NoiseKernel kernel_ = NoiseKernel::kNormal;
   Vector factors_;  // of the noise's scale, by draw
   int run_ = -1;
+  JumpSearch jumps_;
   std::optional<ScoreSums> sums_;
   PredictedOutput result_;
 };
@@ -185,7 +218,9 @@ PredictionBuilder::PredictionBuilder(const PredictionSubject& subject,
                                      const std::vector<int>& columns)
     : by_rows_(options.times.empty()), selection_(subject.rows, options.max_rows) {
   const int64_t times = by_rows_ ? selection_.size() : std::ssize(options.times);
-  for (const int column : columns) outputs_.emplace_back(subject, options, column, times);
+  for (const int column : columns) {
+    outputs_.emplace_back(subject, options, std::ssize(outputs_), column, times);
+  }
   prediction_.draws = static_cast<int>(subject.thetas.rows());
   prediction_.record_rows = subject.rows;
 }

@@ -77,6 +77,15 @@ struct PredictionScore {
   Vector autocorrelation;
 };
 
+// A sudden change of a parameter that drifts, which its random walk does not explain: if a step of
+// the parameter at this time is allowed beside the walk, the log likelihood rises by score²/2.
+// Source: de Jong and Penzer (1998), backward_pass.h.
+struct AbruptChange {
+  SampleRow at;      // the time, of those returned, at which the new value is there
+  double score = 0;  // its sign is that of the step; ~ N(0, 1) at each time if the parameter walks
+  double limit = 0;  // which |score| of a walk exceeds in less than 1 % of records, > 0
+};
+
 // One output over time, in its unit. Vectors have one element for each time.
 struct PredictedOutput {
   std::string output;  // its name
@@ -93,6 +102,9 @@ struct PredictedOutput {
   Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample, 0 where a
                                  // sample has no noise, such as a 0 of relative noise
   PredictionScore score;         // over the whole record
+  // Of a parameter that drifts, if smoothed: the most certain abrupt change, if one has a score
+  // beyond its limit.
+  std::optional<AbruptChange> abrupt_change;
 };
 
 // The prediction.

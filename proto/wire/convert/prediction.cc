@@ -34,6 +34,13 @@ void ToProto(const PredictedOutput& output, Output& proto) {
   Append(output.std_dev, *proto.mutable_std_dev());
   Append(output.quantiles, *proto.mutable_quantiles());
   AddSamples(output, proto);
+  if (output.abrupt_change) {
+    v1::PredictResponse::AbruptChange& change = *proto.mutable_abrupt_change();
+    change.set_run(output.abrupt_change->at.run);
+    change.set_time_s(output.abrupt_change->at.time_s);
+    change.set_score(output.abrupt_change->score);
+    change.set_limit(output.abrupt_change->limit);
+  }
   if (output.sample_std_dev.size() == 0) return;
   Append(output.sample_std_dev, *proto.mutable_sample_std_dev());
   Append(output.sample_quantiles, *proto.mutable_sample_quantiles());

@@ -135,6 +135,46 @@ TEST(DriftPrediction, IsSmoothedByLaterSamples) {
   EXPECT_NEAR(between->outputs[1].mean[0], (a.mean[74] + a.mean[75]) / 2, 1e-9);
 }
 
+// With N(f, F) before a row and N(b, B) from that row and those after it, a step there has the
+// score (b − f)/√(F + B).
+TEST(DriftPrediction, TellsAnAbruptChangeFromAWalk) {
+  constexpr size_t kRows = 150, kChanged = 100;
+  const auto change_of = [](const Samples& samples) {
+    const auto estimator = MakeEstimator(DriftingLevel());
+    EXPECT_TRUE(estimator->Append(samples).ok());
+    EXPECT_TRUE(estimator->Process().ok());
+    PredictionOptions options;
+    options.draws = 50;
+    options.smoothed = true;
+    const auto smoothed = estimator->CurrentPrediction(options);
+    EXPECT_TRUE(smoothed.ok()) << smoothed.status();
+    EXPECT_FALSE(smoothed->outputs[0].abrupt_change.has_value());  // y is no parameter
+    return smoothed->outputs[1].abrupt_change;
+  };
+  Samples samples = Walk(kRows, 4);
+  EXPECT_FALSE(change_of(samples).has_value());
+
+  for (size_t row = kChanged; row < kRows; ++row) samples.columns[0].value[row] -= 12 * kSigma;
+  double largest = 0;
+  LocalLevel backward{0, 1e12, 0};
+  for (size_t row = kRows; row-- > 60;) {
+    const LocalLevel before = ExactFilter(samples, kRate, row);
+    const double predicted = before.variance + kRate * kRate * kStepS;
+    const double S = backward.variance + kSigma * kSigma;
+    backward.mean += backward.variance / S * (samples.columns[0].value[row] - backward.mean);
+    backward.variance *= kSigma * kSigma / S;
+    const double score = (backward.mean - before.mean) / std::sqrt(predicted + backward.variance);
+    if (std::abs(score) > std::abs(largest)) largest = score;
+    backward.variance += kRate * kRate * kStepS;
+  }
+  const auto change = change_of(samples);
+  ASSERT_TRUE(change.has_value());
+  EXPECT_EQ(change->at.run, 0);
+  EXPECT_NEAR(change->at.time_s, samples.time_s[kChanged], 1e-12);
+  EXPECT_NEAR(change->score, largest, 1e-5 * std::abs(largest));
+  EXPECT_NEAR(change->limit, 3.99, 0.01);  // of N(0, 1), 0.005/150 above it
+}
+
 TEST(DriftPrediction, RefusesSmoothingThatIsNone) {
   PredictionOptions options;
   options.smoothed = true;

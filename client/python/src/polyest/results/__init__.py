@@ -12,7 +12,7 @@ from polyest.results.cost import (
 from polyest.results.design import DesignCandidate, DesignOutput, ExperimentDesign, Gain
 from polyest.results.history import History, HistoryPoint, ParameterThen
 from polyest.results.posterior import Joint, Marginal, Posterior
-from polyest.results.prediction import PredictedOutput, Prediction, Score
+from polyest.results.prediction import AbruptChange, PredictedOutput, Prediction, Score
 from polyest.results.prior import (
     ExpansionUsed,
     Propagation,

@@ -35,6 +35,20 @@ class Score:
 
 
 @dataclass(frozen=True)
+class AbruptChange:
+    """A sudden change of a parameter that drifts, which its random walk does not explain."""
+
+    #: The run.
+    run: int
+    #: s since the run began, at which the new value is there.
+    time_s: float
+    #: With the sign of the step; normal with standard deviation 1 if the parameter only walks.
+    score: float
+    #: What |score| of a walk exceeds in less than 1 % of records.
+    limit: float
+
+
+@dataclass(frozen=True)
 class PredictedOutput:
     """One output over T times, with P quantiles and M samples; values are in `unit`."""
 
@@ -62,6 +76,9 @@ class PredictedOutput:
     standardized_residual: Optional[Floats]
     #: How well the samples of the whole record agree; None if the noise is not known.
     score: Optional[Score]
+    #: Of a parameter that drifts, if smoothed: the abrupt change that its random walk explains
+    #: least; None if the walk explains all.
+    abrupt_change: Optional[AbruptChange] = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +140,10 @@ def _output_of(message: Any, times: int, probabilities: int) -> PredictedOutput:
         said = message.score
         score = Score(said.sample_count, said.log_score, said.coverage95, said.root_mean_square,
                       array(said.autocorrelation))
+    change = None
+    if message.HasField("abrupt_change"):
+        told = message.abrupt_change
+        change = AbruptChange(told.run, told.time_s, told.score, told.limit)
     return PredictedOutput(
         output=message.output, unit=message.unit, mean=array(message.mean),
         std_dev=array(message.std_dev), quantiles=array(message.quantiles, times, probabilities),
@@ -131,7 +152,8 @@ def _output_of(message: Any, times: int, probabilities: int) -> PredictedOutput:
         measured_rows=np.array(message.measured_rows, dtype=np.int64),
         measured=array(message.measured), residual=array(message.residual),
         standardized_residual=(array(message.standardized_residual)
-                               if message.standardized_residual else None), score=score)
+                               if message.standardized_residual else None), score=score,
+        abrupt_change=change)
 
 
 def of_message(message: study_service_pb2.PredictResponse) -> Prediction:
