@@ -16,6 +16,9 @@ Markdown files if none is given. Fails with "guide:line" when
   - a link within the repository leads nowhere,
   - the first page has more than 180 lines.
 
+A block that names a measured record (../shared/data/*.csv beside the repository) is not run where the record
+is not there, as is said.
+
 Blocks fenced ```console need root, another machine, an hour or the tests' own programs; they are not
 run, and are few.
 deploy/runbook.md and deploy/cluster/README.md have tests of their own in tests/integration.
@@ -35,6 +38,8 @@ SECONDS_PER_BLOCK = 300  # ends a command that hangs
 
 # A program that the reader saves: its first line names the file.
 PROGRAM = re.compile(r"# (\S+\.py)\n")
+# Measured records that the repository does not have; a guide's reader downloads them.
+RECORDS = re.compile(r"\b(?:air_track_[12]mass|mr_damper_0V|mr_damper_4_4|pendulum|silverbox_multisine)\.csv\b")
 NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 COLOR = re.compile(r"#[0-9a-f]{6}")
 LETTERS = str.maketrans("0123456789", "ghijklmnop")
@@ -133,6 +138,12 @@ def check_pictures(source, guide, sandbox, failures):
                 failures.add(f"{guide}:{number}", f"{target} is not what the command draws")
 
 
+def missing_records(source, block):
+    """Returns the measured records that the block names and that are not there."""
+    return [name for name in RECORDS.findall(block)
+            if not (source.parent / "shared/data" / name).exists()]
+
+
 def run_guide(source, programs, guide, failures):
     """Returns the number of blocks run and of those that are not."""
     text = (source / guide).read_text()
@@ -141,6 +152,9 @@ def run_guide(source, programs, guide, failures):
         for language, line, block in blocks_of(text):
             if language == "console":
                 console += 1
+            elif language == "sh" and (missing := missing_records(source, block)):
+                print(f"{guide}:{line}: not run: {', '.join(missing)} not in ../shared/data")
+                printed = None
             elif language == "sh":
                 status, printed, error = sandbox.run(guide, line, block, SECONDS_PER_BLOCK)
                 run += 1
@@ -149,7 +163,7 @@ def run_guide(source, programs, guide, failures):
                                  f"exit status {status}: {error.strip()[-600:]}")
             elif language == "python" and (program := PROGRAM.match(block)):
                 sandbox.save(program[1], block)
-            elif language == "output" and not same_output(block, printed):
+            elif language == "output" and printed is not None and not same_output(block, printed):
                 failures.add(f"{guide}:{line}", f"the command printed instead:\n{printed}")
             elif language == "json" and '"model"' in block and '"uncertain"' in block:
                 error = sandbox.check_problem(block)

@@ -94,6 +94,8 @@ class Sandbox:
         self.failed_at = ""
         checkout = self.root / "checkout"
         shutil.copytree(source / "client/examples", checkout / "client/examples")
+        for record in (source.parent / "shared/data").glob("*.csv"):
+            shutil.copy(record, checkout / "client/examples")
         shutil.copytree(source / "proto/polyest", checkout / "proto/polyest")
         (checkout / "deploy").mkdir()
         shutil.copy(source / "deploy/polyestd.toml", checkout / "deploy")

@@ -61,6 +61,41 @@ TEST_F(FmuCommandTest, EstimatesAsTheBuiltInModelToTheErrorOfTheFmusOwnSteps) {
   EXPECT_LT(Difference("oscillator_cs3"), 1e-3);
 }
 
+TEST_F(FmuCommandTest, EstimatesWithProcessNoiseAsTheBuiltInModel) {
+  const std::string noisy = R"(, "processNoise": [{"state": "v", "spectralDensity": 0.01}])";
+  const v1::Estimate own = Estimate(R"({"builtin": "mass_spring_damper"})" + noisy, "EXPLICIT");
+  for (const char* fmu : {"oscillator_me2", "oscillator_me3"}) {
+    const v1::Estimate other = Estimate(R"({"fmu": ")" + std::string(fmu) + R"("})" + noisy);
+    for (int i = 0; i < 2; ++i) {
+      const v1::ParameterEstimate& parameter = own.parameters(i);
+      EXPECT_NEAR(other.parameters(i).map(), parameter.map(), 1e-6 * parameter.std_dev()) << fmu;
+      EXPECT_NEAR(other.parameters(i).std_dev(), parameter.std_dev(), 1e-6 * parameter.std_dev());
+      // The process noise is not without effect.
+      EXPECT_GT(parameter.std_dev(), 1.2 * built_in_.parameters(i).std_dev());
+    }
+  }
+}
+
+TEST_F(FmuCommandTest, RefusesProcessNoiseAndDriftWhereStatesAndParametersCannotBeSet) {
+  const auto refusal = [&](const std::string& rest) {
+    const Finished run = Run({"estimate", Problem(rest), data_, "--fmu-dir", POLYEST_TEST_FMUS});
+    EXPECT_EQ(run.exit_status, 2);
+    return run.err;
+  };
+  const std::string noisy = R"(, "processNoise": [{"state": "v", "spectralDensity": 0.01}])";
+  EXPECT_THAT(refusal(R"({"fmu": "oscillator_cs2"})" + noisy),
+              HasSubstr("likelihood: PREDICTION_ERROR needs a model whose states can be set, but "
+                        "oscillator_cs2 is an FMU for Co-Simulation"));
+  const std::string drifting = File("drifting.json", R"({"model": {"fmu": "oscillator_me2"},
+      "uncertain": [{"name": "k", "uniform": {"lower": 30, "upper": 50},
+                     "drift": {"randomWalk": {"stdDevPerSqrtS": 1}}}],
+      "measured": [{"output": "x", "noise": {"absolute": 0.01}}]})");
+  const Finished run = Run({"estimate", drifting, data_, "--fmu-dir", POLYEST_TEST_FMUS});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("uncertain[0].drift: k cannot drift: model oscillator_me2 takes "
+                                 "its parameters at the start of a run only"));
+}
+
 TEST_F(FmuCommandTest, ListsAndDescribesFmusBesideTheBuiltInModels) {
   const Finished list = Run({"models", "--fmu-dir", POLYEST_TEST_FMUS});
   EXPECT_EQ(list.exit_status, 0) << list.err;
