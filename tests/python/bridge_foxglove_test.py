@@ -41,12 +41,12 @@ def serve():
 class Bridged:
     """A bridge that works in threads of its own."""
 
-    def __init__(self, folder, client, server, name, channels=None):
+    def __init__(self, folder, client, url, name, channels=None):
         PROBLEM.save(folder / "problem.json")
         (folder / "bridge.json").write_text(json.dumps({
             "daemon": {"server": client.server},
             "session": {"name": name, "problem": "problem.json", "reorder_window_s": 0.5},
-            "source": {"kind": "foxglove", "url": server.url},
+            "source": {"kind": "foxglove", "url": url},
             "channels": channels or {"x": "/susp.defl",
                                      "force": {"from": "/road.force", "unit": "N"}},
             "stream": {"interval_s": 0.02}, "estimates": {"interval_s": 0.05},
@@ -98,7 +98,7 @@ def send(server, rows):
 
 def test_the_estimate_is_that_of_the_same_rows(tmp_path, client, serve):
     server = serve(SUSPENSION, OTHER, ROAD)
-    bridged = Bridged(tmp_path, client, server, "foxglove")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     rows = messages()
     send(server, rows)
@@ -113,7 +113,7 @@ def test_the_estimate_is_that_of_the_same_rows(tmp_path, client, serve):
 
 def test_a_server_that_goes_is_connected_again(tmp_path, client, serve):
     server = serve(SUSPENSION, ROAD)
-    bridged = Bridged(tmp_path, client, server, "foxglove-again")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-again")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     rows = messages()
     send(server, rows[:1000])
@@ -138,7 +138,7 @@ def test_topics_of_protobuf_are_decoded_by_their_schema(tmp_path, client, serve)
     kind = {"encoding": "protobuf", "schemaName": "google.protobuf.DoubleValue",
             "schema": base64.b64encode(files.SerializeToString()).decode()}
     server = serve({"topic": "/susp", **kind}, {"topic": "/road", **kind})
-    bridged = Bridged(tmp_path, client, server, "foxglove-protobuf", {
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-protobuf", {
         "x": {"from": "/susp.value", "unit": "mm"}, "force": "/road.value"})
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     send(server, [(time_ns, topic, wrappers_pb2.DoubleValue(value=value).SerializeToString())
@@ -149,10 +149,37 @@ def test_topics_of_protobuf_are_decoded_by_their_schema(tmp_path, client, serve)
     assert abs(found["k"].mean - 41.3) < 4 * found["k"].std_dev
 
 
+def test_foxglove_s_own_server_is_understood(tmp_path, client):
+    foxglove = pytest.importorskip("foxglove", reason="foxglove-sdk is missing: pip install it")
+
+    class Subscriptions(foxglove.websocket.ServerListener):
+        topics = frozenset()
+
+        def on_subscribe(self, client, channel):
+            self.topics |= {channel.topic}
+
+    heard = Subscriptions()
+    server = foxglove.start_server(port=0, server_listener=heard)
+    kinds = {"/susp": UNITS, "/road": "{}"}
+    channels = {topic: foxglove.Channel(topic, message_encoding="json", schema=json.loads(kind))
+                for topic, kind in kinds.items()}
+    bridged = Bridged(tmp_path, client, f"ws://127.0.0.1:{server.port}", "foxglove-sdk")
+    wait_for(lambda: heard.topics == set(channels))
+    rows = messages()
+    for number, (time_ns, topic, message) in enumerate(rows):
+        channels[topic].log(json.dumps(message).encode(), log_time=START_NS + time_ns)
+        # It drops messages of which more than 1024 wait.
+        wait_for(lambda sent=number: bridged.taken > sent - 500)
+    assert bridged.end(len(rows)) == 0, bridged.said
+    server.stop()
+    found = bridged.bridge.latest
+    assert abs(found["k"].mean - 41.3) < 4 * found["k"].std_dev
+
+
 def test_an_encoding_that_is_not_read_ends_the_bridge_with_topic_and_encoding(
         tmp_path, client, serve):
     server = serve(ROAD, {"topic": "/susp", "encoding": "cdr"})
-    bridged = Bridged(tmp_path, client, server, "foxglove-cdr")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-cdr")
     bridged.says("ended by a failure: channels.x: topic /susp has messages in 'cdr'; those in "
                  "json and protobuf are read")
     bridged.thread.join(30)
@@ -161,7 +188,7 @@ def test_an_encoding_that_is_not_read_ends_the_bridge_with_topic_and_encoding(
 
 def test_messages_that_cannot_be_read_are_counted_and_the_first_is_said(tmp_path, client, serve):
     server = serve(SUSPENSION, ROAD)
-    bridged = Bridged(tmp_path, client, server, "foxglove-bad")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-bad")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     server.send("/susp", START_NS, b"{")
     server.send("/susp", START_NS, {"defl": "none"})
@@ -183,7 +210,7 @@ def test_messages_that_cannot_be_read_are_counted_and_the_first_is_said(tmp_path
 
 def test_a_topic_that_is_withdrawn_comes_back_under_another_number(tmp_path, client, serve):
     server = serve(SUSPENSION, ROAD)
-    bridged = Bridged(tmp_path, client, server, "foxglove-back")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-back")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     rows = messages()
     send(server, rows[:1000])
@@ -203,7 +230,7 @@ def test_a_topic_that_is_withdrawn_comes_back_under_another_number(tmp_path, cli
 def test_a_topic_that_is_not_there_is_named_with_the_nearest(tmp_path, client, serve, monkeypatch):
     monkeypatch.setattr("polyest.bridge._foxglove_source._PATIENCE_S", 0.1)
     server = serve({**SUSPENSION, "topic": "/suspension"}, ROAD)
-    bridged = Bridged(tmp_path, client, server, "foxglove-missing")
+    bridged = Bridged(tmp_path, client, server.url, "foxglove-missing")
     bridged.says("channels.x: there is no topic '/susp.defl'.*'/suspension'")
     assert bridged.end() == 0
 
