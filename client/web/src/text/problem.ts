@@ -1,4 +1,5 @@
-// A problem as text: its JSON, with short parts on one line and long lists and contents shortened.
+// A problem as text: its JSON, with short parts on one line, long lists and contents shortened, and
+// without what the daemon writes for fields that nobody has set.
 
 import { whole } from './number';
 
@@ -7,6 +8,12 @@ const MAX_NUMBERS = 20;     // of a list that is written out
 const MAX_CHARACTERS = 400; // of a text that is written out: equations are, contents of files are not
 
 const isObject = (value: unknown): value is { [key: string]: unknown } => typeof value === 'object' && value !== null;
+
+// Whether a field says nothing. Zeros, false and empty objects stay: they may be choices.
+function isUnset(value: unknown): boolean {
+  if (typeof value === 'string') return value === '' || value.endsWith('_UNSPECIFIED');
+  return Array.isArray(value) && value.length === 0;
+}
 
 function shortened(value: unknown): string | null {
   if (typeof value === 'string' && value.length > MAX_CHARACTERS) {
@@ -24,7 +31,7 @@ function write(value: unknown, indent: string, room: number): string {
   const isList = Array.isArray(value);
   const [open, close] = isList ? ['[', ']'] : ['{', '}'];
   const deeper = `${indent}  `;
-  const parts = Object.entries(value).map(([key, each]) => {
+  const parts = Object.entries(value).filter(([, each]) => isList || !isUnset(each)).map(([key, each]) => {
     const name = isList ? '' : `${JSON.stringify(key)}: `;
     return name + write(each, deeper, LINE - deeper.length - name.length);
   });

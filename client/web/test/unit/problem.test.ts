@@ -27,8 +27,20 @@ describe('problemText', () => {
     expect(text.length).toBeLessThan(250);
   });
 
+  it('leaves out fields that nobody has set, but no choice and no zero', () => {
+    const written = {
+      $schema: '', uncertain: [{ name: 'k', uniform: { lower: 0, upper: 1 }, perRun: false }], correlations: [],
+      inputs: [{ name: 'road', streamed: { hold: false, interpolation: 'INTERPOLATION_UNSPECIFIED' } }], flags: ['', 'a'],
+      expansion: { adaptive: false },
+    };
+    expect(JSON.parse(problemText(written))).toEqual({
+      uncertain: [{ name: 'k', uniform: { lower: 0, upper: 1 }, perRun: false }], inputs: [{ name: 'road', streamed: { hold: false } }],
+      flags: ['', 'a'], expansion: { adaptive: false },
+    });
+  });
+
   it('writes nothing as null, and an empty problem as such', () => {
     expect(problemText({})).toBe('{}');
-    expect(problemText({ a: null, b: [], c: undefined })).toBe('{"a": null, "b": [], "c": null}');
+    expect(problemText({ a: null, b: {}, c: undefined })).toBe('{"a": null, "b": {}, "c": null}');
   });
 });
