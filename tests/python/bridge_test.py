@@ -303,7 +303,7 @@ def test_a_clock_that_is_set_back_begins_a_new_run(rig, client, data, monkeypatc
     ({"session": {"name": 7}}, "session.name: must be text; got 7"),
     ({"session": {"problem": "none.json"}}, "none.json: cannot be opened"),
     ({"session": {"reorder_window_s": -1}}, "session.reorder_window_s: must be ≥ 0; got -1"),
-    ({"source": {"kind": "lin"}}, "source.kind: must be one of can, mcap; got 'lin'"),
+    ({"source": {"kind": "lin"}}, "source.kind: must be one of can, mcap, foxglove; got 'lin'"),
     ({"source": {"database": "none.dbc"}}, "none.dbc: cannot be opened"),
     ({"source": {"database": "problem.json"}}, "problem.json: is no CAN database"),
     ({"channels": {"x": "SUSP.deflection"}}, "channels.x: there is no signal 'SUSP.deflection'; "

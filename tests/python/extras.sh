@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # extras.sh PYTHON FOLDER makes an environment with the packages of the extras mdf, mcap, can and bridge,
-# and with a server of UM-Bridge models.
+# and with servers of UM-Bridge models and of Foxglove's protocol.
 # Debian's packages stay visible in it, and keep their versions. Exits with 77 (skipped) where packages
 # cannot be fetched, with 1 there in CI; the environment then has Debian's packages alone.
 set -euo pipefail
 
 python="$1" folder="$2"
 # The newest asammdf for Debian's numpy 1.24 and pandas 1.5 is 8.1.2.
-wanted=(asammdf==8.1.2 cantools==45.1.0 mcap==1.6.0 msgpack==1.1.0 paho-mqtt==2.1.0 python-can==4.6.1
-  umbridge==1.2.10 websockets==15.0.1)
+wanted=(asammdf==8.1.2 cantools==45.1.0 foxglove-sdk==0.30.3 mcap==1.6.0 msgpack==1.1.0 paho-mqtt==2.1.0
+  python-can==4.6.1 umbridge==1.2.10 websockets==15.0.1)
 stamp="$folder/made-of"
 
 [[ "$(cat "$stamp" 2>/dev/null)" != "${wanted[*]}" ]] || exit 0

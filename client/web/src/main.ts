@@ -2,9 +2,11 @@
 
 import './style/page.css';
 import './style/panels.css';
+import './style/print.css';
 
 import { setToken, token } from './api/token';
 import { type View, h } from './view/dom';
+import { preparePrinting } from './view/printing';
 import { LIST_ADDRESS, readRoute } from './view/route';
 import { SessionPage } from './view/session_page';
 import { SessionsPage } from './view/sessions_page';
@@ -39,6 +41,7 @@ function open(): void {
 
 function start(): void {
   startTheme();
+  preparePrinting();
   forget.addEventListener('click', () => {
     setToken('');
     open();

@@ -2,9 +2,10 @@
 
 The groups are those of ArviZ's schema as far as the daemon's answers go: `posterior`, `prior`,
 `observed_data`, and `prediction`, the moments and quantiles of the outputs. The daemon returns the
-samples of a posterior as one sequence of equal weight, so that there is one chain; its own R̂ and
-effective sample sizes are attributes of `posterior`. It returns no outputs at single draws: if they
-are asked for, each draw takes a call, which gives `log_likelihood` and `posterior_predictive`.
+samples of a posterior as one sequence of equal weight, so that there is one chain, of which ArviZ
+has no R̂. The daemon's own R̂ (NaN for importance sampling) and effective sample sizes, of all of its
+draws, are attributes of `posterior` and of its variables. It returns no outputs at single draws: if
+they are asked for, each draw takes a call, which gives `log_likelihood` and `posterior_predictive`.
 """
 
 from __future__ import annotations
@@ -93,11 +94,13 @@ def _draws(values: dict[str, Any]) -> Any:
 def _posterior(posterior: Posterior) -> Any:
     found = _draws({name: posterior.samples[:, column]
                     for column, name in enumerate(posterior.parameters)})
-    for name, one in posterior.parameters.items():
-        found[name].attrs.update(units=one.unit, r_hat=one.r_hat,
+    convergence = posterior.convergence()
+    for name, one in convergence.parameters.items():
+        found[name].attrs.update(units=posterior[name].unit, r_hat=one.r_hat,
                                  effective_sample_size=one.effective_sample_size)
     found.attrs.update(method=posterior.method, draw_count=posterior.draw_count,
-                       r_hat=posterior.r_hat, inference_library="polyest")
+                       r_hat=np.max([one.r_hat for one in convergence.parameters.values()]),
+                       inference_library="polyest")
     return found
 
 

@@ -6,10 +6,15 @@ import { ThinnedTable } from './thinned_table';
 const CAPACITY = 1024;
 const MAX_TICKS = 200;
 
-// The table's columns: time and samples, then those of each parameter.
-const TIME = 0;
-const SAMPLES = 1;
-const FIRST = 2;
+// The daemon has kept all estimates if there are fewer than these, and thins them if there are 512.
+const THINNED = 256;
+
+// The table's columns: the batch, by which rows are thinned, time and samples, then those of each
+// parameter.
+const SEQUENCE = 0;
+const TIME = 1;
+const SAMPLES = 2;
+const FIRST = 3;
 const PER_PARAMETER = 4;
 
 export interface Series {
@@ -41,10 +46,12 @@ export class EstimateHistory {
     return this.table.length;
   }
 
-  // Begins anew with what the daemon has kept.
+  // Begins anew with what the daemon has kept. What comes then is kept no more densely: in time it
+  // would crowd out the beginning.
   load(points: readonly HistoryPoint[]): void {
     this.clear();
     for (const point of points) this.add(point);
+    if (points.length >= THINNED) this.table.thinAsSoFar();
   }
 
   clear(): void {
@@ -97,6 +104,7 @@ export class EstimateHistory {
     const isSame = this.last !== null && row.samples === this.last.samples && row.sequence === this.last.sequence;
     this.useColumnsOf(row);
     const numbers = new Array<number>(this.table.width).fill(NaN);
+    numbers[SEQUENCE] = row.sequence;
     numbers[TIME] = row.time;
     numbers[SAMPLES] = row.samples;
     for (const parameter of row.parameters) {

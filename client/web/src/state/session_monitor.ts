@@ -119,7 +119,9 @@ export class SessionMonitor {
   private async rereadHistory(stop: AbortSignal): Promise<void> {
     try {
       const points = await client.getHistory(this.name, stop);
-      if (this.connection.kind === 'open') this.history.load(points);
+      if (this.connection.kind !== 'open') return;
+      this.history.load(points);
+      if (this.estimate) this.history.append(this.estimate);  // it may be newer than the answer
     } catch {
       // The history stays as this page has seen it.
     }

@@ -19,6 +19,7 @@ export const TERMS = {
   reexpansion: 'The computation was moved to where the parameters are now known to be, and made finer there. Marked by ticks at the bottom of the strips since this page was opened.',
   order: 'Degree of the polynomials that stand for the model, and how many runs of the model they rest on.',
   residualToNoise: 'How far these polynomials are from the model itself, in units of the noise. Small beside 1: trust it.',
+  print: 'Prints what the page shows now on A4, or saves it as PDF: estimates, warnings, fit, residuals and the problem. The command polyest report --session makes a file that has every output.',
   durable: 'Whether measurements that were acknowledged survive a restart of the daemon.',
 } as const;
 

@@ -21,7 +21,6 @@ export class Chart {
   private isDrawn = false;  // whether there has been anything to see
   private readonly resizing = new ResizeObserver(() => this.resize());
   private readonly seeing = new IntersectionObserver((entries) => this.see(entries), { rootMargin: '300px' });
-  private readonly onPrint = (): void => this.drawIfStale();
   private readonly onTheme = (): void => this.rebuild();
 
   // `options` is called again when colours change. `height`: px. `read` says in words what is at an
@@ -38,7 +37,6 @@ export class Chart {
     this.resizing.observe(this.place);
     this.seeing.observe(this.place);
     document.addEventListener(THEME_EVENT, this.onTheme);
-    addEventListener('beforeprint', this.onPrint);
   }
 
   setData(data: ChartData): void {
@@ -62,7 +60,6 @@ export class Chart {
     this.resizing.disconnect();
     this.seeing.disconnect();
     document.removeEventListener(THEME_EVENT, this.onTheme);
-    removeEventListener('beforeprint', this.onPrint);
     this.plot?.destroy();
     this.plot = null;
   }
@@ -102,7 +99,7 @@ export class Chart {
 export const COMMON = {
   legend: { show: false },
   cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
-  padding: [8, 12, 0, 0] as uPlot.Padding,
+  padding: [8, 20, 0, 0] as uPlot.Padding,
 } satisfies Partial<ChartOptions>;
 
 const FONT = '12px system-ui, sans-serif';

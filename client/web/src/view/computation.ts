@@ -68,6 +68,11 @@ export class ComputationView implements View {
     this.load.set(entries);
   }
 
+  // The daemon's version; empty while it is not known.
+  get version(): string {
+    return this.status?.version ?? '';
+  }
+
   dispose(): void {
     this.job.dispose();
   }

@@ -129,23 +129,23 @@ export class CornerPlot {
     this.drawFrame(context, frame);
   }
 
-  // Shades cells by their density.
+  // Shades cells by their density, as one picture with a pixel for each: cells that are drawn side by
+  // side show their seams on paper.
   private drawCells(
     context: CanvasRenderingContext2D, { x, y, size }: Frame, density: readonly number[], columns: number, rows: number,
   ): void {
+    const cells = h('canvas', { width: String(columns), height: String(rows) });
+    const picture = cells.getContext('2d');
     const largest = Math.max(...density);
-    if (!(largest > 0)) return;
-    const [stepX, stepY] = [size / columns, size / rows];
-    context.save();
-    context.fillStyle = colour('--accent');
+    if (!picture || !(largest > 0)) return;
+    picture.fillStyle = colour('--accent');
     density.forEach((value, k) => {
       const share = value / largest;
       if (share < 0.01) return;
-      context.globalAlpha = 0.42 * share;
-      const [i, j] = [Math.floor(k / rows), k % rows];
-      context.fillRect(x + i * stepX, y + size - (j + 1) * stepY, stepX, stepY);
+      picture.globalAlpha = 0.42 * share;
+      picture.fillRect(Math.floor(k / rows), rows - 1 - (k % rows), 1, 1);
     });
-    context.restore();
+    context.drawImage(cells, x, y, size, size);
   }
 
   private drawFrame(context: CanvasRenderingContext2D, { x, y, size }: Frame): void {

@@ -13,6 +13,7 @@ import { ComputationView } from './computation';
 import { type View, announce, h, setAttribute, setShown, setText } from './dom';
 import { PosteriorView } from './posterior';
 import { PresentView } from './present';
+import { PrintSheet } from './print_sheet';
 import { LIST_ADDRESS, addressOf } from './route';
 import { SignalsView } from './signals';
 import { Strip } from './strip';
@@ -47,6 +48,9 @@ export class SessionPage implements View {
   private readonly computation = new ComputationView();
   private readonly present = new PresentView();
   private readonly comparison: ComparisonView | null;
+  private readonly sheet = new PrintSheet(() => ({
+    session: this.monitor.session, estimate: this.monitor.estimate, version: this.computation.version,
+  }));
   private byName = new Map<string, Strip>();
   private isFrozen = false;
   private isWhole = false;
@@ -67,12 +71,13 @@ export class SessionPage implements View {
     this.posterior = new PosteriorView(this.monitor.name);
     this.comparison = other ? new ComparisonView(id, other, () => { location.hash = addressOf(id); }) : null;
     this.retry.addEventListener('click', () => this.tryNow());
-    this.element = h('div.session', {}, this.head(), this.frozenNote, this.wait, this.body);
+    this.element = h('div.session', {}, this.sheet.element, this.head(), this.frozenNote, this.wait, this.body);
     this.body.append(this.alarms.element);
     if (this.comparison) this.body.append(this.comparison.element);
     this.body.append(
       h('div', {}, legend(), this.strips), this.present.element, this.signals.element,
-      h('div.pair', {}, this.posterior.element, h('div.panels', {}, this.posterior.words, this.computation.element)));
+      h('div.pair', {}, this.posterior.element, h('div.panels', {}, this.posterior.words, this.computation.element)),
+      this.sheet.problem);
     document.addEventListener('visibilitychange', this.onVisible);
     this.monitor.start();
     this.showStatus();
@@ -83,7 +88,7 @@ export class SessionPage implements View {
     document.removeEventListener('visibilitychange', this.onVisible);
     if (this.timer !== null) clearTimeout(this.timer);
     this.monitor.stop();
-    for (const view of [...this.byName.values(), this.alarms, this.signals, this.posterior, this.computation]) view.dispose();
+    for (const view of [...this.byName.values(), this.alarms, this.signals, this.posterior, this.computation, this.sheet]) view.dispose();
     this.comparison?.dispose();
   }
 

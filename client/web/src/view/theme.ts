@@ -18,7 +18,10 @@ function stored(): Choice {
   }
 }
 
-function apply(choice: Choice): void {
+let isInLight = false;  // whatever is chosen: for paper
+
+function apply(chosen: Choice): void {
+  const choice = isInLight ? 'light' : chosen;
   if (choice === 'auto') delete document.documentElement.dataset['theme'];
   else document.documentElement.dataset['theme'] = choice;
   document.dispatchEvent(new Event(THEME_EVENT));
@@ -27,6 +30,12 @@ function apply(choice: Choice): void {
 export function startTheme(): void {
   apply(stored());
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => apply(stored()));
+}
+
+// Shows the page in light colours, or again in those that are chosen. Charts are drawn anew.
+export function showInLight(isLight: boolean): void {
+  isInLight = isLight;
+  apply(stored());
 }
 
 export function themeSwitch(): HTMLButtonElement {

@@ -5,7 +5,10 @@ import * as client from '../api/client';
 import { CallError } from '../api/errors';
 import { addressOf } from './route';
 import { download, type Kind } from './download';
+import { TERMS } from '../text/terms';
 import { h, setText } from './dom';
+import { printPage } from './printing';
+import { explained } from './tooltip';
 import type { Estimate } from '../api/messages';
 
 export interface ToolbarEvents {
@@ -90,6 +93,14 @@ function comparison(id: string, say: (text: string) => void): HTMLElement {
   return form;
 }
 
+function printing(events: ToolbarEvents, say: (text: string) => void): HTMLButtonElement {
+  const print = (): void => {
+    if (events.estimate()) void printPage();
+    else say('There is no estimate to print yet.');
+  };
+  return explained(h('button', { type: 'button', onclick: print }, 'Print report'), TERMS.print);
+}
+
 export function toolbar(id: string, events: ToolbarEvents): HTMLElement {
   const trouble = h('p.trouble', { role: 'alert', hidden: true });
   const say = (text: string): void => {
@@ -101,6 +112,7 @@ export function toolbar(id: string, events: ToolbarEvents): HTMLElement {
       toggle('Freeze', events.onFreeze),
       toggle('Whole prior', events.onWhole),
       comparison(id, say),
-      downloads(id, events, say)),
+      downloads(id, events, say),
+      printing(events, say)),
     trouble);
 }

@@ -42,7 +42,12 @@ document.addEventListener('scroll', hideTooltip, { passive: true, capture: true 
 
 // A word that explains itself.
 export function term(label: string, text: string): HTMLButtonElement {
-  const button = h('button.term', { type: 'button', 'aria-describedby': idOf(text) }, label);
+  return explained(h('button.term', { type: 'button' }, label), text);
+}
+
+// Makes a button explain itself, and returns it.
+export function explained(button: HTMLButtonElement, text: string): HTMLButtonElement {
+  button.setAttribute('aria-describedby', idOf(text));
   const open = (): void => show(button, explanationOf(button) ?? text);
   button.addEventListener('mouseenter', open);
   button.addEventListener('focus', open);

@@ -67,6 +67,39 @@ test('the history of a session is there when a page is opened late', options, as
   await page.context().close();
 });
 
+test('the whole course of a long session stays while the page watches', options, async () => {
+  const long = daemon.add('wednesday', { count: 40_000, hasWriter: true });
+  const page = await open(browser, `${daemon.address}#/wednesday`);
+  await status(page, 'Live');
+  await page.waitForSelector('.strip canvas');
+  const end = long.history().history.points.at(-1).timeS;
+  // Readings of the chart at some shares of its width, s.
+  const readings = async () => {
+    const over = page.locator('.strip .u-over').first();
+    const { width } = await over.boundingBox();
+    const found = [];
+    for (const share of [0.01, 0.25, 0.5, 0.75, 0.99]) {
+      await over.hover({ position: { x: share * width, y: 40 } });
+      await until(async () => (await text(page, '.strip .readout')) !== '', 'a reading');
+      found.push(Number((await text(page, '.strip .readout')).split(' s:')[0].replace(/\s/g, '')) / (share * end));
+    }
+    return found;
+  };
+  const near = (value) => value > 0.9 && value < 1.1;
+  assert.ok((await readings()).slice(1).every(near), String(await readings()));
+  for (let k = 0; k < 40; ++k) {
+    long.push(100);
+    await page.waitForTimeout(20);
+  }
+  const samples = long.estimate().samples;
+  await page.waitForFunction((wanted) => document.querySelector('.progress').textContent.replace(/\s/g, '').includes(`·${wanted}samples`), samples);
+  const then = (await readings()).map((value) => value * end / long.estimate().time);
+  assert.ok(then.slice(1).every(near), String(then));
+  daemon.delete('wednesday');
+  quiet(page);
+  await page.context().close();
+});
+
 test('numbers follow the stream until they are frozen, and then again', options, async () => {
   const page = await open(browser, `${daemon.address}#/monday`);
   await status(page, 'Live');
@@ -196,7 +229,7 @@ test('the keyboard reaches everything, and sees where it is', options, async () 
     assert.doesNotMatch(name, /^no outline/);
     reached.add(name);
   }
-  for (const name of ['‹ Sessions', 'Freeze', 'Whole prior', 'other', 'Download', 'Whole run', 'Draw now']) {
+  for (const name of ['‹ Sessions', 'Freeze', 'Whole prior', 'other', 'Download', 'Print report', 'Whole run', 'Draw now']) {
     assert.ok(reached.has(name), `${name} is reached: ${[...reached].join(' | ')}`);
   }
   await page.locator('.term').first().focus();

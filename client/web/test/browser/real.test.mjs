@@ -82,6 +82,9 @@ test('all panels follow a record that polyest streams', options, async () => {
   await says(page, '94.1 %');
   await says(page, 'The data determine every combination');
   await hasNoNonsense(page);
+  await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+  assert.match(await page.locator('pre.problem').innerText(), /^\{\s+"model": \{"builtin": "mass_spring_damper"\}/);
+  await page.evaluate(() => dispatchEvent(new Event('afterprint')));
   assert.deepEqual(await findings(page), []);
   quiet(page);
   await page.context().close();

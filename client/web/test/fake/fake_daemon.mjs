@@ -64,9 +64,13 @@ class FakeSession {
     };
   }
 
+  // All estimates until there are 512, then every second one, then every fourth …, and the newest.
   history() {
-    const last = Math.min(this.count, 512);
-    return { history: { points: Array.from({ length: last }, (_, k) => this.point(this.count - last + k)) } };
+    let step = 1;
+    while (Math.ceil(this.count / step) > 512) step *= 2;
+    const kept = Array.from({ length: Math.ceil(this.count / step) }, (_, k) => k * step);
+    if (this.count > 0 && kept[kept.length - 1] !== this.count - 1) kept.push(this.count - 1);
+    return { history: { points: kept.map((index) => this.point(index)) } };
   }
 
   message(withProblem) {

@@ -16,6 +16,17 @@ describe('EstimateHistory', () => {
     expect(Array.from(history.series('k')?.x ?? []).map((x) => Math.round(10 * x))).toEqual([1, 2, 3, 4]);
   });
 
+  it('keeps the whole course of a long session that it watches for long', () => {
+    const history = new EstimateHistory();
+    const total = 100_000;
+    history.load(Array.from({ length: 391 }, (_, k) => at(256 * k)));  // of 100,000 estimates
+    for (let k = 256 * 390 + 1; k <= 2 * total; ++k) history.append(at(k));
+    const sequences = Array.from(history.series('k')?.x ?? []).map((x) => Math.round(10 * x));
+    const steps = sequences.slice(1, -1).map((value, i) => value - (sequences[i] as number));
+    expect(new Set(steps)).toEqual(new Set([256]));
+    expect([sequences[0], sequences[sequences.length - 1]]).toEqual([0, 2 * total]);
+  });
+
   it('does not take an estimate that is older than the last', () => {
     const history = new EstimateHistory();
     history.append(at(5));

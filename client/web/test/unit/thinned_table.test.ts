@@ -41,15 +41,33 @@ describe('ThinnedTable', () => {
   });
 
   it('replaces the newest row, and adds and removes columns', () => {
-    const table = new ThinnedTable(4, 1);
-    table.append([1]);
-    table.append([2]);
-    table.replaceLast([3]);
+    const table = new ThinnedTable(4, 2);
+    table.append([1, 10]);
+    table.append([2, 20]);
+    table.replaceLast([2, 30]);
     table.addColumn();
-    table.append([4, 40]);
-    expect(rows(table)).toEqual([1, 3, 4]);
-    expect(Array.from(table.column(1))).toEqual([NaN, NaN, 40]);
-    table.removeColumn(0);
-    expect(rows(table)).toEqual([NaN, NaN, 40]);
+    table.append([4, 40, 400]);
+    expect(Array.from(table.column(1))).toEqual([10, 30, 40]);
+    expect(Array.from(table.column(2))).toEqual([NaN, NaN, 400]);
+    table.removeColumn(1);
+    expect(Array.from(table.column(1))).toEqual([NaN, NaN, 400]);
+  });
+
+  it('goes on with rows that have been thinned as far apart as they are', () => {
+    const table = new ThinnedTable(64, 1);
+    for (let k = 0; k < 40; ++k) table.append([100 * k]);
+    table.append([3930]);  // the newest, off the others' grid
+    table.thinAsSoFar();
+    for (let k = 3931; k < 6000; ++k) table.append([k]);
+    const kept = rows(table);
+    expect(kept.slice(0, -1)).toEqual(Array.from({ length: 60 }, (_, k) => 100 * k));
+    expect(kept[kept.length - 1]).toBe(5999);
+  });
+
+  it('keeps rows evenly by their places, also where they come in steps', () => {
+    const table = new ThinnedTable(64, 1);
+    for (let k = 0; k < 10_000; k += 5) table.append([k]);
+    const kept = rows(table).slice(0, -1);
+    expect(new Set(kept.slice(1).map((value, i) => value - (kept[i] as number)))).toEqual(new Set([5 * 32]));
   });
 });

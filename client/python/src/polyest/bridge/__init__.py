@@ -1,7 +1,7 @@
-"""Streams a live CAN bus, or MCAP, into a session, and publishes its estimates.
+"""Streams a CAN bus, a server of Foxglove's protocol, or MCAP into a session; publishes estimates.
 
 The command `polyest-bridge CONFIGURATION`, or `python3 -m polyest.bridge CONFIGURATION`, runs for
-days: it connects again to the daemon and to the bus, sends again what the daemon has not
+days: it connects again to the daemon and to the source, sends again what the daemon has not
 acknowledged, and says in a line of status what it does and what it had to leave out. It needs
 `polyest[bridge]`.
 """

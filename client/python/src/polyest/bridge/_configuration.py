@@ -63,6 +63,18 @@ class McapStream:
 
 
 @dataclass(frozen=True)
+class FoxgloveServer:
+    """A server of Foxglove's WebSocket protocol."""
+
+    #: Its address, as in "ws://127.0.0.1:8765".
+    url: str
+
+
+#: Where measurements come from.
+SourceChoice = Union[CanBus, McapStream, FoxgloveServer]
+
+
+@dataclass(frozen=True)
 class Target:
     """Where estimates go."""
 
@@ -91,7 +103,7 @@ class Configuration:
 
     daemon: DaemonOptions
     session: SessionChoice
-    source: Union[CanBus, McapStream]
+    source: SourceChoice
     #: The signal, or the topic and field, of each output and streamed input of the problem.
     channels: Mapping[str, str]
     #: Units of channels that the source does not name, or names wrong.
@@ -201,13 +213,17 @@ def _bus(fields: Fields, folder: pathlib.Path, default: Optional[CanBus]) -> Can
         options=options)
 
 
-def _source(fields: Fields, folder: pathlib.Path) -> Union[CanBus, McapStream]:
-    kind = fields.choice("kind", ("can", "mcap"))
-    found: Union[CanBus, McapStream]
+def _source(fields: Fields, folder: pathlib.Path) -> SourceChoice:
+    kind = fields.choice("kind", ("can", "mcap", "foxglove"))
+    found: SourceChoice
     if kind == "can":
         found = _bus(fields, folder, None)
         if not found.database:
             raise refuse(fields.place("database"), "is required")
+    elif kind == "foxglove":
+        found = FoxgloveServer(fields.text("url"))
+        if not found.url.startswith(("ws://", "wss://")):
+            raise refuse(fields.place("url"), f"must begin with ws:// or wss://; got '{found.url}'")
     else:
         found = McapStream(_path(folder, fields.text("file", "-")))
     fields.end()
@@ -229,7 +245,7 @@ def _channels(table: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]
     return channels, units
 
 
-def _target(fields: Fields, source: Union[CanBus, McapStream], folder: pathlib.Path) -> Target:
+def _target(fields: Fields, source: SourceChoice, folder: pathlib.Path) -> Target:
     kind = fields.choice("kind", ("can", "mqtt", "foxglove", "jsonl"))
     if kind == "can":
         bus = _bus(fields, folder, source if isinstance(source, CanBus) else None)

@@ -14,10 +14,11 @@ from polyest.bridge._values import as_json
 from polyest.estimates import Estimate
 from polyest.io._choices import needed
 
-_PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+#: Names of the protocol, the newest first.
+PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 _CHANNEL = 1
-# Opcode, number of the subscription, time of the message, ns.
-_DATA = struct.Struct("<BIQ")
+#: Head of a message: opcode, number of the subscription, time of the message, ns.
+DATA = struct.Struct("<BIQ")
 _NUMBER = {"type": "number"}
 _SCHEMA = {"type": "object", "title": "polyest.Estimate", "properties": {
     "session": {"type": "string"}, "time": _NUMBER, "samples": {"type": "integer"},
@@ -71,7 +72,7 @@ class _Viewer:
                 payload, self._newest = self._newest, None
                 wanted = list(self._subscriptions)
             for number in wanted:
-                self.connection.send(_DATA.pack(1, number, time.time_ns()) + (payload or b""))
+                self.connection.send(DATA.pack(1, number, time.time_ns()) + (payload or b""))
 
     def end(self) -> None:
         """Ends the thread that writes."""
@@ -96,7 +97,7 @@ class FoxgloveOutlet:
     def open(self) -> None:
         """Listens."""
         self._server = self._serve(self._view, self._target.host, self._target.port,
-                                   subprotocols=list(_PROTOCOLS), max_size=1 << 20)
+                                   subprotocols=list(PROTOCOLS), max_size=1 << 20)
         threading.Thread(target=self._server.serve_forever, name="polyest-foxglove",
                          daemon=True).start()
 

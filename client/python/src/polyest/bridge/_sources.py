@@ -1,4 +1,4 @@
-"""Where measurements come from: a CAN bus that may disappear, or MCAP on the standard input."""
+"""Where measurements come from: a CAN bus, MCAP on the standard input, a server of Foxglove's."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import IO, Any, Optional, Union
 
 from polyest.bridge._backoff import Backoff
-from polyest.bridge._configuration import CanBus, Configuration, McapStream
+from polyest.bridge._configuration import CanBus, Configuration, FoxgloveServer, McapStream
+from polyest.bridge._foxglove_source import FoxgloveSource
+from polyest.bridge._topic_values import TopicValues
 from polyest.errors import InvalidInput
 from polyest.io._choices import needed, unknown
 from polyest.io._frames import FrameDecoder, load_database
 from polyest.io._rows import nanoseconds
-from polyest.io._topics import MessageDecoder, Path, check_encoding, unit_of
-from polyest.io.mcap import values_of
+from polyest.io._topics import MessageDecoder
 
 #: Takes a time, ns, and the values that some channels had then.
 Put = Callable[[int, Mapping[str, float]], None]
@@ -96,9 +97,9 @@ class McapSource:
     def __init__(self, stream: McapStream, channels: Mapping[str, str]) -> None:
         """Use it from one thread."""
         self._stream = stream
-        self._channels = channels
-        #: Units come with the messages: see `units_found`.
-        self.units = {name: "" for name in channels}
+        self._wanted = TopicValues(channels)
+        #: Units come with the topics.
+        self.units = self._wanted.units
         self.reconnects = 0
         self.undecodable = 0
         self.last: Optional[float] = None
@@ -116,32 +117,18 @@ class McapSource:
             raise InvalidInput(f"{name}: cannot be opened: {error.strerror}") from error
 
     def _read(self, opened: IO[bytes], put: Put, stop: threading.Event) -> None:
-        paths: dict[str, Path] = {}
         decoder = MessageDecoder()
         for schema, channel, message in _messages(opened, self._stream.file):
             if stop.is_set():
                 return
-            for quantity, text in self._channels.items():
-                fits = text == channel.topic or text.startswith((f"{channel.topic}.",
-                                                                 f"{channel.topic}["))
-                if quantity not in paths and fits:
-                    self._find(paths, quantity, text, schema, channel)
-            if any(path.topic == channel.topic for path in paths.values()):
-                values = values_of(paths, channel.topic,
-                                   decoder.decode(schema, channel, message.data))
+            if self._wanted.find(schema, channel):
+                values = self._wanted.values(
+                    channel, decoder.decode(schema, channel, message.data))
                 if values:
                     self.last = time.monotonic()
                     put(message.log_time, values)
-        for quantity, text in self._channels.items():
-            if quantity not in paths:
-                raise unknown(f"channels.{quantity}", "topic", text, ())
-
-    def _find(self, paths: dict[str, Path], quantity: str, text: str, schema: Any,
-              channel: Any) -> None:
-        path = Path(f"channels.{quantity}", text, {channel.topic: channel})
-        check_encoding(f"channels.{quantity}", channel)
-        paths[quantity] = path
-        self.units[quantity] = unit_of(schema, channel, path.steps)
+        for quantity, text in self._wanted.missing().items():
+            raise unknown(f"channels.{quantity}", "topic", text, ())
 
 
 def _messages(opened: IO[bytes], name: str) -> Iterator[tuple[Any, Any, Any]]:
@@ -167,11 +154,13 @@ def _messages(opened: IO[bytes], name: str) -> Iterator[tuple[Any, Any, Any]]:
                            f"{error or type(error).__name__}") from error
 
 
-Source = Union[CanSource, McapSource]
+Source = Union[CanSource, McapSource, FoxgloveSource]
 
 
 def source_of(configuration: Configuration, say: Callable[[str], None]) -> Source:
     """Returns the source of a configuration. Raises InvalidInput."""
     if isinstance(configuration.source, CanBus):
         return CanSource(configuration.source, configuration.channels, say)
+    if isinstance(configuration.source, FoxgloveServer):
+        return FoxgloveSource(configuration.source, configuration.channels, say)
     return McapSource(configuration.source, configuration.channels)

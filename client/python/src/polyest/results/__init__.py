@@ -1,5 +1,6 @@
 """Answers of studies: arrays with names and units."""
 
+from polyest.results.convergence import Convergence, ParameterConvergence
 from polyest.results.cost import (
     Axis,
     Choice,
@@ -22,9 +23,9 @@ from polyest.results.prior import (
 )
 
 __all__ = [
-    "Axis", "Choice", "CostGrid", "CostProfile", "CostProfiles", "DesignCandidate", "DesignOutput",
-    "ExpansionUsed", "ExperimentDesign", "Gain", "History", "HistoryPoint", "Joint", "Marginal",
-    "ParameterThen", "Posterior", "PredictedOutput", "Prediction", "Propagation",
-    "PropagationOutput", "RegularizationPoint", "RegularizationSweep", "Score", "Sensitivity",
-    "SensitivityOutput",
+    "AbruptChange", "Axis", "Choice", "Convergence", "CostGrid", "CostProfile", "CostProfiles",
+    "DesignCandidate", "DesignOutput", "ExpansionUsed", "ExperimentDesign", "Gain", "History",
+    "HistoryPoint", "Joint", "Marginal", "ParameterConvergence", "ParameterThen", "Posterior",
+    "PredictedOutput", "Prediction", "Propagation", "PropagationOutput", "RegularizationPoint",
+    "RegularizationSweep", "Score", "Sensitivity", "SensitivityOutput",
 ]

@@ -9,6 +9,7 @@ from polyest._messages import array, enum_name
 from polyest._proto.v1 import study_service_pb2
 from polyest._table import Floats
 from polyest.estimate_parts import Diagnostic
+from polyest.results import convergence
 
 if TYPE_CHECKING:
     import pandas
@@ -88,6 +89,13 @@ class Posterior:
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.parameters)
+
+    def convergence(self) -> convergence.Convergence:
+        """Returns R̂ and effective sample size of each parameter, as a table.
+
+        R̂ is NaN for importance sampling, whose draws form no chains.
+        """
+        return convergence.of_posterior(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Returns the samples as a DataFrame with a column for each parameter."""
