@@ -19,7 +19,9 @@ constexpr double kLargerThanNoise = 1.2;
 constexpr double kDensityMargin = 30;
 constexpr double kRateMargin = 6;
 
-double Rounded(double size) { return std::strtod(FormatNumber(size, 1).c_str(), nullptr); }
+double Rounded(double size, int digits = 1) {
+  return std::strtod(FormatNumber(size, digits).c_str(), nullptr);
+}
 
 std::vector<double> Rounded(std::vector<double> sizes) {
   std::ranges::transform(sizes, sizes.begin(), [](double size) { return Rounded(size); });
@@ -37,11 +39,35 @@ bool IsUncertain(const v1::Problem& problem, const std::string& name) {
                              [&](const auto& parameter) { return parameter.name() == name; });
 }
 
+// Returns χ² per sample of the output, 0 if it has none.
+double ChiSquaredPerSample(const v1::Estimate& estimate, const std::string& output) {
+  for (const v1::ChannelEstimate& channel : estimate.channels()) {
+    if (channel.output() == output && channel.samples() > 0) {
+      return channel.chi_squared() / static_cast<double>(channel.samples());
+    }
+  }
+  return 0;
+}
+
+// Returns the standard deviation of the residuals where they are larger than the noise stated by
+// `absolute` alone, else 0.
+double LargerSize(const v1::MeasuredOutput& output, const v1::Estimate& estimate) {
+  const v1::MeasuredOutput::Noise& noise = output.noise();
+  const double ratio = ChiSquaredPerSample(estimate, output.output());
+  const bool is_absolute = noise.absolute() > 0 && !noise.unknown() && noise.relative() == 0 &&
+                           noise.relative_to_max() == 0;
+  return is_absolute && ratio >= kLargerThanNoise ? Rounded(noise.absolute() * std::sqrt(ratio), 2)
+                                                  : 0;
+}
+
 // Adds correlated noise of all outputs whose noise is white. It stays white where residuals are.
-void AddCorrelatedNoise(const v1::Problem& problem, std::vector<Remedy>& remedies) {
+void AddCorrelatedNoise(const v1::Problem& problem, const v1::Estimate& estimate,
+                        std::vector<Remedy>& remedies) {
   Remedy remedy{Remedy::Kind::kCorrelatedNoise, {}, {}};
   for (const v1::MeasuredOutput& output : problem.measured()) {
-    if (IsWhite(output.noise())) remedy.names.push_back(output.output());
+    if (!IsWhite(output.noise())) continue;
+    remedy.names.push_back(output.output());
+    remedy.sizes.push_back(LargerSize(output, estimate));
   }
   if (!remedy.names.empty()) remedies.push_back(remedy);
 }
@@ -51,19 +77,11 @@ void AddLargerNoise(const v1::Problem& problem, const v1::Estimate& estimate,
                     std::vector<Remedy>& remedies) {
   Remedy remedy{Remedy::Kind::kLargerNoise, {}, {}};
   for (const v1::MeasuredOutput& output : problem.measured()) {
-    const v1::MeasuredOutput::Noise& noise = output.noise();
     const std::string name = NoiseParameter(output.output());
-    if (noise.absolute() <= 0 || noise.unknown() || IsUncertain(problem, name) ||
-        problem.fixed().contains(name)) {
-      continue;
-    }
-    for (const v1::ChannelEstimate& channel : estimate.channels()) {
-      const double ratio =
-          channel.chi_squared() / static_cast<double>(std::max<int64_t>(1, channel.samples()));
-      if (channel.output() != output.output() || ratio < kLargerThanNoise) continue;
-      remedy.names.push_back(output.output());
-      remedy.sizes.push_back(Rounded(noise.absolute() * std::sqrt(ratio)));
-    }
+    const double size = LargerSize(output, estimate);
+    if (size == 0 || IsUncertain(problem, name) || problem.fixed().contains(name)) continue;
+    remedy.names.push_back(output.output());
+    remedy.sizes.push_back(size);
   }
   if (!remedy.names.empty()) remedies.push_back(remedy);
 }
@@ -77,7 +95,7 @@ void AddProcessNoise(const v1::Problem& problem, const std::vector<StateSpread>&
     const double density = state.spread * state.spread / duration_s;
     remedies.push_back({Remedy::Kind::kProcessNoise,
                         {state.state},
-                        Rounded({1e-4 * density, 1e-2 * density, density})});
+                        Rounded({1e-2 * density, density, 1e-4 * density})});
   }
 }
 
@@ -89,7 +107,7 @@ void AddDrifts(const v1::Problem& problem, const v1::Estimate& estimate, double 
       if (p.name() != parameter.name() || !(p.prior_std_dev() > 0)) continue;
       const double rate = p.prior_std_dev() / std::sqrt(duration_s);
       remedies.push_back(
-          {Remedy::Kind::kDrift, {p.name()}, Rounded({1e-2 * rate, 1e-1 * rate, rate})});
+          {Remedy::Kind::kDrift, {p.name()}, Rounded({1e-1 * rate, rate, 1e-2 * rate})});
     }
   }
 }
@@ -100,8 +118,12 @@ v1::UncertainParameter& Named(v1::Problem& problem, const std::string& name) {
 
 void Correlate(v1::Problem& problem, const Remedy& remedy) {
   for (v1::MeasuredOutput& output : *problem.mutable_measured()) {
-    if (!std::ranges::count(remedy.names, output.output())) continue;
-    output.mutable_noise()->mutable_correlation()->set_auto_(true);
+    const auto named = std::ranges::find(remedy.names, output.output());
+    if (named == remedy.names.end()) continue;
+    const double size = remedy.sizes[static_cast<size_t>(named - remedy.names.begin())];
+    v1::MeasuredOutput::Noise& noise = *output.mutable_noise();
+    noise.mutable_correlation()->set_auto_(true);
+    if (size > 0) noise.set_absolute(size);
   }
 }
 
@@ -137,7 +159,7 @@ std::string ListJson(const char* field, const Messages& messages) {
 std::vector<Remedy> ListRemedies(const v1::Problem& problem, const v1::Estimate& estimate,
                                  const std::vector<StateSpread>& states, double duration_s) {
   std::vector<Remedy> remedies;
-  AddCorrelatedNoise(problem, remedies);
+  AddCorrelatedNoise(problem, estimate, remedies);
   AddLargerNoise(problem, estimate, remedies);
   if (!(duration_s > 0)) return remedies;
   AddProcessNoise(problem, states, true, duration_s, remedies);

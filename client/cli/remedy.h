@@ -8,8 +8,8 @@
 // the duration T of the record, they are
 //   10⁻⁴, 10⁻² and 1 times s²/T for a spectral density,
 //   10⁻², 10⁻¹ and 1 times d/√T for the rate of a drift,
-// rounded to one digit. A size that is estimated lies between bounds around one of these, which
-// reach to its neighbours and beyond.
+// rounded to one digit. Noise that is larger than stated has the size of the residuals. A size that
+// is estimated lies between bounds around one of these, which reach to its neighbours and beyond.
 
 #include <string>
 #include <vector>
@@ -31,7 +31,8 @@ struct Remedy {
   Kind kind = Kind::kCorrelatedNoise;
   // The outputs with the noise, or the state or parameter.
   std::vector<std::string> names;
-  // The sizes to try: of kLargerNoise that of each output together, of kCorrelatedNoise none.
+  // The sizes to try: the middle one, the largest and the smallest. Of the two
+  // kinds of noise that of each output; 0 for correlated noise of the size stated.
   std::vector<double> sizes;
 };
 

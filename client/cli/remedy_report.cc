@@ -86,16 +86,38 @@ void PrintRivals(const RemedyTrial& trial, std::ostream& out) {
   }
 }
 
-void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
-  const TriedRemedy& best = trial.tried.front();
-  if (best.gain <= kDecisiveEvidence) {
-    PrintSentence(out, absl::StrFormat(
-                           "None of these remedies fits: none gains more than %g in log evidence. "
-                           "The model probably lacks a term; compare models with and without it by "
-                           "polyest compare.",
-                           kDecisiveEvidence));
+void PrintJson(const TriedRemedy& tried, std::ostream& out) {
+  out << "Write into the problem file:\n";
+  for (const std::string& line : RemedyJson(tried.problem, tried.remedy)) {
+    out << "  " << line << '\n';
+  }
+}
+
+// Prints that no remedy gains evidence. One that leaves no contradiction may be right all the same.
+void PrintNoneFits(const RemedyTrial& trial, std::ostream& out) {
+  const std::string none =
+      absl::StrFormat("none gains more than %g in log evidence", kDecisiveEvidence);
+  const auto clean = std::ranges::find_if(trial.tried, [](const TriedRemedy& one) {
+    return Contradictions(one.assessment.posterior.diagnostics()).empty();
+  });
+  if (clean == trial.tried.end()) {
+    PrintSentence(out, absl::StrCat("None of these remedies fits: ", none,
+                                    ". The model probably lacks a term; compare models with and "
+                                    "without it by polyest compare."));
     return;
   }
+  PrintSentence(
+      out, absl::StrCat("The evidence prefers none of these remedies: ", none, ". With ",
+                        RemedyText(clean->remedy),
+                        " nothing contradicts the problem, however: choose it if it is what you "
+                        "know of the test. If not, the model probably lacks a term; compare "
+                        "models with and without it by polyest compare."));
+  PrintJson(*clean, out);
+}
+
+void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
+  const TriedRemedy& best = trial.tried.front();
+  if (best.gain <= kDecisiveEvidence) return PrintNoneFits(trial, out);
   PrintSentence(out, absl::StrFormat("The evidence prefers %s, by %.1f over the problem as it is; "
                                      "%s.",
                                      RemedyText(best.remedy), best.gain, HeldOutText(best, trial)));
@@ -105,8 +127,7 @@ void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
                                     " remains: the problem probably needs another remedy as well, "
                                     "or the model lacks a term."));
   }
-  out << "Write into the problem file:\n";
-  for (const std::string& line : RemedyJson(best.problem, best.remedy)) out << "  " << line << '\n';
+  PrintJson(best, out);
 }
 
 }  // namespace

@@ -92,13 +92,15 @@ class Trial {
     backend_.SetTask(RemedyText(remedy));
     std::optional<TriedRemedy> tried;
     const std::vector<double> sizes = HasSize(remedy) ? remedy.sizes : std::vector<double>{0};
-    for (const double size : sizes) {
+    for (size_t i = 0; i < sizes.size(); ++i) {
+      const double size = sizes[i];
       const v1::Problem problem = WithKnownSize(experiment_.problem(), remedy, size);
       POLYEST_ASSIGN_OR_RETURN(const bool better, Improve(problem, tried));
       if (!tried) break;
       if (!better) continue;
       tried->remedy = remedy;
       tried->remedy.sizes = HasSize(remedy) ? std::vector<double>{size} : remedy.sizes;
+      if (i == 1) break;  // larger is better than the middle, so that less would be worse
     }
     if (tried) result_.tried.push_back(*std::move(tried));
     return absl::OkStatus();
