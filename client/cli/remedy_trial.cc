@@ -167,6 +167,18 @@ std::vector<v1::Diagnostic::Code> Contradictions(
   return codes;
 }
 
+bool CallsForRemedies(const v1::Estimate& estimate) {
+  const auto codes = Contradictions(estimate.diagnostics());
+  if (std::ranges::any_of(codes, [](auto code) { return code != v1::Diagnostic::MODEL_MISFIT; })) {
+    return true;
+  }
+  // A misfit is said of residuals that are too small where χ² < N/1.5.
+  return !codes.empty() &&
+         std::ranges::any_of(estimate.channels(), [](const v1::ChannelEstimate& channel) {
+           return 1.5 * channel.chi_squared() >= static_cast<double>(channel.samples());
+         });
+}
+
 absl::StatusOr<RemedyTrial> TryRemedies(const v1::Experiment& experiment,
                                         const v1::Estimate& estimate, Backend& backend) {
   return Trial(experiment, backend).Run(estimate);

@@ -34,6 +34,10 @@ struct RemedyTrial {
 std::vector<v1::Diagnostic::Code> Contradictions(
     const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
 
+// Returns whether an estimate is contradicted in a way that remedies may explain: by one of these
+// diagnostics, other than a misfit of residuals that are only too small.
+bool CallsForRemedies(const v1::Estimate& estimate);
+
 // Tries the remedies, at most eight that are not refused. One with a size has the evidence of the
 // best size tried; of the best two that gain a decisive evidence, the size is then estimated, and
 // they are scored on held-out rows as the problem is. Without any evidence of the problem, nothing

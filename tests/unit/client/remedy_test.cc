@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 
+#include "client/cli/remedy_trial.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -114,6 +116,18 @@ TEST(RemedyTest, LargerNoiseIsAParameterWithItsOwnPrior) {
       RemedyJson(WithKnownSize(Oscillator(), remedy, 0), remedy),
       ElementsAre(HasSubstr(R"({"name":"x.noise","lognormal":{"mean":0.02,"stdDev":0.02}})"),
                   R"("likelihood": "PREDICTION_ERROR")"));
+}
+
+TEST(RemedyTest, ResidualsThatAreOnlyTooSmallCallForNone) {
+  v1::Estimate estimate = WithChiSquared(30);
+  EXPECT_FALSE(CallsForRemedies(estimate));
+  estimate.add_diagnostics()->set_code(v1::Diagnostic::MODEL_MISFIT);
+  EXPECT_FALSE(CallsForRemedies(estimate));
+  estimate.mutable_channels(0)->set_chi_squared(200);
+  EXPECT_TRUE(CallsForRemedies(estimate));
+  estimate.mutable_channels(0)->set_chi_squared(30);
+  estimate.add_diagnostics()->set_code(v1::Diagnostic::INCONSISTENT_OVER_TIME);
+  EXPECT_TRUE(CallsForRemedies(estimate));
 }
 
 TEST(RemedyTest, AProblemThatMeasuresNothingHasNoRemedy) {
