@@ -37,7 +37,7 @@ void AddExplain(CommandRegistry& registry) {
            "by filters, which may take a minute or more."},
       arguments);
   AddStudyInput(command, *arguments);
-  command.add_flag("!--no-remedies", arguments->remedies,
+  command.add_flag("--no-remedies", arguments->no_remedies,
                    "Do not try remedies where residuals contradict the problem");
 }
 

@@ -197,7 +197,7 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     design = *std::move(answer);
   }
   std::optional<absl::StatusOr<RemedyTrial>> trial;
-  const bool needed = arguments.remedies && CallsForRemedies(input.estimate);
+  const bool needed = !arguments.no_remedies && CallsForRemedies(input.estimate);
   if (needed && arguments.session.empty()) trial = TryOnRecord(input, *backend);
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);

@@ -123,9 +123,9 @@ void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
                                      RemedyText(best.remedy), best.gain, HeldOutText(best, trial)));
   PrintRivals(trial, out);
   if (!Contradictions(best.assessment.posterior.diagnostics()).empty()) {
-    PrintSentence(out, absl::StrCat("Even so ", Remaining(best.assessment),
-                                    " remains: the problem probably needs another remedy as well, "
-                                    "or the model lacks a term."));
+    PrintSentence(out, absl::StrCat("Even so, warnings remain (", Remaining(best.assessment),
+                                    "): the problem probably needs another remedy as well, or the "
+                                    "model lacks a term."));
   }
   PrintJson(best, out);
 }
