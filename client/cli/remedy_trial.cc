@@ -168,12 +168,8 @@ std::vector<v1::Diagnostic::Code> Contradictions(
 }
 
 bool CallsForRemedies(const v1::Estimate& estimate) {
-  const auto codes = Contradictions(estimate.diagnostics());
-  if (std::ranges::any_of(codes, [](auto code) { return code != v1::Diagnostic::MODEL_MISFIT; })) {
-    return true;
-  }
-  // A misfit is said of residuals that are too small where χ² < N/1.5.
-  return !codes.empty() &&
+  // Residuals are reported as too small where χ² < N/1.5.
+  return !Contradictions(estimate.diagnostics()).empty() &&
          std::ranges::any_of(estimate.channels(), [](const v1::ChannelEstimate& channel) {
            return 1.5 * channel.chi_squared() >= static_cast<double>(channel.samples());
          });

@@ -35,7 +35,7 @@ std::vector<v1::Diagnostic::Code> Contradictions(
     const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
 
 // Returns whether an estimate is contradicted in a way that remedies may explain: by one of these
-// diagnostics, other than a misfit of residuals that are only too small.
+// diagnostics, unless the residuals of all outputs are far smaller than the noise.
 bool CallsForRemedies(const v1::Estimate& estimate);
 
 // Tries the remedies, at most eight that are not refused. One with a size has the evidence of the

@@ -46,7 +46,8 @@ class ExplainTest : public CommandTest {
       if (!ones.empty()) absl::StrAppend(&record, ",1");
     }
     const std::string explained = as.empty() ? file : File("as.json", as);
-    const Finished run = Run({"explain", explained, File("data.csv", record + "\n")});
+    const Finished run =
+        Run({"explain", explained, File("data.csv", record + "\n"), "--no-remedies"});
     EXPECT_EQ(run.exit_status, 0) << run.err;
     return run.out;
   }
