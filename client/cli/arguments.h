@@ -49,7 +49,8 @@ struct ExplainArguments {
   std::string problem_file;
   std::string data_file;
   DataFileOptions data_options;
-  std::string session;  // its id, in place of the files; empty: none
+  std::string session;       // its id, in place of the files; empty: none
+  bool no_remedies = false;  // whether remedies of residuals are left untried
 };
 
 struct StreamArguments {

@@ -20,7 +20,7 @@ class LocalBackend : public Backend {
   explicit LocalBackend(const Place& place)
       : threads_(place.threads),
         models_(OpenModels(place)),
-        line_([progress = progress_] { return progress->Describe(); }) {
+        line_([this] { return WithTask(progress_->Describe()); }) {
     if (place.deadline_s > 0) {
       const std::chrono::duration<double> length(place.deadline_s);
       stop_ =
@@ -110,8 +110,9 @@ absl::StatusOr<Response> WithSizeHint(absl::StatusOr<Response> response) {
 class RemoteBackend : public Backend {
  public:
   explicit RemoteBackend(const Place& place)
-      : client_(place.server, ToClientOptions(place)),
-        line_([server = place.server] { return absl::StrCat("waiting for ", server); }) {}
+      : client_(place.server, ToClientOptions(place)), line_([this, server = place.server] {
+          return WithTask(absl::StrCat("waiting for ", server));
+        }) {}
 
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
       const v1::ComputeEstimateRequest& request) override {
@@ -161,6 +162,16 @@ class RemoteBackend : public Backend {
 };
 
 }  // namespace
+
+void Backend::SetTask(const std::string& task) {
+  const std::lock_guard lock(mutex_);
+  task_ = task;
+}
+
+std::string Backend::WithTask(const std::string& progress) const {
+  const std::lock_guard lock(mutex_);
+  return task_.empty() ? progress : absl::StrCat(task_, " · ", progress);
+}
 
 ClientOptions ToClientOptions(const Place& place) {
   ClientOptions options;

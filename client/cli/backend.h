@@ -5,6 +5,8 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <mutex>
+#include <string>
 
 #include "client/cli/arguments.h"
 #include "core/external/model_library.h"
@@ -38,6 +40,17 @@ class Backend {
   virtual absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request) = 0;
   virtual absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request) = 0;
+
+  // Puts what the next operations are for before the progress that the line shows.
+  void SetTask(const std::string& task);
+
+ protected:
+  // Returns the progress with the task in front, if there is one. Any thread may call it.
+  std::string WithTask(const std::string& progress) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::string task_;
 };
 
 // Returns the options for the client of a place. The token comes from the environment variable

@@ -30,9 +30,15 @@ void AddExplain(CommandRegistry& registry) {
       {.name = "explain",
        .summary =
            "Explain which parameters the data identify, which they do not, and what would help",
-       .examples = {"explain problem.json data.csv", "explain --session rig-1 --server rig:50051"}},
+       .examples = {"explain problem.json data.csv", "explain --session rig-1 --server rig:50051"},
+       .notes =
+           "Where residuals contradict the problem, remedies are tried on the record: correlated\n"
+           "or larger noise of the sensors, process noise and drift. Each takes several estimates\n"
+           "by filters, which may take a minute or more."},
       arguments);
   AddStudyInput(command, *arguments);
+  command.add_flag("--no-remedies", arguments->no_remedies,
+                   "Do not try remedies where residuals contradict the problem");
 }
 
 void AddPosterior(CommandRegistry& registry) {

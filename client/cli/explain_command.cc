@@ -13,6 +13,8 @@
 #include "client/cli/explain_input.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/remedy_report.h"
+#include "client/cli/remedy_trial.h"
 #include "client/cli/screen.h"
 #include "core/common/status.h"
 #include "polyest/data_file.h"
@@ -116,7 +118,7 @@ v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem, doub
 
 // Returns a sentence that proposes how to identify the i-th parameter, or says that no alternative
 // considered would.
-std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) {
+std::string Proposal(const Design& design, int i, const v1::ParameterEstimate& p) {
   const auto helps = [&](double sd) { return sd < kHelps * p.prior_std_dev(); };
   std::string best;
   double least = kHelps * p.prior_std_dev();
@@ -152,17 +154,41 @@ std::string Remedy(const Design& design, int i, const v1::ParameterEstimate& p) 
       ", or tie it to others by \"derived\".");
 }
 
+absl::StatusOr<RemedyTrial> TryOnRecord(const ExplainInput& input, Backend& backend) {
+  v1::Experiment experiment;
+  *experiment.mutable_problem() = input.problem;
+  *experiment.mutable_measurements() = input.measurements;
+  return TryRemedies(experiment, input.estimate, backend);
+}
+
+// Returns the positions of the parameters that the data leave open.
+std::vector<int> OpenParameters(const ExplainInput& input) {
+  std::vector<int> open;
+  for (int i = 0; i < input.estimate.parameters_size(); ++i) {
+    // The parameters of further runs follow those of the first; the same remedies apply to them.
+    if (i >= input.problem.uncertain_size()) break;
+    if (input.estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) {
+      open.push_back(i);
+    }
+  }
+  return open;
+}
+
+// Prints what the data say of the parameters. `design`: for those that are open, if there is one.
+void PrintExplanation(const v1::Estimate& estimate, const std::vector<int>& open,
+                      const std::optional<Design>& design, std::ostream& out) {
+  for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
+  PrintTradeOffs(estimate, out);
+  PrintDiagnostics(estimate.diagnostics(), out);
+  if (!design) return;
+  for (const int i : open) PrintSentence(out, Proposal(*design, i, estimate.parameters(i)));
+}
+
 absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   auto backend = MakeBackend(arguments.place);
   POLYEST_ASSIGN_OR_RETURN(const ExplainInput input, ReadExplainInput(arguments, *backend));
-  const v1::Estimate& estimate = input.estimate;
-  std::vector<int> open;
-  for (int i = 0; i < estimate.parameters_size(); ++i) {
-    // The parameters of further runs follow those of the first; the same remedies apply to them.
-    if (i >= input.problem.uncertain_size()) break;
-    if (estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) open.push_back(i);
-  }
-  // Without any duration there is no experiment to design; the answer has no remedies then.
+  const std::vector<int> open = OpenParameters(input);
+  // Without any duration there is no experiment to design; the answer then proposes none.
   std::optional<Design> design;
   if (const double until_s = LongestRun(input); !open.empty() && until_s > 0) {
     const v1::Problem problem = WithoutStreamedInputs(input.problem, input.measurements);
@@ -170,13 +196,19 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     if (!answer.ok()) return InInput(answer.status(), arguments);
     design = *std::move(answer);
   }
+  std::optional<absl::StatusOr<RemedyTrial>> trial;
+  const bool needed = !arguments.no_remedies && CallsForRemedies(input.estimate);
+  if (needed && arguments.session.empty()) trial = TryOnRecord(input, *backend);
   backend.reset();  // erases its progress line
-  for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
-  PrintTradeOffs(estimate, out);
-  PrintDiagnostics(estimate.diagnostics(), out);
-  if (!design) return absl::OkStatus();
-  for (const int i : open) PrintSentence(out, Remedy(*design, i, estimate.parameters(i)));
-  return absl::OkStatus();
+  PrintExplanation(input.estimate, open, design, out);
+  if (needed && !trial) {
+    PrintSentence(out,
+                  "Remedies are tried where the record is given as files: polyest explain PROBLEM "
+                  "DATA.");
+  }
+  if (!trial) return absl::OkStatus();
+  if (trial->ok()) PrintTrial(**trial, out);
+  return InInput(trial->status(), arguments);
 }
 
 }  // namespace

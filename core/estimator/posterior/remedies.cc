@@ -13,7 +13,7 @@ std::string AdviseProcessNoise(const ResolvedProblem& resolved) {
   problem.process_noise = {{.state = state, .unknown = true, .lower = 1, .upper = 2}};
   problem.likelihood.reset();
   if (!CheckFilters(problem).empty() || resolved.delays_outputs()) return "";
-  return "; where disturbances act on states, give these processNoise";
+  return "; where disturbances act on states, give these processNoise (polyest explain tries it)";
 }
 
 std::string AdviseDrift(const ResolvedProblem& resolved, int parameter) {
@@ -24,7 +24,8 @@ std::string AdviseDrift(const ResolvedProblem& resolved, int parameter) {
     one.drift = RandomWalk{.std_dev_per_sqrt_s = 1};
     problem.likelihood.reset();
     if (!CheckFilters(problem).empty() || resolved.delays_outputs()) return "";
-    return absl::StrCat("; if ", name, " changes with time, let it drift");
+    return absl::StrCat("; if ", name,
+                        " changes with time, let it drift (polyest explain tries it)");
   }
   return "";
 }

@@ -1,9 +1,11 @@
-// Tests `polyest explain` on the paper's three cases, sections 3.4 to 3.6. The records are the
+// Tests `polyest explain` on the paper's three cases, sections 3.4 to 3.6, whose records are the
 // means of the priors' predictions: they have no noise, and their truth is near the priors'
-// centres.
+// centres. Remedies are tried on parts of the examples' records.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
+
+#include <random>
 
 #include "polyest/v1/study_service.pb.h"
 #include "tests/integration/cli/command_test.h"
@@ -44,7 +46,8 @@ class ExplainTest : public CommandTest {
       if (!ones.empty()) absl::StrAppend(&record, ",1");
     }
     const std::string explained = as.empty() ? file : File("as.json", as);
-    const Finished run = Run({"explain", explained, File("data.csv", record + "\n")});
+    const Finished run =
+        Run({"explain", explained, File("data.csv", record + "\n"), "--no-remedies"});
     EXPECT_EQ(run.exit_status, 0) << run.err;
     return run.out;
   }
@@ -137,6 +140,110 @@ TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
   EXPECT_EQ(run.exit_status, 0);
   EXPECT_THAT(run.out, AllOf(HasSubstr("k is identified: 41."), HasSubstr("c is identified: 0.2"),
                              Not(HasSubstr("excitation"))));
+}
+
+// Returns an oscillator's problem. `unknown` is the uncertain parameter, `fixed` the known values.
+std::string PerfectOscillator(const std::string& fixed, const std::string& unknown,
+                              const std::string& more = "") {
+  return absl::StrCat(
+      R"({"model": {"builtin": "mass_spring_damper"}, "fixed": )", fixed, R"(, "uncertain": [)",
+      unknown, R"(], "measured": [{"output": "x", "noise": {"absolute": 0.005}}])", more, "}");
+}
+
+constexpr char kReleased[] = R"({"m": 1, "x0": 1, "c": 0.23})";
+constexpr char kStiffness[] = R"({"name": "k", "normal": {"mean": 41, "stdDev": 1}})";
+
+class RemediesTest : public CommandTest {
+ protected:
+  // Returns the header and every `step`-th of the first `rows` rows of an example's record.
+  std::string Record(const std::string& name, int rows, int step = 1) {
+    std::ifstream in(Example(name));
+    std::string text, line;
+    for (int i = 0; i <= rows && std::getline(in, line); ++i) {
+      if (i % step == 0) text += line + "\n";
+    }
+    return File("record.csv", text);
+  }
+
+  std::string Explain(const std::string& problem, const std::string& record,
+                      const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments = {"explain", File("problem.json", problem), record};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Finished run = Run(arguments);
+    EXPECT_EQ(run.exit_status, 0) << run.err;
+    return run.out;
+  }
+};
+
+TEST_F(RemediesTest, ProcessNoiseIsPreferredWhereAForceDisturbs) {
+  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), Record("disturbed.csv", 120)),
+              AllOf(HasSubstr("The evidence prefers process noise on v, by "),
+                    HasSubstr("the held-out rows agree"),
+                    HasSubstr(R"("processNoise": [{"state":"v","unknown":true)")));
+}
+
+TEST_F(RemediesTest, DriftIsPreferredWhereADamperWarmsUp) {
+  const std::string problem = PerfectOscillator(
+      R"({"m": 1, "k": 41.2})", R"({"name": "c", "lognormal": {"mean": 1, "stdDev": 0.4}})",
+      R"(, "inputs": [{"name": "force", "sinusoid": {"amplitude": 2, "frequencyHz": 1}}])");
+  EXPECT_THAT(Explain(problem, Record("warming.csv", 1200, 8)),
+              AllOf(HasSubstr("The evidence prefers drift of c, by "),
+                    HasSubstr(R"("drift":{"randomWalk":{"unknown":true)")));
+}
+
+TEST_F(RemediesTest, CorrelatedNoiseIsPreferredWhereTheSensorWanders) {
+  std::ifstream in(Example("oscillator.csv"));
+  std::string line, record;
+  std::getline(in, line);
+  record = line + "\n";
+  std::mt19937 random(1);
+  double error = 0;  // first-order autoregressive
+  for (int i = 0; i < 120 && std::getline(in, line); ++i) {
+    const size_t comma = line.find(',');
+    error = 0.9 * error + 0.04 * (static_cast<double>(random()) / std::mt19937::max() - 0.5);
+    absl::StrAppend(&record, line.substr(0, comma), ",", std::stod(line.substr(comma + 1)) + error,
+                    "\n");
+  }
+  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), File("record.csv", record)),
+              AllOf(HasSubstr("The evidence prefers correlated noise of x, by "),
+                    HasSubstr(R"("correlation":{"auto":true})")));
+}
+
+TEST_F(RemediesTest, NoEvidenceIsNeededForARemedyThatLeavesNoContradiction) {
+  const std::string white = R"({
+    "model": {"builtin": "mass_spring_damper"}, "fixed": {"m": 1, "x0": 1},
+    "uncertain": [{"name": "k", "uniform": {"lower": 31.584, "upper": 47.376}},
+                  {"name": "c", "uniform": {"lower": 0.1, "upper": 0.3}}],
+    "measured": [{"output": "x", "noise": {"unknown": true, "outliers": "STUDENT_T"}}]})";
+  EXPECT_THAT(Explain(white, Example("rough_sensor.csv")),
+              AllOf(HasSubstr("With correlated noise of x nothing contradicts the problem"),
+                    HasSubstr(R"("correlation":{"auto":true})"), Not(HasSubstr("process noise"))));
+}
+
+TEST_F(RemediesTest, NothingIsTriedWithoutAContradictionOrIfItIsNotWanted) {
+  const Finished good = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
+  EXPECT_THAT(good.out, Not(HasSubstr("remed")));
+  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), Record("disturbed.csv", 120),
+                      {"--no-remedies"}),
+              AllOf(HasSubstr("model misfit"), Not(HasSubstr("log evidence gained"))));
+}
+
+TEST_F(RemediesTest, NothingIsTriedWithoutEvidence) {
+  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness, R"(, "regularization": 2)"),
+                      Record("disturbed.csv", 120)),
+              HasSubstr("No remedy was tried: the problem has no evidence"));
+}
+
+TEST_F(RemediesTest, ASessionIsReferredToItsFiles) {
+  const DaemonProcess daemon;
+  const std::string problem = File("problem.json", PerfectOscillator(kReleased, kStiffness));
+  const Finished streamed = Run({"stream", problem, Record("disturbed.csv", 120), "--server",
+                                 daemon.address(), "--session", "rig"});
+  ASSERT_EQ(streamed.exit_status, 0) << streamed.err;
+  const Finished run = Run({"explain", "--session", "rig", "--server", daemon.address()});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("model misfit"),
+                             HasSubstr("Remedies are tried where the record is given as files")));
 }
 
 }  // namespace

@@ -1,0 +1,183 @@
+#include "client/cli/remedy_trial.h"
+
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "client/cli/arguments.h"
+#include "client/cli/state_spread.h"
+#include "core/common/status.h"
+#include "proto/wire/refusal/refusal.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr size_t kMaxTried = 8;
+constexpr size_t kFinalists = 2;
+
+// Returns whether the computing program does not accept the problem, whatever the time.
+bool IsRefusal(const absl::Status& status) {
+  if (absl::IsResourceExhausted(status)) {
+    const auto refusal = RefusalOf(status);
+    return !refusal || !refusal->retry_delay;
+  }
+  return absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+}
+
+class Trial {
+ public:
+  Trial(const v1::Experiment& experiment, Backend& backend)
+      : experiment_(experiment), backend_(backend) {}
+
+  absl::StatusOr<RemedyTrial> Run(const v1::Estimate& estimate) {
+    backend_.SetTask("weighing the problem as it is");
+    POLYEST_ASSIGN_OR_RETURN(result_.untreated, Weigh(experiment_, backend_));
+    if (!result_.untreated.log_evidence) return std::move(result_);
+    POLYEST_ASSIGN_OR_RETURN(const std::vector<StateSpread> states,
+                             SpreadsOfStates(experiment_, backend_));
+    const auto& times = experiment_.measurements().time_s();
+    const double duration_s = times.empty() ? 0 : *std::ranges::max_element(times);
+    for (const Remedy& remedy : ListRemedies(experiment_.problem(), estimate, states, duration_s)) {
+      if (result_.tried.size() == kMaxTried) {
+        result_.left_out.push_back(remedy);
+      } else {
+        POLYEST_RETURN_IF_ERROR(TrySizes(remedy));
+      }
+    }
+    Sort();
+    POLYEST_RETURN_IF_ERROR(EstimateSizes());
+    POLYEST_RETURN_IF_ERROR(ScoreFinalists());
+    return std::move(result_);
+  }
+
+ private:
+  void Sort() { std::ranges::stable_sort(result_.tried, std::greater(), &TriedRemedy::gain); }
+
+  bool IsFinalist(size_t i) const {
+    return i < std::min(kFinalists, result_.tried.size()) &&
+           result_.tried[i].gain > kDecisiveEvidence;
+  }
+
+  v1::Experiment With(const v1::Problem& problem) const {
+    v1::Experiment changed = experiment_;
+    *changed.mutable_problem() = problem;
+    return changed;
+  }
+
+  // Weighs the problem with a remedy. Returns whether it is not refused, has an evidence to compare
+  // and gains more than `tried` has, which it then replaces.
+  absl::StatusOr<bool> Improve(const v1::Problem& problem, std::optional<TriedRemedy>& tried) {
+    auto weighed = Weigh(With(problem), backend_);
+    if (IsRefusal(weighed.status())) {
+      result_.refusal.Update(weighed.status());
+      return false;
+    }
+    POLYEST_RETURN_IF_ERROR(weighed.status());
+    if (weighed->values != result_.untreated.values ||
+        !HaveComparableEvidence(*weighed, result_.untreated)) {
+      return false;
+    }
+    const double gain = *weighed->log_evidence - *result_.untreated.log_evidence;
+    if (tried && gain <= tried->gain) return false;
+    if (!tried) tried.emplace();
+    tried->problem = problem;
+    tried->assessment = *std::move(weighed);
+    tried->gain = gain;
+    return true;
+  }
+
+  absl::Status TrySizes(const Remedy& remedy) {
+    backend_.SetTask(RemedyText(remedy));
+    std::optional<TriedRemedy> tried;
+    const std::vector<double> sizes = HasSize(remedy) ? remedy.sizes : std::vector<double>{0};
+    for (size_t i = 0; i < sizes.size(); ++i) {
+      const double size = sizes[i];
+      const v1::Problem problem = WithKnownSize(experiment_.problem(), remedy, size);
+      POLYEST_ASSIGN_OR_RETURN(const bool better, Improve(problem, tried));
+      if (!tried) break;
+      if (!better) continue;
+      tried->remedy = remedy;
+      tried->remedy.sizes = HasSize(remedy) ? std::vector<double>{size} : remedy.sizes;
+      if (i == 1) break;  // larger is better than the middle, so that less would be worse
+    }
+    if (tried) result_.tried.push_back(*std::move(tried));
+    return absl::OkStatus();
+  }
+
+  // Lets the sizes of the finalists be estimated, whatever that costs in evidence.
+  absl::Status EstimateSizes() {
+    for (size_t i = 0; IsFinalist(i); ++i) {
+      TriedRemedy& finalist = result_.tried[i];
+      if (!HasSize(finalist.remedy)) continue;
+      backend_.SetTask(absl::StrFormat("size of %s", RemedyText(finalist.remedy)));
+      std::optional<TriedRemedy> estimated;
+      const v1::Problem problem =
+          WithUnknownSize(experiment_.problem(), finalist.remedy, finalist.remedy.sizes.front());
+      POLYEST_ASSIGN_OR_RETURN(const bool accepted, Improve(problem, estimated));
+      if (!accepted) continue;
+      estimated->remedy = std::move(finalist.remedy);
+      finalist = *std::move(estimated);
+    }
+    Sort();
+    return absl::OkStatus();
+  }
+
+  absl::Status ScoreFinalists() {
+    const double held_out = CompareArguments().held_out;
+    for (size_t i = 0; IsFinalist(i); ++i) {
+      TriedRemedy& finalist = result_.tried[i];
+      if (i == 0) {
+        backend_.SetTask("held-out rows, the problem as it is");
+        const absl::Status scored = Score(experiment_, held_out, backend_, result_.untreated);
+        if (!scored.ok()) return IsRefusal(scored) ? absl::OkStatus() : scored;
+      }
+      backend_.SetTask(absl::StrFormat("held-out rows, %s", RemedyText(finalist.remedy)));
+      const absl::Status scored =
+          Score(With(finalist.problem), held_out, backend_, finalist.assessment);
+      if (!scored.ok() && !IsRefusal(scored)) return scored;
+      finalist.scored = scored.ok() && finalist.assessment.held_out == result_.untreated.held_out;
+    }
+    return absl::OkStatus();
+  }
+
+  const v1::Experiment& experiment_;
+  Backend& backend_;
+  RemedyTrial result_;
+};
+
+}  // namespace
+
+std::vector<v1::Diagnostic::Code> Contradictions(
+    const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics) {
+  std::vector<v1::Diagnostic::Code> codes;
+  for (const v1::Diagnostic& diagnostic : diagnostics) {
+    switch (diagnostic.code()) {
+      case v1::Diagnostic::MODEL_MISFIT:
+      case v1::Diagnostic::CORRELATED_RESIDUALS:
+      case v1::Diagnostic::WINDOWS_DISAGREE:
+      case v1::Diagnostic::INCONSISTENT_OVER_TIME:
+        if (std::ranges::count(codes, diagnostic.code()) == 0) codes.push_back(diagnostic.code());
+        break;
+      default:
+        break;
+    }
+  }
+  return codes;
+}
+
+bool CallsForRemedies(const v1::Estimate& estimate) {
+  // Residuals are reported as too small where χ² < N/1.5.
+  return !Contradictions(estimate.diagnostics()).empty() &&
+         std::ranges::any_of(estimate.channels(), [](const v1::ChannelEstimate& channel) {
+           return 1.5 * channel.chi_squared() >= static_cast<double>(channel.samples());
+         });
+}
+
+absl::StatusOr<RemedyTrial> TryRemedies(const v1::Experiment& experiment,
+                                        const v1::Estimate& estimate, Backend& backend) {
+  return Trial(experiment, backend).Run(estimate);
+}
+
+}  // namespace polyest::internal
