@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 from collections.abc import Iterator
 from typing import Any, Optional
 
@@ -68,22 +69,30 @@ class Transport:
                       requests: Iterator[Request]) -> Response:
         """Sends requests and returns the one answer.
 
-        Raises PolyestError. If the iterator of the requests fails, they end early, which the method
-        must refuse, and its exception is raised.
+        Raises PolyestError. If the iterator of the requests fails, the call is cancelled and its
+        exception raised: requests that merely ended early might be accepted.
         """
         failures: list[Exception] = []
+        begun = threading.Event()
 
         def until_failure() -> Iterator[Request]:
             try:
                 yield from requests
             except Exception as failure:
                 failures.append(failure)
+                begun.wait()
+                call.cancel()
 
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.stream_unary(method.path, encode.SerializeToString, decode.FromString)
+        call = self._channel.stream_unary(
+            method.path, encode.SerializeToString, decode.FromString).future(
+                until_failure(), metadata=self.options.metadata())
+        begun.set()
         try:
-            response: Response = call(until_failure(), metadata=self.options.metadata())
+            response: Response = call.result()
+        except grpc.FutureCancelledError:
+            raise failures[0] from None
         except grpc.RpcError as error:
             raise (failures[0] if failures else self.options.error_of(error)) from None
         return response
