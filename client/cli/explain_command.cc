@@ -88,8 +88,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
   return problem;
 }
 
-// Returns the duration of the longest run, s. Of a session's runs, it knows the last one and, if
-// the session has a streamed input, the first.
+// Returns the duration of the longest run that is known, s. A session's estimate ends in its last
+// run.
 double LongestRun(const ExplainInput& input) {
   const auto& times = input.measurements.time_s();
   const double longest = times.empty() ? 0 : *std::max_element(times.begin(), times.end());
@@ -197,15 +197,11 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     design = *std::move(answer);
   }
   std::optional<absl::StatusOr<RemedyTrial>> trial;
-  const bool needed = !arguments.no_remedies && CallsForRemedies(input.estimate);
-  if (needed && arguments.session.empty()) trial = TryOnRecord(input, *backend);
+  if (!arguments.no_remedies && CallsForRemedies(input.estimate)) {
+    trial = TryOnRecord(input, *backend);
+  }
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
-  if (needed && !trial) {
-    PrintSentence(out,
-                  "Remedies are tried where the record is given as files: polyest explain PROBLEM "
-                  "DATA.");
-  }
   if (!trial) return absl::OkStatus();
   if (trial->ok()) PrintTrial(**trial, out);
   return InInput(trial->status(), arguments);

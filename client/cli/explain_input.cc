@@ -7,6 +7,7 @@
 
 #include "client/cli/data_input.h"
 #include "client/cli/problem_input.h"
+#include "client/cli/remedy_trial.h"
 #include "core/common/status.h"
 #include "core/model/unit_conversion.h"
 #include "polyest/client.h"
@@ -21,53 +22,66 @@ bool StreamsInput(const v1::Problem& problem) {
                      [](const v1::Input& input) { return input.has_streamed(); });
 }
 
-// Returns the streamed inputs in the first `rows` rows of a batch, in the model's units.
-absl::StatusOr<v1::Measurements> InputsOf(const v1::Problem& problem, const DataColumns& columns,
-                                          const v1::Measurements& batch, int rows) {
+bool IsStreamedInput(const v1::Problem& problem, const std::string& name) {
+  return std::any_of(
+      problem.inputs().begin(), problem.inputs().end(),
+      [&](const v1::Input& input) { return input.has_streamed() && input.name() == name; });
+}
+
+// Converts a channel's values to the model's unit.
+absl::Status ToModelUnit(const DataColumns& columns, v1::Measurements::Channel& channel) {
+  const auto unit = columns.units.find(channel.name());
+  if (channel.unit().empty() || unit == columns.units.end()) return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(const UnitConversion conversion,
+                           ConvertUnit(channel.unit(), unit->second));
+  std::transform(channel.values().begin(), channel.values().end(),
+                 channel.mutable_values()->begin(), conversion);
+  channel.clear_unit();
+  return absl::OkStatus();
+}
+
+// Returns the streamed inputs in the rows of the first run of a batch.
+v1::Measurements FirstRunOf(const v1::Problem& problem, const v1::Measurements& batch) {
+  int rows = 0;
+  while (rows < batch.time_s_size() && (batch.run().empty() || batch.run(rows) == 0)) ++rows;
   v1::Measurements inputs;
   inputs.mutable_time_s()->Add(batch.time_s().begin(), batch.time_s().begin() + rows);
-  for (const v1::Input& input : problem.inputs()) {
-    if (!input.has_streamed()) continue;
-    for (const v1::Measurements::Channel& channel : batch.channels()) {
-      if (channel.name() != input.name()) continue;
-      v1::Measurements::Channel& added = *inputs.add_channels();
-      added.set_name(input.name());
-      added.mutable_values()->Add(channel.values().begin(), channel.values().begin() + rows);
-      for (const int row : channel.missing()) {
-        if (row < rows) added.add_missing(row);
-      }
-      const auto unit = columns.units.find(input.name());
-      if (channel.unit().empty() || unit == columns.units.end()) continue;
-      POLYEST_ASSIGN_OR_RETURN(const UnitConversion conversion,
-                               ConvertUnit(channel.unit(), unit->second));
-      std::transform(added.values().begin(), added.values().end(), added.mutable_values()->begin(),
-                     conversion);
+  for (const v1::Measurements::Channel& channel : batch.channels()) {
+    if (!IsStreamedInput(problem, channel.name())) continue;
+    v1::Measurements::Channel& added = *inputs.add_channels();
+    added.set_name(channel.name());
+    added.set_unit(channel.unit());
+    added.mutable_values()->Add(channel.values().begin(), channel.values().begin() + rows);
+    for (const int row : channel.missing()) {
+      if (row < rows) added.add_missing(row);
     }
   }
   return inputs;
 }
 
-absl::StatusOr<v1::Measurements> FirstRunOf(Client& client, const v1::Session& session,
-                                            const Place& place) {
+// Returns the record of a session in the model's units: all of it, or the streamed inputs of its
+// first run.
+absl::StatusOr<v1::Measurements> RecordOf(Client& client, const v1::Session& session,
+                                          const Place& place, bool all) {
   POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(session.problem(), place, {}));
-  v1::Measurements measurements;
+  v1::Measurements record;
   bool ended = false;
   v1::ExportSessionRequest request;
   request.set_name(session.name());
   const absl::Status exported =
-      client.ExportSession(request, [&](const v1::SessionRecord& record) -> absl::Status {
-        if (!record.has_batch()) return absl::OkStatus();
-        const v1::Measurements& batch = record.batch().measurements();
-        int rows = 0;
-        while (rows < batch.time_s_size() && (batch.run().empty() || batch.run(rows) == 0)) ++rows;
-        POLYEST_ASSIGN_OR_RETURN(const v1::Measurements inputs,
-                                 InputsOf(session.problem(), columns, batch, rows));
-        AppendRows(inputs, measurements);
-        ended = rows < batch.time_s_size();
+      client.ExportSession(request, [&](const v1::SessionRecord& piece) -> absl::Status {
+        if (!piece.has_batch()) return absl::OkStatus();
+        const v1::Measurements& batch = piece.batch().measurements();
+        v1::Measurements rows = all ? batch : FirstRunOf(session.problem(), batch);
+        for (v1::Measurements::Channel& channel : *rows.mutable_channels()) {
+          POLYEST_RETURN_IF_ERROR(ToModelUnit(columns, channel));
+        }
+        AppendRows(rows, record);
+        ended = rows.time_s_size() < batch.time_s_size();
         return ended ? absl::CancelledError("the first run is complete") : absl::OkStatus();
       });
   if (!exported.ok() && !ended) return exported;
-  return measurements;
+  return record;
 }
 
 absl::StatusOr<ExplainInput> ReadSession(const ExplainArguments& arguments) {
@@ -83,8 +97,9 @@ absl::StatusOr<ExplainInput> ReadSession(const ExplainArguments& arguments) {
   const int64_t channels = std::max(1, session.problem().measured_size());
   input.rows = static_cast<int>(
       std::min<int64_t>(session.sample_count() / channels, std::numeric_limits<int>::max()));
-  if (StreamsInput(session.problem())) {
-    POLYEST_ASSIGN_OR_RETURN(input.measurements, FirstRunOf(client, session, arguments.place));
+  const bool all = !arguments.no_remedies && CallsForRemedies(input.estimate);
+  if (all || StreamsInput(session.problem())) {
+    POLYEST_ASSIGN_OR_RETURN(input.measurements, RecordOf(client, session, arguments.place, all));
   }
   return input;
 }

@@ -15,8 +15,9 @@ namespace polyest::internal {
 struct ExplainInput {
   v1::Problem problem;
   v1::Estimate estimate;
-  // The measurements of the files; for a session, times and streamed inputs of the first run only,
-  // or nothing if its problem has no streamed input.
+  // The measurements of the files, or those of the session if remedies are to be tried on them. Of
+  // other sessions the times and streamed inputs of the first run only, or nothing if the problem
+  // has no streamed input.
   v1::Measurements measurements;
   int rows = 0;  // number of rows of the record; approximate for a session
 };
