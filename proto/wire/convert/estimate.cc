@@ -171,6 +171,12 @@ v1::EstimateHistory::Point ToHistoryPoint(const v1::Estimate& estimate) {
   point.set_time_s(estimate.time());
   point.set_sample_count(estimate.samples());
   point.set_sequence(estimate.sequence());
+  point.set_reexpansions(estimate.expansion().reexpansions());
+  for (const v1::Diagnostic& diagnostic : estimate.diagnostics()) {
+    if (!std::ranges::count(point.warnings(), diagnostic.code())) {
+      point.add_warnings(diagnostic.code());
+    }
+  }
   for (const v1::ParameterEstimate& parameter : estimate.parameters()) {
     v1::EstimateHistory::Parameter& added = *point.add_parameters();
     added.set_name(parameter.name());

@@ -79,6 +79,8 @@ export interface HistoryPoint {
   samples: number;
   sequence: number;
   parameters: { name: string; mean: number; stdDev: number; lower95: number; upper95: number; verdict: Verdict }[];
+  warnings: string[];  // codes of diagnostics, each once
+  reexpansions: number;
 }
 
 export interface Activity {
@@ -259,6 +261,8 @@ function readHistoryPoint(value: unknown): HistoryPoint {
     samples: asNumber(json['sampleCount']),
     sequence: asNumber(json['sequence']),
     parameters,
+    warnings: asList(json['warnings']).map(asText),
+    reexpansions: asNumber(json['reexpansions']),
   };
 }
 

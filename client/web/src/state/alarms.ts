@@ -1,13 +1,19 @@
 // Follows the diagnostics of successive estimates: when each began, and when it ended.
 
-import type { Diagnostic, Estimate } from '../api/messages';
+import type { Diagnostic, Estimate, HistoryPoint } from '../api/messages';
+
+// When something happened: the time of the record and, if this page saw it, by the clock.
+export interface Moment {
+  time: number;
+  at: Date | null;
+}
 
 export interface Alarm {
   code: string;
-  messages: string[];
-  began: { time: number; at: Date };
-  beganBefore: boolean;  // it was there when this page first looked
-  ended: { time: number; at: Date } | null;
+  messages: string[];  // none of an alarm that was over before this page looked
+  began: Moment;
+  beganBefore: boolean;  // it was there in the first estimate that this page knows of
+  ended: Moment | null;
 }
 
 const MAX_ENDED = 20;
@@ -15,7 +21,7 @@ const MAX_ENDED = 20;
 export class AlarmLog {
   private present = new Map<string, Alarm>();
   private past: Alarm[] = [];
-  private isFirst = true;
+  private sequence: number | null = null;  // of the last estimate known of
 
   // Takes the next estimate. Returns the codes that are new with it.
   update(estimate: Estimate, at = new Date()): string[] {
@@ -23,20 +29,15 @@ export class AlarmLog {
     for (const { code, message } of estimate.diagnostics) {
       byCode.set(code, [...(byCode.get(code) ?? []), message]);
     }
-    this.end(byCode, { time: estimate.time, at });
-    const fresh: string[] = [];
-    for (const [code, messages] of byCode) {
-      const alarm = this.present.get(code);
-      if (alarm) {
-        alarm.messages = messages;
-        continue;
-      }
-      const began = { time: estimate.time, at };
-      this.present.set(code, { code, messages, began, beganBefore: this.isFirst, ended: null });
-      fresh.push(code);
+    return this.follow(byCode, estimate, at);
+  }
+
+  // Learns from the history of what has happened while this page did not watch.
+  catchUp(points: readonly HistoryPoint[]): void {
+    for (const point of points) {
+      if (this.sequence !== null && point.sequence <= this.sequence) continue;
+      this.follow(new Map(point.warnings.map((code) => [code, []])), point, null);
     }
-    this.isFirst = false;
-    return fresh;
   }
 
   // Those of the newest estimate, the latest to begin first.
@@ -52,10 +53,27 @@ export class AlarmLog {
   clear(): void {
     this.present.clear();
     this.past = [];
-    this.isFirst = true;
+    this.sequence = null;
   }
 
-  private end(codes: ReadonlyMap<string, unknown>, now: { time: number; at: Date }): void {
+  private follow(byCode: ReadonlyMap<string, string[]>, { time, sequence }: { time: number; sequence: number },
+                 at: Date | null): string[] {
+    this.end(byCode, { time, at });
+    const fresh: string[] = [];
+    for (const [code, messages] of byCode) {
+      const alarm = this.present.get(code);
+      if (alarm) {
+        if (messages.length > 0) alarm.messages = messages;
+        continue;
+      }
+      this.present.set(code, { code, messages, began: { time, at }, beganBefore: this.sequence === null, ended: null });
+      fresh.push(code);
+    }
+    this.sequence = sequence;
+    return fresh;
+  }
+
+  private end(codes: ReadonlyMap<string, unknown>, now: Moment): void {
     for (const [code, alarm] of this.present) {
       if (codes.has(code)) continue;
       alarm.ended = now;

@@ -29,6 +29,7 @@ interface Row {
   time: number;
   samples: number;
   sequence: number;
+  reexpansions: number;
   parameters: { name: string; mean: number; stdDev: number; lower95: number; upper95: number }[];
 }
 
@@ -36,8 +37,8 @@ export class EstimateHistory {
   private readonly table = new ThinnedTable(CAPACITY, FIRST);
   private names: string[] = [];
   private last: Row | null = null;
-  private reexpansions = -1;
   private ticks: { time: number; samples: number }[] = [];
+  private ticked: Row | null = null;  // the newest row ever added; ticks outlive what is loaded again
 
   // Whether times begin again, as they do with each run: x is then the number of samples.
   hasRuns = false;
@@ -65,20 +66,14 @@ export class EstimateHistory {
   // Adds an estimate, unless it is older than the last one.
   append(estimate: Estimate): void {
     if (this.last !== null && estimate.sequence < this.last.sequence) return;
-    const { reexpansions } = estimate.expansion;
-    if (this.reexpansions >= 0 && reexpansions > this.reexpansions) {
-      this.ticks.push({ time: estimate.time, samples: estimate.samples });
-      if (this.ticks.length > MAX_TICKS) this.ticks.splice(0, this.ticks.length - MAX_TICKS);
-    }
-    this.reexpansions = reexpansions;
-    this.add(estimate);
+    this.add({ ...estimate, reexpansions: estimate.expansion.reexpansions });
   }
 
   // Forgets the ticks as well.
   restart(): void {
     this.clear();
     this.ticks = [];
-    this.reexpansions = -1;
+    this.ticked = null;
   }
 
   // The history of one parameter; null if there is none.
@@ -95,12 +90,13 @@ export class EstimateHistory {
     };
   }
 
-  // Where the expansion moved while this page watched.
+  // Where the expansion moved.
   reexpansionTicks(): number[] {
     return this.ticks.map((tick) => (this.hasRuns ? tick.samples : tick.time));
   }
 
   private add(row: Row): void {
+    this.tick(row);
     const isSame = this.last !== null && row.samples === this.last.samples && row.sequence === this.last.sequence;
     this.useColumnsOf(row);
     const numbers = new Array<number>(this.table.width).fill(NaN);
@@ -118,6 +114,15 @@ export class EstimateHistory {
     if (isSame) this.table.replaceLast(numbers);
     else this.table.append(numbers);
     this.last = row;
+  }
+
+  private tick(row: Row): void {
+    if (this.ticked !== null && row.sequence < this.ticked.sequence) return;
+    if (this.ticked !== null && row.reexpansions > this.ticked.reexpansions) {
+      this.ticks.push({ time: row.time, samples: row.samples });
+      if (this.ticks.length > MAX_TICKS) this.ticks.splice(0, this.ticks.length - MAX_TICKS);
+    }
+    this.ticked = row;
   }
 
   // Parameters of each run come and go: columns are those of the present ones.

@@ -92,6 +92,7 @@ export class SessionMonitor {
     this.session = session;
     const points = await client.getHistory(this.name, stop);
     this.history.load(points);
+    this.alarms.catchUp(points);
     await client.watchSession(this.name, () => this.onOpen(), (estimate) => this.take(estimate), stop);
   }
 

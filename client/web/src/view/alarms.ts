@@ -1,25 +1,25 @@
 // The estimate's diagnostics as alarms: what, since when, what it means, what to do.
 
-import type { Alarm, AlarmLog } from '../state/alarms';
+import type { Alarm, AlarmLog, Moment } from '../state/alarms';
 import { explain } from '../text/diagnostics';
 import { recordTime } from '../text/number';
 import { type View, h } from './dom';
 
-const clock = (at: Date): string => at.toLocaleTimeString(undefined, { hour12: false });
+function moment({ time, at }: Moment): string {
+  const clock = at ? ` (${at.toLocaleTimeString(undefined, { hour12: false })})` : '';
+  return `t = ${recordTime(time)}${clock}`;
+}
 
 function since({ began, beganBefore, ended }: Alarm): string {
-  const start = beganBefore
-    ? `from before this page was opened (at t = ${recordTime(began.time)})`
-    : `t = ${recordTime(began.time)} (${clock(began.at)})`;
-  if (!ended) return beganBefore ? `Since ${start.replace(/^from /, '')}` : `Since ${start}`;
-  return `${beganBefore ? 'From before this page was opened' : `From ${start}`} until t = ${recordTime(ended.time)} (${clock(ended.at)})`;
+  const start = beganBefore ? `the first estimate known, ${moment(began)}` : moment(began);
+  return ended ? `From ${start} until ${moment(ended)}` : `Since ${start}`;
 }
 
 function item(alarm: Alarm): HTMLElement {
   const { title, meaning, remedy, severity } = explain(alarm.code);
   const details = h('details', { 'data-code': alarm.code },
     h('summary', {}, h('strong', {}, title), h('span.since', {}, since(alarm))),
-    h('ul.messages', {}, ...alarm.messages.map((message) => h('li', {}, message))),
+    ...(alarm.messages.length > 0 ? [h('ul.messages', {}, ...alarm.messages.map((message) => h('li', {}, message)))] : []),
     h('p', {}, h('b', {}, 'What it means. '), meaning),
     h('p', {}, h('b', {}, 'What to do. '), remedy),
     h('p.code', {}, alarm.code));

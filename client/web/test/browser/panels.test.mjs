@@ -133,11 +133,14 @@ test('diagnostics are alarms that say since when, and what to do', options, asyn
   live.diagnostics = [];
   await says(page, 'No warnings');
   await says(page, 'Earlier warnings');
-  // One that was there before does not pretend to begin now.
+  // A page that is opened later knows from the history when it began, and what is over.
   live.diagnostics = [misfit];
   await alarm.waitFor();
+  const began = (await alarm.innerText()).match(/Since (t = [\d. ]+ s)/)[1];
   await page.reload();
-  await says(page, 'Since before this page was opened');
+  await says(page, `Since ${began}`);
+  assert.doesNotMatch(await alarm.innerText(), /\d\d:\d\d/);
+  await says(page, 'Earlier warnings');
   live.diagnostics = [];
   quiet(page);
   await page.context().close();

@@ -36,6 +36,7 @@ class FakeSession {
     this.watchers = new Set();
     this.created = new Date(Date.UTC(2026, 0, 1)).toISOString();
     this.override = {};  // fields of the estimate that are another
+    this.warnings = new Map();  // of past estimates by their index
   }
 
   point(index) {
@@ -46,6 +47,8 @@ class FakeSession {
       timeS: point.timeS + lap * points[points.length - 1].timeS,
       sampleCount: String(Number(point.sampleCount) + lap * Number(points[points.length - 1].sampleCount)),
       sequence: String(index + 1),
+      reexpansions: Math.floor((index + 1) / 40),
+      warnings: this.warnings.get(index) ?? [],
     };
   }
 
@@ -57,7 +60,7 @@ class FakeSession {
       const contraction = now.stdDev / parameter.priorStdDev;
       return { ...parameter, ...now, map: now.mean, posteriorStdDev: now.stdDev, contraction };
     });
-    const expansion = { ...recording.estimate.expansion, reexpansions: Math.floor(this.count / 40) };
+    const expansion = { ...recording.estimate.expansion, reexpansions: point.reexpansions };
     return {
       ...recording.estimate, parameters, expansion, diagnostics: this.diagnostics, time: point.timeS,
       samples: point.sampleCount, sequence: point.sequence, ...this.override,
@@ -90,6 +93,7 @@ class FakeSession {
   push(count = 1) {
     for (let k = 0; k < count; ++k) {
       this.count += 1;
+      if (this.diagnostics.length > 0) this.warnings.set(this.count - 1, this.diagnostics.map(({ code }) => code));
       const text = `data: ${JSON.stringify({ estimate: this.estimate() })}\n\n`;
       for (const watcher of this.watchers) watcher.write(text);
     }

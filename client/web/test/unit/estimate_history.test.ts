@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 
 import type { Estimate } from '../../src/api/messages';
 import { EstimateHistory } from '../../src/state/estimate_history';
-import { estimate, parameter } from './samples';
+import { estimate, parameter, pointOf } from './samples';
 
 const at = (k: number, changes: Partial<Estimate> = {}): Estimate =>
   estimate({ time: 0.1 * k, samples: k, sequence: k, ...changes });
@@ -10,7 +10,7 @@ const at = (k: number, changes: Partial<Estimate> = {}): Estimate =>
 describe('EstimateHistory', () => {
   it('joins the history that the daemon kept with what comes then', () => {
     const history = new EstimateHistory();
-    history.load([1, 2, 3].map((k) => at(k)));
+    history.load([1, 2, 3].map((k) => pointOf(at(k))));
     history.append(at(3));  // a stream begins with the present estimate
     history.append(at(4));
     expect(Array.from(history.series('k')?.x ?? []).map((x) => Math.round(10 * x))).toEqual([1, 2, 3, 4]);
@@ -19,7 +19,7 @@ describe('EstimateHistory', () => {
   it('keeps the whole course of a long session that it watches for long', () => {
     const history = new EstimateHistory();
     const total = 100_000;
-    history.load(Array.from({ length: 391 }, (_, k) => at(256 * k)));  // of 100,000 estimates
+    history.load(Array.from({ length: 391 }, (_, k) => pointOf(at(256 * k))));  // of 100,000 estimates
     for (let k = 256 * 390 + 1; k <= 2 * total; ++k) history.append(at(k));
     const sequences = Array.from(history.series('k')?.x ?? []).map((x) => Math.round(10 * x));
     const steps = sequences.slice(1, -1).map((value, i) => value - (sequences[i] as number));
@@ -59,7 +59,10 @@ describe('EstimateHistory', () => {
     history.append(at(20, { expansion: expansion(3) }));
     history.append(at(30, { expansion: expansion(5) }));
     expect(history.reexpansionTicks()).toEqual([3]);
-    for (let k = 31; k < 5000; ++k) history.append(at(k, { expansion: expansion(k) }));
+    // What is loaded again adds what this page has missed, and nothing twice.
+    history.load([20, 30, 40].map((k) => pointOf(at(k, { expansion: expansion(k === 40 ? 6 : k === 30 ? 5 : 3) }))));
+    expect(history.reexpansionTicks()).toEqual([3, 4]);
+    for (let k = 41; k < 5000; ++k) history.append(at(k, { expansion: expansion(k) }));
     expect(history.reexpansionTicks().length).toBeLessThanOrEqual(200);
   });
 

@@ -2,7 +2,7 @@
 
 import { readFileSync } from 'node:fs';
 
-import { type Estimate, type Parameter, readEstimate } from '../../src/api/messages';
+import { type Estimate, type HistoryPoint, type Parameter, readEstimate } from '../../src/api/messages';
 
 // Recorded from polyestd: client/examples/oscillator.
 export const recording = JSON.parse(
@@ -18,3 +18,9 @@ export function parameter(name: string, changes: Partial<Parameter> = {}): Param
 export function estimate(changes: Partial<Estimate> = {}): Estimate {
   return { ...readEstimate({}), parameters: [parameter('k')], ...changes };
 }
+
+// A point of the history as the daemon keeps it of an estimate.
+export const pointOf = (of: Estimate): HistoryPoint => ({
+  time: of.time, samples: of.samples, sequence: of.sequence, parameters: of.parameters,
+  warnings: of.diagnostics.map(({ code }) => code), reexpansions: of.expansion.reexpansions,
+});

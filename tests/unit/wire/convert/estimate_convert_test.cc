@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/wire/convert/estimate.h"
@@ -153,6 +154,18 @@ TEST(EstimateToProto, KeepsWhatDriftsInAHistory) {
   EXPECT_EQ(drifting.std_dev(), 2);
   EXPECT_EQ(drifting.lower95(), 36);
   EXPECT_EQ(drifting.upper95(), 44);
+}
+
+TEST(EstimateToProto, KeepsWarningsAndReexpansionsInAHistory) {
+  Estimate estimate = TwoParameters();
+  estimate.expansion.reexpansions = 3;
+  estimate.diagnostics = {{DiagnosticCode::kModelMisfit, "output x"},
+                          {DiagnosticCode::kNonGaussian, "c"},
+                          {DiagnosticCode::kModelMisfit, "output y"}};
+  const v1::EstimateHistory::Point point = ToHistoryPoint(ToProto(estimate));
+  EXPECT_EQ(point.reexpansions(), 3);
+  EXPECT_THAT(point.warnings(), testing::ElementsAre(v1::Diagnostic::MODEL_MISFIT,
+                                                     v1::Diagnostic::NON_GAUSSIAN));
 }
 
 TEST(EstimateToProto, KnowsEveryDiagnostic) {

@@ -48,6 +48,10 @@ class HistoryPoint:
     #: The values at that time of the parameters that drift, by name; their verdict is empty. Of
     #: these, `parameters` has the values at the beginning.
     drifting: dict[str, ParameterThen]
+    #: The codes of the diagnostics that the estimate had, such as "MODEL_MISFIT".
+    warnings: list[str]
+    #: How often the outputs had been expanded again.
+    reexpansions: int
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,9 @@ def of_message(message: estimate_pb2.EstimateHistory) -> History:
     return History([
         HistoryPoint(point.time_s, point.sample_count, point.sequence,
                      {one.name: _then(one, enum_name(one, "verdict")) for one in point.parameters},
-                     {one.name: _then(one, "") for one in point.drifting})
+                     {one.name: _then(one, "") for one in point.drifting},
+                     [estimate_pb2.Diagnostic.Code.Name(code) for code in point.warnings],
+                     point.reexpansions)
         for point in message.points])
 
 
