@@ -11,6 +11,7 @@
 
 #include "core/propagation/block_integrator.h"
 #include "core/propagation/block_vector.h"
+#include "core/propagation/error_floors.h"
 #include "core/propagation/error_scale.h"
 
 namespace polyest::internal {
@@ -58,26 +59,16 @@ class SundialsIntegrator : public BlockIntegrator {
   void ChooseFirstStepAgain() { first_step_set_ = false; }
 
  private:
-  // Returns a first step, (1/100) min_s S_s ÷ max_p |ẋ_ps|, limited to a small part of `span_s` so
-  // that an input that is 0 now is not stepped over. It is a guess: the error test shortens it, and
-  // it may grow fast.
-  double FirstStep(double span_s);
-  // Gives the error scale its floors, for steps of about `step_s` until a sample in `span_s`.
-  void SetFloors(double step_s, double span_s);
-  // Returns the size that each state which is 0 will have reached after `span_s`, nearly: the rates
-  // on the way, with the other states as large as they are now or will be.
-  Vector ExpectedSizes(double span_s);
   IntegratorOutcome Outcome(int flag, double advance_s, double span_s) const;
 
   BlockSystem* const system_;
   sundials::Context context_;
   ErrorScale scale_;
+  ErrorFloors floors_;
   OwnedVector vector_;  // the states at time_s_
   double time_s_;
   double covered_s_;  // dense output reaches to here
-  Eigen::ArrayXXd first_rates_, moved_states_, moved_rates_;
   bool first_step_set_ = false;
-  double floors_step_s_ = 0;  // for which the floors were set
 };
 
 }  // namespace polyest::internal

@@ -11,10 +11,10 @@
 #include "core/common/status.h"
 #include "core/propagation/bdf_integrator.h"
 #include "core/propagation/block_rows.h"
-#include "core/propagation/erk_integrator.h"
 #include "core/propagation/linear_integrator.h"
 #include "core/propagation/linear_system.h"
 #include "core/propagation/output_limit.h"
+#include "core/propagation/runge_kutta_integrator.h"
 #include "core/propagation/switching_integrator.h"
 
 namespace polyest::internal {
@@ -89,7 +89,7 @@ void TrajectoryBlock::StartIntegrator(double time_s) {
     return;
   }
   integrator_ = stiff_ ? MakeBdfIntegrator(this, tolerance, time_s, states_)
-                       : MakeErkIntegrator(this, tolerance, time_s, states_);
+                       : MakeRungeKuttaIntegrator(this, tolerance, time_s, states_);
 }
 
 bool TrajectoryBlock::MayChangeMethod() const {
