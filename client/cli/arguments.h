@@ -168,7 +168,8 @@ struct CompareArguments {
   Place place;
   std::vector<std::string> files;  // at least two problems, then the data
   DataFileOptions data_options;
-  double held_out = 0.3;  // fraction of the rows, in (0, 1)
+  static constexpr double kHeldOut = 0.3;
+  double held_out = kHeldOut;  // fraction of the rows, in (0, 1)
   Format format = Format::kTable;
 };
 

@@ -203,8 +203,9 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
   if (!trial) return absl::OkStatus();
-  if (trial->ok()) PrintTrial(**trial, out);
-  return InInput(trial->status(), arguments);
+  if (!trial->ok()) return InInput(trial->status(), arguments);
+  PrintTrial(**trial, out);
+  return InInput((*trial)->ended, arguments);
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ bool StreamsInput(const v1::Problem& problem) {
 }
 
 bool IsStreamedInput(const v1::Problem& problem, const std::string& name) {
-  return std::any_of(
-      problem.inputs().begin(), problem.inputs().end(),
-      [&](const v1::Input& input) { return input.has_streamed() && input.name() == name; });
+  return std::any_of(problem.inputs().begin(), problem.inputs().end(), [&](const v1::Input& input) {
+    return input.has_streamed() && input.name() == name;
+  });
 }
 
 // Converts a channel's values to the model's unit.

@@ -49,6 +49,13 @@ void PrintTable(const RemedyTrial& trial, std::ostream& out) {
   out << '\n';
 }
 
+void PrintRefused(const RemedyTrial& trial, std::ostream& out) {
+  for (const RefusedRemedy& one : trial.refused) {
+    PrintSentence(
+        out, absl::StrCat("Refused: ", RemedyText(one.remedy), " (", one.refusal.message(), ")."));
+  }
+}
+
 // Returns what the held-out rows say of the remedy that the evidence prefers.
 std::string HeldOutText(const TriedRemedy& best, const RemedyTrial& trial) {
   if (!best.scored) return "there are no held-out rows to compare it by";
@@ -133,6 +140,12 @@ void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
 }  // namespace
 
 void PrintTrial(const RemedyTrial& trial, std::ostream& out) {
+  if (!trial.refusal.ok()) {
+    out << '\n';
+    PrintSentence(out, absl::StrCat("No remedy was tried: the problem cannot be weighed: ",
+                                    trial.refusal.message()));
+    return;
+  }
   if (!trial.untreated.log_evidence) {
     out << '\n';
     PrintSentence(out,
@@ -142,9 +155,9 @@ void PrintTrial(const RemedyTrial& trial, std::ostream& out) {
   }
   if (trial.tried.empty()) {
     out << '\n';
-    PrintSentence(out, trial.refusal.ok()
-                           ? "No remedy was tried: the problem has room for none."
-                           : absl::StrCat("No remedy could be tried: ", trial.refusal.message()));
+    PrintSentence(out, trial.refused.empty() ? "No remedy was tried: the problem has room for none."
+                                             : "No remedy could be tried.");
+    PrintRefused(trial, out);
     return;
   }
   PrintTable(trial, out);
@@ -155,6 +168,10 @@ void PrintTrial(const RemedyTrial& trial, std::ostream& out) {
                                                     absl::StrAppend(text, RemedyText(remedy));
                                                   }),
                                     "."));
+  }
+  PrintRefused(trial, out);
+  if (!trial.ended.ok()) {
+    PrintSentence(out, "The trial ended early, so that the table is not complete.");
   }
   PrintVerdict(trial, out);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "client/cli/arguments.h"
@@ -33,10 +34,27 @@ class Trial {
 
   absl::StatusOr<RemedyTrial> Run(const v1::Estimate& estimate) {
     backend_.SetTask("weighing the problem as it is");
-    POLYEST_ASSIGN_OR_RETURN(result_.untreated, Weigh(experiment_, backend_));
+    auto untreated = Weigh(experiment_, backend_);
+    if (IsRefusal(untreated.status())) {
+      result_.refusal = untreated.status();
+      return std::move(result_);
+    }
+    POLYEST_RETURN_IF_ERROR(untreated.status());
+    result_.untreated = *std::move(untreated);
     if (!result_.untreated.log_evidence) return std::move(result_);
-    POLYEST_ASSIGN_OR_RETURN(const std::vector<StateSpread> states,
-                             SpreadsOfStates(experiment_, backend_));
+    // Without the spreads of the states no process noise is tried.
+    auto states = SpreadsOfStates(experiment_, backend_);
+    if (IsRefusal(states.status())) states.emplace();
+    POLYEST_RETURN_IF_ERROR(states.status());
+    const absl::Status status = TryAll(estimate, *states);
+    Sort();
+    if (!status.ok() && result_.tried.empty()) return status;
+    result_.ended = status;
+    return std::move(result_);
+  }
+
+ private:
+  absl::Status TryAll(const v1::Estimate& estimate, const std::vector<StateSpread>& states) {
     const auto& times = experiment_.measurements().time_s();
     const double duration_s = times.empty() ? 0 : *std::ranges::max_element(times);
     for (const Remedy& remedy : ListRemedies(experiment_.problem(), estimate, states, duration_s)) {
@@ -48,11 +66,9 @@ class Trial {
     }
     Sort();
     POLYEST_RETURN_IF_ERROR(EstimateSizes());
-    POLYEST_RETURN_IF_ERROR(ScoreFinalists());
-    return std::move(result_);
+    return ScoreFinalists();
   }
 
- private:
   void Sort() { std::ranges::stable_sort(result_.tried, std::greater(), &TriedRemedy::gain); }
 
   bool IsFinalist(size_t i) const {
@@ -68,10 +84,11 @@ class Trial {
 
   // Weighs the problem with a remedy. Returns whether it is not refused, has an evidence to compare
   // and gains more than `tried` has, which it then replaces.
-  absl::StatusOr<bool> Improve(const v1::Problem& problem, std::optional<TriedRemedy>& tried) {
+  absl::StatusOr<bool> Improve(const v1::Problem& problem, const Remedy& remedy,
+                               std::optional<TriedRemedy>& tried) {
     auto weighed = Weigh(With(problem), backend_);
     if (IsRefusal(weighed.status())) {
-      result_.refusal.Update(weighed.status());
+      if (!tried) result_.refused.push_back({remedy, weighed.status()});
       return false;
     }
     POLYEST_RETURN_IF_ERROR(weighed.status());
@@ -95,7 +112,7 @@ class Trial {
     for (size_t i = 0; i < sizes.size(); ++i) {
       const double size = sizes[i];
       const v1::Problem problem = WithKnownSize(experiment_.problem(), remedy, size);
-      POLYEST_ASSIGN_OR_RETURN(const bool better, Improve(problem, tried));
+      POLYEST_ASSIGN_OR_RETURN(const bool better, Improve(problem, remedy, tried));
       if (!tried) break;
       if (!better) continue;
       tried->remedy = remedy;
@@ -112,20 +129,19 @@ class Trial {
       TriedRemedy& finalist = result_.tried[i];
       if (!HasSize(finalist.remedy)) continue;
       backend_.SetTask(absl::StrFormat("size of %s", RemedyText(finalist.remedy)));
-      std::optional<TriedRemedy> estimated;
+      std::optional<TriedRemedy> estimated = finalist;
+      estimated->gain = -std::numeric_limits<double>::infinity();
       const v1::Problem problem =
           WithUnknownSize(experiment_.problem(), finalist.remedy, finalist.remedy.sizes.front());
-      POLYEST_ASSIGN_OR_RETURN(const bool accepted, Improve(problem, estimated));
-      if (!accepted) continue;
-      estimated->remedy = std::move(finalist.remedy);
-      finalist = *std::move(estimated);
+      POLYEST_ASSIGN_OR_RETURN(const bool accepted, Improve(problem, finalist.remedy, estimated));
+      if (accepted) finalist = *std::move(estimated);
     }
     Sort();
     return absl::OkStatus();
   }
 
   absl::Status ScoreFinalists() {
-    const double held_out = CompareArguments().held_out;
+    constexpr double held_out = CompareArguments::kHeldOut;
     for (size_t i = 0; IsFinalist(i); ++i) {
       TriedRemedy& finalist = result_.tried[i];
       if (i == 0) {

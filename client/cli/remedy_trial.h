@@ -22,11 +22,18 @@ struct TriedRemedy {
   bool scored = false;  // whether the assessment has a score
 };
 
+struct RefusedRemedy {
+  Remedy remedy;
+  absl::Status refusal;
+};
+
 struct RemedyTrial {
   Assessment untreated;            // the problem as it is
   std::vector<TriedRemedy> tried;  // the one with the highest evidence first
   std::vector<Remedy> left_out;    // beyond the number that is tried
-  absl::Status refusal;            // of the first remedy that was refused; OK if none was
+  std::vector<RefusedRemedy> refused;
+  absl::Status refusal;  // of the problem as it is, which is then not weighed; else OK
+  absl::Status ended;    // what ended the trial early, after the remedies tried; else OK
 };
 
 // Returns the codes among the diagnostics that say that the data contradict a perfect model with
@@ -41,7 +48,7 @@ bool CallsForRemedies(const v1::Estimate& estimate);
 // Tries the remedies, at most eight that are not refused. One with a size has the evidence of the
 // best size tried; of the best two that gain a decisive evidence, the size is then estimated, and
 // they are scored on held-out rows as the problem is. Without any evidence of the problem, nothing
-// is tried.
+// is tried. An error after some remedies have been tried ends the trial with these.
 absl::StatusOr<RemedyTrial> TryRemedies(const v1::Experiment& experiment,
                                         const v1::Estimate& estimate, Backend& backend);
 

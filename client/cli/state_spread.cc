@@ -81,7 +81,8 @@ std::vector<double> Rates(const Output& output, const v1::PredictResponse& predi
   std::vector<double> rates;
   for (int k = 1; k < std::min(output.mean_size(), prediction.time_s_size()); ++k) {
     const double step_s = prediction.time_s(k) - prediction.time_s(k - 1);
-    if (step_s > 0) rates.push_back((output.mean(k) - output.mean(k - 1)) / step_s);
+    const bool same_run = prediction.run().empty() || prediction.run(k) == prediction.run(k - 1);
+    if (same_run && step_s > 0) rates.push_back((output.mean(k) - output.mean(k - 1)) / step_s);
   }
   return rates;
 }
@@ -110,7 +111,8 @@ absl::StatusOr<std::vector<StateSpread>> SpreadsOfStates(v1::Experiment experime
   v1::PredictRequest request;
   *request.mutable_subject()->mutable_experiment() = std::move(experiment);
   for (const std::string& output : model.outputs) request.add_outputs(output);
-  request.set_draw_count(2);
+  constexpr int kDraws = 20;  // half of which may fail
+  request.set_draw_count(kDraws);
   POLYEST_ASSIGN_OR_RETURN(const v1::PredictResponse prediction, backend.Predict(request));
   for (const StateName& state : model.states) {
     const double spread = SpreadOf(state, prediction);

@@ -1,7 +1,6 @@
 #pragma once
 
-// The interface of an integrator of a block of trajectories, which ERKStep and CVODE implement.
-// They are the oracles for any other.
+// The interface of an integrator of a block of trajectories.
 
 #include "core/common/types.h"
 

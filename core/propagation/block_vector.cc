@@ -75,7 +75,7 @@ void Combine(const double* c, const double* const* x, double* z, Eigen::Index si
   }
 }
 
-constexpr int kMaxTerms = 8;  // Dormand–Prince: the state and its seven stages
+constexpr int kMaxTerms = 8;  // of one pass
 
 int CombineTerms(int terms, const double* c, const double* const* x, double* z, Eigen::Index size) {
   switch (terms) {

@@ -3,8 +3,8 @@
 // A SUNDIALS vector over a block of trajectories, points × states, column by column.
 //
 // Debian compiles SUNDIALS without optimization, so the integration loop must not use SUNDIALS' own
-// vector operations. All operations that ERKStep and CVODE use are compiled here; the longest, the
-// linear combination of stages, reads memory once. The error norm is that of ErrorScale, in which
+// vector operations. All operations that CVODE uses are compiled here; the longest, the linear
+// combination, reads memory once. The error norm is that of ErrorScale, in which
 // the worst point of the block decides.
 
 #include <sundials/sundials_nvector.h>

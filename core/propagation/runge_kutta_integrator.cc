@@ -11,64 +11,12 @@
 #include "core/propagation/error_floors.h"
 #include "core/propagation/error_scale.h"
 #include "core/propagation/order_choice.h"
+#include "core/propagation/stage_sums.h"
 
 namespace polyest::internal {
 namespace {
 
 using Values = Eigen::ArrayXXd;
-using Lanes = Eigen::Array<double, kLanes, 1>;
-using Stages = std::array<Values, DormandPrince8::kAllStages>;
-
-// Rows of coefficients as types, so that sums over stages are unrolled without the zeros.
-template <class Method, int kStage>
-struct StateRow {
-  static constexpr int kCount = kStage;
-  static constexpr double At(size_t j) { return Method::kA[kStage][j]; }
-};
-template <const auto& kCoefficients>
-struct ErrorRow {
-  static constexpr int kCount = std::size(kCoefficients);
-  static constexpr double At(size_t j) { return kCoefficients[j]; }
-};
-template <const auto& kRows, int kRow>
-struct InterpolantRow {
-  static constexpr int kCount = std::size(kRows[kRow]);
-  static constexpr double At(size_t j) { return kRows[kRow][j]; }
-};
-
-// Returns the stages of a row whose coefficients are not 0.
-template <class Row>
-constexpr auto NonzeroStages() {
-  constexpr auto is_nonzero = [](size_t j) { return Row::At(j) != 0; };
-  constexpr size_t count = [&] {
-    size_t nonzero = 0;
-    for (size_t j = 0; j < Row::kCount; ++j) nonzero += is_nonzero(j) ? 1 : 0;
-    return nonzero;
-  }();
-  std::array<size_t, count> stages{};
-  for (size_t j = 0, k = 0; j < Row::kCount; ++j) {
-    if (is_nonzero(j)) stages[k++] = j;
-  }
-  return stages;
-}
-
-// Returns Σ_j c_j k_j of the eight numbers from `i` on.
-template <class Row>
-Lanes Sum(const Stages& stages, Eigen::Index i) {
-  static constexpr auto kNonzero = NonzeroStages<Row>();
-  return [&]<size_t... k>(std::index_sequence<k...>)->Lanes {
-    return (... + (Row::At(kNonzero[k]) * Lanes::Map(stages[kNonzero[k]].data() + i)));
-  }
-  (std::make_index_sequence<kNonzero.size()>());
-}
-
-// Writes x + h Σ_j c_j k_j.
-template <class Row>
-void AddStages(const Values& x, double step_s, const Stages& stages, Values& sums) {
-  for (Eigen::Index i = 0; i < x.size(); i += kLanes) {
-    Lanes::Map(sums.data() + i) = Lanes::Map(x.data() + i) + step_s * Sum<Row>(stages, i);
-  }
-}
 
 class RungeKuttaIntegrator final : public BlockIntegrator {
  public:
@@ -262,7 +210,7 @@ double RungeKuttaIntegrator::Try(double step_s, double next_s) {
 
 double RungeKuttaIntegrator::Error5(double step_s) {
   for (Eigen::Index i = 0; i < error_.size(); i += kLanes) {
-    Lanes::Map(error_.data() + i) = step_s * Sum<ErrorRow<DormandPrince5::kE>>(stages_, i);
+    Lane::Map(error_.data() + i) = step_s * Sum<ErrorRow<DormandPrince5::kE>>(stages_, i);
   }
   return scale_.Norm(error_, scale_.weights());
 }
@@ -270,10 +218,10 @@ double RungeKuttaIntegrator::Error5(double step_s) {
 double RungeKuttaIntegrator::Error8(double step_s) {
   constexpr double kShare = 0.1;  // of the estimate of order 3
   for (Eigen::Index i = 0; i < error_.size(); i += kLanes) {
-    const Lanes order5 = Sum<ErrorRow<DormandPrince8::kE5>>(stages_, i).abs();
-    const Lanes order3 = kShare * Sum<ErrorRow<DormandPrince8::kE3>>(stages_, i).abs();
-    const Lanes largest = order5.max(order3).max(std::numeric_limits<double>::min());
-    Lanes::Map(error_.data() + i) = step_s * order5 * (order5 / largest);
+    const Lane order5 = Sum<ErrorRow<DormandPrince8::kE5>>(stages_, i).abs();
+    const Lane order3 = kShare * Sum<ErrorRow<DormandPrince8::kE3>>(stages_, i).abs();
+    const Lane largest = order5.max(order3).max(std::numeric_limits<double>::min());
+    Lane::Map(error_.data() + i) = step_s * order5 * (order5 / largest);
   }
   return scale_.Norm(error_, scale_.weights());
 }
@@ -298,12 +246,12 @@ void RungeKuttaIntegrator::Interpolate(double time_s) {
   const double s = (time_s - begin_s_) / (end_s_ - begin_s_);
   const size_t coefficients = was_high_ ? 7 : 4;
   for (Eigen::Index i = 0; i < states_.size(); i += kLanes) {
-    Lanes sum = Lanes::Zero();
+    Lane sum = Lane::Zero();
     for (size_t j = coefficients; j-- > 0;) {
       const double factor = was_high_ && j % 2 == 1 ? 1 - s : s;
-      sum = factor * (sum + Lanes::Map(interpolant_[j].data() + i));
+      sum = factor * (sum + Lane::Map(interpolant_[j].data() + i));
     }
-    Lanes::Map(states_.data() + i) = Lanes::Map(begin_.data() + i) + sum;
+    Lane::Map(states_.data() + i) = Lane::Map(begin_.data() + i) + sum;
   }
 }
 
@@ -328,7 +276,7 @@ void RungeKuttaIntegrator::SetInterpolant(double step_s) {
   const auto set = [&]<int kRow>() {
     double* const values = interpolant_[kFirst + kRow].data();
     for (Eigen::Index i = 0; i < states_.size(); i += kLanes) {
-      Lanes::Map(values + i) = step_s * Sum<InterpolantRow<kRows, kRow>>(stages_, i);
+      Lane::Map(values + i) = step_s * Sum<InterpolantRow<kRows, kRow>>(stages_, i);
     }
   };
   [&]<int... kRow>(std::integer_sequence<int, kRow...>) { (set.template operator()<kRow>(), ...); }

@@ -255,7 +255,7 @@ void TrajectoryBlock::LeaveOut(std::span<const int> points, const char* reason) 
 
 void TrajectoryBlock::FailRowsBeyond(const Eigen::ArrayXXd& values, double time_s,
                                      const char* what) {
-  if (values.abs().maxCoeff<Eigen::PropagateNaN>() <= kMaxOutput) return;
+  if (values.size() == 0 || values.abs().maxCoeff<Eigen::PropagateNaN>() <= kMaxOutput) return;
   for (Eigen::Index row = 0; row < std::ssize(point_alive_); ++row) {
     if (!point_alive_[row] || (values.row(row).abs() <= kMaxOutput).all()) continue;
     const bool finite = values.row(row).isFinite().all();

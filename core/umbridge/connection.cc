@@ -15,11 +15,11 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds kConnectWithin(5);
 
 // Whether the connection broke before the end of an answer. An answer without a length ends with
-// its connection, so that only its JSON tells.
+// its connection, so that only its JSON tells. Errors are texts of any kind.
 bool BrokeOff(const httplib::Response& answer) {
   const bool has_length =
       answer.has_header("Content-Length") || answer.has_header("Transfer-Encoding");
-  return !has_length && !nlohmann::json::accept(answer.body);
+  return answer.status == 200 && !has_length && !nlohmann::json::accept(answer.body);
 }
 
 }  // namespace

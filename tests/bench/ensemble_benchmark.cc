@@ -122,7 +122,7 @@ int Main() {
       [&](double tolerance) { comparison.Ensemble(IntegrationMethod::kStiff, tolerance); }, 1e-6,
       kTighter);
   const double ensemble = comparison.Measure(
-      "ensemble, ERKStep Dormand-Prince",
+      "ensemble, order 5 or 8",
       [&](double tolerance) { comparison.Ensemble(IntegrationMethod::kExplicit, tolerance); }, 1e-6,
       kTighter);
   const double limit = comparison.Measure(

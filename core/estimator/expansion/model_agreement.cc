@@ -19,7 +19,9 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
     const ChannelSums& sums = expansion.sums()[c];
     const double own = chi_squared[static_cast<Eigen::Index>(c)];
-    const double differences = 2 * own * (1 - sums.Lag1Correlation(d));
+    // Costs two products with a matrix, so only where it counts.
+    const double differences =
+        sums.correlation_unknown ? 2 * own * (1 - sums.Lag1Correlation(d)) : 0;
     mismatch += NegativeLogLikelihood(sums.Degrees(), own, differences, sums.scale_unknown,
                                       sums.correlation_unknown);
   }

@@ -51,7 +51,7 @@ class JumpSearch {
   void Add(const SampleRow& place, const ConstVectorRef& scores) {
     const double score = scores.mean();
     ++times_;
-    if (std::abs(score) <= std::abs(found_.score)) return;
+    if (!(std::abs(score) > std::abs(found_.score))) return;  // nor where it is not a number
     found_ = {place, score, 0};
   }
   std::optional<AbruptChange> Take() {

@@ -12,9 +12,9 @@ namespace polyest {
 enum class IntegrationMethod {
   // Steps by matrix exponentials for models that are linear in states and inputs
   // (StateSpaceModel::IsLinear), without error of integration; else explicit, and trajectories that
-  // need too many steps change to the stiff method for good.
+  // are stiff change to the stiff method for good.
   kAuto,
-  kExplicit,  // Dormand–Prince 5(4)
+  kExplicit,  // Dormand–Prince, of order 5 or 8, whichever needs fewer evaluations
   kStiff,     // backward differentiation formulas of order 1 to 5
 };
 
