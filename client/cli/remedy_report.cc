@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "client/cli/number_format.h"
 #include "client/cli/screen.h"
@@ -49,10 +51,14 @@ void PrintTable(const RemedyTrial& trial, std::ostream& out) {
   out << '\n';
 }
 
+// Prints which remedies were refused, each reason once.
 void PrintRefused(const RemedyTrial& trial, std::ostream& out) {
+  std::map<std::string, std::vector<std::string>> remedies;  // by the reason
   for (const RefusedRemedy& one : trial.refused) {
-    PrintSentence(
-        out, absl::StrCat("Refused: ", RemedyText(one.remedy), " (", one.refusal.message(), ")."));
+    remedies[std::string(one.refusal.message())].push_back(RemedyText(one.remedy));
+  }
+  for (const auto& [reason, refused] : remedies) {
+    PrintSentence(out, absl::StrCat("Refused: ", absl::StrJoin(refused, ", "), " (", reason, ")."));
   }
 }
 

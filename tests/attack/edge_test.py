@@ -39,20 +39,33 @@ class Edge(unittest.TestCase):
                              f"{self.folder}/audit.log"], stdout=subprocess.PIPE, text=True)
         port = re.match(r"listening on .*:(\d+)", daemon.stdout.readline()).group(1)
         self.addCleanup(daemon.stdout.close)
+        # haproxy cannot choose a port itself, and another program may take the one that was free.
+        while not self.start_edge(port):
+            pass
+
+    def start_edge(self, daemon_port):
+        """Returns whether haproxy listens. It ends if its port has been taken."""
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
         environment = dict(os.environ, EDGE_LISTEN=f"127.0.0.1:{self.port}",
-                           EDGE_DAEMON=f"127.0.0.1:{port}",
+                           EDGE_DAEMON=f"127.0.0.1:{daemon_port}",
                            EDGE_CERTIFICATE=f"{self.folder}/edge.pem")
         if self.client_ca:
             environment["EDGE_CLIENT_CA"] = f"{self.folder}/ca"
         haproxy = self.start(["/usr/sbin/haproxy", "-db", "-f", CONFIGURATION], env=environment,
-                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        self.addCleanup(haproxy.stderr.close)
+        context = ssl.create_default_context(cafile=self.folder / "certificate")
         while haproxy.poll() is None:
-            with contextlib.suppress(OSError):
-                socket.create_connection(("127.0.0.1", self.port), timeout=1).close()
-                break
+            # The handshake tells whether it is this edge that listens.
+            with contextlib.suppress(OSError), context.wrap_socket(
+                    socket.create_connection(("127.0.0.1", self.port), timeout=1),
+                    server_hostname="localhost"):
+                return True
+        errors = haproxy.stderr.read().decode()
+        self.assertIn("Address already in use", errors)
+        return False
 
     def make_certificates(self):
         file = self.folder.joinpath

@@ -109,7 +109,7 @@ def test_a_history_shows_how_the_estimate_came_about(client, problem, rows):
     assert [point.sequence for point in history.points] == [1, 2, 3, 4]
     widths = [point.parameters["k"].std_dev for point in history.points]
     assert widths[-1] < widths[0]
-    assert history.points[-1].reexpansions >= history.points[0].reexpansions > 0
+    assert history.points[-1].reexpansion_count >= history.points[0].reexpansion_count > 0
     frame = history.to_dataframe()
     assert list(frame.columns)[:4] == ["t", "samples", "sequence", "name"] and len(frame) == 8
 

@@ -171,7 +171,7 @@ v1::EstimateHistory::Point ToHistoryPoint(const v1::Estimate& estimate) {
   point.set_time_s(estimate.time());
   point.set_sample_count(estimate.samples());
   point.set_sequence(estimate.sequence());
-  point.set_reexpansions(estimate.expansion().reexpansions());
+  point.set_reexpansion_count(estimate.expansion().reexpansions());
   for (const v1::Diagnostic& diagnostic : estimate.diagnostics()) {
     if (!std::ranges::count(point.warnings(), diagnostic.code())) {
       point.add_warnings(diagnostic.code());

@@ -217,7 +217,9 @@ TEST_F(RemediesTest, NoEvidenceIsNeededForARemedyThatLeavesNoContradiction) {
     "measured": [{"output": "x", "noise": {"unknown": true, "outliers": "STUDENT_T"}}]})";
   EXPECT_THAT(Explain(white, Example("rough_sensor.csv")),
               AllOf(HasSubstr("With correlated noise of x nothing contradicts the problem"),
-                    HasSubstr(R"("correlation":{"auto":true})"), Not(HasSubstr("process noise"))));
+                    HasSubstr(R"("correlation":{"auto":true})"),
+                    HasSubstr("Refused: process noise on v, drift of k"),
+                    Not(HasSubstr("prefers process noise"))));
 }
 
 TEST_F(RemediesTest, NothingIsTriedWithoutAContradictionOrIfItIsNotWanted) {

@@ -262,7 +262,7 @@ function readHistoryPoint(value: unknown): HistoryPoint {
     sequence: asNumber(json['sequence']),
     parameters,
     warnings: asList(json['warnings']).map(asText),
-    reexpansions: asNumber(json['reexpansions']),
+    reexpansions: asNumber(json['reexpansionCount']),
   };
 }
 

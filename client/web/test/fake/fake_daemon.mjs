@@ -47,7 +47,7 @@ class FakeSession {
       timeS: point.timeS + lap * points[points.length - 1].timeS,
       sampleCount: String(Number(point.sampleCount) + lap * Number(points[points.length - 1].sampleCount)),
       sequence: String(index + 1),
-      reexpansions: Math.floor((index + 1) / 40),
+      reexpansionCount: Math.floor((index + 1) / 40),
       warnings: this.warnings.get(index) ?? [],
     };
   }
@@ -60,7 +60,7 @@ class FakeSession {
       const contraction = now.stdDev / parameter.priorStdDev;
       return { ...parameter, ...now, map: now.mean, posteriorStdDev: now.stdDev, contraction };
     });
-    const expansion = { ...recording.estimate.expansion, reexpansions: point.reexpansions };
+    const expansion = { ...recording.estimate.expansion, reexpansions: point.reexpansionCount };
     return {
       ...recording.estimate, parameters, expansion, diagnostics: this.diagnostics, time: point.timeS,
       samples: point.sampleCount, sequence: point.sequence, ...this.override,

@@ -163,7 +163,7 @@ TEST(EstimateToProto, KeepsWarningsAndReexpansionsInAHistory) {
                           {DiagnosticCode::kNonGaussian, "c"},
                           {DiagnosticCode::kModelMisfit, "output y"}};
   const v1::EstimateHistory::Point point = ToHistoryPoint(ToProto(estimate));
-  EXPECT_EQ(point.reexpansions(), 3);
+  EXPECT_EQ(point.reexpansion_count(), 3);
   EXPECT_THAT(point.warnings(), testing::ElementsAre(v1::Diagnostic::MODEL_MISFIT,
                                                      v1::Diagnostic::NON_GAUSSIAN));
 }

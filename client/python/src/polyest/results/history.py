@@ -51,7 +51,7 @@ class HistoryPoint:
     #: The codes of the diagnostics that the estimate had, such as "MODEL_MISFIT".
     warnings: list[str]
     #: How often the outputs had been expanded again.
-    reexpansions: int
+    reexpansion_count: int
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def of_message(message: estimate_pb2.EstimateHistory) -> History:
                      {one.name: _then(one, enum_name(one, "verdict")) for one in point.parameters},
                      {one.name: _then(one, "") for one in point.drifting},
                      [estimate_pb2.Diagnostic.Code.Name(code) for code in point.warnings],
-                     point.reexpansions)
+                     point.reexpansion_count)
         for point in message.points])
 
 
