@@ -21,7 +21,8 @@ START_NS = 1_790_000_000 * 10**9
 UNITS = json.dumps({"type": "object", "properties": {"defl": {"type": "number", "unit": "mm"}}})
 SUSPENSION = {"topic": "/susp", "encoding": "json", "schema": UNITS, "schemaEncoding": "jsonschema"}
 ROAD = {"topic": "/road", "encoding": "json"}
-OTHER = {"topic": "/camera", "encoding": "cdr"}  # nobody asks for it
+OTHER = {"topic": "/camera", "encoding": "cdr"}  # nobody asks for these
+BROKEN = {"topic": "/lidar", "encoding": "protobuf", "schema": "no Base64!"}
 
 
 @pytest.fixture
@@ -97,7 +98,7 @@ def send(server, rows):
 
 
 def test_the_estimate_is_that_of_the_same_rows(tmp_path, client, serve):
-    server = serve(SUSPENSION, OTHER, ROAD)
+    server = serve(SUSPENSION, OTHER, BROKEN, ROAD)
     bridged = Bridged(tmp_path, client, server.url, "foxglove")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
     rows = messages()

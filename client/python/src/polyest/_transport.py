@@ -95,6 +95,8 @@ class Transport:
             raise failures[0] from None
         except grpc.RpcError as error:
             raise (failures[0] if failures else self.options.error_of(error)) from None
+        finally:
+            call.cancel()  # has no effect on a call that has ended
         return response
 
     def open_stream(self, method: Method[Request, Response], requests: Iterator[Request]) -> Any:

@@ -87,17 +87,16 @@ class FoxgloveSource:
                         raise OSError("it does not speak Foxglove's protocol")
                     self.reconnects += opened
                     opened = True
-                    backoff.reset()
-                    _Listener(self, connection, put).listen(stop)
+                    _Listener(self, connection, put).listen(stop, backoff.reset)
             except self._failures as error:
                 self._say(f"the server {self._url} fails: {error}; it is connected again in "
                           f"{backoff.next_s:.1f} s")
                 stop.wait(backoff.delay_s())
 
-    def say_once(self, what: str) -> None:
-        """Says something that would be true of every message."""
-        if what not in self._said:
-            self._said.add(what)
+    def say_once(self, kind: str, what: str) -> None:
+        """Says something that would be true of every message, for the first of its kind."""
+        if kind not in self._said:
+            self._said.add(kind)
             self._say(what)
 
     def wanted(self) -> TopicValues:
@@ -117,8 +116,11 @@ class _Listener:
         #: Subscriptions by number, which is that of the channel.
         self._subscribed: dict[int, tuple[_Schema, _Channel, MessageDecoder]] = {}
 
-    def listen(self, stop: threading.Event) -> None:
-        """Takes messages until `stop` is set; what has arrived by then is taken, too."""
+    def listen(self, stop: threading.Event, works: Callable[[], None]) -> None:
+        """Takes messages until `stop` is set; what has arrived by then is taken, too.
+
+        works: is called when a message has come.
+        """
         last_chance, patience = math.inf, time.monotonic() + _PATIENCE_S
         while time.monotonic() < last_chance:
             if stop.is_set() and last_chance == math.inf:
@@ -129,12 +131,13 @@ class _Listener:
                 if stop.is_set():
                     return
             else:
+                works()
                 self._take(message)
             if time.monotonic() > patience:
                 patience = math.inf
                 for quantity, text in self._wanted.missing().items():
-                    self._source.say_once(unknown(f"channels.{quantity}", "topic", text,
-                                                  self._known.values()).message)
+                    self._source.say_once(f"missing {quantity}", unknown(
+                        f"channels.{quantity}", "topic", text, self._known.values()).message)
 
     def _take(self, message: Any) -> None:
         if isinstance(message, bytes):
@@ -145,7 +148,8 @@ class _Listener:
         except InvalidInput:  # is a ValueError, too
             raise
         except (ValueError, KeyError, TypeError, AttributeError):
-            self._source.say_once("the server sends a message that the protocol does not have")
+            self._source.say_once(
+                "unknown message", "the server sends a message that the protocol does not have")
 
     def _take_told(self, told: Any) -> None:
         if told.get("op") == "advertise":
@@ -156,12 +160,15 @@ class _Listener:
                 self._known.pop(number, None)
                 self._subscribed.pop(number, None)
         elif told.get("op") == "status" and told.get("level", 0) > 0:
-            self._source.say_once(f"the server says: {told.get('message')}")
+            self._source.say_once(f"status {told['level']}",
+                                  f"the server says: {told.get('message')}")
 
     def _advertised(self, told: Mapping[str, Any]) -> None:
         number = int(told["id"])
         channel = _Channel(number, str(told["topic"]), str(told["encoding"]))
         self._known[number] = channel.topic
+        if not self._wanted.wants(channel.topic):
+            return
         schema = _schema(told)
         if self._wanted.find(schema, channel):
             self._subscribed[number] = schema, channel, MessageDecoder()
@@ -175,17 +182,21 @@ class _Listener:
         if number not in self._subscribed:
             return
         schema, channel, decoder = self._subscribed[number]
+        kind = "undecodable"
         try:
             decoded = decoder.decode(schema, channel, message[DATA.size:])
+            kind = "no number"
             values = self._wanted.values(channel, decoded)
         except InvalidInput as error:
             self._source.undecodable += 1
-            self._source.say_once(f"{error.message}; such messages are counted as undecodable")
+            self._source.say_once(f"{kind} {channel.topic}",
+                                  f"{error.message}; such messages are counted as undecodable")
             return
         for quantity, text in self._wanted.lacking(channel, values).items():
-            self._source.say_once("a message has no number at its field: " + unknown(
-                f"channels.{quantity}", "field with numbers", text,
-                fields_of(decoded, channel.topic)).message)
+            self._source.say_once(f"lacking {quantity}", (
+                "a message has no number at its field: " + unknown(
+                    f"channels.{quantity}", "field with numbers", text,
+                    fields_of(decoded, channel.topic)).message))
         if values:
             self._source.last = time.monotonic()
             self._put(time_ns, values)

@@ -59,14 +59,14 @@ class CanSource:
                 with open_bus(self._bus) as bus:
                     self.reconnects += opened
                     opened = True
-                    backoff.reset()
-                    self._listen(bus, put, stop)
+                    self._listen(bus, put, stop, backoff.reset)
             except Exception as error:  # each interface of python-can has its own
                 self._say(f"the bus {self._bus.channel} fails: {error}; it is opened again in "
                           f"{backoff.next_s:.1f} s")
                 stop.wait(backoff.delay_s())
 
-    def _listen(self, bus: Any, put: Put, stop: threading.Event) -> None:
+    def _listen(self, bus: Any, put: Put, stop: threading.Event,
+                works: Callable[[], None]) -> None:
         last_chance = math.inf
         while time.monotonic() < last_chance:
             if stop.is_set() and last_chance == math.inf:  # what has arrived is read
@@ -74,6 +74,8 @@ class CanSource:
             frame = bus.recv(0 if stop.is_set() else _POLL_S)
             if frame is None and stop.is_set():
                 return
+            if frame is not None:
+                works()
             values = self._decoder.decode(frame) if frame is not None else {}
             if frame is not None and values:
                 self.last = time.monotonic()

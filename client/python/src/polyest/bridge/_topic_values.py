@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from polyest.io._topics import Path, check_encoding, unit_of
+from polyest.io._topics import Path, check_encoding, is_in, unit_of
 from polyest.io.mcap import values_of
 
 
@@ -29,14 +29,19 @@ class TopicValues:
         Raises InvalidInput for messages in another encoding than JSON and protobuf.
         """
         for quantity, text in self._channels.items():
-            fits = text == channel.topic or text.startswith((f"{channel.topic}.",
-                                                             f"{channel.topic}["))
-            if quantity not in self._paths and fits:
+            known = self._paths.get(quantity)
+            # A longer topic fits better, as in files.
+            if is_in(text, channel.topic) and (
+                    known is None or len(known.topic) < len(channel.topic)):
                 path = Path(f"channels.{quantity}", text, {channel.topic: channel})
                 check_encoding(f"channels.{quantity}", channel)
-                self._paths[quantity] = path
                 self.units[quantity] = unit_of(schema, channel, path.steps)
+                self._paths[quantity] = path
         return any(path.topic == channel.topic for path in self._paths.values())
+
+    def wants(self, topic: str) -> bool:
+        """Returns whether a channel may be in a topic."""
+        return any(is_in(text, topic) for text in self._channels.values())
 
     def missing(self) -> dict[str, str]:
         """Returns the channels whose topic has not been found, with what was asked for."""

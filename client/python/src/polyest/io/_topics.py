@@ -10,6 +10,7 @@ from typing import Any, Optional, Union
 from google.protobuf import descriptor_pb2, descriptor_pool, message, message_factory
 
 from polyest._table import refuse
+from polyest.errors import InvalidInput
 from polyest.io._choices import unknown
 
 # A step into a message: the name of a field, or the number of an element.
@@ -20,14 +21,18 @@ _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+)\]")
 ENCODINGS = ("json", "protobuf")
 
 
+def is_in(text: str, topic: str) -> bool:
+    """Returns whether a path leads to a topic or into its messages."""
+    return text == topic or text.startswith((f"{topic}.", f"{topic}["))
+
+
 class Path:
     """Where a value is: a topic and the steps into its messages, as in "/susp.travel[0].value"."""
 
     def __init__(self, field: str, text: str, topics: Mapping[str, Any]) -> None:
         """Finds the topic, the longest of those with which `text` begins. Raises InvalidInput."""
         self.text = text
-        fitting = [topic for topic in topics
-                   if text == topic or text.startswith((f"{topic}.", f"{topic}["))]
+        fitting = [topic for topic in topics if is_in(text, topic)]
         if not fitting:
             raise unknown(field, "topic", text, topics)
         #: The topic.
@@ -95,8 +100,10 @@ class MessageDecoder:
             if channel.message_encoding == "json":
                 return json.loads(data)
             if channel.id not in self._parsers:
-                self._parsers[channel.id] = _parser(schema)
+                self._parsers[channel.id] = _parser(schema, channel.topic)
             return self._parsers[channel.id](data)
+        except InvalidInput:  # is a ValueError, too
+            raise
         except ValueError as error:
             raise refuse(channel.topic, f"has a message that cannot be decoded: {error}") from error
         except message.DecodeError as error:
@@ -110,11 +117,16 @@ def check_encoding(field: str, channel: Any) -> None:
                      f"'{channel.message_encoding}'; those in {' and '.join(ENCODINGS)} are read")
 
 
-def _parser(schema: Any) -> Callable[[bytes], Any]:
+def _parser(schema: Any, topic: str) -> Callable[[bytes], Any]:
+    if schema is None:
+        raise refuse(topic, "has no schema, which protobuf messages need")
     pool = descriptor_pool.DescriptorPool()
-    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
-        pool.Add(file)
-    described = pool.FindMessageTypeByName(schema.name)
+    try:
+        for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+            pool.Add(file)
+        described = pool.FindMessageTypeByName(schema.name)
+    except (KeyError, TypeError, message.DecodeError) as error:
+        raise refuse(topic, f"has a schema that cannot be used: {error}") from error
     if hasattr(message_factory, "GetMessageClass"):
         kind: Any = message_factory.GetMessageClass(described)
     else:  # protobuf 4.21
@@ -129,10 +141,16 @@ def unit_of(schema: Any, channel: Any, steps: list[_Step]) -> str:
         try:
             described = json.loads(schema.data)
         except ValueError:
-            described = {}
+            described = None
         for step in steps:
-            described = described.get("items" if isinstance(step, int) else "properties", {})
-            described = described if isinstance(step, int) else described.get(step, {})
-        if isinstance(described.get("unit"), str):
-            return str(described["unit"])
+            described = _property(described, "items" if isinstance(step, int) else "properties")
+            described = described if isinstance(step, int) else _property(described, step)
+        unit = _property(described, "unit")
+        if isinstance(unit, str):
+            return unit
     return str(channel.metadata.get("unit", ""))
+
+
+def _property(described: Any, name: str) -> Any:
+    """Returns a property; None where a schema has another form, since any JSON may stand there."""
+    return described.get(name) if isinstance(described, Mapping) else None
