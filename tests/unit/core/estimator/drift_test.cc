@@ -17,9 +17,9 @@
 namespace polyest::internal {
 namespace {
 
-// Means may differ from the exact ones by the error of the posterior's draws, which is 0.02 standard
-// deviations for an effective number of 2,000. The truncation adds little at this order; at the
-// default one it adds up to the shift at which an expansion is settled again, 0.08.
+// Means may differ from the exact ones by the error of the posterior's draws, which is 0.02
+// standard deviations for an effective number of 2,000. The truncation adds little at this order;
+// at the default one it adds up to the shift at which an expansion is settled again, 0.08.
 constexpr int kFineOrder = 6;
 constexpr double kOfDraws = 0.05;
 

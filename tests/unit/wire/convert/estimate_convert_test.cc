@@ -164,8 +164,8 @@ TEST(EstimateToProto, KeepsWarningsAndReexpansionsInAHistory) {
                           {DiagnosticCode::kModelMisfit, "output y"}};
   const v1::EstimateHistory::Point point = ToHistoryPoint(ToProto(estimate));
   EXPECT_EQ(point.reexpansion_count(), 3);
-  EXPECT_THAT(point.warnings(), testing::ElementsAre(v1::Diagnostic::MODEL_MISFIT,
-                                                     v1::Diagnostic::NON_GAUSSIAN));
+  EXPECT_THAT(point.warnings(),
+              testing::ElementsAre(v1::Diagnostic::MODEL_MISFIT, v1::Diagnostic::NON_GAUSSIAN));
 }
 
 TEST(EstimateToProto, KnowsEveryDiagnostic) {
