@@ -31,8 +31,8 @@ struct Remedy {
   Kind kind = Kind::kCorrelatedNoise;
   // The outputs with the noise, or the state or parameter.
   std::vector<std::string> names;
-  // The sizes to try: the middle one, the largest and the smallest. Of the two
-  // kinds of noise that of each output; 0 for correlated noise of the size stated.
+  // The sizes to try: the middle one, the largest and the smallest. The two kinds of noise have one
+  // size for each output instead, 0 for correlated noise of the size stated.
   std::vector<double> sizes;
 };
 

@@ -8,6 +8,7 @@
 #include "core/common/linear_algebra.h"
 
 namespace polyest::internal {
+
 absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
                                                             const ConstMatrixRef& points,
                                                             double max_condition) {

@@ -28,7 +28,8 @@ struct TrajectoryInstant {
   // The row's samples, one for each measured output, NaN where missing; empty for a time asked for.
   std::span<const double> samples;
   std::span<const double> noise;  // standard deviations of their noise
-  // Of smoothers, RunSmoothers::ReadJumpScores (trajectories × outputs); else null.
+  // The scores of abrupt changes (trajectories × outputs), RunSmoothers::ReadJumpScores, if
+  // smoothed; else null.
   const Matrix* jump_scores = nullptr;
 };
 

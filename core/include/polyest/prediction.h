@@ -102,8 +102,8 @@ struct PredictedOutput {
   Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample, 0 where a
                                  // sample has no noise, such as a 0 of relative noise
   PredictionScore score;         // over the whole record
-  // Of a parameter that drifts, if smoothed: the most certain abrupt change, if one has a score
-  // beyond its limit.
+  // The most certain abrupt change of a parameter that drifts, if smoothed and if its score is
+  // beyond the limit; else empty.
   std::optional<AbruptChange> abrupt_change;
 };
 

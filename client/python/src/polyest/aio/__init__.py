@@ -1,4 +1,4 @@
-"""The same for asyncio: `connect`, `local`, clients, experiments, sessions.
+"""What the package has, for asyncio: `connect`, `local`, clients, experiments, sessions.
 
     async with polyest.aio.local() as client:
         async with await client.session("run7", problem) as session:

@@ -9,14 +9,14 @@ from polyest._table import refuse
 from polyest.estimates import Estimate
 from polyest.io._choices import unknown
 
-# Of the estimate as a whole.
+# Values of the estimate as a whole.
 _WHOLE: dict[str, Callable[[Estimate], float]] = {
     "time": lambda estimate: estimate.time,
     "samples": lambda estimate: estimate.samples,
     "sequence": lambda estimate: estimate.sequence,
     "diagnostics": lambda estimate: len(estimate.diagnostics),
 }
-# Of one parameter.
+# Values of each parameter.
 _OF_PARAMETER = ("mean", "std_dev", "map", "lower95", "upper95", "contraction", "identified")
 
 

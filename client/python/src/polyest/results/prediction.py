@@ -76,8 +76,8 @@ class PredictedOutput:
     standardized_residual: Optional[Floats]
     #: How well the samples of the whole record agree; None if the noise is not known.
     score: Optional[Score]
-    #: Of a parameter that drifts, if smoothed: the abrupt change that its random walk explains
-    #: least; None if the walk explains all.
+    #: The abrupt change of a parameter that drifts which its random walk explains least, if
+    #: smoothed; None if the walk explains all.
     abrupt_change: Optional[AbruptChange] = None
 
 
