@@ -14,8 +14,8 @@ import pytest
 
 import polyest
 from conftest import ROOT
-from polyest.bridge._backoff import Backoff
-from rig import PROBLEM, record, wait_for
+from polyest.bridge._backoff import Backoff, run_reconnecting
+from rig import PROBLEM, Waits, record, wait_for
 
 can = pytest.importorskip("can")
 writer = pytest.importorskip("mcap.writer")
@@ -262,6 +262,27 @@ def test_delays_double_up_to_the_longest_until_a_success():
     assert [backoff.delay_s() for _ in range(4)] == [1.0, 2.0, 4.0, 5.0]
     backoff.reset()
     assert backoff.delay_s() == 1.0
+
+
+def test_a_connection_alone_does_not_shorten_the_delays_but_a_message_does():
+    messages = [0, 0, 0, 1, 0]  # that each connection brings before it ends
+    stop, delays = Waits(len(messages)), []
+
+    def listen(works):
+        for _ in range(messages[len(stop.delays)]):
+            works()
+        raise OSError("closed")
+
+    run_reconnecting(listen, (OSError,), lambda error, delay: delays.append(delay), stop)
+    assert stop.delays == delays == [0.2, 0.4, 0.8, 0.2, 0.4]
+
+
+def test_other_exceptions_are_not_tried_again():
+    def listen(works):
+        raise ValueError("wrong")
+
+    with pytest.raises(ValueError, match="wrong"):
+        run_reconnecting(listen, (OSError,), lambda error, delay: None, Waits(1))
 
 
 def test_viewers_get_the_newest_estimate_by_foxglove_s_protocol(tmp_path, client):

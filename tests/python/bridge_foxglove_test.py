@@ -3,19 +3,22 @@
 import base64
 import json
 import re
+import struct
 import threading
+from types import SimpleNamespace
 
 import pytest
 
 import polyest
 from polyest import bridge
-from rig import PROBLEM, record, wait_for
+from rig import PROBLEM, Waits, record, wait_for
 
 pytest.importorskip("websockets")
 
 from google.protobuf import wrappers_pb2
 
 from foxglove_server import FoxgloveServer
+from polyest.bridge._foxglove_source import FoxgloveSource
 
 START_NS = 1_790_000_000 * 10**9
 UNITS = json.dumps({"type": "object", "properties": {"defl": {"type": "number", "unit": "mm"}}})
@@ -191,18 +194,17 @@ def test_messages_that_cannot_be_read_are_counted_and_the_first_is_said(tmp_path
     server = serve(SUSPENSION, ROAD)
     bridged = Bridged(tmp_path, client, server.url, "foxglove-bad")
     server.wait_for_subscriptions(wait_for, {"/susp", "/road"})
-    server.send("/susp", START_NS, b"{")
-    server.send("/susp", START_NS, {"defl": "none"})
-    server.send("/susp", START_NS, {"deflection": 1.0})
+    for bad in (b"{", b"[1", {"defl": "none"}, {"defl": [1]}, {"deflection": 1.0}, {"defle": 1.0}):
+        server.send("/susp", START_NS, bad)
     server.tell(op="status", level=1, message="the sensor is warm")
     server.connection.send("[]")
     server.connection.send(b"\x02" + bytes(8))  # the time of a simulation
     rows = messages()
     send(server, rows)
-    bridged.says("left out: undecodable 2")
+    bridged.says("left out: undecodable 4")
     assert bridged.end(len(rows)) == 0, bridged.said
     for pattern in ("/susp: has a message that cannot be decoded",
-                    "/susp.defl: is no number but str", "the nearest are '/susp.deflection'",
+                    "/susp.defl: is no number but str", "a message has no number at its field",
                     "the server says: the sensor is warm", "a message that the protocol does not"):
         assert sum(pattern in line for line in bridged.said) == 1, (pattern, bridged.said)
     assert client.session("foxglove-bad").info().sample_count == sum(
@@ -234,6 +236,68 @@ def test_a_topic_that_is_not_there_is_named_with_the_nearest(tmp_path, client, s
     bridged = Bridged(tmp_path, client, server.url, "foxglove-missing")
     bridged.says("channels.x: there is no topic '/susp.defl'.*'/suspension'")
     assert bridged.end() == 0
+
+
+class Closing:
+    """A connection that brings some messages and is closed by the server then."""
+
+    subprotocol = "foxglove.websocket.v1"
+
+    def __init__(self, *brought):
+        self.brought = list(brought)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def send(self, message):
+        pass
+
+    def recv(self, timeout):
+        if not self.brought:
+            raise OSError("closed")
+        return self.brought.pop(0)
+
+
+def sourced(connections, **channels):
+    """Runs a source on these connections; returns it, its lines, samples and delays."""
+    said, taken, stop = [], [], Waits(len(connections))
+    source = FoxgloveSource(SimpleNamespace(url="ws://rig"), channels, said.append)
+    source._connect = lambda *_, **__: connections[len(stop.delays)]
+    source.run(lambda time_ns, values: taken.append((time_ns, values)), stop)
+    return source, said, taken, stop.delays
+
+
+def advertised(*channels):
+    return json.dumps({"op": "advertise", "channels": channels})
+
+
+DATA = struct.pack("<BIQ", 1, 3, START_NS) + b'{"force": 2.0}'
+
+
+def test_a_server_that_closes_each_connection_is_asked_less_and_less_until_data_come():
+    greeting = [json.dumps({"op": "serverInfo", "name": "rig"}), advertised({**ROAD, "id": 3})]
+    source, said, taken, delays = sourced(
+        [Closing(), Closing(*greeting), Closing(*greeting), Closing(*greeting, DATA)],
+        force="/road.force")
+    assert delays == [0.2, 0.4, 0.8, 0.2]
+    assert said[2] == "the server ws://rig fails: closed; it is connected again in 0.8 s"
+    assert taken == [(START_NS, {"force": 2.0})]
+    assert source.reconnects == 3
+
+
+def test_a_wanted_topic_with_a_broken_schema_is_said_once_and_left_out(monkeypatch):
+    # That a topic is missing would be said at once.
+    monkeypatch.setattr("polyest.bridge._foxglove_source._PATIENCE_S", -1.0)
+    announced = advertised({**BROKEN, "id": 2}, {**ROAD, "id": 3})
+    _, said, taken, _ = sourced([Closing(announced, DATA), Closing(announced, DATA)],
+                                x="/lidar.range", force="/road.force")
+    about, = (line for line in said if "/lidar" in line)
+    assert about.startswith("/lidar: has a schema that is no Base64")
+    assert about.endswith("; the topic is left out")
+    assert taken == [(START_NS, {"force": 2.0})] * 2
 
 
 def test_an_address_of_another_kind_is_refused(tmp_path):

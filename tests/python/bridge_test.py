@@ -1,16 +1,19 @@
 """The bridge between a CAN bus and a real daemon: estimates come back, restarts lose nothing."""
 
+import contextlib
 import json
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import polyest
 from polyest import bridge
-from rig import DBC, PROBLEM, TRUTH, record, wait_for
+from polyest.bridge._sources import CanSource
+from rig import DBC, PROBLEM, TRUTH, Waits, record, wait_for
 
 can = pytest.importorskip("can")
 cantools = pytest.importorskip("cantools")
@@ -216,6 +219,26 @@ def test_a_bus_that_disappears_is_opened_again(rig, data, monkeypatch):
     wait_for(lambda: one.bridge.counts().rows >= len(rows_of(data)["t"]) - 1)
     assert one.end() == 0
     assert one.bridge.counts().source_reconnects == 1
+
+
+def test_a_bus_that_fails_at_once_is_opened_less_and_less_until_a_frame_comes(
+        tmp_path, monkeypatch):
+    (tmp_path / "rig.dbc").write_text(DBC)
+    brought = [[], [], [], [frame(START, "ROAD", force=2.0)]]
+    said, taken, stop = [], [], Waits(len(brought))
+
+    @contextlib.contextmanager
+    def open_bus(_):
+        frames_left = brought[len(stop.delays)]
+        yield SimpleNamespace(recv=lambda timeout: frames_left.pop(0))  # IndexError at the end
+
+    monkeypatch.setattr("polyest.bridge._sources.open_bus", open_bus)
+    source = CanSource(SimpleNamespace(channel="rig", database=tmp_path / "rig.dbc"),
+                       {"force": "ROAD.force"}, said.append)
+    source.run(lambda time_ns, values: taken.append(values), stop)
+    assert stop.delays == [0.2, 0.4, 0.8, 0.2]
+    assert len(said) == 4 and "the bus rig fails" in said[2] and "again in 0.8 s" in said[2]
+    assert taken == [{"force": pytest.approx(2.0)}]
 
 
 def test_frames_out_of_order_are_put_in_order_within_the_window(rig, client, data):

@@ -87,6 +87,19 @@ def same(estimate, parameters):
         {name: value for name, value in one.items() if value != 0} for one in parameters]
 
 
+class Waits:
+    """Stands in for the event that ends a source: it is set once so many delays have been asked."""
+
+    def __init__(self, count):
+        self.count, self.delays = count, []
+
+    def is_set(self):
+        return len(self.delays) >= self.count
+
+    def wait(self, timeout_s):
+        self.delays.append(timeout_s)
+
+
 def wait_for(condition, timeout_s=60.0):
     """Waits until something has come about."""
     end = time.monotonic() + timeout_s

@@ -4,6 +4,7 @@ import os
 import select
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -167,6 +168,22 @@ def test_an_exported_session_has_the_same_estimate(client, problem, rows, tmp_pa
     file.write_bytes(file.read_bytes()[:-3])
     with pytest.raises(polyest.InvalidInput, match="ends in the middle of a record"):
         client.import_session(file, "cut-off")
+
+
+def test_an_import_that_is_interrupted_is_cancelled(client, tmp_path, monkeypatch):
+    done = []
+
+    def interrupted():
+        done.append("interrupted")
+        raise KeyboardInterrupt
+
+    call = SimpleNamespace(result=interrupted, cancel=lambda: done.append("cancelled"))
+    begins = SimpleNamespace(future=lambda requests, metadata: call)
+    monkeypatch.setattr(client._transport, "_channel", SimpleNamespace(
+        stream_unary=lambda *_: begins))
+    with pytest.raises(KeyboardInterrupt):
+        client.import_session(tmp_path / "run.polyest")
+    assert done == ["interrupted", "cancelled"]
 
 
 def lives(pid):

@@ -40,11 +40,17 @@ def wrappers(**changes):
                               "data": files.SerializeToString(), **changes})
 
 
+# A file that imports another, which is not there.
+LACKING = descriptor_pb2.FileDescriptorSet(file=[
+    descriptor_pb2.FileDescriptorProto(name="a.proto", dependency=["b.proto"])])
+
+
 @pytest.mark.parametrize("schema, said", [
     (None, "has no schema"),
     (wrappers(name="google.protobuf.Nothing"), "cannot be used"),
     (wrappers(data=b"\xff\xff"), "cannot be used"),
-    (wrappers(data=b""), "cannot be used")])
+    (wrappers(data=b""), "cannot be used"),
+    (wrappers(data=LACKING.SerializeToString()), "cannot be used")])
 def test_a_schema_of_protobuf_that_cannot_be_used_is_refused_by_topic(schema, said):
     with pytest.raises(InvalidInput, match=f"/susp.*{said}"):
         MessageDecoder().decode(schema, topic(encoding="protobuf"), b"")

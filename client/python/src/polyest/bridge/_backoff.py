@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
+
 
 class Backoff:
     """Delays that double from one attempt to the next, up to the longest."""
@@ -19,3 +22,23 @@ class Backoff:
     def reset(self) -> None:
         """Begins anew, after a success."""
         self.next_s = self._first
+
+
+def run_reconnecting(listen: Callable[[Callable[[], None]], None],
+                     failures: tuple[type[Exception], ...],
+                     failed: Callable[[Exception, float], None], stop: threading.Event) -> None:
+    """Calls `listen` until `stop` is set, and again after each failure, with delays that double.
+
+    listen: connects and takes messages. Its argument is a function to call when it takes one: from
+        then on delays begin anew. A connection alone does not end them, since a source may accept
+        connections and close each at once.
+    failures: exceptions after which it is called again.
+    failed: is given the exception and the delay before the next attempt, s.
+    """
+    backoff = Backoff()
+    while not stop.is_set():
+        try:
+            listen(backoff.reset)
+        except failures as error:
+            failed(error, backoff.next_s)
+            stop.wait(backoff.delay_s())

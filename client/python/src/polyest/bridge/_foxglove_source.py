@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional
 
 from polyest._table import refuse
-from polyest.bridge._backoff import Backoff
+from polyest.bridge._backoff import run_reconnecting
 from polyest.bridge._configuration import FoxgloveServer
 from polyest.bridge._foxglove import DATA, PROTOCOLS
 from polyest.bridge._topic_values import TopicValues
 from polyest.errors import InvalidInput
 from polyest.io._choices import needed, unknown
-from polyest.io._topics import MessageDecoder, fields_of
+from polyest.io._topics import MessageDecoder, fields_of, is_in
 
 if TYPE_CHECKING:
     from polyest.bridge._sources import Put
@@ -66,6 +66,7 @@ class FoxgloveSource:
         self._failures = (OSError, needed("websockets.exceptions", "bridge").WebSocketException)
         self._url, self._channels, self._say = server.url, channels, say
         self._said: set[str] = set()
+        self._opened = False
         #: Units come with the topics.
         self.units = {name: "" for name in channels}
         #: How often the connection was made again.
@@ -77,21 +78,20 @@ class FoxgloveSource:
 
     def run(self, put: Put, stop: threading.Event) -> None:
         """Puts all samples until `stop` is set. Raises InvalidInput for unknown encodings."""
-        backoff = Backoff()
-        opened = False
-        while not stop.is_set():
-            try:
-                with self._connect(self._url, subprotocols=list(PROTOCOLS),
-                                   max_size=_MAX_BYTES) as connection:
-                    if connection.subprotocol is None:
-                        raise OSError("it does not speak Foxglove's protocol")
-                    self.reconnects += opened
-                    opened = True
-                    _Listener(self, connection, put).listen(stop, backoff.reset)
-            except self._failures as error:
-                self._say(f"the server {self._url} fails: {error}; it is connected again in "
-                          f"{backoff.next_s:.1f} s")
-                stop.wait(backoff.delay_s())
+        def listen(works: Callable[[], None]) -> None:
+            with self._connect(self._url, subprotocols=list(PROTOCOLS),
+                               max_size=_MAX_BYTES) as connection:
+                if connection.subprotocol is None:
+                    raise OSError("it does not speak Foxglove's protocol")
+                self.reconnects += self._opened
+                self._opened = True
+                _Listener(self, connection, put, works).listen(stop)
+
+        run_reconnecting(listen, self._failures, self._failed, stop)
+
+    def _failed(self, error: Exception, delay_s: float) -> None:
+        self._say(f"the server {self._url} fails: {error}; it is connected again in "
+                  f"{delay_s:.1f} s")
 
     def say_once(self, kind: str, what: str) -> None:
         """Says something that would be true of every message, for the first of its kind."""
@@ -109,18 +109,19 @@ class FoxgloveSource:
 class _Listener:
     """What one connection has announced, and what is subscribed to."""
 
-    def __init__(self, source: FoxgloveSource, connection: Any, put: Put) -> None:
+    def __init__(self, source: FoxgloveSource, connection: Any, put: Put,
+                 works: Callable[[], None]) -> None:
+        """`works` is called for each message of a subscribed topic."""
         self._source, self._connection, self._put = source, connection, put
+        self._works = works
         self._wanted = source.wanted()
         self._known: dict[int, str] = {}  # topics of all channels
+        self._left_out: set[str] = set()  # wanted topics whose schemas cannot be used
         #: Subscriptions by number, which is that of the channel.
         self._subscribed: dict[int, tuple[_Schema, _Channel, MessageDecoder]] = {}
 
-    def listen(self, stop: threading.Event, works: Callable[[], None]) -> None:
-        """Takes messages until `stop` is set; what has arrived by then is taken, too.
-
-        works: is called when a message has come.
-        """
+    def listen(self, stop: threading.Event) -> None:
+        """Takes messages until `stop` is set; what has arrived by then is taken, too."""
         last_chance, patience = math.inf, time.monotonic() + _PATIENCE_S
         while time.monotonic() < last_chance:
             if stop.is_set() and last_chance == math.inf:
@@ -131,13 +132,16 @@ class _Listener:
                 if stop.is_set():
                     return
             else:
-                works()
                 self._take(message)
             if time.monotonic() > patience:
                 patience = math.inf
-                for quantity, text in self._wanted.missing().items():
-                    self._source.say_once(f"missing {quantity}", unknown(
-                        f"channels.{quantity}", "topic", text, self._known.values()).message)
+                self._say_missing()
+
+    def _say_missing(self) -> None:
+        for quantity, text in self._wanted.missing().items():
+            if not any(is_in(text, topic) for topic in self._left_out):
+                self._source.say_once(f"missing {quantity}", unknown(
+                    f"channels.{quantity}", "topic", text, self._known.values()).message)
 
     def _take(self, message: Any) -> None:
         if isinstance(message, bytes):
@@ -169,7 +173,13 @@ class _Listener:
         self._known[number] = channel.topic
         if not self._wanted.wants(channel.topic):
             return
-        schema = _schema(told)
+        try:
+            schema = _schema(told)
+        except InvalidInput as error:
+            self._left_out.add(channel.topic)
+            self._source.say_once(f"schema {channel.topic}",
+                                  f"{error.message}; the topic is left out")
+            return
         if self._wanted.find(schema, channel):
             self._subscribed[number] = schema, channel, MessageDecoder()
             self._connection.send(json.dumps({"op": "subscribe", "subscriptions": [
@@ -181,6 +191,7 @@ class _Listener:
         _, number, time_ns = DATA.unpack_from(message)
         if number not in self._subscribed:
             return
+        self._works()
         schema, channel, decoder = self._subscribed[number]
         kind = "undecodable"
         try:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import IO, Any, Optional, Union
 
-from polyest.bridge._backoff import Backoff
+from polyest.bridge._backoff import run_reconnecting
 from polyest.bridge._configuration import CanBus, Configuration, FoxgloveServer, McapStream
 from polyest.bridge._foxglove_source import FoxgloveSource
 from polyest.bridge._topic_values import TopicValues
@@ -40,6 +40,7 @@ class CanSource:
         self._decoder = FrameDecoder(load_database(bus.database), channels)
         #: The unit of each channel as the database writes it.
         self.units = self._decoder.units
+        self._opened = False
         #: How often the bus was opened again.
         self.reconnects = 0
         #: time.monotonic() of the last frame of these channels.
@@ -52,18 +53,18 @@ class CanSource:
 
     def run(self, put: Put, stop: threading.Event) -> None:
         """Puts all samples until `stop` is set."""
-        backoff = Backoff()
-        opened = False
-        while not stop.is_set():
-            try:
-                with open_bus(self._bus) as bus:
-                    self.reconnects += opened
-                    opened = True
-                    self._listen(bus, put, stop, backoff.reset)
-            except Exception as error:  # each interface of python-can has its own
-                self._say(f"the bus {self._bus.channel} fails: {error}; it is opened again in "
-                          f"{backoff.next_s:.1f} s")
-                stop.wait(backoff.delay_s())
+        def listen(works: Callable[[], None]) -> None:
+            with open_bus(self._bus) as bus:
+                self.reconnects += self._opened
+                self._opened = True
+                self._listen(bus, put, stop, works)
+
+        # Each interface of python-can has exceptions of its own.
+        run_reconnecting(listen, (Exception,), self._failed, stop)
+
+    def _failed(self, error: Exception, delay_s: float) -> None:
+        self._say(f"the bus {self._bus.channel} fails: {error}; it is opened again in "
+                  f"{delay_s:.1f} s")
 
     def _listen(self, bus: Any, put: Put, stop: threading.Event,
                 works: Callable[[], None]) -> None:

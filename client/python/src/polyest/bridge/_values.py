@@ -1,4 +1,4 @@
-"""Values of an estimate that go out: by a path such as "k.mean", and all as a JSON object."""
+"""Picks the values of an estimate that are published: one by a path such as "k.mean", or all."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from polyest._table import refuse
 from polyest.estimates import Estimate
 from polyest.io._choices import unknown
 
-# Values of the estimate as a whole.
+# What a path may name of the estimate as a whole, as in "time".
 _WHOLE: dict[str, Callable[[Estimate], float]] = {
     "time": lambda estimate: estimate.time,
     "samples": lambda estimate: estimate.samples,
     "sequence": lambda estimate: estimate.sequence,
     "diagnostics": lambda estimate: len(estimate.diagnostics),
 }
-# Values of each parameter.
+# What a path may name of each parameter, as in "k.mean".
 _OF_PARAMETER = ("mean", "std_dev", "map", "lower95", "upper95", "contraction", "identified")
 
 

@@ -70,7 +70,7 @@ class RowMaker:
             columns[name] = column = np.full(len(times), np.nan)
             if name in piece:
                 taken, values = piece[name]
-                # Of samples at the same time the first counts: it is written last.
+                # The first of several samples at one time counts: it is written last.
                 column[np.searchsorted(times, taken)[::-1]] = values[::-1]
                 self.repeated += len(taken) - len(np.unique(taken))
         return self._seconds(times), columns

@@ -54,8 +54,8 @@ def _fit_panel(axis: Any, prediction: Prediction, one: PredictedOutput, run: int
 def residuals(prediction: Prediction) -> Figure:
     """Draws residuals in standard deviations of a sample, and their autocorrelation.
 
-    Of a right model 95 % lie within ±2, and correlations within ±2/√samples. Residuals of an output
-    whose noise is not known are in its unit, without autocorrelation.
+    If the model is right, 95 % of them lie within ±2, and correlations within ±2/√samples.
+    Residuals of an output whose noise is not known are in its unit, without autocorrelation.
     """
     figure, axes = _figure.panels(len(prediction.outputs), 2, share_x=False)
     for row, one in enumerate(prediction.outputs.values()):

@@ -4,8 +4,8 @@ The daemon computes both from all of its draws, by the ranks of the draws as in 
 "Rank-normalization, folding, and localization: an improved R̂ for assessing convergence of MCMC",
 Bayesian Analysis 16 (2021). It runs four groups of Markov chains that never exchange anything, and
 R̂ compares the first and second halves of the groups: 8 sequences. It is the R̂ of the ranks; that of
-ArviZ is the larger one of it and of a second, folded one. Of a posterior in several separate pieces
-it is the largest of the pieces.
+ArviZ is the larger one of it and of a second, folded one. A posterior in several separate pieces
+has the largest R̂ of its pieces.
 
 The samples that the daemon returns are a thinned selection of these draws, and do not say which
 chain each one is of. R̂ can therefore not be computed again from `Posterior.samples`.

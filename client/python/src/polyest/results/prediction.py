@@ -76,8 +76,8 @@ class PredictedOutput:
     standardized_residual: Optional[Floats]
     #: How well the samples of the whole record agree; None if the noise is not known.
     score: Optional[Score]
-    #: The abrupt change of a parameter that drifts which its random walk explains least, if
-    #: smoothed; None if the walk explains all.
+    #: The sudden change that the random walk of a drifting parameter explains least; None if the
+    #: walk explains all changes, or if the prediction is not smoothed.
     abrupt_change: Optional[AbruptChange] = None
 
 
