@@ -88,8 +88,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
   return problem;
 }
 
-// Returns the duration of the longest run that is known, s. A session's estimate ends in its last
-// run.
+// Returns the duration of the longest run that is known, s. The rows of a session may not have been
+// read; its estimate then tells how far its last run has come.
 double LongestRun(const ExplainInput& input) {
   const auto& times = input.measurements.time_s();
   const double longest = times.empty() ? 0 : *std::max_element(times.begin(), times.end());

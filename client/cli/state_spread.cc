@@ -27,16 +27,19 @@ struct Described {
   std::vector<std::string> outputs;
 };
 
+// Says whether the state is the derivative of another one.
+bool IsDerivative(const std::string& state, const v1::Equations& equations) {
+  return std::ranges::any_of(equations.states(),
+                             [&](const auto& other) { return other.second == state; });
+}
+
 // Describes the model of equations, which gets each state as an output.
 Described Describe(v1::Equations& equations) {
   Described model;
   for (const auto& [name, derivative] : equations.states()) {
     const auto unit = equations.units().find(name);
     StateName state{name, unit == equations.units().end() ? "" : unit->second};
-    state.is_velocity = absl::EndsWith(state.unit, "/s") ||
-                        std::ranges::any_of(equations.states(), [&](const auto& other) {
-                          return other.second == name;
-                        });
+    state.is_velocity = absl::EndsWith(state.unit, "/s") || IsDerivative(name, equations);
     model.states.push_back(state);
     if (!equations.outputs().contains(name)) (*equations.mutable_outputs())[name] = name;
   }

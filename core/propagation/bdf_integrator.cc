@@ -172,11 +172,9 @@ IntegratorOutcome BdfIntegrator::Outcome(int flag, double advance_s, double span
   outcome.reason = InWords(flag);
   outcome.worst_point = scale_.worst_point();
   outcome.too_many_steps = flag == CV_TOO_MUCH_WORK;
-  // Many steps without progress: more of them will not help.
-  constexpr double kStandstill = 1e-13;
-  if (outcome.too_many_steps && !(advance_s > kStandstill * std::max(std::abs(time_s_), span_s))) {
+  if (outcome.too_many_steps && StandsStill(advance_s, time_s_, span_s)) {
     outcome.too_many_steps = false;
-    outcome.reason = "the step size fell below the resolution of time";
+    outcome.reason = kStandstillReason;
   }
   return outcome;
 }

@@ -2,6 +2,9 @@
 
 // The interface of an integrator of a block of trajectories.
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/common/types.h"
 
 namespace polyest::internal {
@@ -28,6 +31,13 @@ struct IntegratorOutcome {
   bool too_many_steps = false;
   Eigen::Index worst_point = 0;  // the row whose error or value made it fail
 };
+
+// Whether steps that covered `advance_s` up to `time_s`, towards a sample in `span_s`, got nowhere,
+// so that more of them will not help.
+inline bool StandsStill(double advance_s, double time_s, double span_s) {
+  return !(advance_s > 1e-13 * std::max(std::abs(time_s), span_s));
+}
+inline constexpr char kStandstillReason[] = "the step size fell below the resolution of time";
 
 class BlockIntegrator {
  public:

@@ -4,8 +4,8 @@
 //
 // Debian compiles SUNDIALS without optimization, so the integration loop must not use SUNDIALS' own
 // vector operations. All operations that CVODE uses are compiled here; the longest, the linear
-// combination, reads memory once. The error norm is that of ErrorScale, in which
-// the worst point of the block decides.
+// combination, reads memory once. The error norm is that of ErrorScale, in
+// which the worst point of the block decides.
 
 #include <sundials/sundials_nvector.h>
 

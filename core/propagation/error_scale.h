@@ -23,8 +23,8 @@
 //
 // A solver asks for its weights at the beginning of a step. A state that starts from 0 would then
 // have a scale of 0 through the whole step, so the norm also counts the magnitudes in the states
-// at which the right-hand side was evaluated last: at the end of the step under test for
-// Dormand–Prince (its last stage) and for BDF (its corrector).
+// that the solver watches: those at the end of the step under test, for BDF as its corrector has
+// evaluated them last.
 
 #include <Eigen/Core>
 
@@ -57,8 +57,7 @@ class ErrorScale {
   // SetFloors was never called.
   bool NeedsFloors() const;
 
-  // Sets the states at which the right-hand side was evaluated last; they must stay alive until the
-  // next call.
+  // Sets the states at the end of the step under test; they must stay alive until the next call.
   void Watch(const Eigen::ArrayXXd* states) { watched_ = states; }
 
   // Returns ‖error‖, with kHuge for a point that is not finite, and stores each point's norm.

@@ -1,28 +1,13 @@
 #include "core/propagation/row_steps.h"
 
+#include "core/propagation/dormand_prince_tables.h"
+
 namespace polyest::internal {
 namespace {
 
-constexpr int kLast = RowSteps::kStages - 1;
-
-constexpr std::array<double, RowSteps::kStages> kTimes = {0,       1.0 / 5, 3.0 / 10, 4.0 / 5,
-                                                          8.0 / 9, 1,       1};
-// The last row contains the b_i.
-constexpr double kCoefficients[RowSteps::kStages][RowSteps::kStages] = {
-    {},
-    {1.0 / 5},
-    {3.0 / 40, 9.0 / 40},
-    {44.0 / 45, -56.0 / 15, 32.0 / 9},
-    {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
-    {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
-    {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
-constexpr std::array<double, RowSteps::kStages> kErrors = {
-    71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
-constexpr std::array<double, RowSteps::kStages> kDense = {
-    -12715105075.0 / 11282082432,  0,
-    87487479700.0 / 32700410799,   -10690763975.0 / 1880347072,
-    701980252875.0 / 199316789632, -1453857185.0 / 822651844,
-    69997945.0 / 29380423};
+constexpr size_t kLast = DormandPrince5::kStages;
+// The d_i of the interpolant, which are the coefficients of its highest power.
+constexpr const auto& kDense = DormandPrince5::kP.back();
 
 }  // namespace
 
@@ -36,25 +21,24 @@ RowSteps::RowSteps(Eigen::Index rows, Eigen::Index states)
 
 void RowSteps::Take(RowSystem& system, const Eigen::ArrayXd& times_s, const Eigen::ArrayXd& steps_s,
                     const Eigen::ArrayXXd& states) {
-  for (int i = 1; i <= kLast; ++i) {
+  for (size_t i = 1; i <= kLast; ++i) {
     Eigen::ArrayXXd& x = i == kLast ? end_ : i == kLast - 1 ? near_end_ : stage_states_;
     for (Eigen::Index s = 0; s < states.cols(); ++s) {
       auto column = x.col(s);
-      column = kCoefficients[i][0] * stages_[0].col(s);
-      for (int j = 1; j < i; ++j) {
-        if (kCoefficients[i][j] == 0) continue;
-        column += kCoefficients[i][j] * stages_[static_cast<size_t>(j)].col(s);
+      column = DormandPrince5::kA[i][0] * stages_[0].col(s);
+      for (size_t j = 1; j < i; ++j) {
+        if (DormandPrince5::kA[i][j] != 0) column += DormandPrince5::kA[i][j] * stages_[j].col(s);
       }
       column = states.col(s) + steps_s * column;
     }
-    stage_times_s_ = times_s + kTimes[static_cast<size_t>(i)] * steps_s;
-    system.Rates(stage_times_s_, x, stages_[static_cast<size_t>(i)]);
+    stage_times_s_ = times_s + DormandPrince5::kC[i] * steps_s;
+    system.Rates(stage_times_s_, x, stages_[i]);
   }
 }
 
 double RowSteps::Error(Eigen::Index row, Eigen::Index state, double step_s) const {
   double sum = 0;
-  for (size_t i = 0; i < kStages; ++i) sum += kErrors[i] * stages_[i](row, state);
+  for (size_t i = 0; i < kStages; ++i) sum += DormandPrince5::kE[i] * stages_[i](row, state);
   return step_s * sum;
 }
 
@@ -64,7 +48,7 @@ std::array<double, RowSteps::kStages> RowSteps::Weights(double theta) {
   const double rest = 1 - theta;
   std::array<double, kStages> weights;
   for (size_t i = 0; i < kStages; ++i) {
-    const double b = kCoefficients[kLast][i];
+    const double b = DormandPrince5::kA[kLast][i];
     const double first = i == 0 ? 1 : 0;
     const double last = i == kLast ? 1 : 0;
     weights[i] =

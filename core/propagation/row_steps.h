@@ -1,7 +1,7 @@
 #pragma once
 
-// Steps of the method of Dormand and Prince, order 5 with an embedded error estimate of order 4,
-// for rows whose steps begin at different times and have different lengths:
+// Steps of the method of Dormand and Prince of order 5 (dormand_prince_tables.h) for rows whose
+// steps begin at different times and have different lengths:
 //
 //   k_i = f(t + c_i h, x + h Σ_{j<i} a_ij k_j),  x(t + h) ≈ x + h Σ b_i k_i,  error h Σ e_i k_i
 //

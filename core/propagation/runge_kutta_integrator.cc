@@ -37,6 +37,8 @@ class RungeKuttaIntegrator final : public BlockIntegrator {
   Result StepUntil(double time_s, double stop_time_s, int max_steps);
   template <class Method>
   Result Step(double stop_time_s);
+  // Lets stage 0 hold the derivatives at the end of the last step.
+  void PrepareFirstStage();
   template <class Method>
   void Accept(double step_s, double next_s, double factor);
   // Each tries a step from `end_` to `next_`. Returns ‖e‖, which is huge where something is not
@@ -135,11 +137,7 @@ RungeKuttaIntegrator::Result RungeKuttaIntegrator::StepUntil(double time_s, doub
   return Result::kSuccess;
 }
 
-template <class Method>
-RungeKuttaIntegrator::Result RungeKuttaIntegrator::Step(double stop_time_s) {
-  constexpr int kMaxRejections = 30;  // the first step is a guess
-  constexpr double kSafety = 0.9, kShortest = 0.2;
-  constexpr double kHigher = 3;  // steps of order 8 are about so many times as long
+void RungeKuttaIntegrator::PrepareFirstStage() {
   if (!has_rates_) {
     system_->Derivatives(end_s_, end_, stages_[rates_stage_]);
     order_.CountEvaluations(1);
@@ -147,6 +145,14 @@ RungeKuttaIntegrator::Result RungeKuttaIntegrator::Step(double stop_time_s) {
   std::swap(stages_[0], stages_[rates_stage_]);
   rates_stage_ = 0;
   has_rates_ = true;
+}
+
+template <class Method>
+RungeKuttaIntegrator::Result RungeKuttaIntegrator::Step(double stop_time_s) {
+  constexpr int kMaxRejections = 30;  // the first step is a guess
+  constexpr double kSafety = 0.9, kShortest = 0.2;
+  constexpr double kHigher = 3;  // steps of order 8 are about so many times as long
+  PrepareFirstStage();
   const double remaining_s = stop_time_s - end_s_;
   double step_s = step_s_;
   for (int rejections = 0; rejections <= kMaxRejections; ++rejections) {
@@ -337,16 +343,13 @@ IntegratorOutcome RungeKuttaIntegrator::Outcome(Result result, double advance_s,
   outcome.ok = false;
   outcome.flag = -static_cast<int>(result);
   outcome.worst_point = scale_.worst_point();
-  // Many steps without progress: more of them will not help.
-  constexpr double kStandstill = 1e-13;
-  const bool advances = advance_s > kStandstill * std::max(std::abs(time_s_), span_s);
   if (result == Result::kNoStepAccepted) {
     outcome.reason = "no step size gives an acceptable error";
-  } else if (result == Result::kTooManySteps && advances) {
+  } else if (result == Result::kTooManySteps && !StandsStill(advance_s, time_s_, span_s)) {
     outcome.reason = "too many steps between two samples";
     outcome.too_many_steps = true;
   } else {
-    outcome.reason = "the step size fell below the resolution of time";
+    outcome.reason = kStandstillReason;
   }
   return outcome;
 }

@@ -53,9 +53,10 @@ class Edge(unittest.TestCase):
                            EDGE_CERTIFICATE=f"{self.folder}/edge.pem")
         if self.client_ca:
             environment["EDGE_CLIENT_CA"] = f"{self.folder}/ca"
-        haproxy = self.start(["/usr/sbin/haproxy", "-db", "-f", CONFIGURATION], env=environment,
-                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        self.addCleanup(haproxy.stderr.close)
+        log = self.folder / "haproxy.log"
+        with log.open("w") as errors:
+            haproxy = self.start(["/usr/sbin/haproxy", "-db", "-f", CONFIGURATION],
+                                 env=environment, stdout=subprocess.DEVNULL, stderr=errors)
         context = ssl.create_default_context(cafile=self.folder / "certificate")
         while haproxy.poll() is None:
             # The handshake tells whether it is this edge that listens.
@@ -63,8 +64,7 @@ class Edge(unittest.TestCase):
                     socket.create_connection(("127.0.0.1", self.port), timeout=1),
                     server_hostname="localhost"):
                 return True
-        errors = haproxy.stderr.read().decode()
-        self.assertIn("Address already in use", errors)
+        self.assertIn("Address already in use", log.read_text())
         return False
 
     def make_certificates(self):

@@ -18,6 +18,10 @@ def array(values: Iterable[float], *shape: int) -> Floats:
 
 def enum_name(message: Any, field: str) -> str:
     """Returns the name of an enumerator, such as "IDENTIFIED", or an unknown one's number."""
-    number = getattr(message, field)
+    return enumerator_name(message, field, getattr(message, field))
+
+
+def enumerator_name(message: Any, field: str, number: int) -> str:
+    """Returns the name of an enumerator of the type that a field has, or an unknown one's number."""
     values = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number
     return str(values[number].name) if number in values else str(number)

@@ -1,4 +1,4 @@
-// Tests by what OrderChoice decides, with methods whose steps cost what a test says.
+// Tests which order OrderChoice takes, for methods whose steps cost what a test says.
 
 #include "core/propagation/order_choice.h"
 
@@ -33,7 +33,7 @@ TEST(OrderChoice, TakesHighOrderWhereItsStepsAreLong) {
   EXPECT_TRUE(choice.high());
 }
 
-TEST(OrderChoice, KeepsLowOrderWhereHighOnesStepsAreNoLonger) {
+TEST(OrderChoice, KeepsLowOrderWhereStepsOfHighOrderAreHardlyLonger) {
   OrderChoice choice;
   // The pauses between trials double up to 1,024 windows.
   EXPECT_LT(HighShare(choice, 100'000, {6, 1}, {12, 1.5}), 0.005);

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 
 #include "core/propagation/bdf_integrator.h"
 
@@ -17,7 +16,7 @@ namespace {
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kMaxSteps = 1'000'000;
 
-// Oscillators x″ = −ω² x with ω = 1 … 1.7, and one that damps |x′| x′ too. Counts evaluations.
+// Oscillators x″ = −ω² x − d |x′| x′ with ω = 1 … 1.7. Counts the evaluations.
 class Oscillators final : public BlockSystem {
  public:
   explicit Oscillators(double damping = 0) : damping_(damping) {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from polyest._messages import enum_name
+from polyest._messages import enum_name, enumerator_name
 from polyest._proto.v1 import estimate_pb2
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def of_message(message: estimate_pb2.EstimateHistory) -> History:
         HistoryPoint(point.time_s, point.sample_count, point.sequence,
                      {one.name: _then(one, enum_name(one, "verdict")) for one in point.parameters},
                      {one.name: _then(one, "") for one in point.drifting},
-                     [estimate_pb2.Diagnostic.Code.Name(code) for code in point.warnings],
+                     [enumerator_name(point, "warnings", code) for code in point.warnings],
                      point.reexpansion_count)
         for point in message.points])
 
