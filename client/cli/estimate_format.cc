@@ -56,8 +56,7 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
       {"parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior", "verdict"});
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
     table.AddRow({p.name(), FormatUncertain(p.map(), p.std_dev()), UnitText(p.unit()),
-                  absl::StrCat(FormatValue(p.lower95(), p.std_dev()), " … ",
-                               FormatValue(p.upper95(), p.std_dev())),
+                  FormatInterval(p.lower95(), p.upper95(), p.std_dev()),
                   FormatUncertain(p.prior_mean(), p.prior_std_dev()),
                   FormatNumber(p.contraction(), 2),
                   PaintVerdict(out, p.verdict(), VerdictText(p.verdict()))});

@@ -12,6 +12,9 @@ namespace polyest::internal {
 std::string FormatValue(double value, double standard_deviation);
 // Returns value and standard deviation as "40.6612 ± 0.0052".
 std::string FormatUncertain(double value, double standard_deviation);
+// Returns an interval as "40.6510 … 40.6714", and as "1.1e-07 … 2.2e-05" where its ends are decades
+// apart.
+std::string FormatInterval(double lower, double upper, double standard_deviation);
 // Returns a value with at most `digits` significant digits.
 std::string FormatNumber(double value, int digits = 4);
 // Returns a probability as "97.5 %".

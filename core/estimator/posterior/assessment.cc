@@ -21,6 +21,7 @@
 #include "core/estimator/posterior/model_evidence.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/noise_marginal.h"
+#include "core/estimator/posterior/other_minima.h"
 #include "core/estimator/posterior/population_shift.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
@@ -31,10 +32,8 @@ namespace {
 constexpr int kDrawsForEdges = 2'000;
 // Fraction of the posterior at an edge of the region from which on its being cut there matters.
 constexpr double kOverEdge = 0.03;
-// Other minima count when their density is at least this fraction of the best one's: e^−7 ≈ 10⁻³.
-constexpr double kComparableCost = 7;
-// An isolated minimum has all curvatures above the prior's; the floor of a valley does not.
-constexpr double kIsolatedCurvature = 1;
+// Ratio of the draws' and the curvature's standard deviations from which on they contradict.
+constexpr double kContradiction = 2;
 
 class Assessment {
  public:
@@ -59,7 +58,7 @@ class Assessment {
       log_evidence = LogModelEvidence(problem_, *request_.expansion, cost, posterior_, eta);
     }
     NoteMinimum(minima.front(), eta);
-    NoteOtherMinima(cost, minima);
+    findings_.other_minima = OtherMinima(cost, design_, prior_, minima);
     Summarize(cost, eta);
     POLYEST_ASSIGN_OR_RETURN(
         noise_widening_, MarginalizeNoise(problem_, *request_.expansion, cost, *request_.guesses,
@@ -69,7 +68,7 @@ class Assessment {
     findings_.population_shift = PopulationShift(problem_, posterior_);
     findings_.shift =
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
-    fitted_ = FittedParameters(ToGermHessian(cost.MismatchHessian(eta)), prior_);
+    fitted_ = FittedParameters(ToGermHessian(design_.region, cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
@@ -120,12 +119,6 @@ class Assessment {
     return cost;
   }
 
-  // Returns J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
-  Matrix ToGermHessian(const Matrix& hessian) const {
-    const Matrix inverse = Inverse(design_.region.axes());
-    return inverse.transpose() * hessian * inverse;
-  }
-
   // Returns the minimum of the cost with the noise as stated, also where the posterior is taken
   // from a power of the likelihood.
   Vector MinimumAsStated(Cost cost, const Stop& stop) const {
@@ -137,20 +130,6 @@ class Assessment {
       starts.row(static_cast<Eigen::Index>(i)) = minima[i].point.transpose();
     }
     return FindMinima(SearchOf(cost, design_), starts, MinimizerOptions(), stop).front().point;
-  }
-
-  bool Isolated(const Cost& cost, const Vector& eta) const {
-    const Vector unit = prior_.GermStandardDeviation();
-    const Matrix scaled = unit.asDiagonal() * ToGermHessian(cost.Hessian(eta)) * unit.asDiagonal();
-    return SymmetricEigenvalues(scaled).minCoeff() > kIsolatedCurvature;
-  }
-
-  void NoteOtherMinima(const Cost& cost, const std::vector<Minimum>& minima) {
-    for (size_t i = 1; i < minima.size(); ++i) {
-      if (minima[i].value - minima[0].value > kComparableCost) continue;
-      if (!minima[i].converged || !Isolated(cost, minima[i].point)) continue;
-      findings_.other_minima.push_back(prior_.ToParameters(design_.region.ToGerm(minima[i].point)));
-    }
   }
 
   void NoteLeaning() {
@@ -202,11 +181,12 @@ class Assessment {
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
-    const Vector informed = ContractionByData(cost, eta);
     const Vector widening =
         shift_widening_ * noise_widening_.cwiseProduct(findings_.windows.widening);
-    DescribeSpread(cost, eta, informed, widening);
-    estimate_.directions = Directions(ToGermHessian(cost.InformationHessian(eta, spent_)), prior_);
+    Vector informed = widening.cwiseProduct(ContractionByData(cost, eta)).cwiseMin(1);
+    DescribeSpread(cost, eta, widening, informed);
+    estimate_.directions =
+        Directions(ToGermHessian(design_.region, cost.InformationHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
@@ -220,7 +200,7 @@ class Assessment {
       parameter.prior_mean = prior_mean[i];
       parameter.prior_std_dev = prior_deviation[i];
       parameter.contraction = deviation_[i] / prior_deviation[i];
-      parameter.verdict = VerdictOfContraction(std::min(1.0, widening[i] * informed[i]));
+      parameter.verdict = VerdictOfContraction(informed[i]);
       if (parameter.verdict == Verdict::kIdentified && findings_.IsDoubtful(i)) {
         parameter.verdict = Verdict::kWeak;
       }
@@ -232,6 +212,37 @@ class Assessment {
       estimate_.parameters.push_back(std::move(parameter));
     }
     DescribeTradeOffs();
+  }
+
+  // Whether nothing speaks against the draws, so that they count where the curvature contradicts
+  // them. Draws from a prior of another weight than its own say nothing about the data, and where
+  // there are several minima the curvature is that of one of them.
+  bool DrawsAreRight() const {
+    return findings_.power == 1 && findings_.shift <= kInaccurateShift &&
+           !findings_.windows.contradicted && regularization_ == 1 &&
+           findings_.other_minima.empty();
+  }
+
+  // Replaces standard deviations and contractions that contradict the draws. The cost may be flat
+  // at its minimum, where the data tell a limit and no more, or so uneven that the curvature there
+  // means nothing. Without curvature a parameter is not called identified.
+  void GoByDraws(Vector& informed) {
+    findings_.drawn_to_curvature = Vector::Zero(prior_.dimension());
+    for (int i = 0; i < prior_.dimension(); ++i) {
+      const double drawn =
+          std::min(WeightedStandardDeviation(posterior_.Parameter(prior_, i), posterior_.weights),
+                   prior_.StandardDeviation()[i]);
+      const double ratio = drawn / deviation_[i];
+      if (ratio < kContradiction && ratio > 1 / kContradiction) continue;
+      const double contraction =
+          std::min(1.0, WeightedStandardDeviation(posterior_.scores.col(i), posterior_.weights) /
+                            prior_.GermStandardDeviation()[i]);
+      const bool flat = VerdictOfContraction(informed[i]) == Verdict::kNotIdentified;
+      const double least = flat ? std::nextafter(kIdentifiedContraction, 1) : 0;
+      informed[i] = std::max(contraction, least);
+      findings_.drawn_to_curvature[i] = ratio;
+      deviation_[i] = drawn;
+    }
   }
 
   // Sets what is known of parameter i to what its prior says: an expansion that is not accurate
@@ -295,18 +306,17 @@ class Assessment {
   // Fills in the covariance and the standard deviations, never above the prior's. A standard
   // deviation is scaled by the slope of the parameter's map at the estimate. A parameter with a
   // curved map that the data do not identify is given the prior's own standard deviation instead,
-  // wherever the estimate lies.
-  void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& informed,
-                      const Vector& widening) {
-    const Curvature curvature =
-        CovarianceFromCurvature(ToGermHessian(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
+  // wherever the estimate lies. `informed` is what the verdicts go by.
+  void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& widening,
+                      Vector& informed) {
+    const Curvature curvature = CovarianceFromCurvature(
+        ToGermHessian(design_.region, cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
     const Vector prior_deviation = prior_.StandardDeviation();
     deviation_ = widening.cwiseProduct(curvature.standard_deviation).cwiseMin(prior_deviation);
+    if (DrawsAreRight()) GoByDraws(informed);
     for (int i = 0; i < prior_.dimension(); ++i) {
-      const Verdict verdict = VerdictOfContraction(std::min(1.0, widening[i] * informed[i]));
-      if (prior_.IsCurved(i) && verdict == Verdict::kNotIdentified) {
-        deviation_[i] = prior_deviation[i];
-      }
+      const bool identified = VerdictOfContraction(informed[i]) != Verdict::kNotIdentified;
+      if (prior_.IsCurved(i) && !identified) deviation_[i] = prior_deviation[i];
     }
     const Vector factor = deviation_.cwiseQuotient(curvature.standard_deviation);
     estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
@@ -343,7 +353,7 @@ class Assessment {
   // in which the sharp mode of a skewed prior does not count as information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
     const Vector& xi = findings_.map_xi;
-    const Matrix mismatch = ToGermHessian(cost.InformationHessian(eta, spent_));
+    const Matrix mismatch = ToGermHessian(design_.region, cost.InformationHessian(eta, spent_));
     Matrix curved = mismatch;
     curved.diagonal() += prior_.Curvature(xi);
     Matrix spread = mismatch;

@@ -22,8 +22,9 @@ constexpr double kNearBound = 1e-4;
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
 constexpr std::string_view kByPosterior =
-    "the posterior's own mean, standard deviation and interval";
-constexpr std::string_view kByCurvature = "the curvature's, which is the wider";
+    "go by the posterior's own mean, standard deviation and interval";
+constexpr std::string_view kByCurvature = "go by the curvature's, which is the wider";
+constexpr std::string_view kReplaced = "what is reported is the posterior's";
 
 void AddIdentifiability(const Findings& findings, const Estimate& estimate,
                         std::vector<Diagnostic>& diagnostics) {
@@ -87,24 +88,37 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
   for (int i = 0; i < findings.problem->dimension(); ++i) {
     const int bound = BoundReached(findings, i);
     if (bound == 0 || PriorAsksForBound(findings, estimate, i)) continue;
-    diagnostics.push_back({DiagnosticCode::kAtPriorBound,
-                           absl::StrFormat("%s lies on the %s bound of its prior: the data ask for "
-                                           "values beyond it",
-                                           findings.NameOf(i), bound < 0 ? "lower" : "upper")});
+    std::string message = absl::StrFormat("%s lies on the %s bound of its prior: the data ",
+                                          findings.NameOf(i), bound < 0 ? "lower" : "upper");
+    if (findings.GoesByDraws(i)) {
+      const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+      absl::StrAppendFormat(&message, "tell only that it is %s %.3g (97.5 %%)",
+                            bound < 0 ? "below" : "above",
+                            bound < 0 ? parameter.upper95 : parameter.lower95);
+    } else {
+      message += "ask for values beyond it";
+    }
+    diagnostics.push_back({DiagnosticCode::kAtPriorBound, std::move(message)});
   }
 }
 
 // Reports a posterior that differs from the curvature's Gaussian. Parameters that the data do not
-// inform are skipped, because the reported values are then the prior's by definition. The advice is
-// always to go by the wider of the two.
-void AddNonGaussian(const Estimate& estimate, std::vector<Diagnostic>& diagnostics) {
+// inform are skipped, because the reported values are then the prior's by definition. Where the
+// reported standard deviation is the curvature's, the advice is to go by the wider of the two.
+void AddNonGaussian(const Findings& findings, const Estimate& estimate,
+                    std::vector<Diagnostic>& diagnostics) {
   std::vector<std::string> ratios;
-  for (const ParameterEstimate& parameter : estimate.parameters) {
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     if (parameter.verdict == Verdict::kNotIdentified) continue;
-    const double ratio = parameter.posterior_std_dev / parameter.std_dev;
+    const bool replaced = findings.GoesByDraws(i);
+    const double ratio =
+        replaced ? findings.drawn_to_curvature[i] : parameter.posterior_std_dev / parameter.std_dev;
     if (ratio <= kGaussianRatio && ratio >= 1 / kGaussianRatio) continue;
-    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large; go by %s", parameter.name,
-                                     ratio, ratio > 1 ? kByPosterior : kByCurvature));
+    ratios.push_back(absl::StrFormat("that of %s is %.3g times as large; %s", parameter.name, ratio,
+                                     replaced    ? kReplaced
+                                     : ratio > 1 ? kByPosterior
+                                                 : kByCurvature));
   }
   if (ratios.empty()) return;
   diagnostics.push_back(
@@ -308,7 +322,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddEdge(findings, diagnostics);
   DiagnoseResiduals(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
-  AddNonGaussian(estimate, diagnostics);
+  AddNonGaussian(findings, estimate, diagnostics);
   AddComponents(findings, estimate, diagnostics);
   AddMinima(findings, diagnostics);
   AddRegularization(findings, diagnostics);

@@ -36,6 +36,10 @@ struct Findings {
   bool IsDoubtful(int i) const {
     return postponed.any() || windows.doubtful[static_cast<size_t>(i)];
   }
+  // Whether the standard deviation of parameter i is the draws', which the curvature contradicts.
+  bool GoesByDraws(int i) const {
+    return drawn_to_curvature.size() > i && drawn_to_curvature[i] > 0;
+  }
   const std::string& NameOf(int parameter) const;
 
   const ResolvedProblem* problem = nullptr;
@@ -55,6 +59,9 @@ struct Findings {
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion
   WindowAssessment windows;  // what the windows of the record say
+  // By parameter, where the draws' standard deviation replaces the curvature's: draws' ÷
+  // curvature's, else 0; may be empty.
+  Vector drawn_to_curvature;
   // Why the requested rule did not choose α²; empty if it did or if no rule was requested.
   std::string regularization_not_determined;
 };

@@ -133,6 +133,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   Assessed whole;
   whole.estimate = best.estimate;
   whole.findings = best.findings;
+  whole.findings.drawn_to_curvature = {};  // its draws are not those of the whole
   ExpansionSummary& expansion = whole.estimate.expansion;
   Places all;
   for (size_t k = 0; k < components.size(); ++k) {

@@ -72,6 +72,20 @@ TEST(FormatValue, KeepsTwoDigitsOfTheUncertainty) {
   EXPECT_EQ(FormatUncertain(1.23456e9, 1.5e5), "1.23456e+09 ± 1.5e+05");
 }
 
+TEST(FormatValue, LeavesOutZerosThatSayNothing) {
+  EXPECT_EQ(FormatUncertain(0.000015, 0.000059), "1.5e-05 ± 5.9e-05");
+  EXPECT_EQ(FormatUncertain(0.00015, 0.000059), "0.000150 ± 0.000059");
+}
+
+TEST(FormatInterval, HasDigitsAtBothEnds) {
+  EXPECT_EQ(FormatInterval(40.6510, 40.6714, 0.0052), "40.6510 … 40.6714");
+  EXPECT_EQ(FormatInterval(-0.2, 12.3, 3.1), "-0.2 … 12.3");
+  EXPECT_EQ(FormatInterval(0.1, 9.8, 2.4), "0.1 … 9.8");
+  EXPECT_EQ(FormatInterval(1.114e-7, 2.2126e-5, 5.9e-5), "1.1e-07 … 2.2e-05");
+  EXPECT_EQ(FormatInterval(-9.8, -0.0021, 2.4), "-9.8 … -0.0021");
+  EXPECT_EQ(FormatInterval(0, 0.3, 0.1), "0.00 … 0.30");
+}
+
 TEST(FormatValue, ManagesWithoutAnUncertainty) {
   EXPECT_EQ(FormatValue(1.23456789, 0), "1.23457");
   EXPECT_EQ(FormatValue(0, 1e-12), "0.0e+00");

@@ -15,16 +15,7 @@
 namespace polyest::internal::mixture {
 namespace {
 
-// Returns −log density of θ, up to a constant.
-double ExactCost(const Samples& samples, const Output& y, const LogPrior& prior,
-                 const Vector& theta) {
-  double sum = -prior(theta);
-  for (size_t i = 0; i < samples.rows(); ++i) {
-    const double e = samples.columns[0].value[i] - y(theta, samples.time_s[i]);
-    sum += 0.5 * e * e / (kNoise * kNoise);
-  }
-  return sum;
-}
+using ::testing::SizeIs;
 
 struct Piece {
   double log_mass = 0;

@@ -43,6 +43,17 @@ inline Samples Record(const std::function<double(double)>& y, double step_s, int
 using Output = std::function<double(const Vector& theta, double t)>;
 using LogPrior = std::function<double(const Vector& theta)>;
 
+// Returns −log density of θ, up to a constant.
+inline double ExactCost(const Samples& samples, const Output& y, const LogPrior& prior,
+                        const Vector& theta) {
+  double sum = -prior(theta);
+  for (size_t i = 0; i < samples.rows(); ++i) {
+    const double e = samples.columns[0].value[i] - y(theta, samples.time_s[i]);
+    sum += 0.5 * e * e / (kNoise * kNoise);
+  }
+  return sum;
+}
+
 struct Case {
   const char* name;
   Problem problem;
