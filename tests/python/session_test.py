@@ -11,6 +11,8 @@ import pytest
 
 import polyest
 from conftest import TRUTH
+from polyest._proto.v1 import estimate_pb2
+from polyest.results import history
 
 
 def test_batches_give_the_estimate_of_the_whole_record(client, problem, record, rows):
@@ -113,6 +115,12 @@ def test_a_history_shows_how_the_estimate_came_about(client, problem, rows):
     assert history.points[-1].reexpansion_count >= history.points[0].reexpansion_count > 0
     frame = history.to_dataframe()
     assert list(frame.columns)[:4] == ["t", "samples", "sequence", "name"] and len(frame) == 8
+
+
+def test_a_history_of_a_newer_daemon_keeps_what_it_cannot_name():
+    message = estimate_pb2.EstimateHistory()
+    message.points.add(warnings=[estimate_pb2.Diagnostic.MODEL_MISFIT, 9999])
+    assert history.of_message(message).points[0].warnings == ["MODEL_MISFIT", "9999"]
 
 
 def test_an_exception_leaves_the_session_to_the_next_writer(client, problem, rows):
