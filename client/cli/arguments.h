@@ -164,12 +164,19 @@ struct FitArguments {
   Format format = Format::kTable;
 };
 
+// How rows are held out.
+struct HoldOut {
+  double fraction = 0.3;  // of all rows, the last ones
+  // Filters predict each row from the samples up to so many seconds before it (horizon_s of
+  // v1::PredictRequest); 0: from all samples before it.
+  double horizon_s = 0;
+};
+
 struct CompareArguments {
   Place place;
   std::vector<std::string> files;  // at least two problems, then the data
   DataFileOptions data_options;
-  static constexpr double kHeldOut = 0.3;
-  double held_out = kHeldOut;  // fraction of the rows, in (0, 1)
+  HoldOut hold_out;
   Format format = Format::kTable;
 };
 

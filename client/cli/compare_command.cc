@@ -33,7 +33,7 @@ absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArgument
   auto weighed = Weigh(experiment, backend);
   if (!weighed.ok()) return InFile(weighed.status(), file, data);
   Contestant contestant{*std::move(weighed), file};
-  const absl::Status scored = Score(experiment, arguments.held_out, backend, contestant);
+  const absl::Status scored = Score(experiment, arguments.hold_out, backend, contestant);
   if (!scored.ok()) return InFile(scored, file, data);
   return contestant;
 }
@@ -67,11 +67,16 @@ const Contestant& BestScore(const std::vector<Contestant>& all) {
   return *std::ranges::max_element(all, {}, &Contestant::log_score);
 }
 
+// Names the warnings of the estimate from all rows, and those that the score suffers from.
 std::string Warnings(const Contestant& contestant) {
-  return absl::StrJoin(contestant.posterior.diagnostics(), ", ",
-                       [](std::string* text, const v1::Diagnostic& diagnostic) {
-                         absl::StrAppend(text, v1::Diagnostic::Code_Name(diagnostic.code()));
-                       });
+  std::vector<std::string> warnings;
+  for (const v1::Diagnostic& diagnostic : contestant.posterior.diagnostics()) {
+    warnings.push_back(v1::Diagnostic::Code_Name(diagnostic.code()));
+  }
+  for (const v1::Diagnostic::Code code : contestant.doubts) {
+    warnings.push_back(absl::StrCat("score: ", v1::Diagnostic::Code_Name(code)));
+  }
+  return absl::StrJoin(warnings, ", ");
 }
 
 void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {

@@ -126,21 +126,30 @@ void AddCompare(CommandRegistry& registry) {
       {.name = "compare",
        .summary = "Which of several problems explains the data best",
        .examples = {"compare linear.json cubic.json data.csv",
-                    "compare white.json correlated.json data.csv --hold-out 0.5"},
+                    "compare white.json correlated.json data.csv --hold-out 0.5",
+                    "compare perfect.json filtered.json data.csv --horizon 10"},
        .notes =
            "The evidence is the probability that a problem gives to all samples before it has\n"
            "seen them; a difference of 3 in its logarithm are odds of 20 to 1. The score is the\n"
-           "log probability of the last rows, predicted from the rows before. Problems must\n"
-           "measure the same samples, with noise of unknown size in the same outputs or in none."},
+           "log probability of the last rows, predicted by an estimate from the rows before.\n"
+           "Filters go on reading samples meanwhile, so that they win a few rows ahead; ask for\n"
+           "the --horizon that you need. Problems must measure the same samples, with noise of "
+           "unknown size in the same outputs or in none."},
       arguments);
   command.add_option("files", arguments->files, "Problem files, then the data file")
       ->required()
       ->expected(3, 20);
   AddDataOptions(command, arguments->data_options);
   command
-      .add_option("--hold-out", arguments->held_out,
+      .add_option("--hold-out", arguments->hold_out.fraction,
                   "Fraction of the rows to predict, the last ones (default 0.3)")
       ->check(CLI::Range(0.01, 0.99));
+  command
+      .add_option("--horizon", arguments->hold_out.horizon_s,
+                  "With process noise or drift: predict so many seconds ahead, as fit does\n"
+                  "(default 0: predict each row from all rows before it)")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e9));
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "csv"});
 }

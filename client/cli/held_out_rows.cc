@@ -18,20 +18,4 @@ v1::Measurements FirstRows(const v1::Measurements& measurements, int64_t rows) {
   return first;
 }
 
-v1::Measurements WithoutFirstSamples(const v1::Measurements& measurements,
-                                     const v1::Problem& problem, int64_t rows) {
-  v1::Measurements rest = measurements;
-  for (v1::Measurements::Channel& channel : *rest.mutable_channels()) {
-    const bool measured = std::ranges::any_of(
-        problem.measured(), [&](const auto& output) { return output.output() == channel.name(); });
-    if (!measured) continue;
-    google::protobuf::RepeatedField<int32_t> missing;
-    for (int row = 0; row < rows; ++row) missing.Add(row);
-    const auto& own = channel.missing();
-    missing.Add(std::lower_bound(own.begin(), own.end(), rows), own.end());
-    channel.mutable_missing()->Swap(&missing);
-  }
-  return rest;
-}
-
 }  // namespace polyest::internal

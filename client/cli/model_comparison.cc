@@ -10,6 +10,21 @@
 #include "core/common/status.h"
 
 namespace polyest::internal {
+namespace {
+
+// Whether the likelihood is PREDICTION_ERROR, also by default.
+bool UsesFilters(const v1::Problem& problem) {
+  return problem.likelihood() == v1::Problem::PREDICTION_ERROR ||
+         problem.process_noise_size() > 0 ||
+         std::ranges::any_of(problem.uncertain(), &v1::UncertainParameter::has_drift);
+}
+
+bool MakesNumbersDoubtful(v1::Diagnostic::Code code) {
+  return code == v1::Diagnostic::EXPANSION_INACCURATE || code == v1::Diagnostic::NOT_CONVERGED ||
+         code == v1::Diagnostic::POINTS_FAILED;
+}
+
+}  // namespace
 
 absl::StatusOr<Assessment> Weigh(const v1::Experiment& experiment, Backend& backend) {
   v1::ComputePosteriorRequest request;
@@ -26,21 +41,26 @@ absl::StatusOr<Assessment> Weigh(const v1::Experiment& experiment, Backend& back
   return assessment;
 }
 
-absl::Status Score(const v1::Experiment& whole, double held_out, Backend& backend,
+absl::Status Score(const v1::Experiment& whole, const HoldOut& hold_out, Backend& backend,
                    Assessment& assessment) {
   const int rows = whole.measurements().time_s_size();
-  const int64_t first = std::llround((1 - held_out) * rows);
+  const int64_t first = std::llround((1 - hold_out.fraction) * rows);
   if (first < 1 || first == rows) {
     return absl::InvalidArgumentError(absl::StrFormat("--hold-out: %g of %d rows leaves none to %s",
-                                                      held_out, rows,
+                                                      hold_out.fraction, rows,
                                                       first < 1 ? "estimate from" : "predict"));
   }
   v1::PredictRequest request;
   v1::Experiment& seen = *request.mutable_subject()->mutable_experiment();
   *seen.mutable_problem() = whole.problem();
   *seen.mutable_measurements() = FirstRows(whole.measurements(), first);
-  *request.mutable_record() = WithoutFirstSamples(whole.measurements(), whole.problem(), first);
+  *request.mutable_record() = whole.measurements();
+  request.set_first_scored_row(first);
+  if (UsesFilters(whole.problem())) request.set_horizon_s(hold_out.horizon_s);
   POLYEST_ASSIGN_OR_RETURN(const v1::PredictResponse prediction, backend.Predict(request));
+  for (const v1::Diagnostic& diagnostic : prediction.diagnostics()) {
+    if (MakesNumbersDoubtful(diagnostic.code())) assessment.doubts.push_back(diagnostic.code());
+  }
   for (const v1::PredictResponse::Output& output : prediction.outputs()) {
     const auto samples = static_cast<double>(output.score().sample_count());
     assessment.held_out += output.score().sample_count();

@@ -9,7 +9,9 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "client/cli/arguments.h"
 #include "client/cli/backend.h"
 #include "polyest/v1/study_service.pb.h"
 
@@ -26,15 +28,18 @@ struct Assessment {
   int64_t held_out = 0;                 // samples
   double log_score = 0;                 // Σ log p over them
   double covered = 0;                   // of them by 95 % intervals
+  // Diagnostics for which the estimate from the rows before, and so the score, is not to be
+  // believed.
+  std::vector<v1::Diagnostic::Code> doubts;
   v1::ComputePosteriorResponse posterior;
 };
 
 // Computes the posterior and the evidence of a problem. The result has no score yet.
 absl::StatusOr<Assessment> Weigh(const v1::Experiment& experiment, Backend& backend);
 
-// Adds the score of the last rows, `held_out` as a fraction of all, predicted from those before.
-// INVALID_ARGUMENT if that leaves no row to estimate from or none to predict.
-absl::Status Score(const v1::Experiment& whole, double held_out, Backend& backend,
+// Adds the score of the rows held out, by an estimate from those before. INVALID_ARGUMENT if that
+// leaves no row to estimate from or none to predict.
+absl::Status Score(const v1::Experiment& whole, const HoldOut& hold_out, Backend& backend,
                    Assessment& assessment);
 
 // Returns whether both problems have an evidence and their difference has a meaning: an integral

@@ -141,17 +141,16 @@ class Trial {
   }
 
   absl::Status ScoreFinalists() {
-    constexpr double held_out = CompareArguments::kHeldOut;
     for (size_t i = 0; IsFinalist(i); ++i) {
       TriedRemedy& finalist = result_.tried[i];
       if (i == 0) {
         backend_.SetTask("held-out rows, the problem as it is");
-        const absl::Status scored = Score(experiment_, held_out, backend_, result_.untreated);
+        const absl::Status scored = Score(experiment_, HoldOut(), backend_, result_.untreated);
         if (!scored.ok()) return IsRefusal(scored) ? absl::OkStatus() : scored;
       }
       backend_.SetTask(absl::StrFormat("held-out rows, %s", RemedyText(finalist.remedy)));
       const absl::Status scored =
-          Score(With(finalist.problem), held_out, backend_, finalist.assessment);
+          Score(With(finalist.problem), HoldOut(), backend_, finalist.assessment);
       if (!scored.ok() && !IsRefusal(scored)) return scored;
       finalist.scored = scored.ok() && finalist.assessment.held_out == result_.untreated.held_out;
     }

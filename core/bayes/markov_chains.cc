@@ -52,6 +52,9 @@ class ChainRunner {
     }
     result_.etas = etas_.topRows(times_ * chains_);
     result_.costs = costs_.head(times_ * chains_);
+    result_.group = Eigen::VectorXi::NullaryExpr(times_ * chains_, [this](Eigen::Index row) {
+      return static_cast<int>(row % chains_ / in_group_);
+    });
     return std::move(result_);
   }
 

@@ -23,6 +23,8 @@ struct Chains {
   // The draws (draws × n), ordered by time: rows t C … t C + C − 1 are the C particles at time t.
   Matrix etas;
   Vector costs;
+  // The group of each draw, 0 … groups − 1. Groups never exchange anything.
+  Eigen::VectorXi group;
   // The diagnostics, one entry per quantity (convergence.h).
   Vector r_hat;
   Vector effective_size;

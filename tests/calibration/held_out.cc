@@ -1,15 +1,16 @@
 // Asks measured records whether predictions of what was not seen yet are true: an estimate from the
 // first half of a record predicts the second half, in windows within which no sample is used.
 // Beside it stands the same model without process noise, its noise of unknown size, which predicts
-// from the initial state alone.
+// from the initial state alone. Which of both to use so many samples ahead is decided within the
+// first half, as `polyest compare --horizon` does it: by the score of its last 30 %.
 //
 //   held_out [RECORD]...    all records, unless some are named
 //
-// Prints how many of the samples held out 95 % intervals of new samples hold, and how wide those
-// are. Exits with 1 if they hold fewer than 88 %: the errors of a window have much in common, so
-// that a fraction of 95 % is not known any better. More is no fault: process noise that stands for
-// a model that is a little wrong grows with the square root of time, what is wrong does not. Exits
-// with 77 if the records are not there (tests/testing/records.h).
+// Prints how many of the samples held out 95 % intervals of new samples hold, how wide those are,
+// and which model is chosen. Exits with 1 if they hold fewer than 88 %: the errors of a window have
+// much in common, so that a fraction of 95 % is not known any better. More is no fault: process
+// noise that stands for a model that is a little wrong grows with the square root of time, what is
+// wrong does not. Exits with 77 if the records are not there (tests/testing/records.h).
 
 #include <algorithm>
 #include <chrono>
@@ -32,6 +33,7 @@ namespace {
 constexpr int kWindows[] = {5, 50, 500};  // samples
 constexpr int kSkipped = 77;
 constexpr double kLowest = 0.88;
+constexpr double kHoldOut = 0.3;
 
 struct Record {
   std::string name;  // the file's, without .csv
@@ -128,8 +130,9 @@ HeldOut Judge(const PredictedOutput& output, Eigen::Index first) {
   return {covered / n, widths[widths.size() / 2] / std::sqrt(squares / n - (sum / n) * (sum / n))};
 }
 
-// Returns the prediction of each output in windows of so many samples; 0: no filter.
-std::vector<HeldOut> Predict(const Estimator& estimator, const Samples& record, int window) {
+// Predicts in windows of so many samples; 0: no filter.
+Prediction PredictionOf(const Estimator& estimator, const Samples& record, int window,
+                        int64_t first_scored_row) {
   PredictionOptions options;
   options.record = record;
   options.draws = 200;
@@ -137,7 +140,21 @@ std::vector<HeldOut> Predict(const Estimator& estimator, const Samples& record, 
   const double step_s =
       (record.time_s.back() - record.time_s.front()) / static_cast<double>(record.rows() - 1);
   options.horizon_s = window * step_s;
-  const Prediction prediction = estimator.CurrentPrediction(options).value();
+  options.first_scored_row = first_scored_row;
+  return estimator.CurrentPrediction(options).value();
+}
+
+double LogScore(const Estimator& estimator, const Samples& record, int window, int64_t first) {
+  double sum = 0;
+  for (const PredictedOutput& output : PredictionOf(estimator, record, window, first).outputs) {
+    sum += static_cast<double>(output.score.samples) * output.score.log_score;
+  }
+  return sum;
+}
+
+// Returns the prediction of each output in windows of so many samples; 0: no filter.
+std::vector<HeldOut> Predict(const Estimator& estimator, const Samples& record, int window) {
+  const Prediction prediction = PredictionOf(estimator, record, window, 0);
   std::vector<HeldOut> held_out;
   for (const PredictedOutput& output : prediction.outputs) {
     held_out.push_back(Judge(output, std::ssize(record.time_s) / 2));
@@ -145,11 +162,13 @@ std::vector<HeldOut> Predict(const Estimator& estimator, const Samples& record, 
   return held_out;
 }
 
-void Print(const Record& record, size_t output, const std::string& window, const HeldOut& result) {
+void Print(const Record& record, size_t output, int window, const HeldOut& filters,
+           const HeldOut& perfect, bool filters_chosen) {
   std::printf(
-      "| %-15s | %-5s | %13s | %5.1f %% | %5.3f |\n", record.name.c_str(),
+      "| %-15s | %-5s | %3d | %5.1f %%, %5.3f | %5.1f %%, %5.3f | %s |\n", record.name.c_str(),
       record.columns[record.columns.size() - record.problem.measured.size() + output].c_str(),
-      window.c_str(), 100 * result.coverage, result.half_width);
+      window, 100 * filters.coverage, filters.half_width, 100 * perfect.coverage,
+      perfect.half_width, filters_chosen ? "filters" : "perfect model");
   std::fflush(stdout);
 }
 
@@ -168,16 +187,21 @@ bool Run(Record record, Samples samples) {
   const auto begin = std::chrono::steady_clock::now();
   const auto filtered = EstimatorOf(record.problem, first_half);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+  const auto first = static_cast<int64_t>((1 - kHoldOut) * static_cast<double>(first_half.rows()));
+  Samples seen = testing::Rows(first_half, 0, static_cast<size_t>(first));
+  seen.end_of_run = true;
+  const auto trial = EstimatorOf(record.problem, seen);
+  const double score = LogScore(*EstimatorOf(perfect, seen), first_half, 0, first);
+  const std::vector<HeldOut> of_perfect = Predict(*EstimatorOf(perfect, first_half), samples, 0);
   bool holds = true;
   for (const int window : kWindows) {
-    const std::vector<HeldOut> results = Predict(*filtered, samples, window);
-    for (size_t i = 0; i < results.size(); ++i) {
-      Print(record, i, std::to_string(window), results[i]);
-      holds = holds && results[i].coverage >= kLowest;
+    const bool chosen = LogScore(*trial, first_half, window, first) > score;
+    const std::vector<HeldOut> of_filters = Predict(*filtered, samples, window);
+    for (size_t i = 0; i < of_filters.size(); ++i) {
+      Print(record, i, window, of_filters[i], of_perfect[i], chosen);
+      holds = holds && (chosen ? of_filters : of_perfect)[i].coverage >= kLowest;
     }
   }
-  const std::vector<HeldOut> results = Predict(*EstimatorOf(perfect, first_half), samples, 0);
-  for (size_t i = 0; i < results.size(); ++i) Print(record, i, "perfect model", results[i]);
   std::printf("|   estimate from the first half: %.1f s |\n", spent.count());
   return holds;
 }
@@ -188,8 +212,9 @@ int RunAll(const std::vector<std::string>& wanted) {
                                        {"pendulum", {"theta"}, Pendulum()},
                                        {"air_track_2mass", {"x1", "x2"}, Gliders()}};
   std::printf(
-      "| record | output | samples ahead | 95 %% holds | half width ÷ sd of samples |\n"
-      "|---|---|---|---|---|\n");
+      "| record | output | samples ahead | filters: 95 %% holds, half width ÷ sd of samples | "
+      "perfect model | chosen |\n"
+      "|---|---|---|---|---|---|\n");
   bool holds = true;
   for (const Record& record : records) {
     if (!wanted.empty() && std::ranges::find(wanted, record.name) == wanted.end()) continue;

@@ -101,6 +101,7 @@ class Drawing {
     draws_.weights = Vector::Constant(count, 1 / static_cast<double>(count));
     draws_.effective_size = std::move(chains.effective_size);
     draws_.r_hat = std::move(chains.r_hat);
+    draws_.chain = std::move(chains.group);
     return absl::OkStatus();
   }
 

@@ -32,6 +32,8 @@ struct PosteriorDraws {
   // Number of independent draws of the same accuracy, per parameter. For importance sampling: 1/Σ
   // w².
   Vector effective_size;
+  // The group of Markov chains of each draw; empty for importance sampling.
+  Eigen::VectorXi chain;
   Vector r_hat;                 // per parameter, over its chains; empty for importance sampling
   std::vector<Minimum> minima;  // distinct, local coordinates, lowest first; at least one
 

@@ -31,6 +31,9 @@ PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<do
   const Eigen::Index n = components.front().posterior.scores.cols();
   mixture.scores.resize(count, n);
   mixture.weights.resize(count);
+  const bool chains = std::ranges::all_of(
+      places, [&](size_t k) { return components[k].posterior.chain.size() > 0; });
+  if (chains) mixture.chain.resize(count);
   mixture.method = PosteriorMethod::kImportanceSampling;
   mixture.minima = components[places.front()].posterior.minima;
   Vector inverse = Vector::Zero(n);
@@ -39,6 +42,7 @@ PosteriorDraws Mix(const std::vector<Assessed>& components, const std::vector<do
     const PosteriorDraws& draws = components[k].posterior;
     const double weight = weights[k] / all;
     mixture.scores.middleRows(row, draws.weights.size()) = draws.scores;
+    if (chains) mixture.chain.segment(row, draws.weights.size()) = draws.chain;
     mixture.weights.segment(row, draws.weights.size()) = weight * draws.weights;
     row += draws.weights.size();
     // Var(Σ w_k m_k) = Σ w_k² s²/N_k

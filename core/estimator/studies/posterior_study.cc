@@ -55,6 +55,29 @@ void AddNotConverged(Posterior& posterior) {
            static_cast<int>(kMinEffectiveSize))});
 }
 
+// Takes samples of equal weight; of chains, equally many from each group.
+void TakeSamples(const PosteriorDraws& draws, const Matrix& thetas, int count,
+                 Posterior& posterior) {
+  if (draws.chain.size() == 0 || count == 0) {
+    posterior.samples = thetas(EquallyWeighted(draws.weights, count), Eigen::all);
+    return;
+  }
+  posterior.samples.resize(count, thetas.cols());
+  const int chains = draws.chain.maxCoeff() + 1;
+  for (int chain = 0; chain < chains; ++chain) {
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index row = 0; row < draws.chain.size(); ++row) {
+      if (draws.chain[row] == chain) rows.push_back(row);
+    }
+    const Vector weights = draws.weights(rows);
+    const int own = count / chains + (chain < count % chains ? 1 : 0);
+    const auto taken = static_cast<Eigen::Index>(posterior.sample_chains.size());
+    posterior.samples.middleRows(taken, own) =
+        thetas(rows, Eigen::all)(EquallyWeighted(weights / weights.sum(), own), Eigen::all);
+    posterior.sample_chains.insert(posterior.sample_chains.end(), static_cast<size_t>(own), chain);
+  }
+}
+
 }  // namespace
 
 absl::Status Validate(const PosteriorOptions& options, const Prior& prior) {
@@ -121,7 +144,7 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
          WeightedJointDensity(thetas.col(Find(prior, first)), thetas.col(Find(prior, second)),
                               weights, options.joint_bins)});
   }
-  posterior.samples = thetas(EquallyWeighted(weights, options.samples), Eigen::all);
+  TakeSamples(draws, thetas, options.samples, posterior);
   posterior.method = draws.method;
   posterior.draws = draws.scores.rows();
   posterior.effective_size = draws.effective_size.minCoeff();

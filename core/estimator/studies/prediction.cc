@@ -95,6 +95,8 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
                                           "is predicted from all samples anyway");
   }
   POLYEST_RETURN_IF_ERROR(CheckRange("lags", options.lags, 0, kMaxPredictionLags));
+  POLYEST_RETURN_IF_ERROR(CheckRange("first_scored_row", options.first_scored_row, 0,
+                                     std::numeric_limits<int64_t>::max()));
   POLYEST_RETURN_IF_ERROR(CheckRange("times", std::ssize(options.times), 0, kMaxPredictionRows));
   const int64_t times =
       options.times.empty() ? std::min(rows, options.max_rows) : std::ssize(options.times);

@@ -136,7 +136,8 @@ class OutputPrediction {
     }
     const Vector scales =
         (deviations.cwiseAbs2() + (sigma * factors_(alive)).cwiseAbs2()).cwiseSqrt();
-    AddSample(PredictiveDensity(kernel_, values, scales), z, z - mean, place);
+    const bool scored = !std::isnan(z) && instant.row >= options_.first_scored_row;
+    AddSample(PredictiveDensity(kernel_, values, scales), z, z - mean, scored, place);
   }
 
   PredictedOutput Take() {
@@ -186,7 +187,8 @@ class OutputPrediction {
     result_.sample_quantiles.row(place) = result_.quantiles.row(place);
   }
 
-  void AddSample(const PredictiveDensity& density, double z, double residual, Eigen::Index place) {
+  void AddSample(const PredictiveDensity& density, double z, double residual, bool scored,
+                 Eigen::Index place) {
     const double spread = density.StandardDeviation();
     if (place >= 0) {
       result_.sample_std_dev[place] = spread;
@@ -196,7 +198,7 @@ class OutputPrediction {
       }
       result_.standardized_residual[place] = residual / spread;
     }
-    if (std::isnan(z)) return;
+    if (!scored) return;
     sums_->Add({residual, residual / spread, density.LogDensity(z), density.Cumulative(z)});
   }
 

@@ -61,8 +61,8 @@ struct TradeOff {
 // residuals or windows of the record contradict model or noise, std_dev is widened to
 // robust_std_dev, if that is larger, and the posterior's spread with it, but never beyond the
 // prior's. Where the correlation of noise is learned, what is not known of it widens std_dev by the
-// same factor as the 95 % interval. Where the curvature contradicts the posterior by a factor of 2 or
-// more, although nothing speaks against the posterior and it has one minimum, std_dev is
+// same factor as the 95 % interval. Where the curvature contradicts the posterior by a factor of 2
+// or more, although nothing speaks against the posterior and it has one minimum, std_dev is
 // posterior_std_dev: the cost is flat at its minimum where the data tell a limit and no more.
 struct ParameterEstimate {
   std::string name;              // "x_0[2]" for run 2's own value

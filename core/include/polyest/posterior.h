@@ -68,6 +68,10 @@ struct Posterior {
   std::vector<PosteriorMarginal> marginals;  // in the problem's order
   std::vector<PosteriorJoint> joints;        // as asked for
   Matrix samples;  // draws returned × uncertain parameters, equally weighted
+  // The group of Markov chains that each of them is of, in increasing order and as often as the
+  // others to within one. Groups never exchange anything, so that R̂ can be computed from them.
+  // Empty for importance sampling, and for a posterior in pieces of which one was drawn so.
+  std::vector<int> sample_chains;
   // log of the density that model, noise and prior give to the samples, ∫ p(z | θ) p(θ) dθ; the
   // unit of a sample's density is 1/unit of its output. The difference of two problems' for the
   // same samples is the log of the odds that the samples give to them. Noise of unknown size counts

@@ -59,13 +59,15 @@ struct PredictionOptions {
   // `horizon_s`, nor for output errors, whose predictions are of all samples anyway.
   bool smoothed = false;
   int lags = 50;  // of the residuals' autocorrelation, ≥ 0
+  // The first row of the record that is scored, ≥ 0; those before it serve the filters.
+  int64_t first_scored_row = 0;
   // Another record of the same problem to predict, whose samples did not enter the estimate. Its
   // runs' own parameters are drawn from the prior.
   std::optional<Samples> record;
 };
 
-// The agreement of a prediction with the samples of one channel, over all rows of the record,
-// whether returned or not.
+// The agreement of a prediction with the samples of one channel, over all rows of the record from
+// `first_scored_row` on, whether returned or not.
 struct PredictionScore {
   int64_t samples = 0;  // number of them
   // Mean of log p(z), with z in the output's unit: the higher, the better. Differences of two
@@ -101,7 +103,7 @@ struct PredictedOutput {
   Vector residual;               // measured − mean; NaN where there is no sample
   Vector standardized_residual;  // ÷ sample_std_dev; NaN where there is no sample, 0 where a
                                  // sample has no noise, such as a 0 of relative noise
-  PredictionScore score;         // over the whole record
+  PredictionScore score;         // over the record
   // The most certain abrupt change of a parameter that drifts, if smoothed and if its score is
   // beyond the limit; else empty.
   std::optional<AbruptChange> abrupt_change;

@@ -68,6 +68,8 @@ v1::ComputePosteriorResponse ToProto(const Posterior& posterior, const Posterior
     Append(joint.density.density, *added.mutable_density());
   }
   Append(posterior.samples, *response.mutable_samples());
+  response.mutable_sample_chains()->Add(posterior.sample_chains.begin(),
+                                        posterior.sample_chains.end());
   response.set_method(ToProto(posterior.method));
   response.set_draw_count(posterior.draws);
   response.set_effective_sample_size(posterior.effective_size);

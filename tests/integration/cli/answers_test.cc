@@ -1,11 +1,15 @@
 // Tests the command's answers, computed in this process and by a daemon.
 
+#include <absl/strings/match.h>
+#include <absl/strings/str_split.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
+#include <vector>
 
 #include "polyest/v1/study_service.pb.h"
 #include "tests/integration/cli/command_test.h"
@@ -17,6 +21,11 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
+
+std::string TextOf(const std::string& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
 
 class AnswersTest : public CommandTest {
  protected:
@@ -89,13 +98,31 @@ TEST_F(AnswersTest, ComparisonsAgreeAndRankTheModelOfTheDataFirst) {
   EXPECT_THAT(compared.out, HasSubstr("120 samples, 36 of them held out. Evidence and held-out "
                                       "samples prefer"));
 
+  // Filters go on reading samples, the fewer the farther they have to predict.
+  std::string pushed = TextOf(linear);
+  pushed.insert(pushed.find("\"uncertain\""),
+                R"("processNoise": [{"state": "v", "spectralDensity": 1e-2}], )");
+  const std::string filtered = File("filtered.json", pushed);
+  const std::vector<std::string> next = {"compare", linear, filtered, data, "--format", "csv"};
+  std::vector<std::string> ahead = next;
+  ahead.insert(ahead.end(), {"--horizon", "1.5"});
+  ExpectSameAnswer(ahead);
+  const auto score = [&](const std::vector<std::string>& command, const std::string& file) {
+    for (const std::string& line : Lines(Run(command).out)) {
+      const std::vector<std::string> fields = absl::StrSplit(line, ',');
+      if (absl::EndsWith(fields[0], file)) return std::stod(fields[2]);
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+  };
+  EXPECT_EQ(score(next, "linear.json"), score(ahead, "linear.json"));
+  EXPECT_GT(score(next, "filtered.json"), score(ahead, "filtered.json"));
+
   const std::string later = problem("later.json", "c*v", "t > 1");
   const Finished refused = Run({"compare", linear, later, data});
   EXPECT_EQ(refused.exit_status, 2);
   EXPECT_THAT(refused.err, HasSubstr("problems can be compared only if they measure the same"));
 
-  std::ifstream stated(linear);
-  std::string text((std::istreambuf_iterator<char>(stated)), {});
+  std::string text = TextOf(linear);
   text.replace(text.find("\"absolute\": 0.01"), 16, "\"unknown\": true");
   const Finished mixed = Run({"compare", linear, File("unknown.json", text), data});
   EXPECT_EQ(mixed.exit_status, 0) << mixed.err;

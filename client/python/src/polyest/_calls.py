@@ -93,13 +93,13 @@ def check_problem(problem: problem_pb2.Problem,
 
 def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence[float],
             draws: int, max_rows: int, times: Optional[npt.ArrayLike], run: int, lags: int,
-            horizon_s: float, smoothed: bool, forecast_s: float,
+            horizon_s: float, smoothed: bool, forecast_s: float, first_scored_row: int,
             record: Optional[measurements_pb2.Measurements]) -> Call[results.Prediction]:
     """The outputs over time as the posterior predicts them."""
     request = study_service_pb2.PredictRequest(
         subject=subject, outputs=outputs, probabilities=probabilities, draw_count=draws,
         max_row_count=max_rows, lag_count=lags, horizon_s=horizon_s, smoothed=smoothed,
-        forecast_s=forecast_s, record=record)
+        forecast_s=forecast_s, first_scored_row=first_scored_row, record=record)
     if times is not None:
         for time_s in np.asarray(times, dtype=float).ravel():
             request.times.add(run=run, time_s=time_s)

@@ -12,6 +12,7 @@ from polyest.errors import InvalidInput
 
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
 
 #: Data as the package takes them: a pandas DataFrame, a mapping from names to columns, or a
 #: structured numpy array.

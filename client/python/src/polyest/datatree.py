@@ -1,11 +1,12 @@
 """Results as xarray groups for ArviZ.
 
 The groups are those of ArviZ's schema as far as the daemon's answers go: `posterior`, `prior`,
-`observed_data`, and `prediction`, the moments and quantiles of the outputs. The daemon returns the
-samples of a posterior as one sequence of equal weight, so that there is one chain, of which ArviZ
-has no R̂. The daemon's own R̂ (NaN for importance sampling) and effective sample sizes, of all of its
-draws, are attributes of `posterior` and of its variables. It returns no outputs at single draws: if
-they are asked for, each draw takes a call, which gives `log_likelihood` and `posterior_predictive`.
+`observed_data`, and `prediction`, the moments and quantiles of the outputs. Where the samples of a
+posterior come from Markov chains, their four groups are the chains, of which ArviZ computes R̂; in
+importance sampling there is one chain, and no R̂. The daemon's own R̂ (NaN for importance sampling)
+and effective sample sizes, of all of its draws, are attributes of `posterior` and of its variables.
+It returns no outputs at single draws: if they are asked for, each draw takes a call, which gives
+`log_likelihood` and `posterior_predictive`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from google.protobuf import json_format
 
 from polyest._at_draws import outputs_at_draws
 from polyest._draws import prior_draws
-from polyest._table import refuse
+from polyest._table import Integers, refuse
 from polyest.results import Posterior, Prediction
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def groups(studies: Studies, *, samples: int = 1000, seed: int = 0,
     prediction = studies.predict()
     posterior = studies.posterior(samples=samples)
     found = {"posterior": _posterior(posterior),
-             "prior": _draws(prior_draws(problem, samples, seed)),
+             "prior": _draws(prior_draws(problem, samples, seed), np.array([], dtype=np.int64)),
              "observed_data": _observed(prediction), "prediction": _prediction(prediction)}
     if predictive:
         found.update(_predictive(studies, posterior, prediction, seed))
@@ -73,27 +74,39 @@ def _predictive(studies: Studies, posterior: Posterior, prediction: Prediction,
         one = prediction.outputs[name]
         units = {"units": one.unit}
         new[name] = (("chain", "draw", "row"),
-                     generator.normal(at.mean, at.noise)[np.newaxis], units)
+                     _by_chain(generator.normal(at.mean, at.noise), posterior.sample_chains),
+                     units)
         rows = one.measured_rows
         whole = len(rows) == len(prediction.time_s)
         off = (one.measured - at.mean[:, rows]) / at.noise[:, rows]
         density = -0.5 * off**2 - np.log(at.noise[:, rows]) - 0.5 * np.log(2 * np.pi)
         likely[name] = (("chain", "draw", "row" if whole else f"row_{name}"),
-                        density[np.newaxis], units)
+                        _by_chain(density, posterior.sample_chains), units)
     return {"posterior_predictive": xarray.Dataset(new, coords=_row_coordinates(prediction)),
             "log_likelihood": xarray.Dataset(likely)}
 
 
-def _draws(values: dict[str, Any]) -> Any:
+def _by_chain(values: Any, chains: Integers) -> Any:
+    """Returns (draws, …) as (chains, draws, …), as many of each chain as the shortest one has."""
+    values = np.asarray(values)
+    if len(chains) == 0:
+        return values[np.newaxis]
+    apart = [values[chains == chain] for chain in range(chains[-1] + 1)]
+    least = min(len(one) for one in apart)
+    return np.stack([one[:least] for one in apart])
+
+
+def _draws(values: dict[str, Any], chains: Integers) -> Any:
     import xarray
 
-    return xarray.Dataset({name: (("chain", "draw"), np.asarray(drawn)[np.newaxis])
+    return xarray.Dataset({name: (("chain", "draw"), _by_chain(drawn, chains))
                            for name, drawn in values.items()})
 
 
 def _posterior(posterior: Posterior) -> Any:
     found = _draws({name: posterior.samples[:, column]
-                    for column, name in enumerate(posterior.parameters)})
+                    for column, name in enumerate(posterior.parameters)},
+                   posterior.sample_chains)
     convergence = posterior.convergence()
     for name, one in convergence.parameters.items():
         found[name].attrs.update(units=posterior[name].unit, r_hat=one.r_hat,

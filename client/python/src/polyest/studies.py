@@ -62,7 +62,8 @@ class Studies(Subjects):
                 times: Optional[npt.ArrayLike] = None, run: int = 0,
                 probabilities: Sequence[float] = (0.025, 0.5, 0.975), draws: int = 0,
                 max_rows: int = 0, lags: int = 0, horizon_s: float = 0,
-                smoothed: bool = False, forecast_s: float = 0) -> results.Prediction:
+                smoothed: bool = False, forecast_s: float = 0,
+                first_scored_row: int = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores.
 
         outputs: names of outputs and of parameters that drift; by default the measured outputs and
@@ -78,12 +79,14 @@ class Studies(Subjects):
             after it too: what drifting parameters have been. There are no scores then.
         forecast_s: if > 0, `max_rows` evenly spaced times up to so many seconds after the last row,
             in place of the record's rows; not where an input is streamed.
+        first_scored_row: the rows before it, counted from 0, are not scored.
         """
         return self._run(self._predict_call(record, outputs=outputs, times=times, run=run,
                                             probabilities=probabilities, draws=draws,
                                             max_rows=max_rows, lags=lags,
                                             horizon_s=horizon_s, smoothed=smoothed,
-                                            forecast_s=forecast_s))
+                                            forecast_s=forecast_s,
+                                            first_scored_row=first_scored_row))
 
     def posterior(self, *, probabilities: Sequence[float] = (), density_bins: int = 0,
                   joints: Sequence[tuple[str, str]] = (), all_joints: bool = False,

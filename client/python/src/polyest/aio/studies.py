@@ -37,12 +37,13 @@ class Studies(Subjects):
                       probabilities: Sequence[float] = (0.025, 0.5, 0.975), draws: int = 0,
                       max_rows: int = 0, lags: int = 0,
                       horizon_s: float = 0, smoothed: bool = False,
-                      forecast_s: float = 0) -> results.Prediction:
+                      forecast_s: float = 0,
+                      first_scored_row: int = 0) -> results.Prediction:
         """Returns the outputs over time as the posterior predicts them, and their scores."""
         return await self._run(self._predict_call(
             record, outputs=outputs, times=times, run=run, probabilities=probabilities,
             draws=draws, max_rows=max_rows, lags=lags, horizon_s=horizon_s,
-            smoothed=smoothed, forecast_s=forecast_s))
+            smoothed=smoothed, forecast_s=forecast_s, first_scored_row=first_scored_row))
 
     async def posterior(self, *, probabilities: Sequence[float] = (), density_bins: int = 0,
                         joints: Sequence[tuple[str, str]] = (), all_joints: bool = False,

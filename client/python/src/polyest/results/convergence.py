@@ -7,8 +7,8 @@ R̂ compares the first and second halves of the groups: 8 sequences. It is the R
 ArviZ is the larger one of it and of a second, folded one. A posterior in several separate pieces
 has the largest R̂ of its pieces.
 
-The samples that the daemon returns are a thinned selection of these draws, and do not say which
-chain each one is of. R̂ can therefore not be computed again from `Posterior.samples`.
+The samples that the daemon returns are a thinned selection of these draws, equally many from each of
+the four groups. `Posterior.sample_chains` says which group each one is of.
 """
 
 from __future__ import annotations

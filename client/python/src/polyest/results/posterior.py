@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from polyest._messages import array, enum_name
 from polyest._proto.v1 import study_service_pb2
-from polyest._table import Floats
+from polyest._table import Floats, Integers
 from polyest.estimate_parts import Diagnostic
 from polyest.results import convergence
 
@@ -68,6 +70,9 @@ class Posterior:
     joints: list[Joint]
     #: (samples, n), equally weighted, in the parameters' units.
     samples: Floats
+    #: (samples,), the group of Markov chains that each sample is of, 0, 0, …, 1, …, as often as the
+    #: others to within one; empty for importance sampling. Groups never exchange anything.
+    sample_chains: Integers
     #: "IMPORTANCE_SAMPLING" or "MARKOV_CHAINS".
     method: str
     #: Number of draws that the answer is computed from.
@@ -122,6 +127,7 @@ def of_message(message: study_service_pb2.ComputePosteriorResponse) -> Posterior
                       array(one.density, len(one.first_value), len(one.second_value)))
                 for one in message.joints],
         samples=array(message.samples).reshape(-1, max(len(message.parameters), 1)),
+        sample_chains=np.fromiter(message.sample_chains, dtype=np.int64),
         method=enum_name(message, "method"), draw_count=message.draw_count,
         effective_sample_size=message.effective_sample_size, r_hat=message.r_hat,
         diagnostics=[Diagnostic.of_message(one) for one in message.diagnostics],

@@ -97,7 +97,9 @@ TEST(Posterior, GivesOutSamples) {
     EXPECT_NEAR(mean, linear.mean[i], 0.04 * sd);
     EXPECT_NEAR(std::sqrt((samples.col(i).array() - mean).square().mean()), sd, 0.03 * sd);
   }
-  EXPECT_EQ(linear.estimator->CurrentPosterior({}).value().samples.rows(), 0);
+  const Posterior without = linear.estimator->CurrentPosterior({}).value();
+  EXPECT_EQ(without.samples.rows(), 0);
+  EXPECT_TRUE(without.sample_chains.empty());
 }
 
 TEST(Posterior, AgreesWithTheEstimate) {
@@ -134,8 +136,13 @@ TEST(Posterior, IsOfMarkovChainsWhereItIsNotNearlyGaussian) {
     SCOPED_TRACE(one.what);
     const std::string output = absl::StrCat(one.output, " + 0*(b + c + d)");
     const auto estimator = Processed(TextProblem(output, parameters, one.noise), {one.z});
-    const Posterior posterior = estimator->CurrentPosterior({}).value();
+    PosteriorOptions options;
+    options.samples = 10;
+    const Posterior posterior = estimator->CurrentPosterior(options).value();
     EXPECT_EQ(posterior.method, PosteriorMethod::kMarkovChains);
+    EXPECT_EQ(posterior.sample_chains, (std::vector<int>{0, 0, 0, 1, 1, 1, 2, 2, 3, 3}));
+    ASSERT_EQ(posterior.samples.rows(), 10);
+    EXPECT_LE(posterior.samples.cwiseAbs().maxCoeff(), 1);
     EXPECT_GT(posterior.r_hat, 0.99);
     EXPECT_LT(posterior.r_hat, 1.01);
   }

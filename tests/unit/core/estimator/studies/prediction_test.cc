@@ -209,6 +209,12 @@ TEST(Prediction, ThinsItsRowsAndScoresAllOfThem) {
     EXPECT_NEAR(score.autocorrelation[lag - 1], product / u.squaredNorm(), 1e-9);
   }
   EXPECT_NEAR(score.autocorrelation[0], 0.6, 0.08);
+  PredictionOptions last = few;
+  last.first_scored_row = 400;
+  const PredictionScore of_last = PredictionOf(*estimator, last).outputs[0].score;
+  EXPECT_EQ(of_last.samples, 600);
+  const Vector residuals = whole.outputs[0].residual.tail(600);
+  EXPECT_NEAR(of_last.root_mean_square, std::sqrt(residuals.squaredNorm() / 600), 1e-12);
 }
 
 TEST(Prediction, TakesRunsOwnParametersOfAnotherRecordFromThePrior) {
@@ -279,6 +285,8 @@ TEST(Prediction, RefusesWhatItCannotPredict) {
   EXPECT_PRED2(contains, refusal([](auto& o) { o.draws = 1; }), "draws: 1 must be from 2");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.max_rows = 0; }), "max_rows: 0 must be from 1");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.lags = -1; }), "lags: -1 must be from 0");
+  EXPECT_PRED2(contains, refusal([](auto& o) { o.first_scored_row = -1; }),
+               "first_scored_row: -1 must be from 0");
   EXPECT_PRED2(contains, refusal([](auto& o) {
                  o.times = {{1, 0.5}};
                }),
