@@ -264,17 +264,21 @@ def test_delays_double_up_to_the_longest_until_a_success():
     assert backoff.delay_s() == 1.0
 
 
-def test_a_connection_alone_does_not_shorten_the_delays_but_a_message_does():
-    messages = [0, 0, 0, 1, 0]  # that each connection brings before it ends
-    stop, delays = Waits(len(messages)), []
+def test_delays_begin_anew_only_when_messages_have_come_for_a_while():
+    # Seconds from the first message of a connection to its end; None: it ends without one.
+    lasting = [None, 0, 0, 1, 4, 0.1, None]
+    stop, delays, now_s = Waits(len(lasting)), [], [0.0]
 
     def listen(works):
-        for _ in range(messages[len(stop.delays)]):
+        lasts = lasting[len(stop.delays)]
+        for seconds in (0, lasts) if lasts is not None else ():
+            now_s[0] += seconds
             works()
         raise OSError("closed")
 
-    run_reconnecting(listen, (OSError,), lambda error, delay: delays.append(delay), stop)
-    assert stop.delays == delays == [0.2, 0.4, 0.8, 0.2, 0.4]
+    run_reconnecting(listen, (OSError,), lambda error, delay: delays.append(delay), stop,
+                     lambda: now_s[0])
+    assert stop.delays == delays == [0.2, 0.4, 0.8, 1.6, 0.2, 0.4, 0.8]
 
 
 def test_other_exceptions_are_not_tried_again():

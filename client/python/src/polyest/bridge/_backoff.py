@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
+from typing import Optional
 
 
 class Backoff:
@@ -26,19 +28,30 @@ class Backoff:
 
 def run_reconnecting(listen: Callable[[Callable[[], None]], None],
                      failures: tuple[type[Exception], ...],
-                     failed: Callable[[Exception, float], None], stop: threading.Event) -> None:
+                     failed: Callable[[Exception, float], None], stop: threading.Event,
+                     clock: Callable[[], float] = time.monotonic) -> None:
     """Calls `listen` until `stop` is set, and again after each failure, with delays that double.
 
-    listen: connects and takes messages. Its argument is a function to call when it takes one: from
-        then on delays begin anew. A connection alone does not end them, since a source may accept
-        connections and close each at once.
+    listen: connects and takes messages. Its argument is a function to call when it takes one.
+        Delays begin anew if it has gone on from its first message for at least the next delay: a
+        source may accept connections and close each at once, or after a message.
     failures: exceptions after which it is called again.
     failed: is given the exception and the delay before the next attempt, s.
+    clock: tells the time in s.
     """
     backoff = Backoff()
     while not stop.is_set():
+        first_s: Optional[float] = None
+
+        def works() -> None:
+            nonlocal first_s
+            if first_s is None:
+                first_s = clock()
+
         try:
-            listen(backoff.reset)
+            listen(works)
         except failures as error:
+            if first_s is not None and clock() - first_s >= backoff.next_s:
+                backoff.reset()
             failed(error, backoff.next_s)
             stop.wait(backoff.delay_s())
