@@ -277,12 +277,12 @@ def advertised(*channels):
 DATA = struct.pack("<BIQ", 1, 3, START_NS) + b'{"force": 2.0}'
 
 
-def test_a_server_that_closes_each_connection_is_asked_less_and_less_until_data_come():
+def test_a_server_that_closes_each_connection_is_asked_less_and_less():
     greeting = [json.dumps({"op": "serverInfo", "name": "rig"}), advertised({**ROAD, "id": 3})]
     source, said, taken, delays = sourced(
         [Closing(), Closing(*greeting), Closing(*greeting), Closing(*greeting, DATA)],
         force="/road.force")
-    assert delays == [0.2, 0.4, 0.8, 0.2]
+    assert delays == [0.2, 0.4, 0.8, 1.6]
     assert said[2] == "the server ws://rig fails: closed; it is connected again in 0.8 s"
     assert taken == [(START_NS, {"force": 2.0})]
     assert source.reconnects == 3
