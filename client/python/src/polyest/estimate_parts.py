@@ -20,7 +20,8 @@ class Parameter:
     unit: str
     #: The most probable value.
     map: float
-    #: The standard deviation from the curvature of the cost at `map`, at most the prior's.
+    #: The standard deviation from the curvature of the cost at `map`, at most the prior's; that of
+    #: the posterior where the two differ by a factor of 2 or more (NON_GAUSSIAN).
     std_dev: float
     #: The mean of the posterior.
     mean: float

@@ -16,6 +16,9 @@ export interface Shown {
 
 export function shownOf({ map, stdDev, mean, posteriorStdDev, verdict }: Parameter): Shown {
   const ratio = posteriorStdDev / stdDev;
-  const isMean = posteriorStdDev > 0 && (ratio > BELL || ratio < 1 / BELL || verdict === 'NOT_IDENTIFIED');
+  // The daemon gives the distribution's deviation for both where the curvature's contradicts it.
+  const replaced = stdDev === posteriorStdDev;
+  const isMean = posteriorStdDev > 0
+    && (ratio > BELL || ratio < 1 / BELL || replaced || verdict === 'NOT_IDENTIFIED');
   return isMean ? { value: mean, deviation: posteriorStdDev, isMean } : { value: map, deviation: stdDev, isMean };
 }

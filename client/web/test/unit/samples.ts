@@ -10,7 +10,7 @@ export const recording = JSON.parse(
 
 export function parameter(name: string, changes: Partial<Parameter> = {}): Parameter {
   return {
-    name, unit: 'N/m', map: 10, stdDev: 1, mean: 10, posteriorStdDev: 1, lower95: 8, upper95: 12, priorMean: 9, priorStdDev: 5,
+    name, unit: 'N/m', map: 10, stdDev: 1, mean: 10, posteriorStdDev: 1.01, lower95: 8, upper95: 12, priorMean: 9, priorStdDev: 5,
     contraction: 0.2, verdict: 'IDENTIFIED', ...changes,
   };
 }

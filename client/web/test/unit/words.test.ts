@@ -54,6 +54,7 @@ describe('the number that stands for a parameter', () => {
   it('is the mean where it is not, or where the data say less than the prior', () => {
     expect(shownOf(parameter('k', { map: 36.3, stdDev: 3.1, mean: 41, posteriorStdDev: 4 }))).toEqual({ value: 41, deviation: 4, isMean: true });
     expect(shownOf(parameter('k', { posteriorStdDev: 0.5 })).isMean).toBe(true);
+    expect(shownOf(parameter('k', { map: 0, stdDev: 0.2, mean: 0.3, posteriorStdDev: 0.2 })).value).toBe(0.3);
     expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', mean: 9 })).value).toBe(9);
   });
   it('is the most probable value of an older daemon that says no more', () => {
@@ -99,7 +100,7 @@ describe('priors', () => {
 describe('downloads', () => {
   it('have all digits, and cells that no spreadsheet computes', () => {
     const text = estimateCsv(estimate({ parameters: [parameter('=k', { map: 1 / 3, stdDev: NaN })] }));
-    expect(text.split('\r\n')[1]).toContain("'=k,N/m,0.3333333333333333,,10,1,8,12");
+    expect(text.split('\r\n')[1]).toContain("'=k,N/m,0.3333333333333333,,10,1.01,8,12");
   });
   it('have one row for each estimate of the history', () => {
     const lines = historyCsv(readHistory(recording['history']), new Map([['k', 'N/m']])).trimEnd().split('\r\n');
