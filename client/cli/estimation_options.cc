@@ -133,7 +133,7 @@ void AddCompare(CommandRegistry& registry) {
            "seen them; a difference of 3 in its logarithm are odds of 20 to 1. The score is the\n"
            "log probability of the last rows, predicted by an estimate from the rows before.\n"
            "Filters go on reading samples meanwhile, so that they win a few rows ahead; ask for\n"
-           "the --horizon that you need. Problems must measure the same samples, with noise of "
+           "the --horizon that you need. Problems must measure the same samples, with noise of\n"
            "unknown size in the same outputs or in none."},
       arguments);
   command.add_option("files", arguments->files, "Problem files, then the data file")

@@ -38,10 +38,11 @@ std::string FormatValue(double value, double standard_deviation) {
     return FormatNumber(value, 6);
   }
   const int decimals = 1 - LeadingExponent(standard_deviation);
-  if (IsPlain(value, standard_deviation))
-    return absl::StrFormat("%.*f", std::max(decimals, 0), value);
-  const int digits = value == 0 ? 1 : LeadingExponent(std::abs(value)) + decimals;
-  return absl::StrFormat("%.*e", std::clamp(digits, 1, 15), value);
+  if (!IsPlain(value, standard_deviation)) {
+    const int digits = value == 0 ? 1 : LeadingExponent(std::abs(value)) + decimals;
+    return absl::StrFormat("%.*e", std::clamp(digits, 1, 15), value);
+  }
+  return absl::StrFormat("%.*f", std::max(decimals, 0), value);
 }
 
 std::string FormatUncertain(double value, double standard_deviation) {
