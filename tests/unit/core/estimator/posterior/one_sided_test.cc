@@ -1,5 +1,6 @@
-// Tests what is said of a parameter of which the data tell a limit and no more: y = p⁴ is flat at
-// p = 0. The oracle is quadrature of the posterior's density.
+// Tests what is said of a parameter of which the data tell a limit and no more: y = p⁴ + p/100 is
+// nearly flat at the bound p = 0, where the cost has its minimum. The oracle is quadrature of the
+// posterior's density.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ Exact OfQuadrature() {
   double total = 0;
   for (int i = 0; i < kCells; ++i) {
     const double p = (i + 0.5) / kCells;
-    const double e = (kValue - std::pow(p, 4)) / kNoiseOfPower;
+    const double e = (kValue - std::pow(p, 4) - p / 100) / kNoiseOfPower;
     cells.emplace_back(p, std::exp(-0.5 * e * e));
     total += cells.back().second;
   }
@@ -46,7 +47,7 @@ Exact OfQuadrature() {
 
 TEST(OneSidedInformation, IsALimitAndNotThePrior) {
   Problem problem =
-      TextProblem("p^4", {UncertainParameter::Uniform("p", 0, 1).value()}, kNoiseOfPower);
+      TextProblem("p^4 + p/100", {UncertainParameter::Uniform("p", 0, 1).value()}, kNoiseOfPower);
   problem.expansion.order = 4;
   const Estimate estimate = Processed(problem, {kValue})->CurrentEstimate().value();
   const ParameterEstimate& p = estimate.parameters[0];
