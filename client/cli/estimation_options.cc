@@ -76,7 +76,7 @@ void AddTimesOfFit(CLI::App& command, FitArguments& arguments) {
           "With process noise or drift: use no sample of the last S seconds, in windows of\n"
           "that length (default 0: predict each row from all rows before it)")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(Between(0.0, 1e9));
   command.add_flag(
       "--smoothed", arguments.smoothed,
       "With process noise or drift: what all samples say of each row, those after it, too;\n"
@@ -85,7 +85,7 @@ void AddTimesOfFit(CLI::App& command, FitArguments& arguments) {
       .add_option("--forecast", arguments.forecast_s,
                   "Predict so many seconds beyond the last row, in place of the rows")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(Between(0.0, 1e9));
 }
 
 void AddFit(CommandRegistry& registry) {
@@ -143,13 +143,13 @@ void AddCompare(CommandRegistry& registry) {
   command
       .add_option("--hold-out", arguments->hold_out.fraction,
                   "Fraction of the rows to predict, the last ones (default 0.3)")
-      ->check(CLI::Range(0.01, 0.99));
+      ->check(Between(0.01, 0.99));
   command
       .add_option("--horizon", arguments->hold_out.horizon_s,
                   "With process noise or drift: predict so many seconds ahead, as fit does\n"
                   "(default 0: predict each row from all rows before it)")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(Between(0.0, 1e9));
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "csv"});
 }
@@ -226,9 +226,9 @@ void AddRegularization(CommandRegistry& registry) {
       arguments);
   AddStudyInput(command, *arguments);
   command.add_option("--lowest", arguments->lowest, "The least α² (default 1e-4)")
-      ->check(CLI::Range(1e-8, 1e8));
+      ->check(Between(1e-8, 1e8));
   command.add_option("--highest", arguments->highest, "The greatest α² (default 1e4)")
-      ->check(CLI::Range(1e-8, 1e8));
+      ->check(Between(1e-8, 1e8));
   command.add_option("--points", arguments->points, "Values of α² (default 33)")
       ->check(CLI::Range(2, 1'001));
   AddPlot(command, arguments->plot_file, "the sweep");

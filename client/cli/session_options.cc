@@ -31,7 +31,7 @@ void AddStream(CommandRegistry& registry) {
   command
       .add_option("--rate", arguments->rate,
                   "Speed relative to the data's own time (1: real time; 0: as fast as possible)")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(Between(0.0, 1e9));
   command.add_option(
       "--session", arguments->session,
       "Name of the session to create, or to resume with rows after its last one. Its run stays "
@@ -41,7 +41,7 @@ void AddStream(CommandRegistry& registry) {
                   "How much later than rows of other channels a row may come, s in the data's own "
                   "time. Rows are computed once no earlier ones may come; the end of the data ends "
                   "their run. (0: rows come in time order)")
-      ->check(CLI::Range(0.0, 3600.0));
+      ->check(Between(0.0, 3600.0));
   AddFormat(command, arguments->format, {"table", "jsonl"});
 }
 
@@ -171,7 +171,7 @@ void AddDaemonCommands(CommandRegistry& registry) {
   AddServer(command, arguments->place)->required();
   command.add_flag("--once", arguments->once, "Print once and exit");
   command.add_option("--interval", arguments->interval_s, "Refresh interval, s")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(Between(0.1, 3600.0))
       ->capture_default_str();
   AddBackup(registry);
   AddNodes(registry);

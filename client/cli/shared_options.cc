@@ -1,6 +1,9 @@
 #include "client/cli/shared_options.h"
 
+#include <absl/strings/numbers.h>
+
 #include <charconv>
+#include <cmath>
 #include <map>
 
 namespace polyest::internal {
@@ -52,9 +55,19 @@ void AddAccess(CLI::App& command, ServerAccess& access) {
 
 }  // namespace
 
+CLI::Validator Between(double least, double most) {
+  const CLI::Range range(least, most);
+  const auto check = [range](std::string& text) {
+    double number = 0;
+    if (absl::SimpleAtod(text, &number) && std::isnan(number)) return text + " is not a number";
+    return range(text);
+  };
+  return CLI::Validator(check, range.get_description());
+}
+
 CLI::Option* AddServer(CLI::App& command, Place& place) {
   command.add_option("--deadline", place.deadline_s, "Give up after this many seconds; 0: never")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(Between(0.0, 1e9));
   AddAccess(command, place.access);
   return command.add_option("--server", place.server, "The daemon to ask, HOST:PORT")
       ->check(CLI::Validator(CheckServer, "HOST:PORT"));

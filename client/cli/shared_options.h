@@ -10,6 +10,8 @@
 
 namespace polyest::internal {
 
+// Accepts numbers from `least` to `most`, as CLI::Range, which accepts "nan" as well.
+CLI::Validator Between(double least, double most);
 // Adds --server, --deadline and the options for access to a daemon. Returns --server.
 CLI::Option* AddServer(CLI::App& command, Place& place);
 // Adds --fmu-dir and --umbridge-dir and returns them.

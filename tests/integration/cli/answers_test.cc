@@ -1,18 +1,12 @@
 // Tests the command's answers, computed in this process and by a daemon.
 
-#include <absl/strings/match.h>
-#include <absl/strings/str_split.h>
 #include <gmock/gmock.h>
 
-#include <cmath>
-#include <fstream>
-#include <iterator>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "polyest/v1/study_service.pb.h"
-#include "tests/integration/cli/command_test.h"
+#include "tests/integration/cli/same_answer.h"
 
 namespace polyest::internal {
 namespace {
@@ -22,28 +16,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-std::string TextOf(const std::string& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-class AnswersTest : public CommandTest {
- protected:
-  // Runs a command in this process and with a daemon, and compares the answers.
-  void ExpectSameAnswer(const std::vector<std::string>& arguments) {
-    const Finished local = Run(arguments);
-    ASSERT_EQ(local.exit_status, 0) << local.err;
-    EXPECT_THAT(local.err, IsEmpty());
-    EXPECT_FALSE(local.out.empty());
-    std::vector<std::string> with_server = arguments;
-    with_server.insert(with_server.end(), {"--server", daemon_.address()});
-    const Finished remote = Run(with_server);
-    ASSERT_EQ(remote.exit_status, 0) << remote.err;
-    EXPECT_EQ(local.out, remote.out);
-  }
-
-  DaemonProcess daemon_;
-};
+class AnswersTest : public SameAnswerTest {};
 
 TEST_F(AnswersTest, EstimatesAgreeToTheLastDigit) {
   const std::string data = File("data.csv", DemoRows(200));
@@ -65,73 +38,6 @@ TEST_F(AnswersTest, CostsAgreeToTheLastDigit) {
   const std::string data = File("data.csv", DemoRows(20));
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5"});
   ExpectSameAnswer({"cost", Example("oscillator.json"), data, "--grid", "5", "--format", "csv"});
-}
-
-TEST_F(AnswersTest, ComparisonsAgreeAndRankTheModelOfTheDataFirst) {
-  const auto problem = [this](const std::string& name, const std::string& damping,
-                              const std::string& condition = "t > 0") {
-    return File(name, R"({
-      "model": {"equations": {"states": {"x": "v", "v": "-k*x - )" +
-                          damping + R"("},
-                              "outputs": {"position": "x"}}},
-      "fixed": {"x_0": 1},
-      "uncertain": [{"name": "k", "uniform": {"lower": 30, "upper": 50}},
-                    {"name": "c", "uniform": {"lower": 0.01, "upper": 1}}],
-      "measured": [{"output": "position", "noise": {"absolute": 0.01}}],
-      "useWhen": ")" + condition +
-                          R"("
-    })");
-  };
-  // x″ = −39.5 x − 0.2 v from x = 1, whose last digits are the noise.
-  std::string rows = "t,position\n";
-  for (int i = 1; i <= 120; ++i) {
-    const double t = 0.05 * i, w = std::sqrt(39.5 - 0.01);
-    const double x = std::exp(-0.1 * t) * (std::cos(w * t) + 0.1 / w * std::sin(w * t));
-    rows += std::to_string(t) + ',' + std::to_string(std::round(x * 30) / 30) + '\n';
-  }
-  const std::string linear = problem("linear.json", "c*v"), dry = problem("dry.json", "c*sign(v)");
-  const std::string data = File("data.csv", rows);
-  ExpectSameAnswer({"compare", dry, linear, data});
-  ExpectSameAnswer({"compare", dry, linear, data, "--hold-out", "0.5", "--format", "csv"});
-  const Finished compared = Run({"compare", dry, linear, data});
-  EXPECT_THAT(Lines(compared.out)[1], HasSubstr("linear.json"));
-  EXPECT_THAT(compared.out, HasSubstr("120 samples, 36 of them held out. Evidence and held-out "
-                                      "samples prefer"));
-
-  // Filters go on reading samples, the fewer the farther they have to predict.
-  std::string pushed = TextOf(linear);
-  pushed.insert(pushed.find("\"uncertain\""),
-                R"("processNoise": [{"state": "v", "spectralDensity": 1e-2}], )");
-  const std::string filtered = File("filtered.json", pushed);
-  const std::vector<std::string> next = {"compare", linear, filtered, data, "--format", "csv"};
-  std::vector<std::string> ahead = next;
-  ahead.insert(ahead.end(), {"--horizon", "1.5"});
-  ExpectSameAnswer(ahead);
-  const auto score = [&](const std::vector<std::string>& command, const std::string& file) {
-    for (const std::string& line : Lines(Run(command).out)) {
-      const std::vector<std::string> fields = absl::StrSplit(line, ',');
-      if (absl::EndsWith(fields[0], file)) return std::stod(fields[2]);
-    }
-    return std::numeric_limits<double>::quiet_NaN();
-  };
-  EXPECT_EQ(score(next, "linear.json"), score(ahead, "linear.json"));
-  EXPECT_GT(score(next, "filtered.json"), score(ahead, "filtered.json"));
-
-  const std::string later = problem("later.json", "c*v", "t > 1");
-  const Finished refused = Run({"compare", linear, later, data});
-  EXPECT_EQ(refused.exit_status, 2);
-  EXPECT_THAT(refused.err, HasSubstr("problems can be compared only if they measure the same"));
-
-  std::string text = TextOf(linear);
-  text.replace(text.find("\"absolute\": 0.01"), 16, "\"unknown\": true");
-  const Finished mixed = Run({"compare", linear, File("unknown.json", text), data});
-  EXPECT_EQ(mixed.exit_status, 0) << mixed.err;
-  EXPECT_THAT(mixed.out, HasSubstr("Evidence is compared only where"));
-
-  const Finished short_of_rows = Run(
-      {"compare", linear, linear, File("one.csv", "t,position\n0.5,0.1\n"), "--hold-out", "0.3"});
-  EXPECT_EQ(short_of_rows.exit_status, 2);
-  EXPECT_THAT(short_of_rows.err, HasSubstr("--hold-out: 0.3 of 1 rows leaves none to predict"));
 }
 
 TEST_F(AnswersTest, PredictionsAgreeToTheLastDigit) {
