@@ -163,8 +163,8 @@ absl::StatusOr<UmBridgeDescription> ParseUmBridgeDescription(const std::string& 
   }
   POLYEST_RETURN_IF_ERROR(
       Knows(file, "the file",
-            {"urls", "name", "summary", "parameters", "inputSizes", "outputs", "config", "timesS",
-             "requestsPerServer", "timeoutS", "giveUpAfterS"}));
+            {"urls", "name", "summary", "parameters", "inputSizes", "inputs", "outputs", "config",
+             "timesS", "requestsPerServer", "timeoutS", "giveUpAfterS"}));
   UmBridgeDescription read;
   read.model.name = name;
   read.remote_name = name;
@@ -173,13 +173,23 @@ absl::StatusOr<UmBridgeDescription> ParseUmBridgeDescription(const std::string& 
   POLYEST_RETURN_IF_ERROR(ReadServers(file, read.servers));
   POLYEST_RETURN_IF_ERROR(ReadQuantities(file, "parameters", true, read.model.parameters));
   POLYEST_RETURN_IF_ERROR(ReadQuantities(file, "outputs", false, read.model.outputs));
+  if (file.contains("inputs")) {
+    POLYEST_RETURN_IF_ERROR(ReadQuantities(file, "inputs", false, read.model.inputs));
+  }
   POLYEST_RETURN_IF_ERROR(ReadInputSizes(file, read));
   POLYEST_RETURN_IF_ERROR(ReadTimes(file, read.time_s));
+  if (!read.model.inputs.empty() && !read.time_s.empty()) {
+    return Wrong("inputs", file["inputs"],
+                 "cannot drive a model with timesS, which is asked once for its whole record");
+  }
   if (const auto config = file.find("config"); config != file.end()) {
     if (!config->is_object()) return Wrong("config", *config, "must be an object");
     if (config->contains("times") && read.time_s.empty()) {
       return Wrong("config", *config,
                    "must not have \"times\", which polyest adds, without timesS");
+    }
+    if (config->contains("inputs") && !read.model.inputs.empty()) {
+      return Wrong("config", *config, "must not have \"inputs\", which polyest adds");
     }
     read.config = config->dump(-1, ' ', false, Json::error_handler_t::replace);
   }

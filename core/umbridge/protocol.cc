@@ -45,12 +45,14 @@ absl::Status NoVectors() {
 }  // namespace
 
 std::string EvaluateRequest(const std::string& model, const Vectors& input,
-                            const std::string& config, std::span<const double> times_s) {
-  Json with_times = ParseOrDiscarded(config);
-  if (!times_s.empty()) {
-    with_times["times"] = std::vector<double>(times_s.begin(), times_s.end());
+                            const std::string& config, std::span<const double> times_s,
+                            const DrivenInputs& driven) {
+  Json full = ParseOrDiscarded(config);
+  if (!times_s.empty()) full["times"] = std::vector<double>(times_s.begin(), times_s.end());
+  for (const auto& [name, lines] : driven) {
+    full["inputs"][name] = Json{{"times", lines.times_s}, {"values", lines.values}};
   }
-  return Json{{"name", model}, {"input", input}, {"config", std::move(with_times)}}.dump();
+  return Json{{"name", model}, {"input", input}, {"config", std::move(full)}}.dump();
 }
 
 absl::StatusOr<Vectors> ReadEvaluation(int http_status, const std::string& body) {

@@ -5,18 +5,26 @@
 
 #include <absl/status/statusor.h>
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "core/umbridge/input_lines.h"
 
 namespace polyest::internal {
 
 using Vectors = std::vector<std::vector<double>>;
 
-// Returns the request for the outputs at `input`. `times_s` are added to `config`, a JSON object,
-// as the list "times" unless they are empty.
+// What drives a model, by the name of its input.
+using DrivenInputs = std::map<std::string, InputLines>;
+
+// Returns the request for the outputs at `input`. To `config`, a JSON object, are added `times_s`
+// as the list "times" unless they are empty, and `driven` as "inputs": {NAME: {"times": […],
+// "values": […]}, …} unless it is.
 std::string EvaluateRequest(const std::string& model, const Vectors& input,
-                            const std::string& config, std::span<const double> times_s);
+                            const std::string& config, std::span<const double> times_s,
+                            const DrivenInputs& driven = {});
 
 // Reads the answer to EvaluateRequest. Returns FailedPrecondition with the reason if the model says
 // that it cannot be evaluated there, DataLoss if this is no answer of a model.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <utility>
 
@@ -51,10 +52,12 @@ std::string WrongShape(const Vectors& outputs, size_t vectors, size_t count) {
 class UmBridgeEnsemble final : public TrajectoryEnsemble {
  public:
   UmBridgeEnsemble(std::shared_ptr<const UmBridgeDescription> description,
-                   std::shared_ptr<EvaluationPool> pool, EnsembleSpecification specification)
+                   std::shared_ptr<EvaluationPool> pool, EnsembleSpecification specification,
+                   const InputSignals* inputs)
       : description_(std::move(description)),
         pool_(std::move(pool)),
         specification_(std::move(specification)),
+        inputs_(inputs),
         failed_(static_cast<size_t>(points()), false) {}
 
   int points() const override { return static_cast<int>(specification_.parameters.rows()); }
@@ -65,38 +68,87 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
  private:
   absl::StatusOr<std::vector<Evaluation>> EvaluateAll(std::span<const double> times_s,
                                                       const Stop& stop);
+  absl::Status DriveUpTo(double end_s);
+  DrivenInputs DrivenInputsOf(Eigen::Index point) const;
+  double DelayOf(Eigen::Index point, Eigen::Index input) const;
+  absl::Status Annotate(const absl::Status& status) const;
   absl::StatusOr<size_t> IndexOf(double time_s) const;
   absl::Status EvaluateListed(const Stop& stop);
 
   std::shared_ptr<const UmBridgeDescription> description_;
   std::shared_ptr<EvaluationPool> pool_;
   EnsembleSpecification specification_;
+  const InputSignals* inputs_;
+  // By input and delay: what the input's shape has done up to the times that are asked for.
+  std::vector<std::map<double, InputLines>> shapes_;
   std::vector<Evaluation> listed_;  // by point, at the listed times; empty before the first Advance
   std::vector<bool> failed_;        // by point
   std::vector<PointFailure> failures_;
   double time_s_ = 0;  // reached
 };
 
+absl::Status UmBridgeEnsemble::Annotate(const absl::Status& status) const {
+  if (!absl::IsFailedPrecondition(status)) return status;
+  return absl::FailedPreconditionError(
+      absl::StrCat("umbridge ", description_->model.name, ": ", status.message()));
+}
+
+double UmBridgeEnsemble::DelayOf(Eigen::Index point, Eigen::Index input) const {
+  const Matrix& delays_s = specification_.input_delays_s;
+  return delays_s.size() == 0 ? 0 : delays_s(point, input);
+}
+
+absl::Status UmBridgeEnsemble::DriveUpTo(double end_s) {
+  shapes_.assign(inputs_->size(), {});
+  for (size_t i = 0; i < inputs_->size(); ++i) {
+    for (Eigen::Index q = 0; q < points(); ++q) {
+      const double delay_s = DelayOf(q, static_cast<Eigen::Index>(i));
+      if (shapes_[i].contains(delay_s)) continue;
+      absl::StatusOr<InputLines> lines = LinesOf((*inputs_)[i], delay_s, end_s);
+      if (!lines.ok()) {
+        return absl::Status(lines.status().code(),
+                            absl::StrCat("input ", description_->model.inputs[i].name, ": ",
+                                         lines.status().message()));
+      }
+      shapes_[i].emplace(delay_s, *std::move(lines));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// u_i(t) = amplitude_i · shape_i(t − delay_i) + offset_i
+DrivenInputs UmBridgeEnsemble::DrivenInputsOf(Eigen::Index point) const {
+  DrivenInputs driven;
+  for (size_t i = 0; i < shapes_.size(); ++i) {
+    const auto input = static_cast<Eigen::Index>(i);
+    InputLines lines = shapes_[i].at(DelayOf(point, input));
+    const Matrix& offsets = specification_.input_offsets;
+    const double offset = offsets.size() == 0 ? 0 : offsets(point, input);
+    for (double& value : lines.values) {
+      value = specification_.amplitudes(point, input) * value + offset;
+    }
+    driven.emplace(description_->model.inputs[i].name, std::move(lines));
+  }
+  return driven;
+}
+
 // Evaluates the points that have not failed; those that fail now are noted. Others are empty.
 absl::StatusOr<std::vector<Evaluation>> UmBridgeEnsemble::EvaluateAll(
     std::span<const double> times_s, const Stop& stop) {
   const size_t count = times_s.empty() ? description_->time_s.size() : times_s.size();
+  if (!times_s.empty()) POLYEST_RETURN_IF_ERROR(Annotate(DriveUpTo(times_s.back())));
   std::vector<std::string> requests;
   std::vector<size_t> points;
   for (size_t q = 0; q < failed_.size(); ++q) {
     if (failed_[q]) continue;
     points.push_back(q);
-    requests.push_back(EvaluateRequest(
-        description_->remote_name,
-        InputOf(*description_, specification_.parameters, static_cast<Eigen::Index>(q)),
-        description_->config, times_s));
+    const auto point = static_cast<Eigen::Index>(q);
+    requests.push_back(EvaluateRequest(description_->remote_name,
+                                       InputOf(*description_, specification_.parameters, point),
+                                       description_->config, times_s, DrivenInputsOf(point)));
   }
   auto evaluated = pool_->Evaluate(std::move(requests), stop);
-  if (absl::IsFailedPrecondition(evaluated.status())) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("umbridge ", description_->model.name, ": ", evaluated.status().message()));
-  }
-  if (!evaluated.ok()) return evaluated.status();
+  if (!evaluated.ok()) return Annotate(evaluated.status());
   std::vector<Evaluation> results(failed_.size());
   for (size_t i = 0; i < points.size(); ++i) {
     Evaluation& result = results[points[i]] = std::move((*evaluated)[i]);
@@ -191,8 +243,8 @@ UmBridgeModel::UmBridgeModel(UmBridgeDescription description)
       pool_(std::make_shared<EvaluationPool>(description_->servers)) {}
 
 std::unique_ptr<TrajectoryEnsemble> UmBridgeModel::StartEnsemble(
-    EnsembleSpecification specification, const InputSignals* /*inputs*/) const {
-  return std::make_unique<UmBridgeEnsemble>(description_, pool_, std::move(specification));
+    EnsembleSpecification specification, const InputSignals* inputs) const {
+  return std::make_unique<UmBridgeEnsemble>(description_, pool_, std::move(specification), inputs);
 }
 
 }  // namespace polyest::internal

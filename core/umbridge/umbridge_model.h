@@ -1,8 +1,9 @@
 #pragma once
 
 // A model that UM-Bridge servers compute. The protocol knows no time: a model is asked either for
-// its outputs at the times of samples, which it finds as the list "times" in the configuration, or,
-// if its description lists times, once for its outputs at all of them.
+// its outputs at the times of samples, which it finds as the list "times" in the configuration
+// beside what its inputs have done up to then, or, if its description lists times, once for its
+// outputs at all of them.
 
 #include <absl/status/statusor.h>
 

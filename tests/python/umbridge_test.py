@@ -54,10 +54,10 @@ umbridge.serve_models([Oscillator("oscillator")], int(sys.argv[2]))
 """
 
 
-def describe(folder, urls, **more):
-    """Writes a description of the oscillator at these servers."""
-    text = json.dumps({**serve.describe(urls), **more})
-    (folder / "oscillator.umbridge.json").write_text(text)
+def describe(folder, urls, name="oscillator", **more):
+    """Writes a description of an example's model at these servers."""
+    text = json.dumps({**serve.describe(urls)[name], **more})
+    (folder / f"{name}.umbridge.json").write_text(text)
 
 
 @contextlib.contextmanager
@@ -93,12 +93,16 @@ def undisturbed(daemon, folder, record_of_module):
         return daemon.estimate(PROBLEM, record_of_module)
 
 
-@pytest.fixture(scope="module")
-def record_of_module():
+def example_record(name):
     import numpy as np
 
-    table = np.genfromtxt(EXAMPLES / "oscillator.csv", delimiter=",", names=True)
-    return {name: table[name] for name in table.dtype.names}
+    table = np.genfromtxt(EXAMPLES / f"{name}.csv", delimiter=",", names=True)
+    return {column: table[column] for column in table.dtype.names}
+
+
+@pytest.fixture(scope="module")
+def record_of_module():
+    return example_record("oscillator")
 
 
 class Mortals:
@@ -168,6 +172,19 @@ def test_the_server_of_pypis_package_gives_the_same_estimate(daemon, folder, und
         finally:
             server.kill()
     assert estimate.to_dict() == undisturbed.to_dict()
+
+
+def test_a_model_driven_by_a_measured_road_gives_the_builtin_models_estimate(daemon, folder):
+    record = example_record("quarter_car")
+    with served() as url:
+        describe(folder, [url], "quarter_car")
+        remote = daemon.estimate(SERVE / "quarter_car.json", record)
+    builtin = daemon.estimate(EXAMPLES / "quarter_car.json", record)
+    for name in ("ks", "cs", "kt"):
+        one, other = remote.parameters[name], builtin.parameters[name]
+        # The server's steps and lines are as fine as that; the noise is of no concern.
+        assert abs(one.mean - other.mean) < 0.05 * other.posterior_std_dev
+        assert one.posterior_std_dev == pytest.approx(other.posterior_std_dev, rel=0.02)
 
 
 def test_a_model_that_refuses_points_says_why(daemon, folder, record_of_module):

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Serves the oscillator of the examples as a model by the UM-Bridge protocol.
+"""Serves two models of the examples by the UM-Bridge protocol: the oscillator and the quarter car.
 
     serve.py FOLDER [COMMAND…]
 
-Listens on a free port of this machine and writes FOLDER/oscillator.umbridge.json, which tells polyest
-where the model is and what its numbers mean. Ends with the command, or on Ctrl+C without one. Nothing
-but Python itself is needed; the package `umbridge` of PyPI does the same in a few lines.
+Listens on a free port of this machine and writes FOLDER/oscillator.umbridge.json and
+FOLDER/quarter_car.umbridge.json, which tell polyest where the models are and what their numbers mean.
+Ends with the command, or on Ctrl+C without one. Nothing but Python itself is needed; the package
+`umbridge` of PyPI does the same in a few lines.
 """
 
+import bisect
 import http.server
 import json
 import math
@@ -17,8 +19,9 @@ import subprocess
 import sys
 import threading
 
-NAME = "oscillator"
-MASS, START = 1.0, 1.0  # kg; m, released from rest
+MASS, START = 1.0, 1.0  # kg; m, the oscillator is released from rest
+BODY, WHEEL = 290.0, 59.0  # kg, of the quarter car
+STEP_S = 0.005  # longest step of the quarter car's integration
 
 
 def displacements(stiffness, damping, times):
@@ -33,31 +36,93 @@ def displacements(stiffness, damping, times):
             for t in times]
 
 
+def oscillator(parameters, config):
+    return [displacements(*parameters, config["times"])]
+
+
+def along(lines):
+    """Returns the function of time that an input's straight lines are."""
+    times, values = lines["times"], lines["values"]
+
+    def value(t):
+        right = bisect.bisect_right(times, t)
+        if right == 0 or right == len(times):
+            return values[max(right - 1, 0)]
+        left = right - 1
+        fraction = (t - times[left]) / (times[right] - times[left])
+        return values[left] + fraction * (values[right] - values[left])
+
+    return value
+
+
+def quarter_car(parameters, config):
+    """Integrates body and wheel over the road by the classical Runge-Kutta method."""
+    spring, damper, tyre = parameters
+    road = along(config["inputs"]["road"])
+
+    def rates(state, height):
+        zs, zu, vs, vu = state
+        force = spring * (zs - zu) + damper * (vs - vu)
+        return vs, vu, -force / BODY, (force + tyre * (height - zu)) / WHEEL
+
+    def ahead(state, rate, h):
+        return [x + h * dx for x, dx in zip(state, rate)]
+
+    t, state = 0.0, [0.0, 0.0, 0.0, 0.0]
+    travel, acceleration = [], []
+    for end in config["times"]:
+        steps = math.ceil((end - t) / STEP_S - 1e-6)
+        h = (end - t) / max(steps, 1)
+        for _ in range(steps):
+            before, halfway, after = road(t), road(t + h / 2), road(t + h)
+            k1 = rates(state, before)
+            k2 = rates(ahead(state, k1, h / 2), halfway)
+            k3 = rates(ahead(state, k2, h / 2), halfway)
+            k4 = rates(ahead(state, k3, h), after)
+            state = [x + h / 6 * (a + 2 * b + 2 * c + d)
+                     for x, a, b, c, d in zip(state, k1, k2, k3, k4)]
+            t += h
+        t = end
+        travel.append(state[0] - state[1])
+        acceleration.append(rates(state, road(t))[2])
+    return [travel, acceleration]
+
+
+MODELS = {"oscillator": (oscillator, 2, 1), "quarter_car": (quarter_car, 3, 2)}  # inputs, outputs
+
+
 class Handler(http.server.BaseHTTPRequestHandler):
-    """Answers the calls of the protocol: one input vector (k, c), one output vector x."""
+    """Answers the calls of the protocol: one input vector, an output vector for each output."""
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
 
     def do_GET(self):
-        self.answer(200, {"protocolVersion": 1.0, "models": [NAME]})
+        self.answer(200, {"protocolVersion": 1.0, "models": list(MODELS)})
 
     def do_POST(self):
         request = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         config = request.get("config", {})
+        model = MODELS.get(request.get("name"))
+        if model is None:
+            return self.refuse("ModelNotFound", f"there are {', '.join(MODELS)}")
+        compute, inputs, outputs = model
         if self.path == "/ModelInfo":
             self.answer(200, {"support": {"Evaluate": True}})
         elif self.path == "/InputSizes":
-            self.answer(200, {"inputSizes": [2]})
+            self.answer(200, {"inputSizes": [inputs]})
         elif self.path == "/OutputSizes":
-            self.answer(200, {"outputSizes": [len(config["times"])]})
+            self.answer(200, {"outputSizes": [len(config["times"])] * outputs})
         elif self.path == "/Evaluate":
             try:
-                self.answer(200, {"output": [displacements(*request["input"][0], config["times"])]})
+                self.answer(200, {"output": compute(request["input"][0], config)})
             except ValueError as error:
-                self.answer(400, {"error": {"type": "InvalidInput", "message": str(error)}})
+                self.refuse("InvalidInput", str(error))
         else:
-            self.answer(404, {"error": {"type": "UnsupportedFeature", "message": self.path}})
+            self.refuse("UnsupportedFeature", self.path)
+
+    def refuse(self, kind, message):
+        self.answer(400, {"error": {"type": kind, "message": message}})
 
     def answer(self, status, message):
         body = json.dumps(message).encode()
@@ -77,16 +142,33 @@ class Server(http.server.ThreadingHTTPServer):
 
 
 def describe(urls):
-    """Returns what polyest must know of the model at these servers."""
+    """Returns what polyest must know of the models at these servers, by the models' names."""
     return {
-        "summary": "a mass on a spring and damper, released from rest",
-        "urls": urls,
-        "requestsPerServer": 2,
-        "parameters": [
-            {"name": "k", "unit": "N/m", "meaning": "stiffness"},
-            {"name": "c", "unit": "N s/m", "meaning": "damping"},
-        ],
-        "outputs": [{"name": "x", "unit": "m", "meaning": "displacement"}],
+        "oscillator": {
+            "summary": "a mass on a spring and damper, released from rest",
+            "urls": urls,
+            "requestsPerServer": 2,
+            "parameters": [
+                {"name": "k", "unit": "N/m", "meaning": "stiffness"},
+                {"name": "c", "unit": "N s/m", "meaning": "damping"},
+            ],
+            "outputs": [{"name": "x", "unit": "m", "meaning": "displacement"}],
+        },
+        "quarter_car": {
+            "summary": "one corner of a vehicle over a road",
+            "urls": urls,
+            "requestsPerServer": 2,
+            "parameters": [
+                {"name": "ks", "unit": "N/m", "meaning": "stiffness of the suspension"},
+                {"name": "cs", "unit": "N s/m", "meaning": "damping of the suspension"},
+                {"name": "kt", "unit": "N/m", "meaning": "stiffness of the tyre"},
+            ],
+            "inputs": [{"name": "road", "unit": "m", "meaning": "height of the road"}],
+            "outputs": [
+                {"name": "travel", "unit": "m", "meaning": "travel of the suspension"},
+                {"name": "zs_accel", "unit": "m/s^2", "meaning": "acceleration of the body"},
+            ],
+        },
     }
 
 
@@ -94,12 +176,13 @@ def main(folder, *command):
     if not os.path.isdir(folder):
         sys.exit(f"serve.py: {folder} is not a folder; make it first, or name another")
     server = Server(("127.0.0.1", 0), Handler)
-    file = pathlib.Path(folder, f"{NAME}.umbridge.json")
-    draft = file.with_suffix(".new")
-    draft.write_text(json.dumps(describe([f"http://127.0.0.1:{server.server_port}"]), indent=2))
-    os.replace(draft, file)
+    for name, model in describe([f"http://127.0.0.1:{server.server_port}"]).items():
+        file = pathlib.Path(folder, f"{name}.umbridge.json")
+        draft = file.with_suffix(".new")
+        draft.write_text(json.dumps(model, indent=2))
+        os.replace(draft, file)
     if not command:
-        print(f"serving at port {server.server_port}; see {file}", flush=True)
+        print(f"serving {', '.join(MODELS)} at port {server.server_port}; see {folder}", flush=True)
         server.serve_forever()
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return subprocess.run(command, check=False).returncode

@@ -51,6 +51,15 @@ TEST(UmBridgeDescription, HasWhatTheFileSays) {
   EXPECT_EQ(read->servers.give_up_after_s, 0);
 }
 
+TEST(UmBridgeDescription, HasInputs) {
+  const auto read = ParseUmBridgeDescription(
+      "spring", With(R"("inputs": [{"name": "force", "unit": "N", "meaning": "at the mass"}])"));
+  ASSERT_TRUE(read.ok()) << read.status();
+  ASSERT_EQ(read->model.inputs.size(), 1u);
+  EXPECT_EQ(read->model.inputs[0].name, "force");
+  EXPECT_EQ(read->model.inputs[0].unit, "N");
+}
+
 TEST(UmBridgeDescription, NamesWhatIsWrong) {
   const std::vector<std::pair<std::string, const char*>> wrong = {
       {"", "the file must be an object in JSON"},
@@ -76,6 +85,12 @@ TEST(UmBridgeDescription, NamesWhatIsWrong) {
       {With(R"("inputSizes": [-1, 2])"), "inputSizes: -1 must be"},
       {With(R"("config": 1)"), "config: 1 must be an object"},
       {With(R"("config": {"times": 1})"), "must not have \"times\""},
+      {With(R"("inputs": [])"), "inputs: [] must be a list"},
+      {With(R"("inputs": [{"name": "u", "default": 1}])"), "inputs has a member default"},
+      {With(R"("inputs": [{"name": "u"}, {"name": "u"}])"), "has the name of another one"},
+      {With(R"("inputs": [{"name": "u"}], "timesS": [1])"),
+       "inputs: [{\"name\":\"u\"}] cannot drive a model with timesS"},
+      {With(R"("inputs": [{"name": "u"}], "config": {"inputs": 1})"), "must not have \"inputs\""},
       {With(R"("timesS": [1, 1])"), "timesS: 1 must be a list of increasing times"},
       {With(R"("timesS": [-1])"), "timesS: -1 must be a list of increasing times"},
       {With(R"("timesS": [])"), "timesS: [] must be a list of increasing times"},

@@ -175,6 +175,50 @@ TEST(UmBridgeModel, GivesTheEstimateOfTheSameModelAsText) {
   }
 }
 
+// Each point finds its own input, amplitude · shape(t − delay) + offset, up to the last time.
+TEST(UmBridgeModel, IsToldItsInputs) {
+  ModelServer server([](const Json& request, httplib::Response& answer) {
+    const Json& u = request["config"]["inputs"]["u"];
+    EXPECT_EQ(u["times"].back(), request["config"]["times"].back());
+    ModelServer::Answer({u["times"], u["values"]}, answer);
+  });
+  UmBridgeDescription description = Description(server);
+  description.model.inputs = {{"u", "N", ""}};
+  EnsembleSpecification specification;
+  specification.model = std::make_shared<UmBridgeModel>(description);
+  specification.parameters = kPoints;
+  specification.amplitudes = Matrix{{2}, {10}};
+  specification.input_delays_s = Matrix{{0}, {0.5}};
+  specification.input_offsets = Matrix{{0}, {1}};
+  specification.outputs = {0, 1};
+  const InputSignals inputs = {
+      InputSignal::Make(TableInput{.time_s = {0, 1, 2}, .value = {0, 1, 1}}).value()};
+  EnsemblePropagator propagator(std::move(specification), &inputs);
+  Matrix outputs(2, 6);
+  // As many times as the first point's input has points: 0, 1 and 1.5 s. The second one's has the
+  // knots 0 s, 0.5 s and 1.5 s; at 1.5 s its shape is that of 1 s.
+  ASSERT_TRUE(propagator.Advance(std::vector<double>{0.25, 0.5, 1.5}, outputs, Stop()).ok());
+  EXPECT_EQ(outputs, (Matrix{{0, 0, 1, 2, 1.5, 2}, {0, 1, 0.5, 1, 1.5, 11}}));
+}
+
+TEST(UmBridgeModel, SaysWhichInputHasTooManyLines) {
+  ModelServer server(Decay);
+  UmBridgeDescription description = Description(server);
+  description.model.inputs = {{"u", "N", ""}};
+  EnsembleSpecification specification;
+  specification.model = std::make_shared<UmBridgeModel>(description);
+  specification.parameters = kPoints;
+  specification.amplitudes = Matrix::Ones(2, 1);
+  specification.outputs = {0, 1};
+  const InputSignals inputs = {InputSignal::Make(SinusoidInput{.frequency_hz = 1e7}).value()};
+  EnsemblePropagator propagator(std::move(specification), &inputs);
+  Matrix outputs(2, 2);
+  EXPECT_EQ(propagator.Advance(std::vector<double>{1}, outputs, Stop()).message(),
+            "umbridge decay: input u: more than 1e+06 lines would have to stand for it up to "
+            "t = 1 s");
+  EXPECT_EQ(server.requests(), 0);
+}
+
 TEST(UmBridgeModel, EndsAnEstimateIfNoServerIsLeft) {
   std::optional<ModelServer> server(Decay);
   const UmBridgeDescription description = Description(*server);
