@@ -28,8 +28,7 @@ struct Assessment {
   int64_t held_out = 0;                 // samples
   double log_score = 0;                 // Σ log p over them
   double covered = 0;                   // of them by 95 % intervals
-  // Diagnostics for which the estimate from the rows before, and so the score, is not to be
-  // believed.
+  // Diagnostics of the estimate from the rows before that make the score doubtful.
   std::vector<v1::Diagnostic::Code> doubts;
   v1::ComputePosteriorResponse posterior;
 };

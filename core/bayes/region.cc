@@ -37,4 +37,9 @@ Matrix Region::ManyToLocal(const ConstMatrixRef& xis) const {
   return factors_.SolveRows(xis.rowwise() - centre_.transpose());
 }
 
+Matrix Region::HessianToGerm(const ConstMatrixRef& hessian) const {
+  const Matrix inverse = Inverse(axes_);
+  return inverse.transpose() * hessian * inverse;
+}
+
 }  // namespace polyest::internal

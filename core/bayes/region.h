@@ -26,6 +26,9 @@ class Region {
   // Map W points at once, W × n.
   Matrix ManyToGerm(const ConstMatrixRef& etas) const;
   Matrix ManyToLocal(const ConstMatrixRef& xis) const;
+  // Returns a cost's second derivative with respect to ξ, H_ξ = axes⁻ᵀ H_η axes⁻¹, from that with
+  // respect to η.
+  Matrix HessianToGerm(const ConstMatrixRef& hessian) const;
 
  private:
   Vector centre_;

@@ -1,7 +1,7 @@
 // Asks measured records whether predictions of what was not seen yet are true: an estimate from the
 // first half of a record predicts the second half, in windows within which no sample is used.
 // Beside it stands the same model without process noise, its noise of unknown size, which predicts
-// from the initial state alone. Which of both to use so many samples ahead is decided within the
+// from the initial state alone. Which of the two to use so many samples ahead is decided within the
 // first half, as `polyest compare --horizon` does it: by the score of its last 30 %.
 //
 //   held_out [RECORD]...    all records, unless some are named

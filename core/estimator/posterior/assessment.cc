@@ -8,7 +8,6 @@
 #include "core/bayes/minimizer.h"
 #include "core/bayes/regularization_bias.h"
 #include "core/bayes/weighted_samples.h"
-#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/control_trajectories.h"
 #include "core/estimator/expansion/likelihood_power.h"
@@ -68,7 +67,7 @@ class Assessment {
     findings_.population_shift = PopulationShift(problem_, posterior_);
     findings_.shift =
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
-    fitted_ = FittedParameters(ToGermHessian(design_.region, cost.MismatchHessian(eta)), prior_);
+    fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
     WidenForShift();
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
@@ -186,7 +185,7 @@ class Assessment {
     Vector informed = widening.cwiseProduct(ContractionByData(cost, eta)).cwiseMin(1);
     DescribeSpread(cost, eta, widening, informed);
     estimate_.directions =
-        Directions(ToGermHessian(design_.region, cost.InformationHessian(eta, spent_)), prior_);
+        Directions(design_.region.HessianToGerm(cost.InformationHessian(eta, spent_)), prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
@@ -228,10 +227,11 @@ class Assessment {
   // means nothing. Without curvature a parameter is not called identified.
   void GoByDraws(Vector& informed) {
     findings_.drawn_to_curvature = Vector::Zero(prior_.dimension());
+    const Vector prior_deviation = prior_.StandardDeviation();
     for (int i = 0; i < prior_.dimension(); ++i) {
       const double drawn =
           std::min(WeightedStandardDeviation(posterior_.Parameter(prior_, i), posterior_.weights),
-                   prior_.StandardDeviation()[i]);
+                   prior_deviation[i]);
       const double ratio = drawn / deviation_[i];
       if (ratio < kContradiction && ratio > 1 / kContradiction) continue;
       const double contraction =
@@ -310,7 +310,7 @@ class Assessment {
   void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& widening,
                       Vector& informed) {
     const Curvature curvature = CovarianceFromCurvature(
-        ToGermHessian(design_.region, cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
+        design_.region.HessianToGerm(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
     const Vector prior_deviation = prior_.StandardDeviation();
     deviation_ = widening.cwiseProduct(curvature.standard_deviation).cwiseMin(prior_deviation);
     if (DrawsAreRight()) GoByDraws(informed);
@@ -353,7 +353,7 @@ class Assessment {
   // in which the sharp mode of a skewed prior does not count as information either.
   Vector ContractionByData(const Cost& cost, const Vector& eta) const {
     const Vector& xi = findings_.map_xi;
-    const Matrix mismatch = ToGermHessian(design_.region, cost.InformationHessian(eta, spent_));
+    const Matrix mismatch = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
     Matrix curved = mismatch;
     curved.diagonal() += prior_.Curvature(xi);
     Matrix spread = mismatch;

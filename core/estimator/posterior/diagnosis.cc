@@ -90,8 +90,8 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
     if (bound == 0 || PriorAsksForBound(findings, estimate, i)) continue;
     std::string message = absl::StrFormat("%s lies on the %s bound of its prior: the data ",
                                           findings.NameOf(i), bound < 0 ? "lower" : "upper");
-    if (findings.GoesByDraws(i)) {
-      const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    if (findings.GoesByDraws(i) && parameter.verdict != Verdict::kNotIdentified) {
       absl::StrAppendFormat(&message, "tell only that it is %s %.3g (97.5 %%)",
                             bound < 0 ? "below" : "above",
                             bound < 0 ? parameter.upper95 : parameter.lower95);

@@ -11,14 +11,14 @@ namespace {
 constexpr double kComparableCost = 7;
 // An isolated minimum has all curvatures above the prior's; the floor of a valley does not.
 constexpr double kIsolatedCurvature = 1;
-// By how much the cost must rise between two minima. The floor of a flat valley is uneven by less,
-// as the expansion approximates it.
+// By how much the cost must rise between two minima. Where the cost is flat, the expansion has
+// ripples that are lower.
 constexpr double kRidge = 0.5;
 constexpr int kPointsBetween = 15;
 
 bool IsIsolated(const Cost& cost, const Region& region, const Prior& prior, const Vector& eta) {
   const Vector unit = prior.GermStandardDeviation();
-  const Matrix hessian = ToGermHessian(region, cost.Hessian(eta));
+  const Matrix hessian = region.HessianToGerm(cost.Hessian(eta));
   const Matrix scaled = unit.asDiagonal() * hessian * unit.asDiagonal();
   return SymmetricEigenvalues(scaled).minCoeff() > kIsolatedCurvature;
 }
@@ -35,11 +35,6 @@ bool AreSeparate(const Cost& cost, const Minimum& one, const Minimum& other) {
 }
 
 }  // namespace
-
-Matrix ToGermHessian(const Region& region, const ConstMatrixRef& hessian) {
-  const Matrix inverse = Inverse(region.axes());
-  return inverse.transpose() * hessian * inverse;
-}
 
 std::vector<Vector> OtherMinima(const Cost& cost, const ExpansionDesign& design, const Prior& prior,
                                 const std::vector<Minimum>& minima) {

@@ -11,9 +11,6 @@
 
 namespace polyest::internal {
 
-// Returns J's Hessian with respect to the germ: H_ξ = axes⁻ᵀ H_η axes⁻¹.
-Matrix ToGermHessian(const Region& region, const ConstMatrixRef& hessian);
-
 // Returns the parameters θ at those of the distinct `minima` (lowest first) that have a cost
 // comparable with the first one's, are isolated, and lie behind a ridge of the cost.
 std::vector<Vector> OtherMinima(const Cost& cost, const ExpansionDesign& design, const Prior& prior,

@@ -55,26 +55,47 @@ void AddNotConverged(Posterior& posterior) {
            static_cast<int>(kMinEffectiveSize))});
 }
 
+// The rows of the draws of one group of chains, and their weights.
+struct Chain {
+  std::vector<Eigen::Index> rows;
+  Vector weights;
+};
+
+// Returns the groups of chains. None where there are no chains, or where the model's own weights of
+// the draws have left a group with less than half of its share: equally many samples of each group
+// would then be no samples of the posterior.
+std::vector<Chain> ChainsOf(const PosteriorDraws& draws) {
+  if (draws.chain.size() == 0) return {};
+  std::vector<Chain> chains(static_cast<size_t>(draws.chain.maxCoeff() + 1));
+  for (Eigen::Index row = 0; row < draws.chain.size(); ++row) {
+    chains[static_cast<size_t>(draws.chain[row])].rows.push_back(row);
+  }
+  const double share = draws.weights.sum() / static_cast<double>(chains.size());
+  for (Chain& chain : chains) {
+    chain.weights = draws.weights(chain.rows);
+    if (chain.weights.sum() < share / 2) return {};
+  }
+  return chains;
+}
+
 // Takes samples of equal weight; of chains, equally many from each group.
 void TakeSamples(const PosteriorDraws& draws, const Matrix& thetas, int count,
                  Posterior& posterior) {
-  if (draws.chain.size() == 0 || count == 0) {
+  const std::vector<Chain> chains = ChainsOf(draws);
+  if (chains.empty()) {
     posterior.samples = thetas(EquallyWeighted(draws.weights, count), Eigen::all);
     return;
   }
   posterior.samples.resize(count, thetas.cols());
-  const int chains = draws.chain.maxCoeff() + 1;
-  for (int chain = 0; chain < chains; ++chain) {
-    std::vector<Eigen::Index> rows;
-    for (Eigen::Index row = 0; row < draws.chain.size(); ++row) {
-      if (draws.chain[row] == chain) rows.push_back(row);
+  const int groups = static_cast<int>(chains.size());
+  Eigen::Index taken = 0;
+  for (int group = 0; group < groups; ++group) {
+    const Chain& chain = chains[static_cast<size_t>(group)];
+    const int own = count / groups + (group < count % groups ? 1 : 0);
+    for (const Eigen::Index draw : EquallyWeighted(chain.weights, own)) {
+      posterior.samples.row(taken++) = thetas.row(chain.rows[static_cast<size_t>(draw)]);
+      posterior.sample_chains.push_back(group);
     }
-    const Vector weights = draws.weights(rows);
-    const int own = count / chains + (chain < count % chains ? 1 : 0);
-    const auto taken = static_cast<Eigen::Index>(posterior.sample_chains.size());
-    posterior.samples.middleRows(taken, own) =
-        thetas(rows, Eigen::all)(EquallyWeighted(weights / weights.sum(), own), Eigen::all);
-    posterior.sample_chains.insert(posterior.sample_chains.end(), static_cast<size_t>(own), chain);
   }
 }
 

@@ -8,7 +8,6 @@
 
 #include "core/bayes/curvature.h"
 #include "core/common/field_error.h"
-#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/regularization_choice.h"
@@ -21,20 +20,19 @@ constexpr double kMin = 1e-8, kMax = 1e8;
 RegularizationPoint Describe(const RegularizedMinimum& minimum, const RegionalExpansion& expansion,
                              const Prior& prior) {
   const Cost cost = expansion.MakeCost(minimum.regularization);
-  const Matrix inverse = Inverse(cost.region().axes());
-  const auto to_germ = [&](const Matrix& hessian) -> Matrix {
-    return inverse.transpose() * hessian * inverse;
-  };
-  const Vector xi = cost.region().ToGerm(minimum.point);
+  const Region& region = cost.region();
+  const Vector xi = region.ToGerm(minimum.point);
   // An estimate uses these degrees of freedom too.
-  const double spent = FittedParameters(to_germ(cost.MismatchHessian(minimum.point)), prior) + 2;
+  const double spent =
+      FittedParameters(region.HessianToGerm(cost.MismatchHessian(minimum.point)), prior) + 2;
   RegularizationPoint point;
   point.regularization = minimum.regularization;
   point.cost = minimum.cost;
   point.effective_parameters = minimum.effective_parameters;
   point.log_evidence = minimum.log_evidence;
   point.map = prior.ToParameters(xi);
-  point.std_dev = CovarianceFromCurvature(to_germ(cost.Hessian(minimum.point, spent)), prior, xi)
+  const Matrix hessian = region.HessianToGerm(cost.Hessian(minimum.point, spent));
+  point.std_dev = CovarianceFromCurvature(hessian, prior, xi)
                       .standard_deviation.cwiseMin(prior.StandardDeviation());
   point.converged = minimum.converged;
   return point;

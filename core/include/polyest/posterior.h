@@ -70,7 +70,8 @@ struct Posterior {
   Matrix samples;  // draws returned × uncertain parameters, equally weighted
   // The group of Markov chains that each of them is of, in increasing order and as often as the
   // others to within one. Groups never exchange anything, so that R̂ can be computed from them.
-  // Empty for importance sampling, and for a posterior in pieces of which one was drawn so.
+  // Empty for importance sampling, for a posterior in pieces of which one was drawn so, and where a
+  // group has less than half of its share of the posterior.
   std::vector<int> sample_chains;
   // log of the density that model, noise and prior give to the samples, ∫ p(z | θ) p(θ) dθ; the
   // unit of a sample's density is 1/unit of its output. The difference of two problems' for the

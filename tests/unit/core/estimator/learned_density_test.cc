@@ -5,9 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "tests/unit/core/estimator/forced_oscillator.h"
 
@@ -18,67 +16,67 @@ using ::testing::HasSubstr;
 
 constexpr double kLower = 1e-7, kUpper = 1;
 
-// What a log-uniform prior of the density and the record leave, exactly.
-struct Mixture {
-  Vector mean, std_dev;          // of k and c
-  double logarithm_below95 = 0;  // 97.5 % quantile of the density's logarithm
+// Cells of a grid of the density's logarithm over a log-uniform prior.
+constexpr int kCells = 80;
+const double kCellWidth = std::log(kUpper / kLower) / kCells;
+double LogarithmOf(double cell) { return std::log(kLower) + cell * kCellWidth; }
+
+// What the record leaves for each density: of k and c a Gaussian, since their priors are flat and
+// wide.
+struct Grid {
+  Matrix means{kCells, 2}, deviations{kCells, 2};
+  Vector weights{kCells};  // of the cells, Σ = 1
 };
 
-// For a given density, the posterior of k and c is Gaussian: their priors are flat and wide.
-Mixture MixtureOf(const Samples& samples) {
-  constexpr int kCells = 80;
-  const double width = std::log(kUpper / kLower) / kCells;
-  std::vector<double> weights;
-  Matrix means(kCells, 2), deviations(kCells, 2);
+Grid GridOf(const Samples& samples) {
+  Grid grid;
   Vector guess{{kTrueK, kTrueC}};
   for (int cell = 0; cell < kCells; ++cell) {
-    const double logarithm = std::log(kLower) + (cell + 0.5) * width;
-    const Maximum found = Minimize(
-        [&](const Vector& at) {
-          return ExactCost(samples, {at[0], at[1], logarithm});
-        },
-        guess, Vector{{0.02, 0.004}});
+    const auto cost = [&](const Vector& at) {
+      return ExactCost(samples, {at[0], at[1], LogarithmOf(cell + 0.5)});
+    };
+    const Maximum found = Minimize(cost, guess, Vector{{0.02, 0.004}});
     guess = found.at;
-    means.row(cell) = found.at;
-    deviations.row(cell) = found.std_dev;
-    weights.push_back(found.log_volume - found.cost);
+    grid.means.row(cell) = found.at;
+    grid.deviations.row(cell) = found.std_dev;
+    grid.weights[cell] = found.log_volume - found.cost;
   }
-  const double most = std::ranges::max(weights);
-  Vector share(kCells);
-  for (int cell = 0; cell < kCells; ++cell) {
-    share[cell] = std::exp(weights[static_cast<size_t>(cell)] - most);
-  }
-  share /= share.sum();
-  Mixture mixture;
-  mixture.mean = means.transpose() * share;
-  const Vector square =
-      (means.cwiseAbs2() + deviations.cwiseAbs2()).transpose() * share - mixture.mean.cwiseAbs2();
-  mixture.std_dev = square.cwiseSqrt();
-  double below = 0;
-  for (int cell = 0; cell < kCells; ++cell) {
-    const double part = std::min(1.0, (0.975 - below) / share[cell]);
-    below += share[cell];
-    mixture.logarithm_below95 = std::log(kLower) + (cell + part) * width;
-    if (part < 1) break;
-  }
-  return mixture;
+  grid.weights = (grid.weights.array() - grid.weights.maxCoeff()).exp();
+  grid.weights /= grid.weights.sum();
+  return grid;
 }
 
-// The draws carry the accuracy of 1 %, the expansion a bit more.
+// Returns the 97.5 % quantile of the density's logarithm.
+double UpperLogarithm(const Grid& grid) {
+  double below = 0;
+  for (int cell = 0; cell < kCells; ++cell) {
+    const double missing = 0.975 - below;
+    if (grid.weights[cell] >= missing) return LogarithmOf(cell + missing / grid.weights[cell]);
+    below += grid.weights[cell];
+  }
+  return std::log(kUpper);
+}
+
+// The draws tell means and standard deviations to about 1 %; the tolerances leave room for the
+// error of the expansion.
 TEST(LearnedDensity, IsAveragedOverWhereThereIsNoProcessNoise) {
   const Samples samples = Measure(400, 0, 2);
-  const Mixture exact = MixtureOf(samples);
+  const Grid grid = GridOf(samples);
+  const Vector mean = grid.means.transpose() * grid.weights;
+  const Vector square =
+      (grid.means.cwiseAbs2() + grid.deviations.cwiseAbs2()).transpose() * grid.weights;
+  const Vector std_dev = (square - mean.cwiseAbs2()).cwiseSqrt();
   Problem problem = ForcedOscillator();
   problem.process_noise = {{.state = "v", .unknown = true, .lower = kLower, .upper = kUpper}};
   const Estimate estimate = EstimateOf(problem, samples);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
-    EXPECT_NEAR(parameter.mean, exact.mean[i], 0.05 * exact.std_dev[i]) << parameter.name;
-    EXPECT_NEAR(parameter.posterior_std_dev, exact.std_dev[i], 0.05 * exact.std_dev[i]);
+    EXPECT_NEAR(parameter.mean, mean[i], 0.05 * std_dev[i]) << parameter.name;
+    EXPECT_NEAR(parameter.posterior_std_dev, std_dev[i], 0.05 * std_dev[i]);
   }
   // The cost hardly depends on densities below the limit, so that its curvature says nothing.
   const ParameterEstimate& density = estimate.parameters[2];
-  EXPECT_NEAR(std::log(density.upper95), exact.logarithm_below95, 0.1);
+  EXPECT_NEAR(std::log(density.upper95), UpperLogarithm(grid), 0.1);
   EXPECT_EQ(density.std_dev, density.posterior_std_dev);
   EXPECT_NEAR(estimate.covariance(2, 2), std::pow(density.std_dev, 2),
               1e-9 * std::pow(density.std_dev, 2));

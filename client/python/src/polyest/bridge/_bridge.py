@@ -15,7 +15,7 @@ from polyest._table import refuse
 from polyest.bridge._configuration import Configuration
 from polyest.bridge._feeder import Feeder
 from polyest.bridge._publishers import CanOutlet, publisher_of
-from polyest.bridge._sources import source_of
+from polyest.bridge._sources import CanSource, source_of
 from polyest.client import Client
 from polyest.connecting import connect
 from polyest.estimates import Estimate
@@ -39,6 +39,8 @@ class Counts:
     queued: int
     #: Batches that the daemon has not acknowledged yet.
     unacknowledged: int
+    #: Frames that the kernel dropped, since they were not read in time.
+    lost: int
     #: Samples left out because the queue was full.
     dropped: int
     #: Samples left out because they came too late.
@@ -102,7 +104,8 @@ class Bridge:
         rows = self._feeder.rows
         return Counts(
             rows=self._feeder.sent_rows, queued=self._feeder.queued,
-            unacknowledged=self._feeder.unacknowledged, dropped=self._feeder.dropped,
+            unacknowledged=self._feeder.unacknowledged, lost=self._source.lost if isinstance(self._source, CanSource) else 0,
+            dropped=self._feeder.dropped,
             late=rows.late if rows is not None else 0,
             repeated=rows.repeated if rows is not None else 0,
             undecodable=self._source.undecodable, refused=self._feeder.refused_rows,
@@ -168,7 +171,7 @@ class Bridge:
                 ("reconnects", {"daemon": counts.daemon_reconnects,
                                 "source": counts.source_reconnects,
                                 "publishers": counts.publisher_reconnects}),
-                ("left out", {"dropped": counts.dropped, "late": counts.late,
+                ("left out", {"lost": counts.lost, "dropped": counts.dropped, "late": counts.late,
                               "repeated": counts.repeated, "undecodable": counts.undecodable,
                               "refused": counts.refused}),
                 ("", {"saturated": counts.saturated, "new runs": counts.new_runs})):

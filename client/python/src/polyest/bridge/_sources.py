@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import socket
+import struct
 import sys
 import threading
 import time
@@ -25,6 +28,9 @@ Put = Callable[[int, Mapping[str, float]], None]
 # How long a bus is listened to before the end is looked for, s.
 _POLL_S = 0.2
 
+# Linux tells the state of a socket's memory in numbers, the last of which counts what was dropped.
+_SO_MEMINFO, _MEMINFO = 55, struct.Struct("9I")
+
 
 class CanSource:
     """A bus of python-can, opened again when it fails."""
@@ -41,7 +47,9 @@ class CanSource:
         #: The unit of each channel as the database writes it.
         self.units = self._decoder.units
         self._opened = False
-        #: How often the bus was opened again.
+        self._socket: Optional[socket.socket] = None
+        self._lost = 0
+        #: How often the bus was opened again, or frames came after its interface was down.
         self.reconnects = 0
         #: time.monotonic() of the last frame of these channels.
         self.last: Optional[float] = None
@@ -51,13 +59,25 @@ class CanSource:
         """Frames of the wanted messages whose data do not fit them."""
         return self._decoder.undecodable
 
+    @property
+    def lost(self) -> int:
+        """Frames that the kernel dropped, since they were not read in time."""
+        return self._lost + _dropped(self._socket)
+
     def run(self, put: Put, stop: threading.Event) -> None:
         """Puts all samples until `stop` is set."""
         def listen(works: Callable[[], None]) -> None:
             with open_bus(self._bus) as bus:
                 self.reconnects += self._opened
                 self._opened = True
-                self._listen(bus, put, stop, works)
+                if self._bus.interface == "socketcan":
+                    bus.set_filters(self._decoder.filters)  # the kernel keeps what is not wanted
+                    self._socket = bus.socket
+                try:
+                    self._listen(bus, put, stop, works)
+                finally:
+                    lost, self._socket = _dropped(self._socket), None
+                    self._lost += lost
 
         # Each interface of python-can has exceptions of its own.
         run_reconnecting(listen, (Exception,), self._failed, stop)
@@ -68,19 +88,41 @@ class CanSource:
 
     def _listen(self, bus: Any, put: Put, stop: threading.Event,
                 works: Callable[[], None]) -> None:
-        last_chance = math.inf
+        last_chance, down = math.inf, False
         while time.monotonic() < last_chance:
             if stop.is_set() and last_chance == math.inf:  # what has arrived is read
                 last_chance = time.monotonic() + _POLL_S
-            frame = bus.recv(0 if stop.is_set() else _POLL_S)
+            try:
+                frame = bus.recv(0 if stop.is_set() else _POLL_S)
+            except Exception as error:  # each interface of python-can has its own
+                if getattr(error, "error_code", None) != errno.ENETDOWN:
+                    raise
+                # Linux says so once. The same socket has the frames that came before, and those
+                # that come as soon as the interface is up again.
+                down = True
+                self._say(f"the bus {self._bus.channel} is down; it is listened to until it is up")
+                continue
             if frame is None and stop.is_set():
                 return
             if frame is not None:
                 works()
+                self.reconnects += down
+                down = False
             values = self._decoder.decode(frame) if frame is not None else {}
             if frame is not None and values:
                 self.last = time.monotonic()
                 put(nanoseconds(frame.timestamp), values)
+
+
+def _dropped(opened: Optional[socket.socket]) -> int:
+    """Returns how many frames a socket of SocketCAN had no room for."""
+    if opened is None:
+        return 0
+    try:
+        found = opened.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+    except OSError:  # it is closed, or the kernel older than 4.12
+        return 0
+    return int(_MEMINFO.unpack(found)[-1])
 
 
 def open_bus(bus: CanBus) -> Any:

@@ -75,6 +75,12 @@ class FrameDecoder:
             key = message.frame_id, message.is_extended_frame
             self._wanted.setdefault(key, (message, {}))[1][quantity] = signal
 
+    @property
+    def filters(self) -> list[dict[str, Any]]:
+        """The filters of python-can that let only frames of the wanted messages pass."""
+        return [{"can_id": number, "can_mask": 0x1FFFFFFF if extended else 0x7FF,
+                 "extended": extended} for number, extended in self._wanted]
+
     def decode(self, frame: Any) -> dict[str, float]:
         """Returns the values in a frame; those that it lacks or that mean none are left out."""
         found = self._wanted.get((frame.arbitration_id, frame.is_extended_id))
