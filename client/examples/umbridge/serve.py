@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Serves two models of the examples by the UM-Bridge protocol: the oscillator and the quarter car.
+"""Serves two models of the examples by the UM-Bridge protocol: the oscillator and a corner of a car.
 
     serve.py FOLDER [COMMAND…]
 
 Listens on a free port of this machine and writes FOLDER/oscillator.umbridge.json and
-FOLDER/quarter_car.umbridge.json, which tell polyest where the models are and what their numbers mean.
+FOLDER/corner.umbridge.json, which tell polyest where the models are and what their numbers mean.
 Ends with the command, or on Ctrl+C without one. Nothing but Python itself is needed; the package
 `umbridge` of PyPI does the same in a few lines.
 """
@@ -20,8 +20,8 @@ import sys
 import threading
 
 MASS, START = 1.0, 1.0  # kg; m, the oscillator is released from rest
-BODY, WHEEL = 290.0, 59.0  # kg, of the quarter car
-STEP_S = 0.005  # longest step of the quarter car's integration
+BODY, WHEEL = 290.0, 59.0  # kg, of the corner of a car
+STEP_S = 0.005  # longest step of the integration of the corner
 
 
 def displacements(stiffness, damping, times):
@@ -55,7 +55,7 @@ def along(lines):
     return value
 
 
-def quarter_car(parameters, config):
+def corner(parameters, config):
     """Integrates body and wheel over the road by the classical Runge-Kutta method."""
     spring, damper, tyre = parameters
     road = along(config["inputs"]["road"])
@@ -88,7 +88,7 @@ def quarter_car(parameters, config):
     return [travel, acceleration]
 
 
-MODELS = {"oscillator": (oscillator, 2, 1), "quarter_car": (quarter_car, 3, 2)}  # inputs, outputs
+MODELS = {"oscillator": (oscillator, 2, 1), "corner": (corner, 3, 2)}  # inputs, outputs
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
@@ -154,7 +154,7 @@ def describe(urls):
             ],
             "outputs": [{"name": "x", "unit": "m", "meaning": "displacement"}],
         },
-        "quarter_car": {
+        "corner": {
             "summary": "one corner of a vehicle over a road",
             "urls": urls,
             "requestsPerServer": 2,
