@@ -142,7 +142,9 @@ int Crashes() {
 TEST(Durability, NothingAcknowledgedIsLostHoweverOftenTheDaemonIsKilled) {
   const TestFolder data;
   const int crashes = Crashes();
-  std::vector<std::string> arguments = {"--data-dir", data.path(), "--listen", "127.0.0.1:0"};
+  // Not 127.0.0.1, where an attempt to connect while no daemon runs might come from the very port
+  // that it looks for, and take it.
+  std::vector<std::string> arguments = {"--data-dir", data.path(), "--listen", "127.0.0.2:0"};
   auto daemon = std::make_unique<DaemonProcess>(arguments);
   const std::string address = daemon->ReadAddress();
   arguments.back() = address;

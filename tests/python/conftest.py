@@ -51,7 +51,9 @@ def restartable(tmp_path):
     started = []
 
     def start(*arguments, durable=True):
-        listen = started[-1].address if started else "127.0.0.1:0"
+        # At 127.0.0.1 an attempt to connect while no daemon runs might come from the very port that
+        # it looks for, and take it.
+        listen = started[-1].address if started else "127.0.0.2:0"
         started.append(_daemon.start(os.environ.get("POLYEST_DAEMON"),
                                      tmp_path / "sessions" if durable else None, listen, arguments))
         return started[-1]
