@@ -42,14 +42,13 @@ EvaluationPool::~EvaluationPool() {
   for (Worker& worker : workers_) worker.thread.join();
 }
 
-absl::StatusOr<std::vector<Evaluation>> EvaluationPool::Evaluate(std::vector<std::string> requests,
+absl::StatusOr<std::vector<Evaluation>> EvaluationPool::Evaluate(size_t count, RequestOf request_of,
                                                                  const Stop& stop) {
   const auto job = std::make_shared<Job>();
-  for (std::string& request : requests) {
-    job->waiting.push_back(job->points.size());
-    job->points.emplace_back().request = std::move(request);
-  }
-  job->left = job->points.size();
+  job->request_of = std::move(request_of);
+  job->points.resize(count);
+  for (size_t i = 0; i < count; ++i) job->waiting.push_back(i);
+  job->left = count;
   std::unique_lock lock(mutex_);
   StartWorkers();
   if (jobs_.empty()) {
@@ -109,7 +108,7 @@ void EvaluationPool::Work(Server& server, Connection& connection) {
       point.since = since;
     }
     lock.unlock();
-    const HttpReply reply = connection.Post("/Evaluate", point.request);
+    const HttpReply reply = connection.Post("/Evaluate", task->job->request_of(task->point));
     lock.lock();
     Finish(server, *task, reply, since);
   }

@@ -16,6 +16,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -44,10 +45,14 @@ class EvaluationPool {
   // Ends the requests that are being computed for nobody.
   ~EvaluationPool();
 
-  // Returns what came of each request for /Evaluate, in their order. Returns Cancelled or
+  // Writes the i-th request for /Evaluate whenever it is sent: from any thread, at once with
+  // others, and even after Evaluate has returned. The same one each time.
+  using RequestOf = std::function<std::string(size_t)>;
+
+  // Returns what came of each of `count` requests, in their order. Returns Cancelled or
   // DeadlineExceeded on a stop request, FailedPrecondition if no server could be reached for
   // EvaluationServers::give_up_after_s.
-  absl::StatusOr<std::vector<Evaluation>> Evaluate(std::vector<std::string> requests,
+  absl::StatusOr<std::vector<Evaluation>> Evaluate(size_t count, RequestOf request_of,
                                                    const Stop& stop);
 
  private:
@@ -62,7 +67,6 @@ class EvaluationPool {
     std::string fault = {};                            // why it cannot be reached
   };
   struct Point {
-    std::string request;
     const Server* computed_by = nullptr;  // the first that computes it now
     Clock::time_point since{};
     int computations = 0;  // going on
@@ -72,6 +76,7 @@ class EvaluationPool {
     Evaluation result;
   };
   struct Job {
+    RequestOf request_of;
     std::vector<Point> points;
     std::deque<size_t> waiting;
     size_t left = 0;  // points that are not done

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <map>
 #include <sstream>
 #include <utility>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/umbridge/evaluation_requests.h"
 
 namespace polyest::internal {
 namespace {
@@ -22,18 +22,6 @@ constexpr std::uintmax_t kLongestFile = 4 << 20;
 // A time is that of a sample if both differ by at most so much of the last time listed: times are
 // differences of numbers with finitely many digits.
 constexpr double kSameTime = 1e-9;
-
-// Deals the parameters out to the model's input vectors.
-Vectors InputOf(const UmBridgeDescription& description, const Matrix& parameters,
-                Eigen::Index point) {
-  Vectors input;
-  Eigen::Index next = 0;
-  for (const int size : description.input_sizes) {
-    std::vector<double>& vector = input.emplace_back();
-    for (int i = 0; i < size; ++i) vector.push_back(parameters(point, next++));
-  }
-  return input;
-}
 
 // Returns the reason if these are not one vector of `count` values for each output.
 std::string WrongShape(const Vectors& outputs, size_t vectors, size_t count) {
@@ -56,11 +44,11 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
                    const InputSignals* inputs)
       : description_(std::move(description)),
         pool_(std::move(pool)),
-        specification_(std::move(specification)),
+        specification_(std::make_shared<const EnsembleSpecification>(std::move(specification))),
         inputs_(inputs),
         failed_(static_cast<size_t>(points()), false) {}
 
-  int points() const override { return static_cast<int>(specification_.parameters.rows()); }
+  int points() const override { return static_cast<int>(specification_->parameters.rows()); }
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
                        const Stop& stop) override;
   const std::vector<PointFailure>& failures() const override { return failures_; }
@@ -68,19 +56,14 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
  private:
   absl::StatusOr<std::vector<Evaluation>> EvaluateAll(std::span<const double> times_s,
                                                       const Stop& stop);
-  absl::Status DriveUpTo(double end_s);
-  DrivenInputs DrivenInputsOf(Eigen::Index point) const;
-  double DelayOf(Eigen::Index point, Eigen::Index input) const;
   absl::Status Annotate(const absl::Status& status) const;
   absl::StatusOr<size_t> IndexOf(double time_s) const;
   absl::Status EvaluateListed(const Stop& stop);
 
   std::shared_ptr<const UmBridgeDescription> description_;
   std::shared_ptr<EvaluationPool> pool_;
-  EnsembleSpecification specification_;
+  std::shared_ptr<const EnsembleSpecification> specification_;
   const InputSignals* inputs_;
-  // By input and delay: what the input's shape has done up to the times that are asked for.
-  std::vector<std::map<double, InputLines>> shapes_;
   std::vector<Evaluation> listed_;  // by point, at the listed times; empty before the first Advance
   std::vector<bool> failed_;        // by point
   std::vector<PointFailure> failures_;
@@ -93,61 +76,21 @@ absl::Status UmBridgeEnsemble::Annotate(const absl::Status& status) const {
       absl::StrCat("umbridge ", description_->model.name, ": ", status.message()));
 }
 
-double UmBridgeEnsemble::DelayOf(Eigen::Index point, Eigen::Index input) const {
-  const Matrix& delays_s = specification_.input_delays_s;
-  return delays_s.size() == 0 ? 0 : delays_s(point, input);
-}
-
-absl::Status UmBridgeEnsemble::DriveUpTo(double end_s) {
-  shapes_.assign(inputs_->size(), {});
-  for (size_t i = 0; i < inputs_->size(); ++i) {
-    for (Eigen::Index q = 0; q < points(); ++q) {
-      const double delay_s = DelayOf(q, static_cast<Eigen::Index>(i));
-      if (shapes_[i].contains(delay_s)) continue;
-      absl::StatusOr<InputLines> lines = LinesOf((*inputs_)[i], delay_s, end_s);
-      if (!lines.ok()) {
-        return absl::Status(lines.status().code(),
-                            absl::StrCat("input ", description_->model.inputs[i].name, ": ",
-                                         lines.status().message()));
-      }
-      shapes_[i].emplace(delay_s, *std::move(lines));
-    }
-  }
-  return absl::OkStatus();
-}
-
-// u_i(t) = amplitude_i · shape_i(t − delay_i) + offset_i
-DrivenInputs UmBridgeEnsemble::DrivenInputsOf(Eigen::Index point) const {
-  DrivenInputs driven;
-  for (size_t i = 0; i < shapes_.size(); ++i) {
-    const auto input = static_cast<Eigen::Index>(i);
-    InputLines lines = shapes_[i].at(DelayOf(point, input));
-    const Matrix& offsets = specification_.input_offsets;
-    const double offset = offsets.size() == 0 ? 0 : offsets(point, input);
-    for (double& value : lines.values) {
-      value = specification_.amplitudes(point, input) * value + offset;
-    }
-    driven.emplace(description_->model.inputs[i].name, std::move(lines));
-  }
-  return driven;
-}
-
 // Evaluates the points that have not failed; those that fail now are noted. Others are empty.
 absl::StatusOr<std::vector<Evaluation>> UmBridgeEnsemble::EvaluateAll(
     std::span<const double> times_s, const Stop& stop) {
   const size_t count = times_s.empty() ? description_->time_s.size() : times_s.size();
-  if (!times_s.empty()) POLYEST_RETURN_IF_ERROR(Annotate(DriveUpTo(times_s.back())));
-  std::vector<std::string> requests;
+  absl::StatusOr<EvaluationRequests> requests =
+      EvaluationRequests::Make(description_, specification_, *inputs_, times_s);
+  if (!requests.ok()) return Annotate(requests.status());
   std::vector<size_t> points;
   for (size_t q = 0; q < failed_.size(); ++q) {
-    if (failed_[q]) continue;
-    points.push_back(q);
-    const auto point = static_cast<Eigen::Index>(q);
-    requests.push_back(EvaluateRequest(description_->remote_name,
-                                       InputOf(*description_, specification_.parameters, point),
-                                       description_->config, times_s, DrivenInputsOf(point)));
+    if (!failed_[q]) points.push_back(q);
   }
-  auto evaluated = pool_->Evaluate(std::move(requests), stop);
+  const auto request_of = [requests = *std::move(requests), points](size_t i) {
+    return requests.Of(static_cast<Eigen::Index>(points[i]));
+  };
+  auto evaluated = pool_->Evaluate(points.size(), request_of, stop);
   if (!evaluated.ok()) return Annotate(evaluated.status());
   std::vector<Evaluation> results(failed_.size());
   for (size_t i = 0; i < points.size(); ++i) {
@@ -184,7 +127,7 @@ absl::Status UmBridgeEnsemble::EvaluateListed(const Stop& stop) {
 absl::Status UmBridgeEnsemble::Advance(std::span<const double> times_s, MatrixRef outputs,
                                        const Stop& stop) {
   POLYEST_CHECK(outputs.rows() == points());
-  POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * std::ssize(specification_.outputs));
+  POLYEST_CHECK(outputs.cols() == std::ssize(times_s) * std::ssize(specification_->outputs));
   POLYEST_RETURN_IF_ERROR(stop.Check());
   if (points() == 0 || times_s.empty()) return absl::OkStatus();
   std::vector<size_t> index(times_s.size());
@@ -200,10 +143,10 @@ absl::Status UmBridgeEnsemble::Advance(std::span<const double> times_s, MatrixRe
     POLYEST_ASSIGN_OR_RETURN(evaluated, EvaluateAll(times_s, stop));
   }
   const std::vector<Evaluation>& values = listed ? listed_ : evaluated;
-  const auto m = std::ssize(specification_.outputs);
+  const auto m = std::ssize(specification_->outputs);
   for (size_t q = 0; q < failed_.size(); ++q) {
     for (Eigen::Index j = 0; j < outputs.cols(); ++j) {
-      const auto output = static_cast<size_t>(specification_.outputs[static_cast<size_t>(j % m)]);
+      const auto output = static_cast<size_t>(specification_->outputs[static_cast<size_t>(j % m)]);
       outputs(static_cast<Eigen::Index>(q), j) =
           failed_[q] ? kNaN : values[q].outputs[output][index[static_cast<size_t>(j / m)]];
     }

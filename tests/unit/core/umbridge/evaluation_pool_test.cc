@@ -40,12 +40,12 @@ void Square(const Json& request, httplib::Response& answer) {
   ModelServer::Answer({{x * x}}, answer);
 }
 
-std::vector<std::string> Requests(int count) {
-  std::vector<std::string> requests;
-  for (int i = 0; i < count; ++i) {
-    requests.push_back(EvaluateRequest("square", {{i / 10.0}}, "{}", {}));
-  }
-  return requests;
+absl::StatusOr<std::vector<Evaluation>> Squares(EvaluationPool& pool, size_t count,
+                                                const Stop& stop = Stop()) {
+  const auto request_of = [](size_t i) {
+    return EvaluateRequest("square", {{static_cast<double>(i) / 10}}, "{}", {});
+  };
+  return pool.Evaluate(count, request_of, stop);
 }
 
 void ExpectSquares(const absl::StatusOr<std::vector<Evaluation>>& evaluations, int count) {
@@ -75,14 +75,14 @@ TEST(EvaluationPool, DealsPointsOutToAllServers) {
   };
   ModelServer one(handler(1)), two(handler(2));
   EvaluationPool pool({.urls = {one.url(), two.url()}});
-  ExpectSquares(pool.Evaluate(Requests(30), Stop()), 30);
+  ExpectSquares(Squares(pool, 30), 30);
   EXPECT_GE(one.requests() + two.requests(), 30);
 }
 
 TEST(EvaluationPool, DoesWithoutAServerThatCannotBeReached) {
   ModelServer good(Square);
   EvaluationPool pool({.urls = {kNobody, good.url()}});
-  ExpectSquares(pool.Evaluate(Requests(20), Stop()), 20);
+  ExpectSquares(Squares(pool, 20), 20);
 }
 
 TEST(EvaluationPool, ComputesThePointsOfAServerThatDies) {
@@ -94,7 +94,7 @@ TEST(EvaluationPool, ComputesThePointsOfAServerThatDies) {
                                 [](size_t, size_t, httplib::DataSink&) { return false; });
   });
   EvaluationPool pool({.urls = {dying->url(), good.url()}});
-  ExpectSquares(pool.Evaluate(Requests(40), Stop()), 40);
+  ExpectSquares(Squares(pool, 40), 40);
 }
 
 // Speaks HTTP by hand: the library's own server always tells the length of an answer.
@@ -144,14 +144,14 @@ TEST(EvaluationPool, TakesAnAnswerWithoutLengthThatBreaksOffForALostConnection) 
     SCOPED_TRACE(beginning);
     Abrupt dying(beginning);
     EvaluationPool pool({.urls = std::vector<std::string>(10, dying.url())});
-    const auto evaluations = pool.Evaluate(Requests(1), Stop());
+    const auto evaluations = Squares(pool, 1);
     ASSERT_TRUE(evaluations.ok()) << evaluations.status();
     EXPECT_EQ((*evaluations)[0].failure, "10 connections were lost while it was computed");
     EXPECT_EQ(dying.answers(), 10);
   }
   Abrupt brief(R"({"output": [[25]]})");
   EvaluationPool pool({.urls = {brief.url()}});
-  const auto evaluations = pool.Evaluate(Requests(1), Stop());
+  const auto evaluations = Squares(pool, 1);
   ASSERT_TRUE(evaluations.ok()) << evaluations.status();
   EXPECT_THAT((*evaluations)[0].outputs, ElementsAre(ElementsAre(25)));
 }
@@ -164,7 +164,7 @@ TEST(EvaluationPool, FailsAPointThatEndsEachConnection) {
   });
   // The same server ten times: each rests after a lost connection, and ten losses are needed.
   EvaluationPool pool({.urls = std::vector<std::string>(10, server.url())});
-  const auto evaluations = pool.Evaluate(Requests(3), Stop());
+  const auto evaluations = Squares(pool, 3);
   ASSERT_TRUE(evaluations.ok()) << evaluations.status();
   EXPECT_THAT((*evaluations)[0].failure, IsEmpty());
   EXPECT_EQ((*evaluations)[1].failure, "10 connections were lost while it was computed");
@@ -177,7 +177,7 @@ TEST(EvaluationPool, TakesTheModelsWordThatAPointFails) {
     ModelServer::Refuse("the spring\nbreaks", answer);
   });
   EvaluationPool pool({.urls = {server.url()}});
-  const auto evaluations = pool.Evaluate(Requests(3), Stop());
+  const auto evaluations = Squares(pool, 3);
   ASSERT_TRUE(evaluations.ok()) << evaluations.status();
   EXPECT_EQ((*evaluations)[1].failure, "InvalidInput: the spring breaks");
   EXPECT_EQ(server.requests(), 3);
@@ -192,7 +192,7 @@ TEST(EvaluationPool, AsksThreeTimesWhereTheAnswerIsNone) {
       answer.set_content(text, "application/json");
     });
     EvaluationPool pool({.urls = {server.url()}});
-    const auto evaluations = pool.Evaluate(Requests(1), Stop());
+    const auto evaluations = Squares(pool, 1);
     ASSERT_TRUE(evaluations.ok()) << evaluations.status();
     EXPECT_THAT((*evaluations)[0].failure, HasSubstr("the answer"));
     EXPECT_EQ(server.requests(), 3);
@@ -208,7 +208,7 @@ TEST(EvaluationPool, FailsAPointThatTakesTooLong) {
   });
   {
     EvaluationPool pool({.urls = {server.url()}, .requests_per_server = 4, .timeout_s = 0.05});
-    const auto evaluations = pool.Evaluate(Requests(2), Stop());
+    const auto evaluations = Squares(pool, 2);
     ASSERT_TRUE(evaluations.ok()) << evaluations.status();
     EXPECT_EQ((*evaluations)[1].failure, "no answer within 0.05 s");
   }
@@ -227,14 +227,14 @@ TEST(EvaluationPool, ComputesASlowPointElsewhereToo) {
   ModelServer fast(Square);
   {
     EvaluationPool pool({.urls = {slow.url(), fast.url()}});
-    ExpectSquares(pool.Evaluate(Requests(10), Stop()), 10);
+    ExpectSquares(Squares(pool, 10), 10);
     end.set_value();  // lets the server end
   }
 }
 
 TEST(EvaluationPool, SaysWhichServersCannotBeReached) {
   EvaluationPool pool({.urls = {kNobody}, .give_up_after_s = 0});
-  const absl::Status status = pool.Evaluate(Requests(1), Stop()).status();
+  const absl::Status status = Squares(pool, 1).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(status.message()),
               AllOf(HasSubstr("no server could be reached for 0 s (giveUpAfterS)"),
@@ -250,9 +250,9 @@ TEST(EvaluationPool, EndsOnAStopRequestAndServesTheNextCaller) {
     Square(request, answer);
   });
   EvaluationPool pool({.urls = {server.url()}, .requests_per_server = 2});
-  EXPECT_EQ(pool.Evaluate(Requests(5), Stop(source.get_token())).status().code(),
+  EXPECT_EQ(Squares(pool, 5, Stop(source.get_token())).status().code(),
             absl::StatusCode::kCancelled);
-  ExpectSquares(pool.Evaluate(Requests(5), Stop()), 5);
+  ExpectSquares(Squares(pool, 5), 5);
   end.set_value();
 }
 
