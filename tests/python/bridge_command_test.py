@@ -192,6 +192,28 @@ def test_sigint_ends_while_the_daemon_is_away(tmp_path):
     assert "ended by a failure" in err
 
 
+SIGNALLED_WITHIN_WAIT = """
+import signal, sys
+from polyest.bridge import Bridge, __main__
+
+def run(bridge, stop):
+    with stop._cond:
+        signal.raise_signal(signal.SIGTERM)
+    return 0 if stop.wait(30) else 1
+
+Bridge.run = run
+sys.exit(__main__.main(sys.argv[1:]))
+"""
+
+
+def test_a_signal_may_come_while_the_lock_of_the_event_is_held(tmp_path):
+    PROBLEM.save(tmp_path / "problem.json")
+    file = tmp_path / "bridge.toml"
+    file.write_text(MCAP.format(server="127.0.0.1:1", name="signalled"))
+    done = subprocess.run([sys.executable, "-B", "-c", SIGNALLED_WITHIN_WAIT, file], timeout=60)
+    assert done.returncode == 0
+
+
 class Broker(threading.Thread):
     """As much of an MQTT 3.1.1 broker as a publisher needs; it hangs up once."""
 

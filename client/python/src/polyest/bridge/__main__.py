@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import queue
 import signal
 import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Optional
+from typing import Optional
 
 from polyest.bridge._bridge import Bridge
 from polyest.bridge._configuration import Configuration, read_configuration
@@ -53,21 +54,33 @@ def main(given: Optional[Sequence[str]] = None) -> int:
     if options.check:
         print(f"{options.configuration} is right")
         return 0
-    stop = threading.Event()
-
-    def end(*_: Any) -> None:
-        stop.set()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
+    stop = _ended_by_signals()
     if options.duration is not None:
-        timer = threading.Timer(options.duration, end)
+        timer = threading.Timer(options.duration, stop.set)
         timer.daemon = True
         timer.start()
     status = bridge.run(stop)
     if bridge.latest is not None:
         print(bridge.latest, flush=True)
     return status
+
+
+def _ended_by_signals() -> threading.Event:
+    """Returns an event that SIGINT and SIGTERM set.
+
+    Not in their handler: it interrupts the main thread, which may hold the event's lock just then.
+    """
+    stop = threading.Event()
+    signals: queue.SimpleQueue[int] = queue.SimpleQueue()  # the handler may put into it
+
+    def wait() -> None:
+        signals.get()
+        stop.set()
+
+    threading.Thread(target=wait, name="polyest-signals", daemon=True).start()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: signals.put(number))
+    return stop
 
 
 def _command() -> None:

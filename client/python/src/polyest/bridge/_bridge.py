@@ -104,7 +104,8 @@ class Bridge:
         rows = self._feeder.rows
         return Counts(
             rows=self._feeder.sent_rows, queued=self._feeder.queued,
-            unacknowledged=self._feeder.unacknowledged, lost=self._source.lost if isinstance(self._source, CanSource) else 0,
+            unacknowledged=self._feeder.unacknowledged,
+            lost=self._source.lost if isinstance(self._source, CanSource) else 0,
             dropped=self._feeder.dropped,
             late=rows.late if rows is not None else 0,
             repeated=rows.repeated if rows is not None else 0,

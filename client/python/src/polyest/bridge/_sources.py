@@ -28,6 +28,9 @@ Put = Callable[[int, Mapping[str, float]], None]
 # How long a bus is listened to before the end is looked for, s.
 _POLL_S = 0.2
 
+# How long, in the end, frames are read that have arrived, s.
+_DRAIN_S = 2.0
+
 # Linux tells the state of a socket's memory in numbers, the last of which counts what was dropped.
 _SO_MEMINFO, _MEMINFO = 55, struct.Struct("9I")
 
@@ -91,7 +94,7 @@ class CanSource:
         last_chance, down = math.inf, False
         while time.monotonic() < last_chance:
             if stop.is_set() and last_chance == math.inf:  # what has arrived is read
-                last_chance = time.monotonic() + _POLL_S
+                last_chance = time.monotonic() + _DRAIN_S
             try:
                 frame = bus.recv(0 if stop.is_set() else _POLL_S)
             except Exception as error:  # each interface of python-can has its own
