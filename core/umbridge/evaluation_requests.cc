@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <iterator>
+#include <set>
 #include <utility>
 
 #include "core/common/status.h"
@@ -16,27 +18,30 @@ absl::StatusOr<EvaluationRequests> EvaluationRequests::Make(
   requests.description_ = std::move(description);
   requests.specification_ = std::move(specification);
   requests.times_s_.assign(times_s.begin(), times_s.end());
-  // A model with listed times has no inputs.
-  if (!times_s.empty()) POLYEST_RETURN_IF_ERROR(requests.Drive(inputs));
+  requests.inputs_ = inputs;
+  POLYEST_RETURN_IF_ERROR(requests.CheckInputs());
   return requests;
 }
 
-absl::Status EvaluationRequests::Drive(const InputSignals& inputs) {
-  shapes_.resize(inputs.size());
-  for (size_t i = 0; i < inputs.size(); ++i) {
+// Whether there are too many lines depends on the delay.
+absl::Status EvaluationRequests::CheckInputs() const {
+  for (Eigen::Index i = 0; i < std::ssize(inputs_); ++i) {
+    std::set<double> delays_s;
     for (Eigen::Index point = 0; point < specification_->parameters.rows(); ++point) {
-      const double delay_s = DelayOf(point, static_cast<Eigen::Index>(i));
-      if (shapes_[i].contains(delay_s)) continue;
-      absl::StatusOr<InputLines> lines = LinesOf(inputs[i], delay_s, times_s_.back());
-      if (!lines.ok()) {
-        return absl::Status(lines.status().code(),
-                            absl::StrCat("input ", description_->model.inputs[i].name, ": ",
-                                         lines.status().message()));
-      }
-      shapes_[i].emplace(delay_s, *std::move(lines));
+      if (!delays_s.insert(DelayOf(point, i)).second) continue;
+      const absl::Status status = LinesFor(point, i).status();
+      if (status.ok()) continue;
+      const std::string& name = description_->model.inputs[static_cast<size_t>(i)].name;
+      return absl::Status(status.code(), absl::StrCat("input ", name, ": ", status.message()));
     }
   }
   return absl::OkStatus();
+}
+
+// A model with inputs has no listed times, so that there are some here.
+absl::StatusOr<InputLines> EvaluationRequests::LinesFor(Eigen::Index point,
+                                                        Eigen::Index input) const {
+  return LinesOf(inputs_[static_cast<size_t>(input)], DelayOf(point, input), times_s_.back());
 }
 
 double EvaluationRequests::DelayOf(Eigen::Index point, Eigen::Index input) const {
@@ -58,15 +63,14 @@ Vectors EvaluationRequests::Parameters(Eigen::Index point) const {
 // u_i(t) = amplitude_i · shape_i(t − delay_i) + offset_i
 DrivenInputs EvaluationRequests::Inputs(Eigen::Index point) const {
   DrivenInputs driven;
-  for (size_t i = 0; i < shapes_.size(); ++i) {
-    const auto input = static_cast<Eigen::Index>(i);
-    InputLines lines = shapes_[i].at(DelayOf(point, input));
+  for (Eigen::Index i = 0; i < std::ssize(inputs_); ++i) {
+    InputLines lines = LinesFor(point, i).value();  // as CheckInputs has seen
     const Matrix& offsets = specification_->input_offsets;
-    const double offset = offsets.size() == 0 ? 0 : offsets(point, input);
+    const double offset = offsets.size() == 0 ? 0 : offsets(point, i);
     for (double& value : lines.values) {
-      value = specification_->amplitudes(point, input) * value + offset;
+      value = specification_->amplitudes(point, i) * value + offset;
     }
-    driven.emplace(description_->model.inputs[i].name, std::move(lines));
+    driven.emplace(description_->model.inputs[static_cast<size_t>(i)].name, std::move(lines));
   }
   return driven;
 }

@@ -1,18 +1,16 @@
 #pragma once
 
 // What servers are asked for at the points of an ensemble. A request is written when it is sent and
-// not before: each has all that inputs have done since the beginning.
+// not before, since each may be long: it has all that inputs have done since the beginning.
 
 #include <absl/status/statusor.h>
 
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/propagation/trajectory_ensemble.h"
-#include "core/umbridge/input_lines.h"
 #include "core/umbridge/model_file.h"
 #include "core/umbridge/protocol.h"
 
@@ -33,7 +31,8 @@ class EvaluationRequests {
 
  private:
   EvaluationRequests() = default;
-  absl::Status Drive(const InputSignals& inputs);
+  absl::Status CheckInputs() const;
+  absl::StatusOr<InputLines> LinesFor(Eigen::Index point, Eigen::Index input) const;
   double DelayOf(Eigen::Index point, Eigen::Index input) const;
   Vectors Parameters(Eigen::Index point) const;
   DrivenInputs Inputs(Eigen::Index point) const;
@@ -41,8 +40,7 @@ class EvaluationRequests {
   std::shared_ptr<const UmBridgeDescription> description_;
   std::shared_ptr<const EnsembleSpecification> specification_;
   std::vector<double> times_s_;
-  // By input and delay: what the input's shape does up to the last of the times.
-  std::vector<std::map<double, InputLines>> shapes_;
+  InputSignals inputs_;  // as they are known now
 };
 
 }  // namespace polyest::internal

@@ -12,6 +12,10 @@
 set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
+[[ $# -eq 2 && -x "$1" && -x "$2" ]] || {
+  echo "vcan.sh: give two programs: tests/can/vcan.sh POLYESTD POLYEST" >&2
+  exit 2
+}
 polyestd="$(realpath "$1")" polyest="$(realpath "$2")"
 build="$(dirname "$(dirname "$polyestd")")"
 timeout_s=180
@@ -33,15 +37,9 @@ done
 [[ -d "$build/python/polyest" ]] || skip "$build/python/polyest"
 "$here/../python/extras.sh" /usr/bin/python3 "$build/python-extras"
 
+source "$here/../testing/user_mode_linux.sh"
 scratch="$(mktemp --directory)"
-uml_pid=""
-clean() {
-  # Timeout passes it on to the kernel, which has a session of its own and ends its processes.
-  [[ -z "$uml_pid" ]] || { kill "$uml_pid" && wait "$uml_pid"; } 2>/dev/null || true
-  rm -rf "$scratch"
-}
-trap clean EXIT
-: >"$scratch/output"
+trap clean_uml EXIT
 
 # Writes the first process. It can read all of this machine's files, and write those of this try alone.
 cat >"$scratch/init" <<END
@@ -62,15 +60,7 @@ sleep 60
 END
 chmod +x "$scratch/init"
 
-echo "==> booting user-mode Linux" >&2
-# The kernel's processes end with timeout. Consoles of their own would need a terminal.
-timeout --kill-after=10 "$timeout_s" linux.uml mem=1024M rootfstype=hostfs rootflags=/ ro \
-  init="$scratch/init" uml_dir="$scratch/uml" \
-  con=null con0=null,fd:1 </dev/null >"$scratch/console" 2>&1 &
-uml_pid=$!
-tail --pid="$uml_pid" --lines=+1 --follow "$scratch/output"
-wait "$uml_pid" || true
-uml_pid=""
+boot_uml "$timeout_s" mem=1024M ro
 if [[ ! -e "$scratch/passed" ]]; then
   tail -n 40 "$scratch/console" "$scratch"/*.log >&2 || true
   echo "vcan.sh: the bridge does not hold on a real bus" >&2

@@ -36,18 +36,12 @@ done
 package="$(ls -t "$packages"/polyest_*_amd64.deb 2>/dev/null | head -n 1)"
 [[ -n "$package" ]] || status=2 fail "no polyest_*_amd64.deb in $packages: deploy/package.sh"
 
+source "$here/../testing/user_mode_linux.sh"
 scratch="$(mktemp --directory)"
-uml_pid=""
-clean() {
-  # Kills timeout, which leads the group, and with it the kernel's processes.
-  [[ -z "$uml_pid" ]] || kill -KILL -- "-$uml_pid" 2>/dev/null || true
-  rm -rf "$scratch"
-}
-trap clean EXIT
+trap clean_uml EXIT
 cp "$package" "$scratch/polyest.deb"
 cp "$here/under_systemd.sh" "$scratch/"
 cp "$here"/../../client/examples/oscillator.{json,csv} "$scratch/"
-: >"$scratch/output"
 
 # Writes the first process, which makes an overlay of / on memory, mounts this try's folder at
 # /try, and starts systemd.
@@ -91,15 +85,7 @@ StandardOutput=append:/try/output
 StandardError=append:/try/output
 END
 
-echo "==> booting user-mode Linux" >&2
-# The kernel's processes end with timeout. Consoles of their own would need a terminal.
-timeout --kill-after=10 "$timeout_s" linux.uml mem=1536M rootfstype=hostfs rootflags=/ rw \
-  init="$scratch/init" uml_dir="$scratch/uml" \
-  con=null con0=null,fd:1 </dev/null >"$scratch/console" 2>&1 &
-uml_pid=$!
-tail --pid="$uml_pid" --lines=+1 --follow "$scratch/output"
-wait "$uml_pid" || true
-uml_pid=""
+boot_uml "$timeout_s" mem=1536M rw
 if [[ ! -e "$scratch/passed" ]]; then
   echo "--- the end of the console" >&2
   tail -n 30 "$scratch/console" >&2

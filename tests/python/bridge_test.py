@@ -1,21 +1,16 @@
 """The bridge between a CAN bus and a real daemon: estimates come back, restarts lose nothing."""
 
-import contextlib
-import errno
 import json
 import socket
-import struct
 import threading
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import polyest
 from polyest import bridge
-from polyest.bridge._sources import CanSource
-from rig import DBC, PROBLEM, TRUTH, Waits, record, wait_for
+from rig import DBC, PROBLEM, TRUTH, record, wait_for
 
 can = pytest.importorskip("can")
 cantools = pytest.importorskip("cantools")
@@ -221,53 +216,6 @@ def test_a_bus_that_disappears_is_opened_again(rig, data, monkeypatch):
     wait_for(lambda: one.bridge.counts().rows >= len(rows_of(data)["t"]) - 1)
     assert one.end() == 0
     assert one.bridge.counts().source_reconnects == 1
-
-
-def test_a_bus_that_fails_at_once_is_opened_less_and_less(tmp_path, monkeypatch):
-    (tmp_path / "rig.dbc").write_text(DBC)
-    brought = [[], [], [], [frame(START, "ROAD", force=2.0)]]
-    said, taken, stop = [], [], Waits(len(brought))
-
-    @contextlib.contextmanager
-    def open_bus(_):
-        frames_left = brought[len(stop.delays)]
-        yield SimpleNamespace(recv=lambda timeout: frames_left.pop(0))  # IndexError at the end
-
-    monkeypatch.setattr("polyest.bridge._sources.open_bus", open_bus)
-    source = CanSource(SimpleNamespace(channel="rig", database=tmp_path / "rig.dbc",
-                                       interface="virtual"), {"force": "ROAD.force"}, said.append)
-    source.run(lambda time_ns, values: taken.append(values), stop)
-    assert stop.delays == [0.2, 0.4, 0.8, 1.6]  # a single frame does not shorten them
-    assert len(said) == 4 and "the bus rig fails" in said[2] and "again in 0.8 s" in said[2]
-    assert taken == [{"force": pytest.approx(2.0)}]
-
-
-def test_an_interface_that_is_down_is_listened_to_until_it_is_up(tmp_path, monkeypatch):
-    """As SocketCAN does: frames that came before wait, and are lost with the socket."""
-    (tmp_path / "rig.dbc").write_text(DBC)
-    brought = [frame(START, "ROAD", force=1.0), can.CanOperationError("down", errno.ENETDOWN),
-               frame(START + 1, "ROAD", force=2.0), None, frame(START + 9, "ROAD", force=3.0)]
-    said, taken, filters, stop = [], [], [], threading.Event()
-
-    def recv(timeout_s):
-        came = brought.pop(0) if brought else stop.set()
-        if isinstance(came, Exception):
-            raise came
-        return came
-
-    @contextlib.contextmanager
-    def open_bus(_):
-        numbers = SimpleNamespace(getsockopt=lambda *_: struct.pack("9I", *range(9)))
-        yield SimpleNamespace(recv=recv, set_filters=filters.extend, socket=numbers)
-
-    monkeypatch.setattr("polyest.bridge._sources.open_bus", open_bus)
-    source = CanSource(SimpleNamespace(channel="can0", database=tmp_path / "rig.dbc",
-                                       interface="socketcan"), {"force": "ROAD.force"}, said.append)
-    source.run(lambda time_ns, values: taken.append(values["force"]), stop)
-    assert taken == pytest.approx([1.0, 2.0, 3.0])
-    assert (source.reconnects, source.lost) == (1, 8)
-    assert filters == [{"can_id": 512, "can_mask": 0x7FF, "extended": False}]
-    assert said == ["the bus can0 is down; it is listened to until it is up"]
 
 
 def test_frames_out_of_order_are_put_in_order_within_the_window(rig, client, data):

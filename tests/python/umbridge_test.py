@@ -56,7 +56,7 @@ umbridge.serve_models([Oscillator("oscillator")], int(sys.argv[2]))
 
 def describe(folder, urls, name="oscillator", **more):
     """Writes a description of an example's model at these servers."""
-    text = json.dumps({**serve.describe(urls)[name], **more})
+    text = json.dumps({**serve.describe(name, urls), **more})
     (folder / f"{name}.umbridge.json").write_text(text)
 
 

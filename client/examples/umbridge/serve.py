@@ -88,7 +88,30 @@ def corner(parameters, config):
     return [travel, acceleration]
 
 
-MODELS = {"oscillator": (oscillator, 2, 1), "corner": (corner, 3, 2)}  # inputs, outputs
+MODELS = {"oscillator": oscillator, "corner": corner}
+DESCRIPTIONS = {
+    "oscillator": {
+        "summary": "a mass on a spring and damper, released from rest",
+        "parameters": [
+            {"name": "k", "unit": "N/m", "meaning": "stiffness"},
+            {"name": "c", "unit": "N s/m", "meaning": "damping"},
+        ],
+        "outputs": [{"name": "x", "unit": "m", "meaning": "displacement"}],
+    },
+    "corner": {
+        "summary": "one corner of a vehicle over a road",
+        "parameters": [
+            {"name": "ks", "unit": "N/m", "meaning": "stiffness of the suspension"},
+            {"name": "cs", "unit": "N s/m", "meaning": "damping of the suspension"},
+            {"name": "kt", "unit": "N/m", "meaning": "stiffness of the tyre"},
+        ],
+        "inputs": [{"name": "road", "unit": "m", "meaning": "height of the road"}],
+        "outputs": [
+            {"name": "travel", "unit": "m", "meaning": "travel of the suspension"},
+            {"name": "zs_accel", "unit": "m/s^2", "meaning": "acceleration of the body"},
+        ],
+    },
+}
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
@@ -103,19 +126,19 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def do_POST(self):
         request = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         config = request.get("config", {})
-        model = MODELS.get(request.get("name"))
-        if model is None:
+        name = request.get("name")
+        if name not in MODELS:
             return self.refuse("ModelNotFound", f"there are {', '.join(MODELS)}")
-        compute, inputs, outputs = model
         if self.path == "/ModelInfo":
             self.answer(200, {"support": {"Evaluate": True}})
         elif self.path == "/InputSizes":
-            self.answer(200, {"inputSizes": [inputs]})
+            self.answer(200, {"inputSizes": [len(DESCRIPTIONS[name]["parameters"])]})
         elif self.path == "/OutputSizes":
-            self.answer(200, {"outputSizes": [len(config["times"])] * outputs})
+            outputs = DESCRIPTIONS[name]["outputs"]
+            self.answer(200, {"outputSizes": [len(config["times"])] * len(outputs)})
         elif self.path == "/Evaluate":
             try:
-                self.answer(200, {"output": compute(request["input"][0], config)})
+                self.answer(200, {"output": MODELS[name](request["input"][0], config)})
             except ValueError as error:
                 self.refuse("InvalidInput", str(error))
         else:
@@ -141,45 +164,20 @@ class Server(http.server.ThreadingHTTPServer):
     request_queue_size = 64
 
 
-def describe(urls):
-    """Returns what polyest must know of the models at these servers, by the models' names."""
-    return {
-        "oscillator": {
-            "summary": "a mass on a spring and damper, released from rest",
-            "urls": urls,
-            "requestsPerServer": 2,
-            "parameters": [
-                {"name": "k", "unit": "N/m", "meaning": "stiffness"},
-                {"name": "c", "unit": "N s/m", "meaning": "damping"},
-            ],
-            "outputs": [{"name": "x", "unit": "m", "meaning": "displacement"}],
-        },
-        "corner": {
-            "summary": "one corner of a vehicle over a road",
-            "urls": urls,
-            "requestsPerServer": 2,
-            "parameters": [
-                {"name": "ks", "unit": "N/m", "meaning": "stiffness of the suspension"},
-                {"name": "cs", "unit": "N s/m", "meaning": "damping of the suspension"},
-                {"name": "kt", "unit": "N/m", "meaning": "stiffness of the tyre"},
-            ],
-            "inputs": [{"name": "road", "unit": "m", "meaning": "height of the road"}],
-            "outputs": [
-                {"name": "travel", "unit": "m", "meaning": "travel of the suspension"},
-                {"name": "zs_accel", "unit": "m/s^2", "meaning": "acceleration of the body"},
-            ],
-        },
-    }
+def describe(name, urls):
+    """Returns what polyest must know of a model at these servers."""
+    return {"urls": urls, "requestsPerServer": 2, **DESCRIPTIONS[name]}
 
 
 def main(folder, *command):
     if not os.path.isdir(folder):
         sys.exit(f"serve.py: {folder} is not a folder; make it first, or name another")
     server = Server(("127.0.0.1", 0), Handler)
-    for name, model in describe([f"http://127.0.0.1:{server.server_port}"]).items():
+    for name in MODELS:
         file = pathlib.Path(folder, f"{name}.umbridge.json")
         draft = file.with_suffix(".new")
-        draft.write_text(json.dumps(model, indent=2))
+        description = describe(name, [f"http://127.0.0.1:{server.server_port}"])
+        draft.write_text(json.dumps(description, indent=2))
         os.replace(draft, file)
     if not command:
         print(f"serving {', '.join(MODELS)} at port {server.server_port}; see {folder}", flush=True)

@@ -4,9 +4,11 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/estimator/studies/sample_choice.h"
 
 namespace polyest::internal {
 namespace {
@@ -53,50 +55,6 @@ void AddNotConverged(Posterior& posterior) {
            "the draws are worth %.0f independent ones and should be worth %d",
            posterior.r_hat, kMaxRHat, posterior.effective_size,
            static_cast<int>(kMinEffectiveSize))});
-}
-
-// The rows of the draws of one group of chains, and their weights.
-struct Chain {
-  std::vector<Eigen::Index> rows;
-  Vector weights;
-};
-
-// Returns the groups of chains. None where there are no chains, or where the model's own weights of
-// the draws have left a group with less than half of its share: equally many samples of each group
-// would then be no samples of the posterior.
-std::vector<Chain> ChainsOf(const PosteriorDraws& draws) {
-  if (draws.chain.size() == 0) return {};
-  std::vector<Chain> chains(static_cast<size_t>(draws.chain.maxCoeff() + 1));
-  for (Eigen::Index row = 0; row < draws.chain.size(); ++row) {
-    chains[static_cast<size_t>(draws.chain[row])].rows.push_back(row);
-  }
-  const double share = draws.weights.sum() / static_cast<double>(chains.size());
-  for (Chain& chain : chains) {
-    chain.weights = draws.weights(chain.rows);
-    if (chain.weights.sum() < share / 2) return {};
-  }
-  return chains;
-}
-
-// Takes samples of equal weight; of chains, equally many from each group.
-void TakeSamples(const PosteriorDraws& draws, const Matrix& thetas, int count,
-                 Posterior& posterior) {
-  const std::vector<Chain> chains = ChainsOf(draws);
-  if (chains.empty()) {
-    posterior.samples = thetas(EquallyWeighted(draws.weights, count), Eigen::all);
-    return;
-  }
-  posterior.samples.resize(count, thetas.cols());
-  const int groups = static_cast<int>(chains.size());
-  Eigen::Index taken = 0;
-  for (int group = 0; group < groups; ++group) {
-    const Chain& chain = chains[static_cast<size_t>(group)];
-    const int own = count / groups + (group < count % groups ? 1 : 0);
-    for (const Eigen::Index draw : EquallyWeighted(chain.weights, own)) {
-      posterior.samples.row(taken++) = thetas.row(chain.rows[static_cast<size_t>(draw)]);
-      posterior.sample_chains.push_back(group);
-    }
-  }
 }
 
 }  // namespace
@@ -165,7 +123,9 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
          WeightedJointDensity(thetas.col(Find(prior, first)), thetas.col(Find(prior, second)),
                               weights, options.joint_bins)});
   }
-  TakeSamples(draws, thetas, options.samples, posterior);
+  SampleChoice choice = ChooseSamples(draws.weights, draws.chain, options.samples);
+  posterior.samples = thetas(choice.draws, Eigen::all);
+  posterior.sample_chains = std::move(choice.groups);
   posterior.method = draws.method;
   posterior.draws = draws.scores.rows();
   posterior.effective_size = draws.effective_size.minCoeff();

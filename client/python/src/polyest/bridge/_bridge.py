@@ -15,7 +15,7 @@ from polyest._table import refuse
 from polyest.bridge._configuration import Configuration
 from polyest.bridge._feeder import Feeder
 from polyest.bridge._publishers import CanOutlet, publisher_of
-from polyest.bridge._sources import CanSource, source_of
+from polyest.bridge._sources import source_of
 from polyest.client import Client
 from polyest.connecting import connect
 from polyest.estimates import Estimate
@@ -105,8 +105,7 @@ class Bridge:
         return Counts(
             rows=self._feeder.sent_rows, queued=self._feeder.queued,
             unacknowledged=self._feeder.unacknowledged,
-            lost=self._source.lost if isinstance(self._source, CanSource) else 0,
-            dropped=self._feeder.dropped,
+            lost=self._source.lost, dropped=self._feeder.dropped,
             late=rows.late if rows is not None else 0,
             repeated=rows.repeated if rows is not None else 0,
             undecodable=self._source.undecodable, refused=self._feeder.refused_rows,

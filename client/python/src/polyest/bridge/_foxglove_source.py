@@ -73,6 +73,8 @@ class FoxgloveSource:
         self.reconnects = 0
         #: Messages of the wanted topics that cannot be decoded, or whose field is no number.
         self.undecodable = 0
+        #: A server does not tell what it left out.
+        self.lost = 0
         #: time.monotonic() of the last message with a value.
         self.last: Optional[float] = None
 

@@ -148,8 +148,7 @@ class McapSource:
         self._wanted = TopicValues(channels)
         #: Units come with the topics.
         self.units = self._wanted.units
-        self.reconnects = 0
-        self.undecodable = 0
+        self.reconnects = self.undecodable = self.lost = 0
         self.last: Optional[float] = None
 
     def run(self, put: Put, stop: threading.Event) -> None:
