@@ -195,7 +195,7 @@ TEST(Drift, IsToldApartFromTheNoise) {
   EXPECT_NEAR(sigma.mean, noise / all, kOfDraws * sigma.posterior_std_dev);
   EXPECT_NEAR(walk.mean, rate / all, kOfDraws * walk.posterior_std_dev);
   EXPECT_NEAR(estimate.channels[0].noise_std_dev, sigma.map, 1e-12);
-  EXPECT_THAT(estimate.diagnostics, testing::IsEmpty());
+  EXPECT_THAT(estimate.diagnostics, ::testing::IsEmpty());
 }
 
 TEST(Drift, RefusesWhatItCannotDo) {
