@@ -210,8 +210,10 @@ absl::Status Daemon::OpenWeb() {
 absl::StatusOr<std::unique_ptr<WebPort>> Daemon::OpenHttp(WebPort::Protocol protocol,
                                                           std::optional<ListenAddress>& address) {
   if (!address) return nullptr;
-  const auto knows = [this](auto authorization, auto certificate) {
-    return access_->Authorize({std::move(authorization), std::move(certificate)}, "GetStatus").ok();
+  const auto who = [this](auto authorization, auto certificate) -> std::optional<Caller> {
+    const absl::StatusOr<Caller> caller =
+        access_->Authorize({std::move(authorization), std::move(certificate)}, "GetStatus");
+    return caller.ok() ? std::optional(*caller) : std::nullopt;
   };
   POLYEST_ASSIGN_OR_RETURN(
       auto port,
@@ -222,7 +224,7 @@ absl::StatusOr<std::unique_ptr<WebPort>> Daemon::OpenHttp(WebPort::Protocol prot
                      .tls = options_.tls,
                      .max_message_mb = options_.max_message_mb,
                      .body_memory_bytes = BufferBytes(),
-                     .knows = knows,
+                     .who = who,
                      .count = [this](int status) { metrics_.CountWebRequest(status); }}));
   address->port = port->port();
   return port;

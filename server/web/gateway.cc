@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/wire/refusal/refusal.h"
+#include "server/security/method_roles.h"
 #include "server/service/status_mapping.h"
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"
@@ -50,7 +51,8 @@ Gateway::Gateway(std::shared_ptr<grpc::Channel> channel, MethodTable methods, Ho
     : channel_(std::move(channel)),
       methods_(std::move(methods)),
       hosts_(std::move(hosts)),
-      options_(std::move(options)) {}
+      options_(std::move(options)),
+      watches_(channel_) {}
 
 HttpAnswer Gateway::Refusal(int status, std::string_view why) const {
   const auto code = [&] {
@@ -103,7 +105,7 @@ std::optional<HttpAnswer> Gateway::AnswerHead(const HttpRequest& request) const 
     return Refusal(501, Instead(method->method->name()));
   }
   // The call without its body is refused, logged and counted as any call of theirs.
-  if (!options_.knows(request)) return Secured(AnswerCall(*method, request, ""));
+  if (!options_.who(request)) return Secured(AnswerCall(*method, request, ""));
   return std::nullopt;
 }
 
@@ -141,7 +143,22 @@ HttpAnswer Gateway::AnswerCall(const WebMethod& method, const HttpRequest& reque
                                         " streams over HTTP at a time"),
                            {.reason = kBusy, .retry_delay = std::chrono::seconds(1)})));
   }
-  return AnswerEvents(std::make_shared<WebCall>(channel_, call), method, request, std::move(place));
+  return AnswerEvents(Begin(method, request, call), request, std::move(place));
+}
+
+std::shared_ptr<EventSource> Gateway::Begin(const WebMethod& method, const HttpRequest& request,
+                                            const WebCall::Request& call) const {
+  const std::optional<Caller> caller = options_.who(request);
+  // A time limit or a request's id is of this client only.
+  const bool alone = call.timeout || request.Header(kRequestIdKey);
+  if (method.rpc_path != PathOf("WatchSession") || alone || !caller) {
+    return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
+  }
+  SharedWatches::Key key = {call.message, caller->tenant, caller->name, RoleName(caller->role),
+                            request.certificate_name};
+  const auto [first, last] = request.headers.equal_range("Authorization");
+  for (auto header = first; header != last; ++header) key.push_back(header->second);
+  return watches_.Join(std::move(key), call);
 }
 
 std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpRequest& request,
@@ -179,42 +196,41 @@ HttpAnswer Gateway::AnswerOnce(WebCall& call, const WebMethod& method,
   return answer;
 }
 
-HttpAnswer Gateway::AnswerEvents(std::shared_ptr<WebCall> call, const WebMethod& method,
-                                 const HttpRequest& request, Place place) const {
-  const WebCall::Event event = call->Await(request.client, Clock::now() + kFirstEvent);
-  if (event == WebCall::Event::kEnd && !call->status().ok()) {
-    return ErrorAnswer(ToRpcStatus(call->status()));
+HttpAnswer Gateway::AnswerEvents(std::shared_ptr<EventSource> source, const HttpRequest& request,
+                                 Place place) const {
+  const WebCall::Event event = source->Await(request.client, Clock::now() + kFirstEvent);
+  if (event == WebCall::Event::kEnd && !source->status().ok()) {
+    return ErrorAnswer(ToRpcStatus(source->status()));
   }
   HttpAnswer answer{.content_type = kEvents};
-  answer.events = [this, call = std::move(call), event, &method, client = request.client,
+  answer.events = [this, source = std::move(source), event, client = request.client,
                    place = std::move(place)](const HttpAnswer::Send& send) {
-    SendEvents(*call, event, method, client, send);
+    SendEvents(*source, event, client, send);
   };
   return answer;
 }
 
-void Gateway::SendEvents(WebCall& call, WebCall::Event event, const WebMethod& method, int client,
+void Gateway::SendEvents(EventSource& source, WebCall::Event event, int client,
                          const HttpAnswer::Send& send) const {
   bool sent = true;
   while (sent) {
     switch (event) {
-      case WebCall::Event::kMessage: {
-        const JsonCache::Text json =
-            json_.ToJson(call.TakeMessage(), *method.method->output_type());
-        sent = send(absl::StrCat("data: ", *json, "\n\n"));
+      case WebCall::Event::kMessage:
+        sent = send(*source.Take());
         break;
-      }
       case WebCall::Event::kTimeout:
         sent = send(": alive\n\n");
         break;
-      case WebCall::Event::kEnd:
-        send(call.status().ok() ? Event("end", "{}")
-                                : Event("error", ErrorAnswer(ToRpcStatus(call.status())).body));
+      case WebCall::Event::kEnd: {
+        const grpc::Status status = source.status();
+        send(status.ok() ? Event("end", "{}")
+                         : Event("error", ErrorAnswer(ToRpcStatus(status)).body));
         return;
+      }
       case WebCall::Event::kClientGone:
         return;
     }
-    if (sent) event = call.Await(client, Clock::now() + options_.alive);
+    if (sent) event = source.Await(client, Clock::now() + options_.alive);
   }
 }
 

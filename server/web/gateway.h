@@ -9,14 +9,17 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 
+#include "server/security/caller.h"
 #include "server/telemetry/log_limit.h"
+#include "server/web/event_source.h"
 #include "server/web/host_check.h"
 #include "server/web/http_message.h"
-#include "server/web/json_cache.h"
 #include "server/web/method_table.h"
+#include "server/web/shared_watch.h"
 #include "server/web/turns.h"
 #include "server/web/web_call.h"
 #include "server/web/web_page.h"
@@ -34,8 +37,10 @@ class Gateway final : public HttpHandler {
     // Time after which a stream without messages shows that it lives.
     std::chrono::milliseconds alive{10'000};
     std::span<const WebFile> files = EmbeddedFiles();
-    // Returns whether the daemon knows who asks. The bodies of others are not read.
-    std::function<bool(const HttpRequest&)> knows = [](const HttpRequest&) { return true; };
+    // Returns who asks, if the daemon knows. The bodies of others are not read.
+    std::function<std::optional<Caller>(const HttpRequest&)> who = [](const HttpRequest&) {
+      return Caller();
+    };
     // Counts an answer by its status.
     std::function<void(int)> count = [](int) {};
   };
@@ -62,9 +67,12 @@ class Gateway final : public HttpHandler {
   std::optional<HttpAnswer> Read(const WebMethod& method, const HttpRequest& request,
                                  const std::string& body, std::string& message) const;
   HttpAnswer AnswerOnce(WebCall& call, const WebMethod& method, const HttpRequest& request) const;
-  HttpAnswer AnswerEvents(std::shared_ptr<WebCall> call, const WebMethod& method,
-                          const HttpRequest& request, Place place) const;
-  void SendEvents(WebCall& call, WebCall::Event event, const WebMethod& method, int client,
+  // Begins a stream of events, be it of a call of its own or of a watch that others have begun.
+  std::shared_ptr<EventSource> Begin(const WebMethod& method, const HttpRequest& request,
+                                     const WebCall::Request& call) const;
+  HttpAnswer AnswerEvents(std::shared_ptr<EventSource> source, const HttpRequest& request,
+                          Place place) const;
+  void SendEvents(EventSource& source, WebCall::Event event, int client,
                   const HttpAnswer::Send& send) const;
   // Returns a place; null if all are taken.
   Place TakePlace() const;
@@ -74,7 +82,7 @@ class Gateway final : public HttpHandler {
   const HostCheck hosts_;
   const Options options_;
   mutable std::atomic<int> streams_ = 0;
-  mutable JsonCache json_;
+  mutable SharedWatches watches_;
   mutable Turns large_requests_;
   mutable LogLimit refusals_{/*burst=*/50, /*a_second=*/5};
 };

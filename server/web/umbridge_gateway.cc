@@ -89,7 +89,7 @@ std::optional<HttpAnswer> UmBridgeGateway::AnswerHead(const HttpRequest& request
     return refusal;
   }
   // The list that they get is a refusal, logged and counted as any call of theirs.
-  if (!options_.knows(request)) return AnswerInfo(request);
+  if (!options_.who(request)) return AnswerInfo(request);
   return std::nullopt;
 }
 

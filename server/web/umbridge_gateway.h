@@ -8,9 +8,11 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "polyest/v1/study_service.pb.h"
+#include "server/security/caller.h"
 #include "server/web/host_check.h"
 #include "server/web/http_message.h"
 
@@ -19,8 +21,10 @@ namespace polyest::internal {
 class UmBridgeGateway final : public HttpHandler {
  public:
   struct Options {
-    // Returns whether the daemon knows who asks. The bodies of others are not read.
-    std::function<bool(const HttpRequest&)> knows = [](const HttpRequest&) { return true; };
+    // Returns who asks, if the daemon knows. The bodies of others are not read.
+    std::function<std::optional<Caller>(const HttpRequest&)> who = [](const HttpRequest&) {
+      return Caller();
+    };
     // Counts an answer by its status.
     std::function<void(int)> count = [](int) {};
   };

@@ -4,18 +4,13 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/support/client_callback.h>
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
 #include <condition_variable>
-#include <cstdint>
 #include <mutex>
 
 #include "core/common/check.h"
 #include "server/telemetry/request_id.h"
+#include "server/web/wake_up.h"
 
 namespace polyest::internal {
 namespace {
@@ -29,9 +24,7 @@ constexpr std::chrono::hours kForever{24 * 365};
 // the next read may be started from another thread.
 class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
-  Reactor(const std::shared_ptr<grpc::Channel>& channel, const Request& request)
-      : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), stub_(channel) {
-    POLYEST_CHECK(event_ >= 0);
+  Reactor(const std::shared_ptr<grpc::Channel>& channel, const Request& request) : stub_(channel) {
     for (const auto& [key, value] : request.metadata) context_.AddMetadata(key, value);
     if (request.timeout) {
       context_.set_deadline(
@@ -49,9 +42,8 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
     StartWriteLast(&request_, grpc::WriteOptions());
     StartCall();
   }
-  ~Reactor() override { close(event_); }
 
-  int event() const { return event_; }
+  const WakeUp& wake_up() const { return wake_up_; }
 
   void OnReadDone(bool ok) override {
     bool release = false;
@@ -60,7 +52,7 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
       reading_ = false;
       has_message_ = ok && !closing_;
       if (!has_message_) release = std::exchange(held_, false);
-      Signal();
+      wake_up_.Signal();
     }
     if (release) RemoveHold();
   }
@@ -69,7 +61,7 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
     const std::lock_guard lock(mutex_);
     status_ = status;
     done_ = true;
-    Signal();
+    wake_up_.Signal();
     ended_.notify_all();
   }
 
@@ -78,8 +70,7 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
     bool read = false;
     {
       const std::lock_guard lock(mutex_);
-      uint64_t count = 0;
-      (void)!::read(event_, &count, sizeof(count));
+      wake_up_.Clear();
       if (has_message_) return Event::kMessage;
       if (done_) return Event::kEnd;
       if (held_ && !reading_) read = reading_ = true;
@@ -102,8 +93,10 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
     return message;
   }
 
+  void Cancel() { context_.TryCancel(); }
+
   void Close() {
-    context_.TryCancel();
+    Cancel();
     bool release = false;
     {
       const std::lock_guard lock(mutex_);
@@ -127,13 +120,7 @@ class WebCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, 
   }
 
  private:
-  // Wakes the thread that waits; called with the mutex held.
-  void Signal() const {
-    const uint64_t one = 1;
-    (void)!write(event_, &one, sizeof(one));
-  }
-
-  const int event_;
+  const WakeUp wake_up_;
   grpc::GenericStub stub_;
   grpc::ClientContext context_;
   grpc::ByteBuffer request_;
@@ -153,16 +140,18 @@ WebCall::WebCall(const std::shared_ptr<grpc::Channel>& channel, const Request& r
 
 WebCall::~WebCall() { reactor_->Close(); }
 
+void WebCall::Cancel() { reactor_->Cancel(); }
+
 WebCall::Event WebCall::Await(int client, Clock::time_point deadline) {
   while (true) {
     if (const std::optional<Event> event = reactor_->Look()) return *event;
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
-    if (left <= 0) return Event::kTimeout;
-    pollfd waiting[] = {{reactor_->event(), POLLIN, 0}, {client, POLLRDHUP, 0}};
-    const int happened = poll(waiting, 2, static_cast<int>(std::min<int64_t>(left, 60'000)));
-    POLYEST_CHECK(happened >= 0 || errno == EINTR);
-    if (happened > 0 && (waiting[1].revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0) {
-      return Event::kClientGone;
+    switch (reactor_->wake_up().Await(client, deadline)) {
+      case WakeUp::Reason::kSignal:
+        break;
+      case WakeUp::Reason::kClientGone:
+        return Event::kClientGone;
+      case WakeUp::Reason::kTimeout:
+        return Event::kTimeout;
     }
   }
 }

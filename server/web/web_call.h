@@ -40,9 +40,12 @@ class WebCall {
   WebCall(const WebCall&) = delete;
   WebCall& operator=(const WebCall&) = delete;
 
+  // Ends the call early; its status is CANCELLED then. May be called by any thread.
+  void Cancel();
+
   // Waits for what happens next, at most until `deadline`. Every message but the first is asked for
   // only here, so that a server does not send more than the client takes. `client` is the client's
-  // socket.
+  // socket; negative: there is none to wait for.
   Event Await(int client, Clock::time_point deadline);
   // Waits for the only message of a unary call and for the call's end. Returns how the call has
   // ended; INTERNAL if it has ended well without a message, nothing if the client has closed its

@@ -21,20 +21,20 @@ absl::StatusOr<std::unique_ptr<WebPort>> WebPort::Open(const Options& options) {
 }
 
 std::unique_ptr<HttpHandler> WebPort::MakeHandler(std::shared_ptr<grpc::Channel> channel) const {
-  const auto knows = [this](const HttpRequest& request) {
+  const auto who = [this](const HttpRequest& request) {
     std::optional<std::string> certificate;
     if (!request.certificate_name.empty()) certificate = request.certificate_name;
-    return options_.knows(request.Header("Authorization"), std::move(certificate));
+    return options_.who(request.Header("Authorization"), std::move(certificate));
   };
   HostCheck hosts(options_.host, options_.names);
   if (options_.protocol == Protocol::kUmBridge) {
     return std::make_unique<UmBridgeGateway>(
         std::move(channel), std::move(hosts),
-        UmBridgeGateway::Options{.knows = knows, .count = options_.count});
+        UmBridgeGateway::Options{.who = who, .count = options_.count});
   }
   Gateway::Options gateway{.message_bytes = static_cast<size_t>(options_.max_message_mb) << 20,
                            .count = options_.count};
-  gateway.knows = knows;
+  gateway.who = who;
   return std::make_unique<Gateway>(std::move(channel), MethodTable(Services()), std::move(hosts),
                                    std::move(gateway));
 }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "server/security/caller.h"
 #include "server/security/tls_material.h"
 #include "server/web/http_message.h"
 #include "server/web/web_server.h"
@@ -33,9 +34,10 @@ class WebPort {
     TlsFiles tls{};                    // without a certificate: no encryption
     int max_message_mb = 64;
     int64_t body_memory_bytes = int64_t{256} << 20;  // of all requests together
-    // Returns whether the daemon knows a caller, from the header Authorization and the common name
-    // of a certificate, either of which may be missing.
-    std::function<bool(std::optional<std::string>, std::optional<std::string>)> knows;
+    // Returns who calls, if the daemon knows, from the header Authorization and the common name of
+    // a certificate, either of which may be missing.
+    std::function<std::optional<Caller>(std::optional<std::string>, std::optional<std::string>)>
+        who;
     std::function<void(int)> count = [](int) {};  // counts an answer by its status
   };
 

@@ -72,6 +72,46 @@ TEST_F(WebTokensTest, AllowWhatTheirRoleMayAndShowTheirTenantsSessionsOnly) {
   EXPECT_EQ(web_->Post("SessionService/GetSession", name, Bearer(other_.secret)).status, 404);
 }
 
+// The watch of the session that its token could see before is still open when another asks alike.
+TEST_F(WebTokensTest, ShareNoWatchWithATenantThatTheyHaveLeft) {
+  const std::string create =
+      R"({"sessionId": "rig", "session": {"problem": )" + ToJson(Oscillator(), false) + "}}";
+  const std::string rig = R"({"session": "sessions/rig"})";
+  ASSERT_EQ(web_->Post("SessionService/CreateSession", create, Bearer(writer_.secret)).status, 200);
+  v1::AddMeasurementsRequest rows;
+  rows.set_session("sessions/rig");
+  rows.set_sequence(1);
+  *rows.mutable_measurements() = OscillatorRows(0, 5);
+  ASSERT_EQ(
+      web_->Post("SessionService/AddMeasurements", ToJson(rows, false), Bearer(writer_.secret))
+          .status,
+      200);
+  // The caller of the first event has another tenant from then on.
+  std::string moved = reader_.line;
+  moved.replace(moved.find("chassis"), std::string("chassis").size(), "engines");
+  const auto watching = [&](const httplib::Headers& headers, WebClientOfTest& client,
+                            const std::function<bool(const WebEvent&)>& take) {
+    return client.Stream("SessionService/WatchSession", rig, take, headers);
+  };
+  int status = 0;
+  const WebAnswer first = watching(Bearer(reader_.secret), *web_, [&](const WebEvent& event) {
+    EXPECT_EQ(SequenceOf(event), 1);
+    folder_.Write("tokens", moved + "\n" + writer_.line + "\n");
+    daemon_->Signal(SIGHUP);
+    const std::string own = R"({"name": "sessions/rig"})";
+    WebClientOfTest other("web page on " + web_->address() + "/");
+    while (other.Post("SessionService/GetSession", own, Bearer(reader_.secret)).status == 200) {
+    }
+    status = watching(Bearer(reader_.secret), other, [](const WebEvent& seen) {
+               ADD_FAILURE() << seen.data;
+               return false;
+             }).status;
+    return false;
+  });
+  EXPECT_EQ(first.status, 200);
+  EXPECT_EQ(status, 404);
+}
+
 // What is sent by those who have no token is not even read.
 TEST_F(WebTokensTest, AreAskedForBeforeTheBody) {
   const auto answer =

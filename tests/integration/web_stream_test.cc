@@ -105,6 +105,31 @@ TEST_F(WebStreamTest, IsCancelledWhenItsClientGoes) {
   while (Watchers() != 0) std::this_thread::yield();
 }
 
+// All who look at one session take one of the daemon's watches.
+TEST_F(WebStreamTest, IsOneWatchForAllWhoAskAlike) {
+  constexpr int kClients = 20;
+  std::vector<std::unique_ptr<WebClientOfTest>> clients;
+  std::vector<std::thread> threads;
+  std::atomic<int> watching = 0;
+  for (int i = 0; i < kClients; ++i) {
+    clients.push_back(std::make_unique<WebClientOfTest>("web page on " + web_->address() + "/"));
+    threads.emplace_back([&, client = clients.back().get()] {
+      std::vector<int64_t> seen;
+      client->Stream("SessionService/WatchSession", R"({"session": "sessions/rig"})",
+                     [&](const WebEvent& event) {
+                       if (seen.empty()) ++watching;
+                       seen.push_back(SequenceOf(event));
+                       return seen.back() != 2;
+                     });
+      EXPECT_THAT(seen, ::testing::ElementsAre(1, 2));
+    });
+  }
+  while (watching < kClients) std::this_thread::yield();
+  EXPECT_EQ(Watchers(), 1);
+  EXPECT_TRUE(Add("sessions/rig", 2, OscillatorRows(5, 10)).ok());
+  for (std::thread& thread : threads) thread.join();
+}
+
 TEST_F(WebStreamTest, EndsUnavailableWhenTheDaemonIsStopped) {
   std::vector<WebEvent> events;
   Watch([&](const WebEvent& event) {
