@@ -21,7 +21,8 @@
 #   python       tests the package for Python with protobuf 5, 6, 7, and with the newest packages of PyPI
 #   sbibm        compares posteriors with the reference draws of a public benchmark, which it downloads
 #   can          streams through a real SocketCAN interface, in user-mode Linux (a minute)
-#   cluster      lets Patroni replace a database's primary while a rig streams (a minute)
+#   cluster      lets daemons that share a database, and their connections, fail 100 times while rigs
+#                stream; lets Patroni replace a database's primary (15 minutes)
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
 #
@@ -135,6 +136,8 @@ cluster() {
   apt-get install --yes --no-install-recommends patroni etcd-server
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest
+  python3 -B tests/cluster/faults.py build/release/bin/polyestd build/release/bin/polyest --faults 100 \
+    --bound
   # 77: a program is missing, as the step has said.
   tests/cluster/patroni.sh build/release/bin/polyestd build/release/bin/polyest || [[ $? -eq 77 ]]
 }

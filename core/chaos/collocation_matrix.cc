@@ -6,11 +6,13 @@
 
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
+#include "core/common/status.h"
 
 namespace polyest::internal {
 
 absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
                                                             const ConstMatrixRef& points,
+                                                            const Stop& stop,
                                                             double max_condition) {
   POLYEST_CHECK(points.cols() == basis.dimension());
   const int terms = basis.size();
@@ -23,12 +25,12 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   POLYEST_CHECK(points.allFinite());
   CollocationMatrix result;
   basis.EvaluateMany(points, result.matrix_);
-  ThinQr factors = DecomposeThinQr(result.matrix_);
+  POLYEST_ASSIGN_OR_RETURN(ThinQr factors, DecomposeThinQr(result.matrix_, stop));
   result.thin_q_ = std::move(factors.q);
   result.triangular_ = std::move(factors.r);
   result.workspace_.resize(points.rows());
   // R has the singular values of A.
-  const Conditioning conditioning = ConditioningOf(result.triangular_);
+  const Conditioning conditioning = ConditioningOfTriangular(result.triangular_);
   result.condition_ = conditioning.number;
   if (conditioning.rank < terms || !(result.condition_ <= max_condition)) {
     return absl::FailedPreconditionError(absl::StrFormat(

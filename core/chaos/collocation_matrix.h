@@ -7,14 +7,17 @@
 
 #include "core/chaos/basis.h"
 #include "core/common/types.h"
+#include "polyest/stop.h"
 
 namespace polyest::internal {
 
 class CollocationMatrix {
  public:
   // Factors A for `points` (Q × n, Q ≥ S). Returns FAILED_PRECONDITION, naming order, terms and
-  // points, if A lacks full rank or its condition number exceeds `max_condition`.
+  // points, if A lacks full rank or its condition number exceeds `max_condition`; on a stop request
+  // its status.
   static absl::StatusOr<CollocationMatrix> Factor(const Basis& basis, const ConstMatrixRef& points,
+                                                  const Stop& stop = {},
                                                   double max_condition = 1e8);
 
   int points() const { return static_cast<int>(matrix_.rows()); }  // Q

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "core/common/linear_algebra.h"
 
@@ -60,7 +61,81 @@ class BidiagonalSpectrum {
   const Eigen::Index size_;
 };
 
+// The decomposition of larger matrices takes long.
+constexpr Eigen::Index kMostDirect = 256;
+// Steps after which the extreme singular values of any matrix are known to about a percent
+// (Kuczynski and Wozniakowski, SIAM Journal on Matrix Analysis and Applications 13, 1992).
+constexpr Eigen::Index kSteps = 60;
+
+// Takes away what a vector has of the first columns of an orthonormal matrix, and returns the
+// length of the rest, to which it is normalized. Twice, because of rounding.
+double Orthonormalize(const Matrix& columns, Eigen::Index count, Vector& vector) {
+  for (int pass = 0; pass < 2; ++pass) {
+    const Vector along = columns.leftCols(count).transpose() * vector;
+    vector -= columns.leftCols(count) * along;
+  }
+  const double length = vector.norm();
+  if (length > 0) vector /= length;
+  return length;
+}
+
+// Returns the largest singular value of a square matrix A of which only the products A v and Aᵀ u
+// are known, by the bidiagonalization of Golub, Kahan and Lanczos (Golub and Van Loan, Matrix
+// Computations, 10.4): that of the bidiagonal matrix is a lower bound, which converges first.
+template <typename Apply, typename ApplyTransposed>
+double LargestSingularValue(Eigen::Index size, const Apply& apply,
+                            const ApplyTransposed& apply_transposed) {
+  Matrix left(size, kSteps), right(size, kSteps);
+  std::vector<double> entries;
+  // Any vector will do that is orthogonal to no singular vector.
+  Vector v = Vector::LinSpaced(size, 0, static_cast<double>(size - 1)).array().sin() + 0.5;
+  v.normalize();
+  for (Eigen::Index k = 0; k < kSteps; ++k) {
+    right.col(k) = v;
+    Vector u = apply(v);
+    const double diagonal = Orthonormalize(left, k, u);
+    entries.push_back(diagonal);
+    if (diagonal == 0 || k + 1 == kSteps) break;
+    left.col(k) = u;
+    v = apply_transposed(u);
+    const double beside = Orthonormalize(right, k + 1, v);
+    if (beside == 0) break;
+    entries.push_back(beside);
+  }
+  if (entries.size() % 2 == 0) entries.pop_back();
+  const Eigen::Map<const Vector> all(entries.data(), std::ssize(entries));
+  const double scale = all.cwiseAbs().maxCoeff();
+  if (!std::isfinite(scale) || scale == 0) return scale;
+  const BidiagonalSpectrum spectrum(all / scale);
+  return scale * spectrum.Find((std::ssize(entries) - 1) / 2, 0, spectrum.Bound());
+}
+
 }  // namespace
+
+Conditioning ConditioningOfTriangular(const Matrix& upper) {
+  const Eigen::Index size = upper.cols();
+  if (size <= kMostDirect) return ConditioningOf(upper);
+  Conditioning result{0, std::numeric_limits<double>::infinity()};
+  const double scale = upper.cwiseAbs().maxCoeff();
+  if (!upper.allFinite() || scale == 0) return result;
+  const double zero = static_cast<double>(size) * std::numeric_limits<double>::epsilon();
+  result.rank = (upper.diagonal().cwiseAbs().array() > zero * scale).count();
+  if (result.rank < size) return result;
+  const auto triangle = upper.triangularView<Eigen::Upper>();
+  const double largest = LargestSingularValue(
+      size, [&](const Vector& v) -> Vector { return triangle * v; },
+      [&](const Vector& u) -> Vector { return triangle.transpose() * u; });
+  const double inverse_of_smallest = LargestSingularValue(
+      size, [&](const Vector& v) -> Vector { return triangle.solve(v); },
+      [&](const Vector& u) -> Vector { return triangle.transpose().solve(u); });
+  const double number = largest * inverse_of_smallest;
+  if (number * zero < 1) {
+    result.number = number;
+  } else {
+    result.rank = size - 1;
+  }
+  return result;
+}
 
 Conditioning ConditioningOf(const Matrix& matrix) {
   Conditioning result{0, std::numeric_limits<double>::infinity()};

@@ -14,16 +14,16 @@ namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,
-    const TemperedBeginning& beginning) {
+    const TemperedBeginning& beginning, const Stop& stop) {
   std::unique_ptr<ComponentMixture> mixture(new ComponentMixture);
   POLYEST_ASSIGN_OR_RETURN(mixture->components_.emplace_back(),
-                           MixtureComponent::OfPrior(problem, store, threads, beginning));
+                           MixtureComponent::OfPrior(problem, store, threads, beginning, stop));
   return mixture;
 }
 
 absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
     const ResolvedProblem& problem, MixtureState state, int64_t rows, const SampleStore* store,
-    int threads) {
+    int threads, const Stop& stop) {
   const bool several = state.components.size() > 1;
   if (state.components.empty() || std::ssize(state.components) > MostComponents(problem) ||
       (several && state.weighing_row <= rows)) {
@@ -32,8 +32,9 @@ absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
   std::unique_ptr<ComponentMixture> mixture(new ComponentMixture);
   for (ComponentState& one : state.components) {
     if (one.taken != rows) return absl::DataLossError("the snapshot's components do not agree");
-    POLYEST_ASSIGN_OR_RETURN(mixture->components_.emplace_back(),
-                             MixtureComponent::FromState(problem, std::move(one), store, threads));
+    POLYEST_ASSIGN_OR_RETURN(
+        mixture->components_.emplace_back(),
+        MixtureComponent::FromState(problem, std::move(one), store, threads, stop));
   }
   mixture->weighing_row_ = state.weighing_row;
   mixture->left_out_ = state.left_out;

@@ -21,16 +21,18 @@ namespace polyest::internal {
 
 class ComponentMixture {
  public:
-  // Makes a mixture of one component over the whole prior. `store` must outlive it.
+  // Makes a mixture of one component over the whole prior. `store` must outlive it. Errors are
+  // those of MixtureComponent::OfPrior.
   static absl::StatusOr<std::unique_ptr<ComponentMixture>> OfPrior(
       const ResolvedProblem& problem, const SampleStore* store, int threads,
-      const TemperedBeginning& beginning = {});
-  // Restores a mixture after `rows` rows. Returns DataLoss when the state cannot belong to it.
+      const TemperedBeginning& beginning, const Stop& stop);
+  // Restores a mixture after `rows` rows. Returns DataLoss when the state cannot belong to it,
+  // or the status of a stop request.
   static absl::StatusOr<std::unique_ptr<ComponentMixture>> FromState(const ResolvedProblem& problem,
                                                                      MixtureState state,
                                                                      int64_t rows,
                                                                      const SampleStore* store,
-                                                                     int threads);
+                                                                     int threads, const Stop& stop);
   // Returns the state. May be called where all components may be asked for theirs.
   MixtureState State() const;
 

@@ -55,8 +55,9 @@ class Estimator::Implementation {
         checkpoints_(problem_.problem().integration.samples_between_checkpoints,
                      problem_.has_checkpoints_in_runs()) {}
 
-  absl::Status Begin() {
-    POLYEST_ASSIGN_OR_RETURN(mixture_, ComponentMixture::OfPrior(problem_, store_.get(), threads_));
+  absl::Status Begin(const Stop& stop) {
+    POLYEST_ASSIGN_OR_RETURN(mixture_,
+                             ComponentMixture::OfPrior(problem_, store_.get(), threads_, {}, stop));
     return absl::OkStatus();
   }
 
@@ -74,7 +75,7 @@ class Estimator::Implementation {
 
   absl::Status Append(const Samples& samples);
   absl::Status Process(const Stop& stop);
-  absl::Status Restore(const EstimatorSnapshot& snapshot);
+  absl::Status Restore(const EstimatorSnapshot& snapshot, const Stop& stop);
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop) const;
@@ -152,7 +153,8 @@ void Estimator::Implementation::MakeSnapshot(int64_t rows) {
   checkpoints_.Pass(rows);
 }
 
-absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapshot) {
+absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapshot,
+                                                const Stop& stop) {
   if (rows_processed() > 0) {
     return absl::FailedPreconditionError(absl::StrFormat(
         "%d rows have been processed; a snapshot is restored before any", rows_processed()));
@@ -166,7 +168,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
                                                              FingerprintOf(problem_.problem())));
   POLYEST_ASSIGN_OR_RETURN(
       mixture_, ComponentMixture::FromState(problem_, std::move(state.mixture), snapshot.rows,
-                                            store_.get(), threads_));
+                                            store_.get(), threads_, stop));
   search_.Restore(state.search);
   density_.reset();
   checkpoints_.Pass(snapshot.rows);
@@ -302,9 +304,10 @@ Estimator::Estimator(std::unique_ptr<Implementation> implementation)
 Estimator::~Estimator() = default;
 
 absl::StatusOr<std::unique_ptr<Estimator>> Estimator::Make(Problem problem,
-                                                           EstimatorOptions options) {
+                                                           EstimatorOptions options,
+                                                           const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem resolved, ResolvedProblem::Make(std::move(problem)));
-  return EstimatorAccess::Make(std::move(resolved), std::move(options));
+  return EstimatorAccess::Make(std::move(resolved), std::move(options), stop);
 }
 
 const Problem& Estimator::problem() const { return implementation_->problem().problem(); }
@@ -333,8 +336,8 @@ absl::StatusOr<Prediction> Estimator::CurrentPrediction(const PredictionOptions&
                                                         const Stop& stop) const {
   return implementation_->CurrentPrediction(options, stop);
 }
-absl::Status Estimator::Restore(const EstimatorSnapshot& snapshot) {
-  return implementation_->Restore(snapshot);
+absl::Status Estimator::Restore(const EstimatorSnapshot& snapshot, const Stop& stop) {
+  return implementation_->Restore(snapshot, stop);
 }
 int64_t Estimator::rows_appended() const { return implementation_->rows_appended(); }
 int64_t Estimator::rows_processed() const { return implementation_->rows_processed(); }
@@ -344,7 +347,8 @@ int64_t Estimator::rows_processed() const { return implementation_->rows_process
 namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<Estimator>> EstimatorAccess::Make(ResolvedProblem problem,
-                                                                 EstimatorOptions options) {
+                                                                 EstimatorOptions options,
+                                                                 const Stop& stop) {
   if (problem.channels() == 0) {
     return InvalidField("measured", "at least one output must be measured");
   }
@@ -358,7 +362,7 @@ absl::StatusOr<std::unique_ptr<Estimator>> EstimatorAccess::Make(ResolvedProblem
   }
   auto implementation =
       std::make_unique<Estimator::Implementation>(std::move(problem), std::move(options));
-  POLYEST_RETURN_IF_ERROR(implementation->Begin());
+  POLYEST_RETURN_IF_ERROR(implementation->Begin(stop));
   return std::unique_ptr<Estimator>(new Estimator(std::move(implementation)));
 }
 

@@ -16,7 +16,8 @@ class EstimatorAccess {
  public:
   // Makes an estimator for a resolved problem; otherwise like Estimator::Make.
   static absl::StatusOr<std::unique_ptr<Estimator>> Make(ResolvedProblem problem,
-                                                         EstimatorOptions options = {});
+                                                         EstimatorOptions options = {},
+                                                         const Stop& stop = {});
   // Returns the estimator's problem, resolved for the runs appended so far.
   static const ResolvedProblem& ProblemOf(const Estimator& estimator);
   // Returns about how many bytes of memory the estimator holds, without its rows.

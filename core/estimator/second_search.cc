@@ -37,7 +37,7 @@ absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStor
       }
       POLYEST_ASSIGN_OR_RETURN(
           second_, ComponentMixture::OfPrior(first_run ? *first_run : problem, store, threads,
-                                             {.misfit = misfit, .rows = state_.row}));
+                                             {.misfit = misfit, .rows = state_.row}, stop));
     }
     const absl::Status taken = second_->TakeUpTo(state_.row, stop);
     if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;

@@ -52,8 +52,10 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
   AddLimit(app, "--max-session-rows", limits.rows, "Rows of a session");
   AddLimit(app, "--max-tenant-rows", limits.rows_per_tenant, "Rows of all sessions of a tenant");
   AddLimit(app, "--max-total-rows", limits.total_rows, "Rows of all sessions of all tenants");
-  app.add_option("--max-tenant-disk-mb", limits.disk_mb_per_tenant,
-                 "Size of all sessions of a tenant, MiB of problems and measurements; 0: no limit")
+  app.add_option(
+         "--max-tenant-disk-mb", limits.disk_mb_per_tenant,
+         "Size of all sessions of a tenant, MiB of problems, measurements and snapshots; 0: "
+         "no limit")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
   app.add_option("--max-tenant-memory-mb", limits.memory_mb_per_tenant,

@@ -77,7 +77,8 @@ void DaemonGauges::CollectSessions(Families& families) const {
   Add(families, "polyest_sessions_loaded", "Sessions whose estimator is in memory.", loaded);
   Add(families, "polyest_stored_rows", "Rows of all sessions of all tenants.",
       static_cast<double>(rows));
-  Add(families, "polyest_stored_bytes", "Bytes of the problems and measurements of all tenants.",
+  Add(families, "polyest_stored_bytes",
+      "Bytes of the problems, measurements and snapshots of all tenants.",
       static_cast<double>(sessions_.services().stored->InAll().bytes));
   Add(families, "polyest_sessions_behind_real_time",
       "Sessions with an open stream whose real-time factor is below 1.", behind);

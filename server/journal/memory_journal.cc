@@ -28,6 +28,7 @@ absl::StatusOr<std::vector<SessionHead>> MemoryJournal::Heads() const {
     for (const JournalEntry& batch : kept.batches) {
       head.bytes += static_cast<int64_t>(batch.measurements.size());
     }
+    if (kept.snapshot) head.snapshot_bytes = static_cast<int64_t>(kept.snapshot->state.size());
   }
   std::sort(heads.begin(), heads.end(), [](const SessionHead& a, const SessionHead& b) {
     return std::tie(a.tenant, a.name) < std::tie(b.tenant, b.name);

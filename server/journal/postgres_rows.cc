@@ -11,11 +11,12 @@ namespace {
 constexpr int64_t kHeadsOfPage = 500;
 
 // The columns of a head, and where they come from.
-#define POLYEST_HEADS                                                                              \
-  "SELECT number, tenant, name, created_s, created_ns, reorder_window_s, coalesce(sequence, 0), "  \
-  "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "                  \
-  "coalesce(place_time_s, 0), octet_length(problem) + coalesce(place_bytes, 0) FROM session LEFT " \
-  "JOIN LATERAL (SELECT * FROM batch WHERE "                                                       \
+#define POLYEST_HEADS                                                                             \
+  "SELECT number, tenant, name, created_s, created_ns, reorder_window_s, coalesce(sequence, 0), " \
+  "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "                 \
+  "coalesce(place_time_s, 0), octet_length(problem) + coalesce(place_bytes, 0), "                 \
+  "coalesce((SELECT octet_length(state) FROM snapshot WHERE session = number), 0) FROM session "  \
+  "LEFT JOIN LATERAL (SELECT * FROM batch WHERE "                                                 \
   "batch.session = session.number ORDER BY sequence DESC LIMIT 1) last ON true WHERE NOT hidden "
 
 constexpr char kHeads[] =
@@ -52,6 +53,7 @@ SessionHead HeadIn(const PostgresResult& result, int row) {
   head.place.rows = result.Integer(row, 8);
   head.place.last_row = {static_cast<int>(result.Integer(row, 9)), result.Real(row, 10)};
   head.bytes = result.Integer(row, 11);
+  head.snapshot_bytes = result.Integer(row, 12);
   return head;
 }
 

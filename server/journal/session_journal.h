@@ -44,6 +44,7 @@ struct SessionHead {
   google::protobuf::Timestamp create_time;
   SessionPlace place;
   int64_t bytes = 0;            // of its problem and its batches, serialized; set by Heads
+  int64_t snapshot_bytes = 0;   // of its snapshot; set by Heads
   double reorder_window_s = 0;  // within which rows may arrive out of order; 0: they may not
 };
 

@@ -60,7 +60,8 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
       "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, "
       "session.digest, coalesce(sequence, 0), coalesce(place_samples, 0), coalesce(place_rows, 0), "
       "coalesce(place_run, 0), coalesce(place_time_s, 0), length(problem) + coalesce(place_bytes, "
-      "0) FROM session LEFT JOIN batch ON "
+      "0), coalesce((SELECT length(state) FROM snapshot WHERE session = number), 0) FROM session "
+      "LEFT JOIN batch ON "
       "batch.session = number AND sequence = (SELECT max(sequence) FROM batch WHERE session = "
       "number) ORDER BY tenant, name");
   std::vector<SessionHead> heads;
@@ -75,6 +76,7 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
     head.place.rows = query.Integer(11);
     head.place.last_row = {static_cast<int>(query.Integer(12)), query.Real(13)};
     head.bytes = query.Integer(14);
+    head.snapshot_bytes = query.Integer(15);
   }
 }
 

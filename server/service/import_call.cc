@@ -64,7 +64,9 @@ void ImportFlow::Take() {
   Advance();
 }
 
-absl::Status ImportFlow::TakeRequest() { return import_->Take(request_); }
+absl::Status ImportFlow::TakeRequest() {
+  return stop_.Name(import_->Take(request_, stop_.Begin()));
+}
 
 absl::Status ImportFlow::FinishImport() {
   {
@@ -92,6 +94,7 @@ void ImportFlow::Drain() {
 
 void ImportFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
+  stop_source_.request_stop();
 }
 
 void ImportFlow::Advance() {
@@ -114,7 +117,7 @@ void ImportFlow::OnDone() {
 
 ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
                        v1::Session* response)
-    : flow_(std::make_shared<ImportFlow>(context, response)) {
+    : flow_(std::make_shared<ImportFlow>(context, call, response)) {
   absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ImportSession");
   if (admitted.ok()) {
     auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, admitted->tenant, flow_);

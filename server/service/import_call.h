@@ -7,7 +7,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 
+#include "server/service/call_stop.h"
 #include "server/service/first_message_timer.h"
 #include "server/service/service_context.h"
 #include "server/sessions/session_import.h"
@@ -19,8 +21,11 @@ using ImportReactor = grpc::ServerReadReactor<v1::ImportSessionRequest>;
 // Holds the state of one import. It outlives its reactor, because the executor may still hold it.
 class ImportFlow final : public Drainable, public std::enable_shared_from_this<ImportFlow> {
  public:
-  ImportFlow(ServiceContext& context, v1::Session* response)
-      : context_(context), response_(response) {}
+  ImportFlow(ServiceContext& context, const grpc::CallbackServerContext& call,
+             v1::Session* response)
+      : context_(context),
+        stop_(call, stop_source_.get_token(), context.max_computing),
+        response_(response) {}
 
   // Begins for the caller admitted, or ends the call at once.
   void OnStart(ImportReactor* reactor, const absl::StatusOr<Caller>& admitted);
@@ -42,6 +47,8 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
   absl::Status FinishImport();
 
   ServiceContext& context_;
+  std::stop_source stop_source_;
+  const CallStop stop_;
   v1::Session* const response_;  // owned by gRPC; valid until the call is finished
   std::unique_ptr<SessionImport> import_;
   std::string lane_;

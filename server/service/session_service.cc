@@ -99,12 +99,12 @@ SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::Session* response) {
   return ForCaller({call, "CreateSession", request, response},
-                   [=, this](const Caller& caller, const Stop&) -> absl::Status {
+                   [=, this](const Caller& caller, const Stop& stop) -> absl::Status {
                      const v1::Problem& problem = request->session().problem();
                      POLYEST_ASSIGN_OR_RETURN(
                          const auto session,
                          context_.sessions.Create(caller.tenant, request->session_id(), problem,
-                                                  request->session().reorder_window_s()));
+                                                  request->session().reorder_window_s(), stop));
                      *response = session->Describe();
                      *response->mutable_problem() = problem;
                      return absl::OkStatus();

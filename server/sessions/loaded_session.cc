@@ -22,12 +22,12 @@ constexpr int64_t kCopiesOfProblem = 4;
 
 absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(
     v1::Problem problem, const ModelLibrary& models, const ProblemLimits& limits,
-    double reorder_window_s, const CheckMemory& check_memory) {
+    double reorder_window_s, const CheckMemory& check_memory, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved, ToProblem(problem, models, limits));
   if (check_memory) POLYEST_RETURN_IF_ERROR(check_memory(ExpectedBytes(resolved)));
   std::unique_ptr<LoadedSession> loaded(
       new LoadedSession(std::move(problem), resolved, reorder_window_s));
-  POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin({}));
+  POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin({}, stop));
   return loaded;
 }
 
@@ -37,7 +37,7 @@ LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolve
       reorder_window_s_(reorder_window_s),
       intake_(resolved, reorder_window_s) {}
 
-absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts) {
+absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts, const Stop& stop) {
   Computed computed;
   computed.store = std::make_shared<JournalStore>(intake_.problem(), reorder_window_s_, cuts);
   computed.cuts = std::move(cuts);
@@ -48,7 +48,7 @@ absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts) {
     if (save_) save_(std::move(snapshot));
   };
   POLYEST_ASSIGN_OR_RETURN(computed.estimator,
-                           EstimatorAccess::Make(intake_.problem(), std::move(options)));
+                           EstimatorAccess::Make(intake_.problem(), std::move(options), stop));
   return computed;
 }
 
@@ -58,10 +58,11 @@ void LoadedSession::ReadFrom(const SessionJournal& journal, int64_t session) {
   computed_.store->ReadFrom(journal, session);
 }
 
-void LoadedSession::Attach(SessionJournal& journal, int64_t session) {
+void LoadedSession::Attach(SessionJournal& journal, int64_t session, TakeSnapshotRoom take_room) {
   ReadFrom(journal, session);
-  save_ = [this, &journal](EstimatorSnapshot snapshot) {
+  save_ = [this, &journal, take_room = std::move(take_room)](EstimatorSnapshot snapshot) {
     std::string state = computed_.cuts.Prepend(std::move(snapshot.state));
+    if (!take_room(static_cast<int64_t>(state.size()))) return;
     journal.SaveSnapshot(number_, {computed_.sequence, snapshot.rows, std::move(state)});
   };
 }
@@ -80,12 +81,12 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(
     const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(head.number));
   POLYEST_ASSIGN_OR_RETURN(
-      auto loaded, Make(std::move(problem), models, {}, head.reorder_window_s, check_memory));
+      auto loaded, Make(std::move(problem), models, {}, head.reorder_window_s, check_memory, stop));
   loaded->ReadFrom(journal, head.number);
   auto [cuts, snapshot] = loaded->Snapshot();
   const bool any_cut = !cuts.empty();
   if (any_cut) {
-    POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin(std::move(cuts)));
+    POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin(std::move(cuts), stop));
   }
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
@@ -100,13 +101,14 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(
   // A snapshot only saves time, so one that cannot be used is ignored, and so are its cuts, which
   // may be those of another version.
   const bool restored =
-      !snapshot.state.empty() && loaded->computed_.estimator->Restore(snapshot).ok();
+      !snapshot.state.empty() && loaded->computed_.estimator->Restore(snapshot, stop).ok();
+  POLYEST_RETURN_IF_ERROR(stop.Check());
   if (any_cut && !restored) POLYEST_RETURN_IF_ERROR(loaded->BeginAnew({}, stop));
   return loaded;
 }
 
 absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(Computed anew, Begin(std::move(cuts)));
+  POLYEST_ASSIGN_OR_RETURN(Computed anew, Begin(std::move(cuts), stop));
   BatchIntake intake(intake_.problem(), reorder_window_s_);
   const absl::Status enough = absl::OutOfRangeError("the batches have been read");
   const auto give = [&](const JournalBatch& batch) -> absl::Status {
@@ -163,8 +165,8 @@ absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop&
   failed_rows_ = processed;
   // The snapshot, which only saves time, is of rows before the failure.
   const EstimatorSnapshot snapshot = Snapshot().second;
-  if (!snapshot.state.empty()) computed_.estimator->Restore(snapshot).IgnoreError();
-  return absl::OkStatus();
+  if (!snapshot.state.empty()) computed_.estimator->Restore(snapshot, stop).IgnoreError();
+  return stop.Check();
 }
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {
@@ -209,7 +211,7 @@ absl::StatusOr<SharedEstimate> LoadedSession::CurrentEstimate(const Stop& stop) 
 // Returns what is known without any sample, for a posterior that is not found.
 absl::StatusOr<Estimate> LoadedSession::PriorEstimate(const absl::Status& reason,
                                                       const Stop& stop) const {
-  POLYEST_ASSIGN_OR_RETURN(const auto prior, EstimatorAccess::Make(intake_.problem(), {}));
+  POLYEST_ASSIGN_OR_RETURN(const auto prior, EstimatorAccess::Make(intake_.problem(), {}, stop));
   POLYEST_ASSIGN_OR_RETURN(Estimate estimate, prior->CurrentEstimate(stop));
   estimate.diagnostics.push_back(
       {DiagnosticCode::kNotConverged,

@@ -33,12 +33,11 @@ class LoadedSession {
 
   // Makes a session without batches, whose rows may arrive out of order within
   // `reorder_window_s`. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one beyond the
-  // limits; other errors are those of `check_memory`, if it is given, and of Estimator::Make.
-  static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
-                                                             const ModelLibrary& models,
-                                                             const ProblemLimits& limits = {},
-                                                             double reorder_window_s = 0,
-                                                             const CheckMemory& check_memory = {});
+  // limits; other errors are those of `check_memory`, if it is given, and of Estimator::Make, which
+  // may take seconds.
+  static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(
+      v1::Problem problem, const ModelLibrary& models, const ProblemLimits& limits = {},
+      double reorder_window_s = 0, const CheckMemory& check_memory = {}, const Stop& stop = {});
   // Rebuilds a session from the batches that the journal keeps. The latest snapshot in the journal,
   // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`;
   // the errors of `check_memory`.
@@ -46,9 +45,13 @@ class LoadedSession {
       const SessionJournal& journal, const SessionHead& head, const SessionPlace& place,
       const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop);
 
-  // From here on, gives the estimator's snapshots to the journal, as those of this session, and
-  // reads rows that are no longer in memory from it. The journal must outlive this.
-  void Attach(SessionJournal& journal, int64_t session);
+  // Returns whether there is room for a snapshot of so many bytes in place of the last one.
+  using TakeSnapshotRoom = std::function<bool(int64_t bytes)>;
+
+  // From here on, gives the estimator's snapshots to the journal, as those of this session, as far
+  // as there is room for them, and reads rows that are no longer in memory from it. The journal
+  // must outlive this.
+  void Attach(SessionJournal& journal, int64_t session, TakeSnapshotRoom take_room);
   // Lets go of the rows of batches up to `sequence`, which the journal must keep.
   void Release(int64_t sequence) { computed_.store->Release(sequence); }
 
@@ -100,7 +103,7 @@ class LoadedSession {
   LoadedSession(v1::Problem problem, const ResolvedProblem& resolved, double reorder_window_s);
   void ReadFrom(const SessionJournal& journal, int64_t session);
   // Makes an estimator without batches that will leave out these rows.
-  absl::StatusOr<Computed> Begin(RunCuts cuts);
+  absl::StatusOr<Computed> Begin(RunCuts cuts, const Stop& stop);
   // Gives a new estimator the batches that the present one has, from the journal, without the rows
   // that `cuts` leave out.
   absl::Status BeginAnew(RunCuts cuts, const Stop& stop);

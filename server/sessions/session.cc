@@ -47,7 +47,7 @@ Session::Session(const SessionServices& services, SessionHead head,
       writer_(head_.name),
       observers_(head_.name) {
   if (loaded == nullptr) return;
-  loaded->Attach(services.journal, number());
+  loaded->Attach(services.journal, number(), services.SnapshotRoom(number(), tenant()));
   Replace({std::move(loaded), 0});
 }
 
@@ -153,7 +153,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
                            LoadedSession::Load(
                                services_.journal, head_, ledger_.kept(), services_.models,
                                [this](int64_t bytes) { return CheckMemory(bytes); }, stop));
-  loaded->Attach(services_.journal, number());
+  loaded->Attach(services_.journal, number(), services_.SnapshotRoom(number(), tenant()));
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;
   history_.reset();

@@ -46,6 +46,13 @@ struct SessionServices {
   std::shared_ptr<StoredData> stored = nullptr;
   // Weighs what is loaded; null: it is not weighed. The registry sets it.
   std::shared_ptr<TenantMemory> tenant_memory = nullptr;
+
+  // Returns what takes room for the snapshots of a session.
+  LoadedSession::TakeSnapshotRoom SnapshotRoom(int64_t session, const std::string& tenant) const {
+    return [counted = stored, session, tenant](int64_t bytes) {
+      return counted == nullptr || counted->TakeSnapshot(session, tenant, bytes);
+    };
+  }
 };
 
 class Session : public std::enable_shared_from_this<Session> {

@@ -32,10 +32,10 @@ SessionImport::~SessionImport() {
   registry_.services().tenant_memory->Forget(head_.number);
 }
 
-absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
+absl::Status SessionImport::Take(const v1::ImportSessionRequest& request, const Stop& stop) {
   switch (request.record().record_case()) {
     case v1::SessionRecord::kHead:
-      return Begin(request.session_id(), request.record().head());
+      return Begin(request.session_id(), request.record().head(), stop);
     case v1::SessionRecord::kBatch:
       return Append(request.record().batch());
     case v1::SessionRecord::kPastEstimate:
@@ -46,7 +46,8 @@ absl::Status SessionImport::Take(const v1::ImportSessionRequest& request) {
   return InvalidField("record", "must be a head, a batch or a past estimate");
 }
 
-absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head) {
+absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head,
+                                  const Stop& stop) {
   if (loaded_ != nullptr) {
     return InvalidField("record.head", "there is one already; batches follow it");
   }
@@ -78,9 +79,9 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   };
   POLYEST_ASSIGN_OR_RETURN(auto loaded,
                            LoadedSession::Make(problem, services.models, services.limits.problem,
-                                               head_.reorder_window_s, check_memory));
+                                               head_.reorder_window_s, check_memory, stop));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
-  loaded->Attach(services.journal, head_.number);
+  loaded->Attach(services.journal, head_.number, services.SnapshotRoom(head_.number, head_.tenant));
   loaded_ = std::move(loaded);
   services.tenant_memory->Set(head_.number, head_.tenant, loaded_->memory_bytes());
   const auto bytes = static_cast<int64_t>(DeterministicBytes(problem).size());

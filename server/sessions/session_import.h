@@ -24,8 +24,8 @@ class SessionImport {
   // Takes the head, then batch after batch, then the history; waits for the journal.
   // INVALID_ARGUMENT for a record that does not follow the one before, RESOURCE_EXHAUSTED while
   // memory is short; other errors are those of SessionRegistry::Create and of a batch that is
-  // streamed. Must not be called again after an error.
-  absl::Status Take(const v1::ImportSessionRequest& request);
+  // streamed; on a stop request its status. Must not be called again after an error.
+  absl::Status Take(const v1::ImportSessionRequest& request, const Stop& stop = {});
   // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
   // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
   // RESOURCE_EXHAUSTED when the last place has been.
@@ -35,7 +35,7 @@ class SessionImport {
   int64_t rows_in_memory() const { return loaded_ == nullptr ? 0 : loaded_->rows_in_memory(); }
 
  private:
-  absl::Status Begin(const std::string& id, const v1::SessionRecord::Head& head);
+  absl::Status Begin(const std::string& id, const v1::SessionRecord::Head& head, const Stop& stop);
   absl::Status Append(const v1::SessionRecord::Batch& batch);
   absl::Status Remember(const v1::SessionRecord::PastEstimate& past);
 

@@ -46,7 +46,8 @@ absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
   std::unique_ptr<SessionRegistry> registry(new SessionRegistry(services, std::move(clock)));
   for (SessionHead& head : heads) {
     ++registry->count_[head.tenant];
-    registry->services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes});
+    registry->services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes},
+                                      head.snapshot_bytes);
     const Key key(head.tenant, head.name);
     registry->sessions_.emplace(key,
                                 std::make_shared<Session>(registry->services_, std::move(head)));
@@ -57,7 +58,8 @@ absl::StatusOr<std::unique_ptr<SessionRegistry>> SessionRegistry::Open(
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::string& tenant,
                                                                  const std::string& id,
                                                                  const v1::Problem& problem,
-                                                                 double reorder_window_s) {
+                                                                 double reorder_window_s,
+                                                                 const Stop& stop) {
   if (!id.empty()) POLYEST_RETURN_IF_ERROR(CheckSessionId(id));
   POLYEST_RETURN_IF_ERROR(CheckReorderWindow({"session", "reorderWindowS"}, reorder_window_s));
   SessionHead head;
@@ -71,10 +73,10 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   // The mutex is not held here, because a large problem takes its time, and so does the journal.
   // The journal checks again whether the name is free.
   POLYEST_ASSIGN_OR_RETURN(
-      auto loaded, LoadedSession::Make(problem, services_.models, services_.limits.problem,
-                                       reorder_window_s, [&](int64_t bytes) {
-                                         return services_.tenant_memory->MakeRoom(tenant, bytes);
-                                       }));
+      auto loaded,
+      LoadedSession::Make(
+          problem, services_.models, services_.limits.problem, reorder_window_s,
+          [&](int64_t bytes) { return services_.tenant_memory->MakeRoom(tenant, bytes); }, stop));
   head.create_time = clock_();
   // The address of the schema is for editors, and may be of any length.
   v1::Problem kept = problem;
@@ -205,7 +207,8 @@ std::shared_ptr<Session> SessionRegistry::Follow(SessionHead head) {
     }
     if (session == nullptr) ++count_[key.first];
     before = std::exchange(session, nullptr);
-    services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes});
+    services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes},
+                            head.snapshot_bytes);
     session = std::make_shared<Session>(services_, std::move(head));
     if (before == nullptr) return session;
   }

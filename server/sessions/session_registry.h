@@ -28,10 +28,12 @@ class SessionRegistry {
 
   // Creates a session. `id` is the last part of its name; empty lets the registry choose.
   // `reorder_window_s` is that of v1::Session. INVALID_ARGUMENT for a bad id, problem or window,
-  // ALREADY_EXISTS when the name is taken, RESOURCE_EXHAUSTED past a limit. Waits for the journal.
+  // ALREADY_EXISTS when the name is taken, RESOURCE_EXHAUSTED past a limit; on a stop request its
+  // status. Waits for the journal.
   absl::StatusOr<std::shared_ptr<Session>> Create(const std::string& tenant, const std::string& id,
                                                   const v1::Problem& problem,
-                                                  double reorder_window_s = 0);
+                                                  double reorder_window_s = 0,
+                                                  const Stop& stop = {});
   // Returns the session of this full name; NOT_FOUND when there is none that this daemon knows.
   absl::StatusOr<std::shared_ptr<Session>> Get(const std::string& tenant,
                                                const std::string& name) const;

@@ -55,9 +55,23 @@ absl::Status StoredData::Take(int64_t session, const std::string& tenant,
   return room;
 }
 
-void StoredData::Count(int64_t session, const std::string& tenant, const StoredAmount& amount) {
+bool StoredData::TakeSnapshot(int64_t session, const std::string& tenant, int64_t bytes) {
   const std::lock_guard lock(mutex_);
-  Add(session, tenant, amount);
+  const auto share = sessions_.find(session);
+  // Every session has a problem; this one has been deleted.
+  if (share == sessions_.end()) return false;
+  const StoredAmount more{0, bytes - share->second.snapshot_bytes};
+  if (more.bytes > 0 && !Check(tenants_[tenant], more).ok()) return false;
+  Add(session, tenant, more);
+  share->second.snapshot_bytes = bytes;
+  return true;
+}
+
+void StoredData::Count(int64_t session, const std::string& tenant, const StoredAmount& amount,
+                       int64_t snapshot_bytes) {
+  const std::lock_guard lock(mutex_);
+  Add(session, tenant, {amount.rows, amount.bytes + snapshot_bytes});
+  if (snapshot_bytes > 0) sessions_[session].snapshot_bytes = snapshot_bytes;
 }
 
 void StoredData::Release(int64_t session, const StoredAmount& amount) {

@@ -13,7 +13,7 @@
 
 namespace polyest::internal {
 
-// Rows of measurements, and bytes of these and of problems.
+// Rows of measurements, and bytes of these, of problems and of snapshots.
 struct StoredAmount {
   bool operator==(const StoredAmount&) const = default;
 
@@ -28,8 +28,12 @@ class StoredData {
 
   // Takes room for more. RESOURCE_EXHAUSTED, naming the limit, when there is none.
   absl::Status Take(int64_t session, const std::string& tenant, const StoredAmount& more);
-  // Counts what is stored already, within the limits or not.
-  void Count(int64_t session, const std::string& tenant, const StoredAmount& amount);
+  // Takes room for a snapshot of so many bytes in place of the session's last one. Returns false,
+  // and leaves the last one its room, if the tenant has none for it.
+  bool TakeSnapshot(int64_t session, const std::string& tenant, int64_t bytes);
+  // Counts what is stored already, within the limits or not; the bytes of the snapshot apart.
+  void Count(int64_t session, const std::string& tenant, const StoredAmount& amount,
+             int64_t snapshot_bytes = 0);
   // Gives back the room of what was taken and then not stored. Does nothing when the session has
   // been forgotten meanwhile.
   void Release(int64_t session, const StoredAmount& amount);
@@ -43,6 +47,7 @@ class StoredData {
   struct Share {
     std::string tenant;
     StoredAmount amount;
+    int64_t snapshot_bytes = 0;  // a part of the amount
   };
 
   // The following are called with the mutex held.

@@ -38,9 +38,10 @@ def call_credentials(token):
 class Probe:
     """A session with its open stream."""
 
-    def __init__(self, address, certificate=None, token=None):
+    def __init__(self, address, certificate=None, token=None, streams_to=None):
         """`certificate`: PEM file of the one that the server at `address` has; none without TLS.
-        `token`: of a writer; none if the server has no tokens."""
+        `token`: of a writer; none if the server has no tokens. `streams_to`: the address of another
+        daemon of the same database, which gets the stream."""
         message = messages()
         self.request = message("StreamMeasurementsRequest")
         create = message("CreateSessionRequest")
@@ -56,6 +57,8 @@ class Probe:
                             request_serializer=create.SerializeToString,
                             response_deserializer=bytes)(request, timeout=30,
                                                          metadata=call_credentials(token))
+        if streams_to:
+            channel = grpc.insecure_channel(streams_to)
         self.queue = queue.Queue()
         self.sequence = 0
         self.answers = channel.stream_stream(

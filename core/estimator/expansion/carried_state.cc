@@ -17,18 +17,19 @@ Eigen::Index StateCount(const ResolvedProblem& problem) {
 class Substitution {
  public:
   Substitution(const ResolvedProblem& problem, const RegionalExpansion& present,
-               const ExpansionState& kept, int controls)
+               const ExpansionState& kept, int controls, const Stop& stop)
       : problem_(problem),
         present_(present),
         kept_(kept),
         before_(present.design()),
-        controls_(controls) {}
+        controls_(controls),
+        stop_(stop) {}
 
   // Finds T, δ and the terms at the new points. Fails if a collocation matrix cannot be factored.
   absl::Status Prepare(const ExpansionDesign& design) {
     first_check_ = design.points.rows();
     POLYEST_ASSIGN_OR_RETURN(CollocationMatrix after,
-                             CollocationMatrix::Factor(*design.basis, design.points));
+                             CollocationMatrix::Factor(*design.basis, design.points, stop_));
     Matrix points(design.points.rows() + design.check_points.rows(), design.points.cols());
     points << design.points, design.check_points;
     before_.basis->EvaluateMany(before_.region.ManyToLocal(design.region.ManyToGerm(points)), phi_);
@@ -123,7 +124,7 @@ class Substitution {
   absl::StatusOr<Matrix> AtNewPoints(const Matrix& values) const {
     const Eigen::Index points = before_.points.rows();
     POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
-                             CollocationMatrix::Factor(*before_.basis, before_.points));
+                             CollocationMatrix::Factor(*before_.basis, before_.points, stop_));
     Matrix coefficients(phi_.cols(), values.cols());
     Vector residual(values.cols());
     fit.Solve(values.topRows(points), coefficients, residual);
@@ -164,6 +165,7 @@ class Substitution {
   const ExpansionState& kept_;
   const ExpansionDesign& before_;
   Eigen::Index controls_;
+  const Stop& stop_;
   Eigen::Index first_check_ = 0;  // its row among the new points
   Matrix transfer_;               // T, S′ × S
   Vector shift_;                  // δ, S
@@ -186,15 +188,16 @@ EnsembleState WithInterpolated(const ResolvedProblem& problem, const EnsembleSta
 absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
                                             const RegionalExpansion& present,
                                             const ExpansionState& kept,
-                                            const ExpansionDesign& design, double error) {
+                                            const ExpansionDesign& design, double error,
+                                            const Stop& stop) {
   // A new expansion knows how many control trajectories it has.
-  POLYEST_ASSIGN_OR_RETURN(
-      const auto fresh,
-      RegionalExpansion::Make(problem, nullptr, design, present.noise().ForNewExpansion(), 1));
+  POLYEST_ASSIGN_OR_RETURN(const auto fresh,
+                           RegionalExpansion::Make(problem, nullptr, design,
+                                                   present.noise().ForNewExpansion(), 1, stop));
   if (fresh->controls() > 0 && kept.absorbed.control_scores.cols() == 0) {
     return absl::FailedPreconditionError("there are no control trajectories");
   }
-  Substitution substitution(problem, present, kept, fresh->controls());
+  Substitution substitution(problem, present, kept, fresh->controls(), stop);
   POLYEST_RETURN_IF_ERROR(substitution.Prepare(design));
   return substitution.StateOn(design, error);
 }

@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include "core/estimator/expansion/expansion_state.h"
+#include "polyest/stop.h"
 
 namespace polyest::internal {
 
@@ -20,10 +21,11 @@ EnsembleState WithInterpolated(const ResolvedProblem& problem, const EnsembleSta
 // is one of `present`: the sums by its own terms, and trajectories in states interpolated between
 // those of the collocation points. `error` is Σ ρ/R of the sums in the new region. Returns
 // FailedPrecondition if a collocation matrix cannot be factored or the new expansion has control
-// trajectories and the present one none.
+// trajectories and the present one none; on a stop request its status.
 absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
                                             const RegionalExpansion& present,
                                             const ExpansionState& kept,
-                                            const ExpansionDesign& design, double error);
+                                            const ExpansionDesign& design, double error,
+                                            const Stop& stop);
 
 }  // namespace polyest::internal

@@ -124,11 +124,11 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(
   POLYEST_ASSIGN_OR_RETURN(const Inherited inherited, Judge(problem, present, *kept, design, store,
                                                             rows, threads, stop, max_shift));
   POLYEST_ASSIGN_OR_RETURN(ExpansionState state,
-                           CarriedState(problem, present, *kept, design, inherited.error));
+                           CarriedState(problem, present, *kept, design, inherited.error, stop));
   state.absorbed.propagated = inherited.propagated;
   state.absorbed.carried_rate = inherited.rate;
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved =
-      RegionalExpansion::FromState(problem, std::move(state), store, threads);
+      RegionalExpansion::FromState(problem, std::move(state), store, threads, stop);
   if (absl::IsDataLoss(moved.status())) return Refused("the state cannot be carried over");
   POLYEST_RETURN_IF_ERROR(moved.status());
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, **moved));
@@ -149,8 +149,8 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Restored(const RegionalExpans
   }
   ExpansionState state = *present.kept_state();
   state.noise = present.noise();
-  POLYEST_ASSIGN_OR_RETURN(auto restored,
-                           RegionalExpansion::FromState(problem, std::move(state), store, threads));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto restored, RegionalExpansion::FromState(problem, std::move(state), store, threads, stop));
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, *restored));
   return restored;
 }

@@ -173,15 +173,17 @@ ExpansionState RegionalExpansion::State() const {
 }
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
-    const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads) {
+    const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads,
+    const Stop& stop) {
   if (!IsNoiseOf(problem, state.noise)) return Inconsistent("noise");
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignOf(problem, std::move(state.design)));
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
-      Make(problem, &store, std::move(design), std::move(state.noise), threads);
-  if (!expansion.ok()) return Inconsistent("collocation points");
+      Make(problem, &store, std::move(design), std::move(state.noise), threads, stop);
+  if (absl::IsFailedPrecondition(expansion.status())) return Inconsistent("collocation points");
+  POLYEST_RETURN_IF_ERROR(expansion.status());
   (*expansion)->next_row_ = state.absorbed.rows;
   if (state.ensemble) POLYEST_RETURN_IF_ERROR((*expansion)->RestoreRun(state, store));
-  POLYEST_RETURN_IF_ERROR((*expansion)->RestoreFit(state));
+  POLYEST_RETURN_IF_ERROR((*expansion)->RestoreFit(state, stop));
   return expansion;
 }
 
@@ -224,7 +226,7 @@ absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const Sa
 }
 
 // Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
-absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
+absl::Status RegionalExpansion::RestoreFit(ExpansionState& state, const Stop& stop) {
   const bool has_windows = problem_.ended_runs() == nullptr;
   if (!HasSizesOf(state.absorbed, absorbed_, has_windows)) return Inconsistent("sums");
   for (size_t c = 0; c < absorbed_.sums.size(); ++c) {
@@ -250,8 +252,9 @@ absl::Status RegionalExpansion::RestoreFit(ExpansionState& state) {
   if (std::ssize(state.kept) == points()) return absl::OkStatus();
   kept_ = std::move(state.kept);
   const Matrix left = design_.points(kept_, Eigen::all);
-  absl::StatusOr<CollocationMatrix> matrix = CollocationMatrix::Factor(*design_.basis, left);
-  if (!matrix.ok()) return Inconsistent("collocation points");
+  absl::StatusOr<CollocationMatrix> matrix = CollocationMatrix::Factor(*design_.basis, left, stop);
+  if (absl::IsFailedPrecondition(matrix.status())) return Inconsistent("collocation points");
+  POLYEST_RETURN_IF_ERROR(matrix.status());
   matrix_ = *std::move(matrix);
   return absl::OkStatus();
 }

@@ -1,16 +1,20 @@
 // The fit of the outputs' coefficients at each row (regional_expansion.h).
 
 #include <algorithm>
+#include <utility>
 
 #include "core/estimator/expansion/regional_expansion.h"
 
 namespace polyest::internal {
 
-// Fits each stretch of rows over which the same trajectories are valid.
-void RegionalExpansion::FitRows(int first, int count) {
+// Fits each stretch of rows over which the same trajectories are valid. Fails on a stop request
+// only.
+absl::Status RegionalExpansion::FitRows(int first, int count, const Stop& stop) {
   for (int begin = first; begin < first + count;) {
-    shortage_ = DropFailed(begin);
-    if (!shortage_.ok()) return;
+    absl::Status dropped = DropFailed(begin, stop);
+    if (!dropped.ok() && !absl::IsFailedPrecondition(dropped)) return dropped;
+    shortage_ = std::move(dropped);
+    if (!shortage_.ok()) return absl::OkStatus();
     int end = begin + 1;
     while (end < first + count && !FailsAt(end)) ++end;
     const int columns = (end - begin) * channels_;
@@ -21,6 +25,7 @@ void RegionalExpansion::FitRows(int first, int count) {
     }
     fitted_rows_ = begin = end;
   }
+  return absl::OkStatus();
 }
 
 // Fits some columns of `all_values` (a row for each trajectory).

@@ -103,7 +103,8 @@ absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
 
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
                                                                      std::vector<int> outputs,
-                                                                     int threads) {
+                                                                     int threads,
+                                                                     const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a study of the prior"));
   POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
   const ExpansionOptions& design = problem.problem().expansion;
@@ -112,7 +113,8 @@ absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const Resol
   const int count = static_cast<int>(std::ceil(design.points_per_term * basis->size()));
   POLYEST_ASSIGN_OR_RETURN(Matrix points,
                            CollocationPoints(design.points, germs, basis->order(), count));
-  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix, CollocationMatrix::Factor(*basis, points));
+  POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
+                           CollocationMatrix::Factor(*basis, points, stop));
   return std::unique_ptr<PriorExpansion>(new PriorExpansion(problem, std::move(outputs),
                                                             std::move(basis), std::move(points),
                                                             std::move(matrix), threads));
@@ -144,7 +146,7 @@ absl::Status PriorExpansion::Run(const TimeGrid& grid,
     Matrix values(points_.rows(), m * count);
     POLYEST_RETURN_IF_ERROR(
         ensemble_.Advance({times.data() + first, static_cast<size_t>(count)}, values, stop));
-    POLYEST_RETURN_IF_ERROR(LeaveOutFailed());
+    POLYEST_RETURN_IF_ERROR(LeaveOutFailed(stop));
     // c = A⁺ Y (10). A trajectory with an output beyond 1e100 has failed (output_limit.h), so that
     // squares of c do not overflow.
     Matrix coefficients(basis_->size(), values.cols());
@@ -164,7 +166,7 @@ Matrix PriorExpansion::Thetas() const {
 }
 
 // Leaves failed points out of the fit, beginning with the times of this call of Advance.
-absl::Status PriorExpansion::LeaveOutFailed() {
+absl::Status PriorExpansion::LeaveOutFailed(const Stop& stop) {
   if (kept_.size() + failures().size() == static_cast<size_t>(points_.rows())) {
     return absl::OkStatus();
   }
@@ -181,7 +183,8 @@ absl::Status PriorExpansion::LeaveOutFailed() {
         kept_.size(), points_.rows(), basis_->size(), DescribePoint(last.point), last.time_s,
         last.reason, last.flag));
   }
-  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*basis_, points_(kept_, Eigen::all)));
+  POLYEST_ASSIGN_OR_RETURN(matrix_,
+                           CollocationMatrix::Factor(*basis_, points_(kept_, Eigen::all), stop));
   return absl::OkStatus();
 }
 

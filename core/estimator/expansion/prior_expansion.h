@@ -63,8 +63,8 @@ class PriorExpansion {
   // there are no data to provide it; other errors are those of CollocationPoints and
   // CollocationMatrix::Factor. `problem` must outlive the expansion.
   static absl::StatusOr<std::unique_ptr<PriorExpansion>> Make(const ResolvedProblem& problem,
-                                                              std::vector<int> outputs,
-                                                              int threads);
+                                                              std::vector<int> outputs, int threads,
+                                                              const Stop& stop);
 
   const Basis& basis() const { return *basis_; }
   int points() const { return static_cast<int>(points_.rows()); }  // Q
@@ -83,7 +83,7 @@ class PriorExpansion {
                  int threads);
 
   Matrix Thetas() const;
-  absl::Status LeaveOutFailed();
+  absl::Status LeaveOutFailed(const Stop& stop);
   std::string DescribePoint(int point) const;
 
   const Prior& prior_;

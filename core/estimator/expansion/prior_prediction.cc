@@ -52,10 +52,10 @@ void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record
   if (block.count() == 0) return;
   auto design = DesignForPrior(problem);
   if (!design.ok()) return;
-  auto expansion =
-      RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1);
-  if (!expansion.ok()) return;
   const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
+  auto expansion =
+      RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1, stop);
+  if (!expansion.ok()) return;
   if (!(*expansion)->Propagate(block, stop).ok()) return;
   for (int row = 0; row < (*expansion)->fitted_rows(); ++row) {
     AddPredictionsOf(**expansion, row, record);

@@ -283,7 +283,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           int threads, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(
       std::unique_ptr<RegionalExpansion> expansion,
-      RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads));
+      RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads, stop));
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, *expansion));
   return expansion;
 }

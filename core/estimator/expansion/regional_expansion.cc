@@ -51,9 +51,9 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, const SampleStore* store, ExpansionDesign design,
-    LearnedNoise noise, int threads) {
+    LearnedNoise noise, int threads, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
-                           CollocationMatrix::Factor(*design.basis, design.points));
+                           CollocationMatrix::Factor(*design.basis, design.points, stop));
   return std::unique_ptr<RegionalExpansion>(new RegionalExpansion(
       problem, store, std::move(design), std::move(noise), std::move(matrix), threads));
 }
@@ -174,7 +174,7 @@ absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& s
                                    : Advance(first, count, stop));
   if (input_reach_s_ < kInfinity) inputs_->Forget(last_s - input_reach_s_);
   whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
-  FitRows(first, count);
+  POLYEST_RETURN_IF_ERROR(FitRows(first, count, stop));
   AddDelayErrors(first);
   PredictNoise(first);
   return absl::OkStatus();
@@ -192,7 +192,7 @@ bool RegionalExpansion::FailsAt(int row) const {
 
 // Leaves out the trajectories without output at this row, and factors the remaining collocation
 // points again.
-absl::Status RegionalExpansion::DropFailed(int row) {
+absl::Status RegionalExpansion::DropFailed(int row, const Stop& stop) {
   if (!FailsAt(row)) return absl::OkStatus();
   NoteFailures(row);
   const auto values = outputs_.block(0, row * channels_, points(), channels_);
@@ -207,7 +207,7 @@ absl::Status RegionalExpansion::DropFailed(int row) {
         DescribeFailure(last, problem_.prior())));
   }
   const Matrix left = design_.points(kept_, Eigen::all);
-  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left));
+  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left, stop));
   return absl::OkStatus();
 }
 

@@ -97,18 +97,20 @@ struct FilteredStates {
 class RegionalExpansion {
  public:
   // Makes an expansion that has absorbed no rows. Returns FailedPrecondition when the design's
-  // collocation matrix cannot be factored. `problem` and `store`, which has the rows, must outlive
-  // the expansion; the store may be null if no input is streamed.
+  // collocation matrix cannot be factored, or the status of a stop request. `problem` and `store`,
+  // which has the rows, must outlive the expansion; the store may be null if no input is streamed.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,
                                                                  const SampleStore* store,
                                                                  ExpansionDesign design,
-                                                                 LearnedNoise noise, int threads);
+                                                                 LearnedNoise noise, int threads,
+                                                                 const Stop& stop = {});
 
   // Restores an expansion from a state that State returned. The store must hold at least its rows.
   // Returns DataLoss when the state cannot belong to such a problem, FailedPrecondition when the
-  // rows differ from those of the state.
+  // rows differ from those of the state, the status of a stop request.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> FromState(
-      const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads);
+      const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads,
+      const Stop& stop);
   // Returns the state. All propagated rows must have been absorbed. The last one must be at a
   // checkpoint, or anywhere if a new run begins next.
   ExpansionState State() const;
@@ -225,14 +227,14 @@ class RegionalExpansion {
   void KeepState(int next_run);
   double InputReach(int run) const;
   absl::Status PropagateRun(int first, int count, const Stop& stop);
-  absl::Status RestoreFit(ExpansionState& state);
+  absl::Status RestoreFit(ExpansionState& state, const Stop& stop);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
-  void FitRows(int first, int count);
+  absl::Status FitRows(int first, int count, const Stop& stop);
   void FitColumns(int first, int count, const Matrix& all_values, Matrix& coefficients,
                   Vector& residual);
   void AddDelayErrors(int first);
   bool FailsAt(int row) const;
-  absl::Status DropFailed(int row);
+  absl::Status DropFailed(int row, const Stop& stop);
   void NoteFailures(int row);
   void TakeEndedRuns();
   void LookFromPosterior();

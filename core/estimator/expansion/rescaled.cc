@@ -100,7 +100,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
   state.absorbed.propagated = 0;
   state.noise = noise.ForNewExpansion();
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
-      RegionalExpansion::FromState(problem, std::move(state), store, threads);
+      RegionalExpansion::FromState(problem, std::move(state), store, threads, stop);
   if (absl::IsDataLoss(expansion.status())) {
     return absl::FailedPreconditionError("the state cannot be gone on from");
   }

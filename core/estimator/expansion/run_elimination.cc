@@ -51,7 +51,7 @@ class Elimination {
   bool IsWithinRegion() const;
   RunPath PathFound() const;
   // Adds the run, whose path is the one found.
-  absl::Status AddTo(const RunPath& path, EndedRuns& ended) const;
+  absl::Status AddTo(const RunPath& path, const Stop& stop, EndedRuns& ended) const;
   int64_t propagated() const { return expansion_->propagated_rows(); }
 
  private:
@@ -124,7 +124,7 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
   const Vector inside = NearestInside(problem_.prior(), region.centre());
   ExpansionDesign design = DesignForRegion(problem_, truncation_, std::move(region), inside);
   POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, &store, std::move(design),
-                                                               NoiseAbout(inside), threads));
+                                                               NoiseAbout(inside), threads, stop));
   expansion_->BeginAt(rows.first);
   run_ = rows.run;
   RowBlock block;
@@ -340,10 +340,10 @@ std::vector<ChannelSums> Elimination::AddSumsTo(EndedRuns& ended, const Matrix& 
   return sums;
 }
 
-absl::Status Elimination::AddTo(const RunPath& path, EndedRuns& ended) const {
+absl::Status Elimination::AddTo(const RunPath& path, const Stop& stop, EndedRuns& ended) const {
   const ExpansionDesign& design = expansion_->design();
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
-                           CollocationMatrix::Factor(*ended.basis, points_));
+                           CollocationMatrix::Factor(*ended.basis, points_, stop));
   Matrix phi;
   design.basis->EvaluateMany(AlongPath(matrix), phi);
   Matrix transfer(ended.basis->size(), phi.cols());
@@ -392,7 +392,7 @@ absl::StatusOr<int64_t> EliminateRun(const EliminationRequest& request, const Ru
     present = elimination.PathFound();
     if (elimination.IsWithinRegion() || attempt == kMaxEliminations) break;
   }
-  POLYEST_RETURN_IF_ERROR(elimination.AddTo(present, ended));
+  POLYEST_RETURN_IF_ERROR(elimination.AddTo(present, stop, ended));
   ended.Append(rows.run, rows.first, rows.end, present);
   return propagated;
 }

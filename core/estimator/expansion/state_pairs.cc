@@ -31,7 +31,7 @@ class StatePairs {
         threads_(threads) {}
 
   absl::StatusOr<PairComparison> Compare(int64_t rows, const Stop& stop) {
-    POLYEST_RETURN_IF_ERROR(Start());
+    POLYEST_RETURN_IF_ERROR(Start(stop));
     Whitening whitening(noise_.channels, 2 * checks());
     RowBlock block;
     PairComparison comparison;
@@ -73,8 +73,8 @@ class StatePairs {
     return count;
   }
 
-  absl::Status Start() {
-    POLYEST_ASSIGN_OR_RETURN(const Matrix states, States());
+  absl::Status Start(const Stop& stop) {
+    POLYEST_ASSIGN_OR_RETURN(const Matrix states, States(stop));
     const Matrix xis = design_.region.ManyToGerm(design_.check_points);
     Matrix thetas(2 * checks(), xis.cols());
     for (Eigen::Index i = 0; i < checks(); ++i) {
@@ -103,9 +103,9 @@ class StatePairs {
     return propagator_.emplace(std::move(specification), &inputs_->signals()).Restore(state);
   }
 
-  absl::StatusOr<Matrix> States() const {
+  absl::StatusOr<Matrix> States(const Stop& stop) const {
     POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
-                             CollocationMatrix::Factor(*design_.basis, design_.points));
+                             CollocationMatrix::Factor(*design_.basis, design_.points, stop));
     const Matrix all = InterpolableStates(problem_, *kept_.ensemble);
     Matrix coefficients(fit.terms(), all.cols()), phi;
     Vector residual(all.cols());

@@ -124,15 +124,17 @@ ComponentState MixtureComponent::State() const {
 }
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
-    const ResolvedProblem& problem, ComponentState state, const SampleStore* store, int threads) {
+    const ResolvedProblem& problem, ComponentState state, const SampleStore* store, int threads,
+    const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem own, ProblemOf(problem, state));
   if (!IsStateFor(own, state)) {
     return absl::DataLossError("the snapshot's windows or particles cannot be of this problem");
   }
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(own, store, threads));
-  POLYEST_ASSIGN_OR_RETURN(component->expansion_,
-                           RegionalExpansion::FromState(
-                               component->problem_, std::move(state.expansion), *store, threads));
+  POLYEST_ASSIGN_OR_RETURN(
+      component->expansion_,
+      RegionalExpansion::FromState(component->problem_, std::move(state.expansion), *store, threads,
+                                   stop));
   component->particles_ = std::move(state.particles);
   component->memory_ = std::move(state.memory);
   component->weight_ = state.weight;

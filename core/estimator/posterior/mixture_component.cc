@@ -60,7 +60,7 @@ MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleS
 
 absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,
-    const TemperedBeginning& beginning) {
+    const TemperedBeginning& beginning, const Stop& stop) {
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(problem, store, threads));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(component->problem_));
   LearnedNoise noise = NoiseToBeginWith(problem.problem());
@@ -68,7 +68,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
   component->tempered_ = beginning;
   POLYEST_ASSIGN_OR_RETURN(component->expansion_,
                            RegionalExpansion::Make(component->problem_, store, std::move(design),
-                                                   noise.ForNewExpansion(), threads));
+                                                   noise.ForNewExpansion(), threads, stop));
   component->room_ = MostComponents(problem);
   return component;
 }

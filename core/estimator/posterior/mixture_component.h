@@ -42,18 +42,18 @@ struct TemperedBeginning {
 class MixtureComponent {
  public:
   // Makes a component over the whole prior. Returns FailedPrecondition when its expansion cannot be
-  // factored. `store` must outlive the component.
+  // factored, or the status of a stop request. `store` must outlive the component.
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(
       const ResolvedProblem& problem, const SampleStore* store, int threads,
-      const TemperedBeginning& beginning = {});
+      const TemperedBeginning& beginning, const Stop& stop);
 
   // Restores a component from a state that State returned. The store must hold at least its rows.
   // Returns DataLoss when the state cannot belong to such a problem, FailedPrecondition when the
-  // rows differ from those of the state.
+  // rows differ from those of the state, the status of a stop request.
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> FromState(const ResolvedProblem& problem,
                                                                      ComponentState state,
                                                                      const SampleStore* store,
-                                                                     int threads);
+                                                                     int threads, const Stop& stop);
   // Returns the state. May be called after TakeUpTo a checkpoint or the row before a new run,
   // unless must_divide().
   ComponentState State() const;

@@ -302,7 +302,7 @@ absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem
   for (const Candidate& candidate : candidates) columns.push_back(candidate.column);
   const auto m = static_cast<int>(columns.size());
   POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads));
+                           PriorExpansion::Make(problem, columns, options.threads, stop));
   const TimeGrid grid{options.until_s, options.step_s};
   POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(),
                                           expansion->basis().size() + kDraws * problem.dimension(),

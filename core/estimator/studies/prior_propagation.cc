@@ -105,7 +105,7 @@ absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
   // A larger result needs a different tool, not more memory.
   POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(), numbers, kMaxPropagatedValues));
   POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads));
+                           PriorExpansion::Make(problem, columns, options.threads, stop));
   Propagation result = EmptyPropagation(problem, options, grid, columns);
   POLYEST_RETURN_IF_ERROR(expansion->Run(
       grid, [&](const ExpandedOutputs& expanded) { Describe(expanded, options, result); }, stop));

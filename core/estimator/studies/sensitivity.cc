@@ -217,7 +217,7 @@ absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& pr
   POLYEST_RETURN_IF_ERROR(
       CheckAnswerSize(grid, columns.size(), 5 + 2 * problem.dimension(), kMaxPropagatedValues));
   POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads));
+                           PriorExpansion::Make(problem, columns, options.threads, stop));
   SensitivityAnalysis result = EmptyAnalysis(problem, grid, columns);
   const TermMasks masks(expansion->basis());
   POLYEST_RETURN_IF_ERROR(expansion->Run(

@@ -59,9 +59,11 @@ class Estimator {
  public:
   // Makes an estimator. INVALID_ARGUMENT and RESOURCE_EXHAUSTED name the field of `problem` or
   // `options`, its value and the rule; an unknown name is answered with the known ones.
-  // FAILED_PRECONDITION if the problem's expansion cannot be computed or the store is not empty.
+  // FAILED_PRECONDITION if the problem's expansion cannot be computed or the store is not empty. On
+  // a stop request returns its status: thousands of collocation points take seconds to factor.
   static absl::StatusOr<std::unique_ptr<Estimator>> Make(Problem problem,
-                                                         EstimatorOptions options = {});
+                                                         EstimatorOptions options = {},
+                                                         const Stop& stop = {});
   ~Estimator();
 
   // The problem that is estimated.
@@ -81,9 +83,10 @@ class Estimator {
   // Restores the estimator to the state saved in `snapshot`, much faster than processing the rows.
   // Every later answer has the same bits as without. The estimator must be of the same problem,
   // with the same rows appended (or more) and none processed; otherwise FAILED_PRECONDITION, as for
-  // a snapshot of another version. DATA_LOSS if bytes are cut off, corrupted or inconsistent. The
-  // estimator is then unchanged and can process its rows itself.
-  absl::Status Restore(const EstimatorSnapshot& snapshot);
+  // a snapshot of another version. DATA_LOSS if bytes are cut off, corrupted or inconsistent. On a
+  // stop request returns its status. After an error the estimator is unchanged and can process its
+  // rows itself.
+  absl::Status Restore(const EstimatorSnapshot& snapshot, const Stop& stop = {});
 
   // Returns the estimate from all processed samples. It does not change the estimator, so how often
   // it is called never changes a later answer. Its time does not depend on the number of samples.

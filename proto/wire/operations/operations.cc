@@ -51,24 +51,24 @@ absl::StatusOr<std::unique_ptr<Estimator>> MakeEstimator(const v1::Experiment& e
                                                          int threads, const ModelLibrary& models,
                                                          const ProblemLimits& limits,
                                                          std::shared_ptr<SampleStore> store,
-                                                         Samples& samples) {
+                                                         const Stop& stop, Samples& samples) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem problem,
                            ToProblem(experiment.problem(), models, limits));
   POLYEST_RETURN_IF_ERROR(CheckRuns(limits, problem, experiment.measurements()));
   POLYEST_ASSIGN_OR_RETURN(samples, ToSamples(experiment.measurements(), *problem.problem().model));
   samples.end_of_run = true;
-  return EstimatorAccess::Make(std::move(problem),
-                               {.threads = threads, .store = std::move(store), .snapshot = {}});
+  return EstimatorAccess::Make(
+      std::move(problem), {.threads = threads, .store = std::move(store), .snapshot = {}}, stop);
 }
 
 // Returns an estimator that holds all measurements of an experiment, none of them processed yet.
 absl::StatusOr<std::unique_ptr<Estimator>> TakeAll(const v1::Experiment& experiment, int threads,
                                                    const ModelLibrary& models,
-                                                   const ProblemLimits& limits,
+                                                   const ProblemLimits& limits, const Stop& stop,
                                                    std::shared_ptr<SampleStore> store = nullptr) {
   Samples samples;
   POLYEST_ASSIGN_OR_RETURN(auto estimator, MakeEstimator(experiment, threads, models, limits,
-                                                         std::move(store), samples));
+                                                         std::move(store), stop, samples));
   POLYEST_RETURN_IF_ERROR(WireFields(estimator->Append(samples)));
   return estimator;
 }
@@ -78,7 +78,8 @@ absl::StatusOr<std::optional<Estimate>> EstimateSoFar(const v1::Experiment& expe
                                                       const Stop& stop, const ModelLibrary& models,
                                                       const ProblemLimits& limits) {
   if (experiment.measurements().time_s().empty()) return std::optional<Estimate>();
-  POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(experiment, threads, models, limits));
+  POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                           TakeAll(experiment, threads, models, limits, stop));
   POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
   return estimator->CurrentEstimate(stop);
 }
@@ -108,7 +109,7 @@ absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
   }
   Samples samples;
   POLYEST_ASSIGN_OR_RETURN(const auto estimator, MakeEstimator(*experiment, threads, models, limits,
-                                                               std::move(store), samples));
+                                                               std::move(store), stop, samples));
   v1::ComputeEstimateResponse response;
   v1::EstimateHistory history;
   POLYEST_RETURN_IF_ERROR(
@@ -143,7 +144,8 @@ absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
   CostGridOptions options = ToCostGridOptions(request);
   options.threads = threads;
   if (problem.problem().regularization_mode != RegularizationMode::kFixed) {
-    POLYEST_ASSIGN_OR_RETURN(const auto estimator, TakeAll(*experiment, threads, models, limits));
+    POLYEST_ASSIGN_OR_RETURN(const auto estimator,
+                             TakeAll(*experiment, threads, models, limits, stop));
     POLYEST_RETURN_IF_ERROR(estimator->Process(stop));
     POLYEST_ASSIGN_OR_RETURN(const Estimate estimate, estimator->CurrentEstimate(stop));
     options.regularization = estimate.regularization;
@@ -226,7 +228,7 @@ absl::StatusOr<v1::ComputePosteriorResponse> ComputePosterior(
     const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+                           TakeAll(*experiment, threads, models, limits, stop, std::move(store)));
   return ComputePosterior(request, *estimator, stop);
 }
 
@@ -245,7 +247,7 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
     const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+                           TakeAll(*experiment, threads, models, limits, stop, std::move(store)));
   return ComputeCostProfiles(request, *estimator, stop);
 }
 
@@ -269,7 +271,7 @@ absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
     const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+                           TakeAll(*experiment, threads, models, limits, stop, std::move(store)));
   return ComputeLogDensity(request, *estimator, stop);
 }
 
@@ -288,7 +290,7 @@ absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSwee
     const ModelLibrary& models, const ProblemLimits& limits, std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+                           TakeAll(*experiment, threads, models, limits, stop, std::move(store)));
   return ComputeRegularizationSweep(request, *estimator, stop);
 }
 
@@ -308,7 +310,7 @@ absl::StatusOr<v1::PredictResponse> Predict(const v1::PredictRequest& request, i
                                             std::shared_ptr<SampleStore> store) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
   POLYEST_ASSIGN_OR_RETURN(const auto estimator,
-                           TakeAll(*experiment, threads, models, limits, std::move(store)));
+                           TakeAll(*experiment, threads, models, limits, stop, std::move(store)));
   return Predict(request, *estimator, stop);
 }
 

@@ -35,10 +35,10 @@ struct MeasurementStreamOptions {
   // The delay before the first attempt to connect again; it doubles from one attempt to the next.
   std::chrono::milliseconds first_delay{100};
   // The longest such delay.
-  std::chrono::milliseconds max_delay{5'000};
+  std::chrono::milliseconds max_delay{2'000};
   // Attempts to reach the daemon without an acknowledgement in between, ≥ 0; then the stream fails.
   // While the daemon answers and asks to try later, the number of attempts is not limited.
-  int max_attempts = 16;
+  int max_attempts = 32;
   // Waits for the given time; returns false to give up. Null: sleeps.
   std::function<bool(std::chrono::milliseconds)> wait = nullptr;
 };

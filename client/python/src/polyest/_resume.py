@@ -41,9 +41,9 @@ class StreamOptions:
     #: The delay before the first attempt to connect again, s; it doubles from one to the next.
     first_delay_s: float = 0.1
     #: The longest such delay, s.
-    max_delay_s: float = 5.0
+    max_delay_s: float = 2.0
     #: Attempts to reach the daemon without an acknowledgement in between, ≥ 0.
-    max_attempts: int = 16
+    max_attempts: int = 32
 
 
 class BatchQueue:

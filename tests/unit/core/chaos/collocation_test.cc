@@ -193,8 +193,8 @@ TEST(CollocationMatrix, TooFewPointsAreRefused) {
 TEST(CollocationMatrix, AConditionNumberPastTheLimitIsRefused) {
   const Basis basis({Germ::Uniform()}, 1);
   const Matrix close = Vector{{0.3, 0.3 + 1e-5, 0.3 - 1e-5}};
-  EXPECT_TRUE(CollocationMatrix::Factor(basis, close, 1e8).ok());
-  const auto refused = CollocationMatrix::Factor(basis, close, 1e4);
+  EXPECT_TRUE(CollocationMatrix::Factor(basis, close, {}, 1e8).ok());
+  const auto refused = CollocationMatrix::Factor(basis, close, {}, 1e4);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(refused.status().message(), HasSubstr("at most 1e+04 allowed"));
 }

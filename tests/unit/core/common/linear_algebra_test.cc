@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -95,12 +96,23 @@ TEST(TriangularSolves, ReadTheLowerTriangleOnly) {
       1e-10);
 }
 
+// One panel of columns, some whole ones, and some with a part of one more.
 TEST(ThinQr, HasOrthonormalColumnsAndATriangle) {
-  const Matrix matrix = SomeMatrix(2 * kSize, kSize);
-  const ThinQr factors = DecomposeThinQr(matrix);
-  EXPECT_LT((factors.q * factors.r - matrix).norm(), kRounding * matrix.norm());
-  EXPECT_LT((factors.q.transpose() * factors.q - Matrix::Identity(kSize, kSize)).norm(), kRounding);
-  EXPECT_TRUE(factors.r.isUpperTriangular(0));
+  for (const Eigen::Index columns : {1, 30, 48, 96, 110}) {
+    const Matrix matrix = SomeMatrix(2 * columns, columns);
+    const ThinQr factors = *DecomposeThinQr(matrix);
+    EXPECT_LT((factors.q * factors.r - matrix).norm(), kRounding * matrix.norm()) << columns;
+    EXPECT_LT((factors.q.transpose() * factors.q - Matrix::Identity(columns, columns)).norm(),
+              kRounding)
+        << columns;
+    EXPECT_TRUE(factors.r.isUpperTriangular(0)) << columns;
+  }
+}
+
+TEST(ThinQr, LooksAtTheStop) {
+  const Stop past({}, Stop::Clock::now() - std::chrono::seconds(1));
+  EXPECT_EQ(DecomposeThinQr(SomeMatrix(2, 1), past).status().code(),
+            absl::StatusCode::kDeadlineExceeded);
 }
 
 TEST(OrthonormalBasis, BeginsAlongTheVector) {
@@ -141,6 +153,33 @@ TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
   EXPECT_EQ(ConditioningOf(Matrix::Constant(1, 1, -3)).number, 1);
   EXPECT_NEAR(ConditioningOf(left).number, 1, kRounding);  // Many singular values are equal.
   EXPECT_EQ(ConditioningOf(Matrix::Zero(3, 3)).rank, 0);
+}
+
+// The oracle is the decomposition; the triangle has more columns than are decomposed.
+TEST(Conditioning, IsFoundByIterationForLargeTriangles) {
+  const Matrix square = SomeMatrix(300, 300);
+  const Matrix upper = DecomposeThinQr(square)->r;
+  const Conditioning exact = ConditioningOf(upper);
+  const Conditioning found = ConditioningOfTriangular(upper);
+  EXPECT_EQ(found.rank, 300);
+  EXPECT_NEAR(found.number, exact.number, 0.01 * exact.number);
+  EXPECT_LE(found.number, exact.number * (1 + kRounding));
+}
+
+TEST(Conditioning, IsInfiniteForLargeSingularTriangles) {
+  Matrix upper = Matrix::Identity(300, 300);
+  upper(7, 7) = 0;
+  EXPECT_EQ(ConditioningOfTriangular(upper).rank, 299);
+  EXPECT_EQ(ConditioningOfTriangular(upper).number, std::numeric_limits<double>::infinity());
+  // Kahan's matrix: none of its diagonal entries is small, and yet it is all but singular.
+  const double c = std::cos(1.2), s = std::sin(1.2);
+  for (Eigen::Index i = 0; i < 300; ++i) {
+    upper.row(i).setZero();
+    upper(i, i) = std::pow(s, i);
+    upper.row(i).tail(299 - i).setConstant(-c * std::pow(s, i));
+  }
+  EXPECT_LT(ConditioningOfTriangular(upper).rank, 300);
+  EXPECT_EQ(ConditioningOfTriangular(upper).number, std::numeric_limits<double>::infinity());
 }
 
 TEST(Conditioning, IsTheWorstForEntriesThatAreNotFinite) {

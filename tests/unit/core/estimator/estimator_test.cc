@@ -95,6 +95,12 @@ TEST(Estimator, TakesNothingWhenAlreadyStoppedAndGoesOnLater) {
   ExpectSame(estimator->CurrentEstimate().value(), Undisturbed());
 }
 
+TEST(Estimator, IsNotMadeWhenAlreadyStopped) {
+  const Stop past({}, Stop::Clock::now() - std::chrono::seconds(1));
+  EXPECT_EQ(Estimator::Make(testing::OscillatorProblem(3), {}, past).status().code(),
+            absl::StatusCode::kDeadlineExceeded);
+}
+
 TEST(Estimator, ReachesTheSameBitsThroughAnyStops) {
   const auto store = std::make_shared<StoppingStore>();
   EstimatorOptions options;

@@ -190,6 +190,10 @@ TEST_P(JournalContractTest, CountsTheBytesOfAProblemAndItsBatches) {
     ASSERT_TRUE(Append(entry).ok());
   }
   EXPECT_EQ(journal_->Heads()->front().bytes, bytes);
+  EXPECT_EQ(journal_->Heads()->front().snapshot_bytes, 0);
+  journal_->SaveSnapshot(number, {2, 2, std::string(1'000, 's')});
+  ASSERT_TRUE(Append(Entry(number, 4, 4)).ok());  // The snapshot is stored before.
+  EXPECT_EQ(journal_->Heads()->front().snapshot_bytes, 1'000);
 }
 
 TEST_P(JournalContractTest, ForgetsWhatIsDeleted) {

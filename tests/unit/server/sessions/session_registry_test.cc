@@ -119,6 +119,14 @@ TEST_F(SessionRegistryTest, RefusesABadProblemAndKeepsNothingOfIt) {
   EXPECT_EQ(registry_->Get("t", "sessions/a").status().code(), absl::StatusCode::kNotFound);
 }
 
+TEST_F(SessionRegistryTest, KeepsNothingOfASessionWhoseCreationIsStopped) {
+  const Stop past({}, Stop::Clock::now() - std::chrono::seconds(1));
+  EXPECT_EQ(registry_->Create("t", "a", SmallProblem(), 0, past).status().code(),
+            absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(registry_->Get("t", "sessions/a").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_TRUE(StatusOfCreate("a").ok());
+}
+
 TEST_F(SessionRegistryTest, HoldsNoMoreThanItsLimit) {
   for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(StatusOfCreate(id).ok());
   const absl::Status full = StatusOfCreate("d");

@@ -34,6 +34,22 @@ TEST(StoredData, ReachTheBytesOfATenantAndNoFurther) {
   EXPECT_TRUE(stored.Take(2, "a", {0, 1}).ok());
 }
 
+TEST(StoredData, HaveOneSnapshotOfASession) {
+  constexpr int64_t kHalf = 1 << 19;
+  StoredData stored(Limits(10, 10, /*disk_mb=*/1));
+  EXPECT_FALSE(stored.TakeSnapshot(1, "a", 1));  // There is no such session.
+  stored.Count(1, "a", {1, 100}, kHalf);
+  EXPECT_EQ(stored.OfTenant("a"), (StoredAmount{1, 100 + kHalf}));
+  EXPECT_TRUE(stored.TakeSnapshot(1, "a", kHalf + 1));
+  EXPECT_EQ(stored.OfTenant("a").bytes, 101 + kHalf);
+  EXPECT_FALSE(stored.TakeSnapshot(1, "a", 2 * kHalf));
+  EXPECT_EQ(stored.OfTenant("a").bytes, 101 + kHalf);
+  EXPECT_TRUE(stored.TakeSnapshot(1, "a", 7));
+  EXPECT_EQ(stored.OfTenant("a").bytes, 107);
+  stored.Forget(1);
+  EXPECT_EQ(stored.InAll(), StoredAmount());
+}
+
 TEST(StoredData, ReachTheLimitOfATenantAndNoFurther) {
   StoredData rows(Limits(10, 100));
   ASSERT_TRUE(rows.Take(1, "a", {6, 0}).ok());
