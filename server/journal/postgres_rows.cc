@@ -15,8 +15,8 @@ constexpr int64_t kHeadsOfPage = 500;
   "SELECT number, tenant, name, created_s, created_ns, reorder_window_s, coalesce(sequence, 0), " \
   "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "                 \
   "coalesce(place_time_s, 0), octet_length(problem) + coalesce(place_bytes, 0), "                 \
-  "coalesce((SELECT octet_length(state) FROM snapshot WHERE session = number), 0) FROM session "  \
-  "LEFT JOIN LATERAL (SELECT * FROM batch WHERE "                                                 \
+  "coalesce((SELECT octet_length(state)::bigint FROM snapshot WHERE session = number), 0) FROM "  \
+  "session LEFT JOIN LATERAL (SELECT * FROM batch WHERE "                                         \
   "batch.session = session.number ORDER BY sequence DESC LIMIT 1) last ON true WHERE NOT hidden "
 
 constexpr char kHeads[] =

@@ -14,6 +14,8 @@ PROBLEM = {"model": {"builtin": "mass_spring_damper"}, "fixed": {"m": 1, "x0": 1
            "uncertain": [{"name": "k", "uniform": {"lower": 31.58, "upper": 47.37}}],
            "measured": [{"output": "x", "noise": {"absolute": 0.01}}]}
 INTERVAL_S = 0.01
+# From one estimate to the next, s: one after each row would keep a core busy by itself.
+ESTIMATE_INTERVAL_S = 1.0
 
 
 def messages():
@@ -72,6 +74,8 @@ class Probe:
         """Streams one row and returns the time until its acknowledgement, s."""
         self.sequence += 1
         request = self.request(session=self.name, sequence=self.sequence)
+        if self.sequence == 1:
+            request.estimates.min_interval_s = ESTIMATE_INTERVAL_S
         request.measurements.time_s.append(0.01 * self.sequence)
         channel = request.measurements.channels.add(name="x")
         channel.values.append(0.5)

@@ -97,8 +97,8 @@ class NoDrainTest : public DaemonTest {
   NoDrainTest() : DaemonTest({"--drain-timeout-s", "0", "--threads", "1"}) {}
 };
 
-// Order 61 in two unknowns is 1953 terms and 19,530 points, whose factorization looks at nothing.
-TEST_F(NoDrainTest, EndsWithoutAComputationThatDoesNotLookAtItsStop) {
+// Order 61 in two unknowns is 1953 terms and 19,530 points, whose factorization takes a minute.
+TEST_F(NoDrainTest, EndsALongComputation) {
   v1::StartComputationRequest request;
   v1::Experiment& experiment = *request.mutable_estimate()->mutable_subject()->mutable_experiment();
   *experiment.mutable_problem() = Oscillator();
@@ -118,7 +118,8 @@ TEST_F(NoDrainTest, EndsWithoutAComputationThatDoesNotLookAtItsStop) {
   ASSERT_EQ(operation.state(), v1::Operation::RUNNING);
   daemon_.Signal(SIGTERM);
   EXPECT_EQ(daemon_.Wait(), 0);
-  EXPECT_THAT(daemon_.Errors(), HasSubstr("stopped without computations"));
+  EXPECT_THAT(daemon_.Errors(), HasSubstr("[info] stopped"));
+  EXPECT_THAT(daemon_.Errors(), ::testing::Not(HasSubstr("went on after they were cancelled")));
 }
 
 TEST_F(LifecycleTest, EndsOnAnInterruptToo) {

@@ -157,7 +157,8 @@ TEST(Conditioning, IsThatOfTheSingularValuesAMatrixIsMadeOf) {
 
 // The oracle is the decomposition; the triangle has more columns than are decomposed.
 TEST(Conditioning, IsFoundByIterationForLargeTriangles) {
-  const Matrix square = SomeMatrix(300, 300);
+  Matrix square = SomeMatrix(300, 300);
+  square.diagonal() += Vector::LinSpaced(300, 1, 100);
   const Matrix upper = DecomposeThinQr(square)->r;
   const Conditioning exact = ConditioningOf(upper);
   const Conditioning found = ConditioningOfTriangular(upper);

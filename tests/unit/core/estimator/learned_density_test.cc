@@ -57,8 +57,9 @@ double UpperLogarithm(const Grid& grid) {
   return std::log(kUpper);
 }
 
-// The draws tell means and standard deviations to about 1 %; the tolerances leave room for the
-// error of the expansion.
+// The default order leaves a shift of the means below that at which the expansion is settled again,
+// 0.08 standard deviations (kMaxShift of mixture_component.cc), and an error of the standard
+// deviations that is small beside it.
 TEST(LearnedDensity, IsAveragedOverWhereThereIsNoProcessNoise) {
   const Samples samples = Measure(400, 0, 2);
   const Grid grid = GridOf(samples);
@@ -71,7 +72,7 @@ TEST(LearnedDensity, IsAveragedOverWhereThereIsNoProcessNoise) {
   const Estimate estimate = EstimateOf(problem, samples);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
-    EXPECT_NEAR(parameter.mean, mean[i], 0.05 * std_dev[i]) << parameter.name;
+    EXPECT_NEAR(parameter.mean, mean[i], 0.08 * std_dev[i]) << parameter.name;
     EXPECT_NEAR(parameter.posterior_std_dev, std_dev[i], 0.05 * std_dev[i]);
   }
   // The cost hardly depends on densities below the limit, so that its curvature says nothing.
