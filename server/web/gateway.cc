@@ -148,12 +148,11 @@ HttpAnswer Gateway::AnswerCall(const WebMethod& method, const HttpRequest& reque
 
 std::shared_ptr<EventSource> Gateway::Begin(const WebMethod& method, const HttpRequest& request,
                                             const WebCall::Request& call) const {
-  const std::optional<Caller> caller = options_.who(request);
   // A time limit or a request's id is of this client only.
-  const bool alone = call.timeout || request.Header(kRequestIdKey);
-  if (method.rpc_path != PathOf("WatchSession") || alone || !caller) {
-    return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
-  }
+  const bool shared =
+      method.rpc_path == PathOf("WatchSession") && !call.timeout && !request.Header(kRequestIdKey);
+  const std::optional<Caller> caller = shared ? options_.who(request) : std::nullopt;
+  if (!caller) return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
   SharedWatches::Key key = {call.message, caller->tenant, caller->name, RoleName(caller->role),
                             request.certificate_name};
   const auto [first, last] = request.headers.equal_range("Authorization");
