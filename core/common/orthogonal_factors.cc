@@ -25,8 +25,10 @@ absl::StatusOr<ThinQr> DecomposeThinQr(const Matrix& matrix, const Stop& stop) {
     left.bottomRightCorner(matrix.rows() - first, columns - after)
         .applyOnTheLeft(panel.householderQ().adjoint());
   }
-  ThinQr result{Matrix::Identity(matrix.rows(), columns),
-                left.topRows(columns).triangularView<Eigen::Upper>()};
+  ThinQr result;
+  result.r = left.topRows(columns).triangularView<Eigen::Upper>();
+  left.resize(0, 0);  // Large matrices should not need more memory than they must.
+  result.q = Matrix::Identity(matrix.rows(), columns);
   for (auto panel = panels.rbegin(); panel != panels.rend(); ++panel) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     const Eigen::Index rows = panel->rows();

@@ -103,11 +103,12 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(
   const bool restored =
       !snapshot.state.empty() && loaded->computed_.estimator->Restore(snapshot, stop).ok();
   POLYEST_RETURN_IF_ERROR(stop.Check());
-  if (any_cut && !restored) POLYEST_RETURN_IF_ERROR(loaded->BeginAnew({}, stop));
+  if (any_cut && !restored) POLYEST_RETURN_IF_ERROR(loaded->BeginAnew({}, {}, stop));
   return loaded;
 }
 
-absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
+absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& snapshot,
+                                      const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(Computed anew, Begin(std::move(cuts), stop));
   BatchIntake intake(intake_.problem(), reorder_window_s_);
   const absl::Status enough = absl::OutOfRangeError("the batches have been read");
@@ -124,6 +125,9 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const Stop& stop) {
   if (anew.sequence != computed_.sequence) {
     return absl::DataLossError("the last batches of the session are missing in the journal");
   }
+  // The snapshot only saves time.
+  if (!snapshot.state.empty()) anew.estimator->Restore(snapshot, stop).IgnoreError();
+  POLYEST_RETURN_IF_ERROR(stop.Check());
   computed_ = std::move(anew);
   latest_ = nullptr;
   return absl::OkStatus();
@@ -161,12 +165,10 @@ absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop&
   POLYEST_RETURN_IF_ERROR(computed_.store->Read(failed, 1, block));
   RunCuts cuts = computed_.cuts;
   cuts.Add(block.rows.front(), failed == 0, reason.message());
-  POLYEST_RETURN_IF_ERROR(BeginAnew(std::move(cuts), stop));
+  // The snapshot is of rows before the failure.
+  POLYEST_RETURN_IF_ERROR(BeginAnew(std::move(cuts), Snapshot().second, stop));
   failed_rows_ = processed;
-  // The snapshot, which only saves time, is of rows before the failure.
-  const EstimatorSnapshot snapshot = Snapshot().second;
-  if (!snapshot.state.empty()) computed_.estimator->Restore(snapshot, stop).IgnoreError();
-  return stop.Check();
+  return absl::OkStatus();
 }
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {

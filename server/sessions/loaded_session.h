@@ -105,8 +105,9 @@ class LoadedSession {
   // Makes an estimator without batches that will leave out these rows.
   absl::StatusOr<Computed> Begin(RunCuts cuts, const Stop& stop);
   // Gives a new estimator the batches that the present one has, from the journal, without the rows
-  // that `cuts` leave out.
-  absl::Status BeginAnew(RunCuts cuts, const Stop& stop);
+  // that `cuts` leave out, and the state of a snapshot that is not empty, if it is usable. After an
+  // error everything is as before.
+  absl::Status BeginAnew(RunCuts cuts, const EstimatorSnapshot& snapshot, const Stop& stop);
   // Takes the journal's snapshot and the cuts before it; nothing if it has none that is readable.
   std::pair<RunCuts, EstimatorSnapshot> Snapshot() const;
   absl::Status GiveUpTo(int64_t sequence);

@@ -19,14 +19,14 @@ void Change(StoredAmount& amount, const StoredAmount& by, int64_t sign) {
 }  // namespace
 
 absl::Status StoredData::Check(const StoredAmount& of_tenant, const StoredAmount& more) const {
-  if (of_tenant.rows + more.rows > limits_.rows_per_tenant) {
+  if (more.rows > 0 && of_tenant.rows + more.rows > limits_.rows_per_tenant) {
     return LimitExceeded(
         "--max-tenant-rows",
         absl::StrFormat("measurements.timeS: %d rows beside the %d that the tenant has stored are "
                         "more than it may have, %d (--max-tenant-rows); delete a session",
                         more.rows, of_tenant.rows, limits_.rows_per_tenant));
   }
-  if (in_all_.rows + more.rows > limits_.total_rows) {
+  if (more.rows > 0 && in_all_.rows + more.rows > limits_.total_rows) {
     // The message does not tell how many rows the other tenants have.
     return LimitExceeded(
         "--max-total-rows",

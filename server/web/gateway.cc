@@ -6,6 +6,7 @@
 
 #include <utility>
 
+#include "polyest/v1/session_service.pb.h"
 #include "proto/wire/refusal/refusal.h"
 #include "server/security/method_roles.h"
 #include "server/service/status_mapping.h"
@@ -157,7 +158,32 @@ std::shared_ptr<EventSource> Gateway::Begin(const WebMethod& method, const HttpR
                             request.certificate_name};
   const auto [first, last] = request.headers.equal_range("Authorization");
   for (auto header = first; header != last; ++header) key.push_back(header->second);
-  return watches_.Join(std::move(key), call);
+  if (watches_.IsOpen(key) && !MakePresent(request, call)) {
+    return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
+  }
+  return watches_.Join(key, call);
+}
+
+bool Gateway::MakePresent(const HttpRequest& request, const WebCall::Request& watch) const {
+  v1::WatchSessionRequest watched;
+  if (!watched.ParseFromString(watch.message)) return false;
+  const auto call = [&](std::string method, const auto& message, auto& answer) {
+    WebCall once(channel_, {.method = std::move(method),
+                            .metadata = watch.metadata,
+                            .message = message.SerializeAsString()});
+    std::string bytes;
+    const std::optional<grpc::Status> status = once.AwaitOnly(request.client, bytes);
+    return status && status->ok() && answer.ParseFromString(bytes);
+  };
+  v1::GetSessionRequest get;
+  get.set_name(watched.session());
+  v1::Session session;
+  if (!call(PathOf("GetSession"), get, session)) return false;
+  if (session.sample_count() == 0) return true;  // A watch begins with the first samples then.
+  v1::GetEstimateRequest present;
+  present.set_session(watched.session());
+  v1::Estimate estimate;
+  return call(PathOf("GetEstimate"), present, estimate);
 }
 
 std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpRequest& request,

@@ -2,6 +2,7 @@
 
 // Serves the methods of the daemon's services as JSON over HTTP, and the live page. Every call goes
 // through the daemon's gRPC server, so that callers, roles, limits, logs and errors are the same.
+// Clients that ask for the same watch share one call (shared_watch.h).
 
 #include <grpcpp/channel.h>
 
@@ -70,6 +71,9 @@ class Gateway final : public HttpHandler {
   // Begins a stream of events, be it of a call of its own or of a watch that others have begun.
   std::shared_ptr<EventSource> Begin(const WebMethod& method, const HttpRequest& request,
                                      const WebCall::Request& call) const;
+  // Has the estimate made that a watch begins with, for all who watch the session. Returns false if
+  // the caller cannot have it.
+  bool MakePresent(const HttpRequest& request, const WebCall::Request& watch) const;
   HttpAnswer AnswerEvents(std::shared_ptr<EventSource> source, const HttpRequest& request,
                           Place place) const;
   void SendEvents(EventSource& source, WebCall::Event event, int client,

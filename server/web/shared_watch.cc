@@ -11,6 +11,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kNoClient = -1;
+// Size of an event that is not kept for clients who come later, bytes.
+constexpr size_t kLargest = size_t{64} << 10;
 // The call ends when its last client goes.
 constexpr std::chrono::hours kForever{24 * 365};
 
@@ -42,6 +44,7 @@ void SharedWatch::Read() {
     const std::lock_guard lock(mutex_);
     status_ = status;
   }
+  const std::lock_guard lock(clients_mutex_);
   WakeAll();
 }
 
@@ -51,17 +54,21 @@ grpc::Status SharedWatch::ReadAll() {
     EventSource::Text event = ToEvent(bytes, *v1::WatchSessionResponse::descriptor());
     v1::WatchSessionResponse response;
     POLYEST_CHECK(response.ParseFromString(bytes));
-    {
-      const std::lock_guard lock(mutex_);
-      last_[response.has_prediction() ? kPrediction : kEstimate] = {std::move(event), ++count_};
-    }
-    WakeAll();
+    Publish(response.has_prediction() ? kPrediction : kEstimate, std::move(event));
   }
   return call_.status();
 }
 
-void SharedWatch::WakeAll() {
+void SharedWatch::Publish(Kind kind, EventSource::Text event) {
   const std::lock_guard lock(clients_mutex_);
+  {
+    const std::lock_guard lock_messages(mutex_);
+    last_[kind] = {std::move(event), ++count_, clients_.size()};
+  }
+  WakeAll();
+}
+
+void SharedWatch::WakeAll() const {
   for (const WakeUp* const client : clients_) client->Signal();
 }
 
@@ -79,7 +86,7 @@ const SharedWatch::Message* WatchEvents::Next() const {
   const SharedWatch::Message* next = nullptr;
   for (int kind = 0; kind < SharedWatch::kKinds; ++kind) {
     const SharedWatch::Message& last = watch_->last_[kind];
-    if (last.number == taken_[kind]) continue;
+    if (last.event == nullptr || last.number == taken_[kind]) continue;
     if (next == nullptr || last.number < next->number) next = &last;
   }
   return next;
@@ -108,8 +115,14 @@ EventSource::Text WatchEvents::Take() {
   const std::lock_guard lock(watch_->mutex_);
   const SharedWatch::Message* const next = Next();
   POLYEST_CHECK(next != nullptr);
-  taken_[next - watch_->last_.data()] = next->number;
-  return next->event;
+  const auto kind = next - watch_->last_.data();
+  taken_[static_cast<size_t>(kind)] = next->number;
+  SharedWatch::Message& message = watch_->last_[static_cast<size_t>(kind)];
+  const bool taken_by_all = message.waiting <= 1;
+  if (!taken_by_all) --message.waiting;
+  // Predictions may have millions of numbers.
+  if (taken_by_all && message.event->size() > kLargest) return std::move(message.event);
+  return message.event;
 }
 
 grpc::Status WatchEvents::status() const {
@@ -117,13 +130,25 @@ grpc::Status WatchEvents::status() const {
   return *watch_->status_;
 }
 
-std::shared_ptr<EventSource> SharedWatches::Join(Key key, const WebCall::Request& request) {
+std::shared_ptr<SharedWatch> SharedWatches::Find(const Key& key) const {
+  const auto found = watches_.find(key);
+  std::shared_ptr<SharedWatch> watch;
+  if (found != watches_.end()) watch = found->second.lock();
+  return watch == nullptr || watch->ended() ? nullptr : watch;
+}
+
+bool SharedWatches::IsOpen(const Key& key) const {
+  const std::lock_guard lock(mutex_);
+  return Find(key) != nullptr;
+}
+
+std::shared_ptr<EventSource> SharedWatches::Join(const Key& key, const WebCall::Request& request) {
   const std::lock_guard lock(mutex_);
   std::erase_if(watches_, [](const auto& entry) { return entry.second.expired(); });
-  std::weak_ptr<SharedWatch>& known = watches_[std::move(key)];
-  std::shared_ptr<SharedWatch> watch = known.lock();
-  if (watch == nullptr || watch->ended()) {
-    known = watch = std::make_shared<SharedWatch>(channel_, request);
+  std::shared_ptr<SharedWatch> watch = Find(key);
+  if (watch == nullptr) {
+    watch = std::make_shared<SharedWatch>(channel_, request);
+    watches_[key] = watch;
   }
   return std::make_shared<WatchEvents>(std::move(watch));
 }

@@ -24,6 +24,7 @@
 namespace polyest::internal {
 
 // One watch. As in a watch of one's own, a slow client misses estimates but never the last one.
+// Whoever comes later gets the last estimate that was made, which need not be of the last batch.
 class SharedWatch {
  public:
   // Starts the call, which must be one of WatchSession.
@@ -41,16 +42,20 @@ class SharedWatch {
 
   // The last estimate or the last prediction, as an event.
   struct Message {
-    EventSource::Text event;
-    int64_t number = 0;  // among all messages of the watch, from 1; 0: none yet
+    EventSource::Text event;  // null if it was large and has been taken
+    int64_t number = 0;       // among all messages of the watch, from 1; 0: none yet
+    size_t waiting = 0;       // clients that have not taken it
   };
   enum Kind { kEstimate, kPrediction, kKinds };
 
+  // Keeps a message and wakes all clients.
+  void Publish(Kind kind, EventSource::Text event);
   // Takes the call's messages until it ends. Runs on the watch's own thread.
   void Read();
   // The same; returns how the call has ended.
   grpc::Status ReadAll();
-  void WakeAll();
+  // Called with the mutex of the clients held.
+  void WakeAll() const;
 
   WebCall call_;
   mutable std::mutex mutex_;
@@ -92,11 +97,16 @@ class SharedWatches {
   explicit SharedWatches(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}
 
   // Returns what a client gets of the watch of this key, which `request` starts if there is none.
-  std::shared_ptr<EventSource> Join(Key key, const WebCall::Request& request);
+  std::shared_ptr<EventSource> Join(const Key& key, const WebCall::Request& request);
+  // Returns whether there is a watch of this key.
+  bool IsOpen(const Key& key) const;
 
  private:
+  // Returns the watch of a key; null if there is none. Called with the mutex held.
+  std::shared_ptr<SharedWatch> Find(const Key& key) const;
+
   const std::shared_ptr<grpc::Channel> channel_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::map<Key, std::weak_ptr<SharedWatch>> watches_;
 };
 

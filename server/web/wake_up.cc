@@ -7,12 +7,15 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <system_error>
 
 #include "core/common/check.h"
 
 namespace polyest::internal {
 
-WakeUp::WakeUp() : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) { POLYEST_CHECK(event_ >= 0); }
+WakeUp::WakeUp() : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (event_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+}
 
 WakeUp::~WakeUp() { close(event_); }
 

@@ -15,6 +15,7 @@ class WakeUp {
     kTimeout,
   };
 
+  // Throws std::system_error if the process has no descriptor left.
   WakeUp();
   ~WakeUp();
   WakeUp(const WakeUp&) = delete;

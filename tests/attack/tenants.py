@@ -5,7 +5,7 @@
     memory     creates session after session with a large expansion, to hold more memory than a tenant
                may have
     batches    sends batches of a hundred thousand rows, one after the other
-    computing  asks for expansions with 1,953 terms and ten points each, which take a minute to factor
+    computing  asks for expansions with 1,953 terms and ten points each, which take 20 s to factor
 
 All attacks unless some are named. Prints the rig's p50 and p99, ms, idle and under attack, and the
 daemon's memory. Exits with status 1 if the rig's p99 passes the bound, if a call of the attacker fails

@@ -36,7 +36,7 @@ RECORD_S = 50.0  # of the example
 BATCH_ROWS = 4
 NODES = 3
 # How long a fault lasts, and from its end to the next one, s; a lease lasts 3 s.
-FAULT_S, REST_S = (3.5, 6.0), (0.5, 2.0)
+FAULT_S, REST_S = (3.5, 6.0), (2.0, 4.0)
 # A silence of the rigs, s: after a fault of a daemon, and beyond one of the database.
 DAEMON_SILENCE_S, DATABASE_SILENCE_S = 10.0, 5.0
 PATIENCE_S = 120.0
@@ -63,7 +63,7 @@ class Rig:
 
     def silences(self, spans):
         """Returns the number of the fault with which each silence began, and how long it was."""
-        times = [*self.times, time.monotonic()]
+        times = self.times if self.process.poll() is not None else [*self.times, time.monotonic()]
         for begin, end in zip(times, times[1:]):
             touched = (i for i, span in enumerate(spans) if span.begin < end and span.end > begin)
             if (first := next(touched, None)) is not None:
@@ -124,9 +124,10 @@ class Faults:
 
 @contextlib.contextmanager
 def stopped(processes):
-    for process in processes:
-        os.kill(process, signal.SIGSTOP)
     try:
+        for process in processes:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGSTOP)
         yield
     finally:
         for process in processes:
@@ -162,7 +163,7 @@ def run(arguments, folder, stack):
     seconds = arguments.faults * (sum(FAULT_S) + sum(REST_S)) / 2
     rigs = []
     for number in range(arguments.rigs):
-        rigs.append(Rig(number, arguments.polyest, to_rigs.port, RECORD_S / (seconds + 5), folder))
+        rigs.append(Rig(number, arguments.polyest, to_rigs.port, RECORD_S / (1.1 * seconds + 30), folder))
         stack.callback(rigs[-1].close)
     faults, chance = Faults(database, nodes, to_rigs), random.Random(arguments.seed)
     order = [kind for _ in range(arguments.faults // len(faults.kinds) + 1)

@@ -97,7 +97,7 @@ class NoDrainTest : public DaemonTest {
   NoDrainTest() : DaemonTest({"--drain-timeout-s", "0", "--threads", "1"}) {}
 };
 
-// Order 61 in two unknowns is 1953 terms and 19,530 points, whose factorization takes a minute.
+// Order 61 in two unknowns is 1953 terms and 19,530 points, whose factorization takes 20 s.
 TEST_F(NoDrainTest, EndsALongComputation) {
   v1::StartComputationRequest request;
   v1::Experiment& experiment = *request.mutable_estimate()->mutable_subject()->mutable_experiment();

@@ -130,6 +130,37 @@ TEST_F(WebStreamTest, IsOneWatchForAllWhoAskAlike) {
   for (std::thread& thread : threads) thread.join();
 }
 
+// The rig wants one estimate, at its end, so that none has been made since the first client came.
+TEST_F(WebStreamTest, BeginsWithThePresentEstimateForWhoComesLater) {
+  std::vector<int64_t> seen;
+  grpc::ClientContext context;
+  const auto stream = sessions_->StreamMeasurements(&context);
+  Watch([&](const WebEvent& event) {
+    EXPECT_EQ(SequenceOf(event), 1);
+    v1::StreamMeasurementsRequest request;
+    request.set_session("sessions/rig");
+    request.set_sequence(2);
+    *request.mutable_measurements() = OscillatorRows(5, 10);
+    request.mutable_estimates()->set_only_last(true);
+    EXPECT_TRUE(stream->Write(request));
+    v1::StreamMeasurementsResponse response;
+    EXPECT_TRUE(stream->Read(&response));
+    EXPECT_TRUE(response.has_acknowledgement());
+    WebClientOfTest later("web page on " + web_->address() + "/");
+    later.Stream("SessionService/WatchSession", R"({"session": "sessions/rig"})",
+                 [&](const WebEvent& next) {
+                   seen.push_back(SequenceOf(next));
+                   return seen.back() == 1;
+                 });
+    return false;
+  });
+  ASSERT_FALSE(seen.empty());
+  EXPECT_EQ(seen.back(), 2);
+  stream->WritesDone();
+  for (v1::StreamMeasurementsResponse rest; stream->Read(&rest);) continue;
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
 TEST_F(WebStreamTest, EndsUnavailableWhenTheDaemonIsStopped) {
   std::vector<WebEvent> events;
   Watch([&](const WebEvent& event) {

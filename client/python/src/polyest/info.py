@@ -135,7 +135,7 @@ class DaemonStatus:
     uptime_s: float
     #: Resident memory, bytes.
     memory_bytes: int
-    #: Bytes of the problems and measurements that the caller's tenant has stored.
+    #: Bytes of the problems, measurements and snapshots that the caller's tenant has stored.
     stored_bytes: int
     #: The most that it may have stored, bytes; 0: there is no limit.
     max_stored_bytes: int

@@ -141,6 +141,21 @@ TEST_F(SharedWatchTest, GivesWhoComesLateTheLastOfEachKindInTheirOrder) {
   EXPECT_EQ(service_.calls(), 1);
 }
 
+TEST_F(SharedWatchTest, KeepsNoLargePredictionForWhoComesLate) {
+  v1::WatchSessionResponse large = PredictionOf(1);
+  large.mutable_prediction()->mutable_time_s()->Resize(100'000, 0.5);
+  const auto first = Join("reader"), second = Join("reader");
+  service_.Send(EstimateOf(1));
+  Next(*first);
+  Next(*second);
+  service_.Send(large);
+  EXPECT_EQ(Next(*first), Text(large));
+  EXPECT_EQ(Next(*second), Text(large));
+  const auto late = Join("reader");
+  EXPECT_EQ(Next(*late), Text(EstimateOf(1)));
+  EXPECT_EQ(late->Await(-1, WebCall::Clock::now()), Event::kTimeout);
+}
+
 TEST_F(SharedWatchTest, LetsASlowClientMissAllButTheLast) {
   const auto slow = Join("reader"), fast = Join("reader");
   for (int64_t sequence = 1; sequence <= 3; ++sequence) {
