@@ -107,7 +107,7 @@ def start_with_sessions(nodes, sessions):
 
 def run(arguments, folder, stack):
     database = Database(folder)
-    stack.callback(database.stop)
+    stack.callback(database.close)
     write_secret(folder)
     nodes = []
     print(f"{'':44s}  CPU time a batch, ms    acknowledgement, ms")

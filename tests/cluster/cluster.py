@@ -1,5 +1,6 @@
 """A cluster to be tried: PostgreSQL in a folder, and daemons that share it, behind proxies."""
 
+import contextlib
 import os
 import pathlib
 import re
@@ -43,11 +44,21 @@ class Database:
     def stop(self):
         self._run("pg_ctl", "--pgdata", self.folder / "data", "--mode", "immediate", "stop")
 
+    def close(self):
+        """Stops the server if it runs."""
+        with contextlib.suppress(subprocess.CalledProcessError):
+            self.stop()
+
     def processes(self):
-        main = (self.folder / "data" / "postmaster.pid").read_text().split()[0]
-        children = subprocess.run(["pgrep", "--parent", main], capture_output=True, text=True,
-                                  check=False)
-        return [int(main), *map(int, children.stdout.split())]
+        """Returns the ids of the server's processes, the main one first."""
+        main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
+        children = []
+        for status in pathlib.Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError):
+                parent = status.read_text().rpartition(")")[2].split()[1]
+                if int(parent) == main:
+                    children.append(int(status.parent.name))
+        return [main, *children]
 
 
 class Node:

@@ -153,7 +153,7 @@ def undisturbed(polyestd, polyest):
 def run(arguments, folder, stack):
     expected = undisturbed(arguments.polyestd, arguments.polyest)
     database = Database(folder)
-    stack.callback(database.stop)
+    stack.callback(database.close)
     write_secret(folder)
     nodes = []
     for number in range(NODES):
