@@ -104,8 +104,10 @@ double LargestSingularValue(Eigen::Index size, const Apply& apply,
   }
   if (entries.size() % 2 == 0) entries.pop_back();
   const Eigen::Map<const Vector> all(entries.data(), std::ssize(entries));
+  // A solution with a triangle that is all but singular may overflow.
+  if (!all.allFinite()) return std::numeric_limits<double>::infinity();
   const double scale = all.cwiseAbs().maxCoeff();
-  if (!std::isfinite(scale) || scale == 0) return scale;
+  if (scale == 0) return 0;
   const BidiagonalSpectrum spectrum(all / scale);
   return scale * spectrum.Find((std::ssize(entries) - 1) / 2, 0, spectrum.Bound());
 }

@@ -6,7 +6,6 @@
 
 #include <utility>
 
-#include "polyest/v1/session_service.pb.h"
 #include "proto/wire/refusal/refusal.h"
 #include "server/security/method_roles.h"
 #include "server/service/status_mapping.h"
@@ -39,6 +38,11 @@ std::string Instead(const std::string& method) {
     return "ImportSession takes a stream, which needs gRPC: use polyest import";
   }
   return absl::StrCat(method, " takes a stream, which needs gRPC: send batches by AddMeasurements");
+}
+
+// Returns another call of the same client.
+WebCall::Request CallFor(const WebCall::Request& client, std::string method, std::string message) {
+  return {.method = std::move(method), .metadata = client.metadata, .message = std::move(message)};
 }
 
 std::string Event(absl::string_view name, absl::string_view data) {
@@ -158,32 +162,33 @@ std::shared_ptr<EventSource> Gateway::Begin(const WebMethod& method, const HttpR
                             request.certificate_name};
   const auto [first, last] = request.headers.equal_range("Authorization");
   for (auto header = first; header != last; ++header) key.push_back(header->second);
-  if (watches_.IsOpen(key) && !MakePresent(request, call)) {
-    return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
+  if (!watches_.IsOpen(key)) return watches_.Join(key, call);
+  // The estimate with which a watch of one's own would begin may still have to be made. It comes to
+  // all who watch the session.
+  const std::optional<v1::Session> session = SessionOf(request, call);
+  if (!session) return std::make_shared<CallEvents>(channel_, call, *method.method->output_type());
+  std::shared_ptr<WatchEvents> events = watches_.Join(key, call);
+  if (session->sample_count() > 0) {
+    v1::GetEstimateRequest present;
+    present.set_session(session->name());
+    events->Keep(std::make_unique<WebCall>(
+        channel_, CallFor(call, PathOf("GetEstimate"), present.SerializeAsString())));
   }
-  return watches_.Join(key, call);
+  return events;
 }
 
-bool Gateway::MakePresent(const HttpRequest& request, const WebCall::Request& watch) const {
+std::optional<v1::Session> Gateway::SessionOf(const HttpRequest& request,
+                                              const WebCall::Request& watch) const {
   v1::WatchSessionRequest watched;
-  if (!watched.ParseFromString(watch.message)) return false;
-  const auto call = [&](std::string method, const auto& message, auto& answer) {
-    WebCall once(channel_, {.method = std::move(method),
-                            .metadata = watch.metadata,
-                            .message = message.SerializeAsString()});
-    std::string bytes;
-    const std::optional<grpc::Status> status = once.AwaitOnly(request.client, bytes);
-    return status && status->ok() && answer.ParseFromString(bytes);
-  };
+  if (!watched.ParseFromString(watch.message)) return std::nullopt;
   v1::GetSessionRequest get;
   get.set_name(watched.session());
+  WebCall call(channel_, CallFor(watch, PathOf("GetSession"), get.SerializeAsString()));
+  std::string bytes;
+  const std::optional<grpc::Status> status = call.AwaitOnly(request.client, bytes);
   v1::Session session;
-  if (!call(PathOf("GetSession"), get, session)) return false;
-  if (session.sample_count() == 0) return true;  // A watch begins with the first samples then.
-  v1::GetEstimateRequest present;
-  present.set_session(watched.session());
-  v1::Estimate estimate;
-  return call(PathOf("GetEstimate"), present, estimate);
+  if (!status || !status->ok() || !session.ParseFromString(bytes)) return std::nullopt;
+  return session;
 }
 
 std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpRequest& request,

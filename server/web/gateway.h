@@ -14,6 +14,7 @@
 #include <span>
 #include <string>
 
+#include "polyest/v1/session_service.pb.h"
 #include "server/security/caller.h"
 #include "server/telemetry/log_limit.h"
 #include "server/web/event_source.h"
@@ -71,9 +72,9 @@ class Gateway final : public HttpHandler {
   // Begins a stream of events, be it of a call of its own or of a watch that others have begun.
   std::shared_ptr<EventSource> Begin(const WebMethod& method, const HttpRequest& request,
                                      const WebCall::Request& call) const;
-  // Has the estimate made that a watch begins with, for all who watch the session. Returns false if
-  // the caller cannot have it.
-  bool MakePresent(const HttpRequest& request, const WebCall::Request& watch) const;
+  // Returns the watched session as the caller sees it; nothing if there is none.
+  std::optional<v1::Session> SessionOf(const HttpRequest& request,
+                                       const WebCall::Request& watch) const;
   HttpAnswer AnswerEvents(std::shared_ptr<EventSource> source, const HttpRequest& request,
                           Place place) const;
   void SendEvents(EventSource& source, WebCall::Event event, int client,

@@ -11,12 +11,29 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kNoClient = -1;
-// Size of an event that is not kept for clients who come later, bytes.
+// Largest prediction that is kept for clients who come later, bytes: it may have millions of
+// numbers.
 constexpr size_t kLargest = size_t{64} << 10;
 // The call ends when its last client goes.
 constexpr std::chrono::hours kForever{24 * 365};
 
 }  // namespace
+
+void LatestEvents::Put(Kind kind, EventSource::Text event) {
+  Remove(kind);
+  events_.emplace_back(kind, std::move(event));
+}
+
+void LatestEvents::Remove(Kind kind) {
+  std::erase_if(events_, [&](const auto& entry) { return entry.first == kind; });
+}
+
+EventSource::Text LatestEvents::Take() {
+  POLYEST_CHECK(!events_.empty());
+  EventSource::Text event = std::move(events_.front().second);
+  events_.erase(events_.begin());
+  return event;
+}
 
 SharedWatch::SharedWatch(const std::shared_ptr<grpc::Channel>& channel,
                          const WebCall::Request& request)
@@ -32,6 +49,18 @@ bool SharedWatch::ended() const {
   return status_.has_value();
 }
 
+void SharedWatch::Add(WatchEvents& client) {
+  const std::lock_guard lock(mutex_);
+  client.Give(latest_);
+  if (status_) client.End(*status_);
+  clients_.insert(&client);
+}
+
+void SharedWatch::Remove(WatchEvents& client) {
+  const std::lock_guard lock(mutex_);
+  clients_.erase(&client);
+}
+
 void SharedWatch::Read() {
   grpc::Status status;
   try {
@@ -40,94 +69,79 @@ void SharedWatch::Read() {
     // Want of memory ends this watch only.
     status = grpc::Status(grpc::StatusCode::INTERNAL, "unexpected error");
   }
-  {
-    const std::lock_guard lock(mutex_);
-    status_ = status;
-  }
-  const std::lock_guard lock(clients_mutex_);
-  WakeAll();
+  const std::lock_guard lock(mutex_);
+  status_ = status;
+  for (WatchEvents* const client : clients_) client->End(status);
 }
 
 grpc::Status SharedWatch::ReadAll() {
   while (call_.Await(kNoClient, WebCall::Clock::now() + kForever) == WebCall::Event::kMessage) {
     const std::string bytes = call_.TakeMessage();
-    EventSource::Text event = ToEvent(bytes, *v1::WatchSessionResponse::descriptor());
     v1::WatchSessionResponse response;
-    POLYEST_CHECK(response.ParseFromString(bytes));
-    Publish(response.has_prediction() ? kPrediction : kEstimate, std::move(event));
+    POLYEST_CHECK(response.ParseFromString(bytes));  // the daemon's own server wrote it
+    Publish(
+        response.has_prediction() ? LatestEvents::Kind::kPrediction : LatestEvents::Kind::kEstimate,
+        ToEvent(bytes, *response.GetDescriptor()));
   }
   return call_.status();
 }
 
-void SharedWatch::Publish(Kind kind, EventSource::Text event) {
-  const std::lock_guard lock(clients_mutex_);
-  {
-    const std::lock_guard lock_messages(mutex_);
-    last_[kind] = {std::move(event), ++count_, clients_.size()};
+void SharedWatch::Publish(LatestEvents::Kind kind, const EventSource::Text& event) {
+  const std::lock_guard lock(mutex_);
+  if (kind == LatestEvents::Kind::kPrediction && event->size() > kLargest) {
+    latest_.Remove(kind);
+  } else {
+    latest_.Put(kind, event);
   }
-  WakeAll();
-}
-
-void SharedWatch::WakeAll() const {
-  for (const WakeUp* const client : clients_) client->Signal();
+  for (WatchEvents* const client : clients_) client->Give(kind, event);
 }
 
 WatchEvents::WatchEvents(std::shared_ptr<SharedWatch> watch) : watch_(std::move(watch)) {
-  const std::lock_guard lock(watch_->clients_mutex_);
-  watch_->clients_.insert(&wake_up_);
+  watch_->Add(*this);
 }
 
-WatchEvents::~WatchEvents() {
-  const std::lock_guard lock(watch_->clients_mutex_);
-  watch_->clients_.erase(&wake_up_);
+WatchEvents::~WatchEvents() { watch_->Remove(*this); }
+
+void WatchEvents::Give(const LatestEvents& events) {
+  const std::lock_guard lock(mutex_);
+  events_ = events;
 }
 
-const SharedWatch::Message* WatchEvents::Next() const {
-  const SharedWatch::Message* next = nullptr;
-  for (int kind = 0; kind < SharedWatch::kKinds; ++kind) {
-    const SharedWatch::Message& last = watch_->last_[kind];
-    if (last.event == nullptr || last.number == taken_[kind]) continue;
-    if (next == nullptr || last.number < next->number) next = &last;
+void WatchEvents::Give(LatestEvents::Kind kind, const Text& event) {
+  {
+    const std::lock_guard lock(mutex_);
+    events_.Put(kind, event);
   }
-  return next;
+  wake_up_.Signal();
+}
+
+void WatchEvents::End(const grpc::Status& status) {
+  {
+    const std::lock_guard lock(mutex_);
+    status_ = status;
+  }
+  wake_up_.Signal();
 }
 
 WebCall::Event WatchEvents::Await(int client, WebCall::Clock::time_point deadline) {
-  while (true) {
-    {
-      const std::lock_guard lock(watch_->mutex_);
-      wake_up_.Clear();
-      if (Next() != nullptr) return WebCall::Event::kMessage;
-      if (watch_->status_) return WebCall::Event::kEnd;
-    }
-    switch (wake_up_.Await(client, deadline)) {
-      case WakeUp::Reason::kSignal:
-        break;
-      case WakeUp::Reason::kClientGone:
-        return WebCall::Event::kClientGone;
-      case WakeUp::Reason::kTimeout:
-        return WebCall::Event::kTimeout;
-    }
-  }
+  const auto look = [this]() -> std::optional<WebCall::Event> {
+    const std::lock_guard lock(mutex_);
+    wake_up_.Clear();
+    if (!events_.empty()) return WebCall::Event::kMessage;
+    if (status_) return WebCall::Event::kEnd;
+    return std::nullopt;
+  };
+  return WebCall::AwaitEvent(wake_up_, client, deadline, look);
 }
 
 EventSource::Text WatchEvents::Take() {
-  const std::lock_guard lock(watch_->mutex_);
-  const SharedWatch::Message* const next = Next();
-  POLYEST_CHECK(next != nullptr);
-  const auto kind = next - watch_->last_.data();
-  taken_[static_cast<size_t>(kind)] = next->number;
-  SharedWatch::Message& message = watch_->last_[static_cast<size_t>(kind)];
-  const bool taken_by_all = message.waiting <= 1;
-  if (!taken_by_all) --message.waiting;
-  // Predictions may have millions of numbers.
-  if (taken_by_all && message.event->size() > kLargest) return std::move(message.event);
-  return message.event;
+  const std::lock_guard lock(mutex_);
+  return events_.Take();
 }
 
 grpc::Status WatchEvents::status() const {
-  const std::lock_guard lock(watch_->mutex_);
-  return *watch_->status_;
+  const std::lock_guard lock(mutex_);
+  return *status_;
 }
 
 std::shared_ptr<SharedWatch> SharedWatches::Find(const Key& key) const {
@@ -142,7 +156,7 @@ bool SharedWatches::IsOpen(const Key& key) const {
   return Find(key) != nullptr;
 }
 
-std::shared_ptr<EventSource> SharedWatches::Join(const Key& key, const WebCall::Request& request) {
+std::shared_ptr<WatchEvents> SharedWatches::Join(const Key& key, const WebCall::Request& request) {
   const std::lock_guard lock(mutex_);
   std::erase_if(watches_, [](const auto& entry) { return entry.second.expired(); });
   std::shared_ptr<SharedWatch> watch = Find(key);

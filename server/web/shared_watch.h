@@ -5,8 +5,6 @@
 
 #include <grpcpp/channel.h>
 
-#include <array>
-#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -23,8 +21,26 @@
 
 namespace polyest::internal {
 
-// One watch. As in a watch of one's own, a slow client misses estimates but never the last one.
-// Whoever comes later gets the last estimate that was made, which need not be of the last batch.
+// The last estimate and the last prediction, as events, in the order in which they came.
+class LatestEvents {
+ public:
+  enum class Kind { kEstimate, kPrediction };
+
+  bool empty() const { return events_.empty(); }
+  // Puts an event in place of the one of its kind.
+  void Put(Kind kind, EventSource::Text event);
+  // Forgets the event of a kind.
+  void Remove(Kind kind);
+  // Takes the older event out. There must be one.
+  EventSource::Text Take();
+
+ private:
+  std::vector<std::pair<Kind, EventSource::Text>> events_;
+};
+
+class WatchEvents;
+
+// One watch.
 class SharedWatch {
  public:
   // Starts the call, which must be one of WatchSession.
@@ -36,40 +52,28 @@ class SharedWatch {
 
   // Returns whether the call has ended.
   bool ended() const;
+  // Gives a client what the last events were, and from here on each new one and the end.
+  void Add(WatchEvents& client);
+  void Remove(WatchEvents& client);
 
  private:
-  friend class WatchEvents;
-
-  // The last estimate or the last prediction, as an event.
-  struct Message {
-    EventSource::Text event;  // null if it was large and has been taken
-    int64_t number = 0;       // among all messages of the watch, from 1; 0: none yet
-    size_t waiting = 0;       // clients that have not taken it
-  };
-  enum Kind { kEstimate, kPrediction, kKinds };
-
-  // Keeps a message and wakes all clients.
-  void Publish(Kind kind, EventSource::Text event);
   // Takes the call's messages until it ends. Runs on the watch's own thread.
   void Read();
   // The same; returns how the call has ended.
   grpc::Status ReadAll();
-  // Called with the mutex of the clients held.
-  void WakeAll() const;
+  void Publish(LatestEvents::Kind kind, const EventSource::Text& event);
 
   WebCall call_;
   mutable std::mutex mutex_;
-  std::array<Message, kKinds> last_;
-  int64_t count_ = 0;
+  LatestEvents latest_;                 // for clients who come later
   std::optional<grpc::Status> status_;  // once the call has ended
-  // Of its own, so that who is woken does not wait until all are.
-  std::mutex clients_mutex_;
-  std::set<const WakeUp*> clients_;
+  std::set<WatchEvents*> clients_;
   std::thread reader_;
 };
 
-// What one client gets of a watch, which ends with its last client: first the present estimate,
-// then each new one.
+// What one client gets of a watch, which ends with its last client. As in a watch of one's own, a
+// slow client misses estimates but never the last one. Whoever comes later begins with the last
+// estimate that was made, which need not be of the last batch.
 class WatchEvents final : public EventSource {
  public:
   explicit WatchEvents(std::shared_ptr<SharedWatch> watch);
@@ -79,13 +83,21 @@ class WatchEvents final : public EventSource {
   Text Take() override;
   grpc::Status status() const override;
 
- private:
-  // Returns the oldest message that the client has not been given; null if there is none.
-  const SharedWatch::Message* Next() const;
+  // Keeps a call that is made for the client as long as the client stays, whatever it answers.
+  void Keep(std::unique_ptr<WebCall> call) { call_ = std::move(call); }
 
+  // These are for the watch.
+  void Give(const LatestEvents& events);
+  void Give(LatestEvents::Kind kind, const Text& event);
+  void End(const grpc::Status& status);
+
+ private:
   const std::shared_ptr<SharedWatch> watch_;
+  std::unique_ptr<WebCall> call_;
   const WakeUp wake_up_;
-  std::array<int64_t, SharedWatch::kKinds> taken_{};  // numbers
+  mutable std::mutex mutex_;
+  LatestEvents events_;                 // that have not been taken
+  std::optional<grpc::Status> status_;  // once the watch has ended
 };
 
 // The watches of a server. Thread-safe.
@@ -97,7 +109,7 @@ class SharedWatches {
   explicit SharedWatches(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}
 
   // Returns what a client gets of the watch of this key, which `request` starts if there is none.
-  std::shared_ptr<EventSource> Join(const Key& key, const WebCall::Request& request);
+  std::shared_ptr<WatchEvents> Join(const Key& key, const WebCall::Request& request);
   // Returns whether there is a watch of this key.
   bool IsOpen(const Key& key) const;
 

@@ -10,7 +10,6 @@
 
 #include "core/common/check.h"
 #include "server/telemetry/request_id.h"
-#include "server/web/wake_up.h"
 
 namespace polyest::internal {
 namespace {
@@ -143,9 +142,14 @@ WebCall::~WebCall() { reactor_->Close(); }
 void WebCall::Cancel() { reactor_->Cancel(); }
 
 WebCall::Event WebCall::Await(int client, Clock::time_point deadline) {
+  return AwaitEvent(reactor_->wake_up(), client, deadline, [this] { return reactor_->Look(); });
+}
+
+WebCall::Event WebCall::AwaitEvent(const WakeUp& wake_up, int client, Clock::time_point deadline,
+                                   absl::FunctionRef<std::optional<Event>()> look) {
   while (true) {
-    if (const std::optional<Event> event = reactor_->Look()) return *event;
-    switch (reactor_->wake_up().Await(client, deadline)) {
+    if (const std::optional<Event> event = look()) return *event;
+    switch (wake_up.Await(client, deadline)) {
       case WakeUp::Reason::kSignal:
         break;
       case WakeUp::Reason::kClientGone:

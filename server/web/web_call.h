@@ -3,6 +3,7 @@
 // Calls a method of the daemon's own gRPC server on behalf of an HTTP client, and waits for its
 // messages and for the client at the same time.
 
+#include <absl/functional/function_ref.h>
 #include <grpcpp/channel.h>
 #include <grpcpp/support/status.h>
 
@@ -12,6 +13,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "server/web/wake_up.h"
 
 namespace polyest::internal {
 
@@ -51,6 +54,11 @@ class WebCall {
   // ended; INTERNAL if it has ended well without a message, nothing if the client has closed its
   // connection.
   std::optional<grpc::Status> AwaitOnly(int client, std::string& message);
+
+  // Waits until `look` returns what has happened: at once, and again after each signal of
+  // `wake_up`. Otherwise like Await.
+  static Event AwaitEvent(const WakeUp& wake_up, int client, Clock::time_point deadline,
+                          absl::FunctionRef<std::optional<Event>()> look);
 
   // Returns the message that has come, serialized, and forgets it.
   std::string TakeMessage();
