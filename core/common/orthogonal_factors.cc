@@ -27,7 +27,7 @@ absl::StatusOr<ThinQr> DecomposeThinQr(const Matrix& matrix, const Stop& stop) {
   }
   ThinQr result;
   result.r = left.topRows(columns).triangularView<Eigen::Upper>();
-  left.resize(0, 0);  // Large matrices should not need more memory than they must.
+  left.resize(0, 0);  // Q takes as much memory.
   result.q = Matrix::Identity(matrix.rows(), columns);
   for (auto panel = panels.rbegin(); panel != panels.rend(); ++panel) {
     POLYEST_RETURN_IF_ERROR(stop.Check());

@@ -153,7 +153,7 @@ HttpAnswer Gateway::AnswerCall(const WebMethod& method, const HttpRequest& reque
 
 std::shared_ptr<EventSource> Gateway::Begin(const WebMethod& method, const HttpRequest& request,
                                             const WebCall::Request& call) const {
-  // A time limit or a request's id is of this client only.
+  // A time limit or the id of a request belongs to one client.
   const bool shared =
       method.rpc_path == PathOf("WatchSession") && !call.timeout && !request.Header(kRequestIdKey);
   const std::optional<Caller> caller = shared ? options_.who(request) : std::nullopt;

@@ -3,10 +3,10 @@
 
     faults.py POLYESTD POLYEST [--faults N] [--rigs N] [--seed N] [--bound]
 
-Each fault is one at random: a daemon is killed, or stopped for longer than its lease; its connections
-to the database, to the other daemons or to the rigs are cut, or silent; the database crashes, or
-stands still. Then asks of every rig that its stream went on by itself, and that its last estimate has
-the bits of an undisturbed run over the same record: nothing acknowledged lost, nothing taken twice.
+The faults come in random order: a daemon is killed, or stopped for longer than its lease; its
+connections to the database, to the other daemons or to the rigs are cut, or silent; the database crashes,
+or stands still. Every rig must go on by itself, and its last estimate must have the bits of an undisturbed
+run over the same record: no acknowledged batch is lost, and none is taken twice.
 Prints the longest silence of a rig's estimates that began with each kind of fault. Exits with status 1
 if a rig has not gone on to that estimate; with --bound, which asks for a machine that is not busy, also
 if a silence is longer than 10 s or, after a fault of the database, than the fault and 5 s more.
