@@ -12,6 +12,7 @@
 #include "server/digest/digest.h"
 #include "server/journal/seal_check.h"
 #include "server/journal/session_digest.h"
+#include "server/journal/sqlite_parts.h"
 #include "server/journal/sqlite_schema.h"
 
 namespace polyest::internal {
@@ -58,16 +59,20 @@ absl::Status CheckBatches(SqliteDatabase& database, const SessionRow& row, const
                           JournalContents& contents) {
   const std::string label = SealLabel(row.head.tenant, row.head.name);
   Seal read = Seal::At(row.head.number, "", "", seal == nullptr ? 0 : seal->from);
-  SqliteQuery query(database,
-                    "SELECT sequence, measurements, digest FROM batch WHERE session = ? ORDER BY "
-                    "sequence");
+  SqliteQuery query(
+      database,
+      "SELECT sequence, measurements, digest, parts FROM batch WHERE session = ? ORDER "
+      "BY sequence");
   query.Bind(row.head.number);
   int64_t last = 0;
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
     if (!more) break;
     ++contents.batches;
-    if (query.Integer(0) != last + 1 || query.Bytes(2) != Digest(query.Bytes(1))) {
+    POLYEST_ASSIGN_OR_RETURN(
+        const std::string measurements,
+        JoinParts(database, row.head.number, query.Integer(0), query.Integer(3), query.Bytes(1)));
+    if (query.Integer(0) != last + 1 || query.Bytes(2) != Digest(measurements)) {
       contents.damage.push_back(
           absl::StrFormat("%s: batch %d is damaged or missing", label, last + 1));
       return absl::OkStatus();

@@ -140,13 +140,14 @@ absl::Status PostgresJournal::Delete(int64_t session) {
 
 void PostgresJournal::Append(JournalEntry entry, Done done) {
   const auto [owner, lane] = HoldOf(entry.session);
-  const auto bytes = static_cast<int64_t>(entry.measurements.size());
-  queue_->Submit(
-      [entry = std::move(entry), owner = owner](PostgresWriter& writer) {
-        SendBatch(writer, entry, owner);
-        return absl::OkStatus();
-      },
-      std::move(done), lane, bytes);
+  const auto send_with = [owner = owner](auto send) {
+    return [=](PostgresWriter& writer, const JournalEntry& batch, const BatchPart& part) {
+      send(writer, batch, part, owner);
+      return absl::OkStatus();
+    };
+  };
+  SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(SendBatch),
+                std::move(done));
 }
 
 void PostgresJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {

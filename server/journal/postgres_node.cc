@@ -56,6 +56,9 @@ constexpr char kDropHidden[] =
 constexpr char kRemoveBatches[] =
     "DELETE FROM batch WHERE ctid = ANY (ARRAY (SELECT batch.ctid FROM batch WHERE session = "
     "(SELECT session FROM deleted ORDER BY session LIMIT 1) LIMIT 256))";
+constexpr char kRemoveParts[] =
+    "DELETE FROM part WHERE ctid = ANY (ARRAY (SELECT part.ctid FROM part WHERE session = "
+    "(SELECT session FROM deleted ORDER BY session LIMIT 1) LIMIT 256))";
 constexpr char kRemoveRest[] =
     "WITH done AS (DELETE FROM deleted WHERE NOT EXISTS (SELECT 1 FROM batch WHERE batch.session = "
     "deleted.session) RETURNING session), history AS (DELETE FROM history USING done WHERE "
@@ -251,9 +254,11 @@ absl::Status PostgresNode::Review(PostgresConnection& connection) {
 }
 
 bool PostgresNode::Tidy() {
-  const auto removed = connection_->Query(kRemoveBatches);
-  if (!removed.ok()) return false;
-  if (removed->changes() > 0) return true;
+  for (const char* const remove : {kRemoveBatches, kRemoveParts}) {
+    const auto removed = connection_->Query(remove);
+    if (!removed.ok()) return false;
+    if (removed->changes() > 0) return true;
+  }
   const auto rest = connection_->Query(kRemoveRest);
   if (!rest.ok()) return false;
   const auto left = connection_->Query("SELECT count(*) FROM deleted");

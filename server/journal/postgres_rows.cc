@@ -30,14 +30,16 @@ constexpr char kRow[] =
     "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, digest "
     "FROM session WHERE number = $1";
 // One statement looks for the session and for its batches, because the session may be deleted and
-// its batches removed between two. A page has at most 8 MiB, or one batch.
+// its batches removed between two. A page has at most 8 MiB, or one batch. Before the last part of
+// a batch stand those that are kept apart (batch_parts.h).
 constexpr char kPage[] =
-    "SELECT coalesce(sequence, 0), measurements, page.digest FROM session LEFT JOIN LATERAL "
-    "(SELECT "
-    "* FROM (SELECT sequence, measurements, batch.digest, sum(octet_length(measurements)) OVER "
-    "(ORDER BY sequence) AS bytes FROM (SELECT * FROM batch WHERE batch.session = $1 AND sequence "
-    "> "
-    "$2 ORDER BY sequence LIMIT 256) batch) summed WHERE bytes <= 8388608 OR sequence = $2 + 1) "
+    "SELECT coalesce(sequence, 0), CASE WHEN parts > 0 THEN (SELECT string_agg(bytes, ''::bytea "
+    "ORDER BY part.number) FROM part WHERE part.session = $1 AND part.sequence = page.sequence AND "
+    "part.number <= parts) || measurements ELSE measurements END, page.digest FROM session LEFT "
+    "JOIN LATERAL (SELECT * FROM (SELECT sequence, measurements, parts, batch.digest, "
+    "sum(octet_length(measurements) + 262144 * parts) OVER "
+    "(ORDER BY sequence) AS size FROM (SELECT * FROM batch WHERE batch.session = $1 AND sequence > "
+    "$2 ORDER BY sequence LIMIT 256) batch) summed WHERE size <= 8388608 OR sequence = $2 + 1) "
     "page ON true WHERE number = $1 ORDER BY 1";
 
 SessionHead HeadIn(const PostgresResult& result, int row) {

@@ -64,6 +64,15 @@ constexpr const char* kPostgresMigrations[] = {
        CREATE INDEX owner_by_node ON owner (node);)",
     "ALTER TABLE node ADD streams bigint NOT NULL DEFAULT 0, ADD busy_cores double precision NOT "
     "NULL DEFAULT 0, ADD draining boolean NOT NULL DEFAULT false;",
+    // The parts of large batches but their last ones, and how many a batch has (batch_parts.h).
+    R"(CREATE TABLE part (
+         session bigint NOT NULL,
+         sequence bigint NOT NULL,
+         number bigint NOT NULL,
+         bytes bytea NOT NULL,
+         PRIMARY KEY (session, sequence, number));
+       ALTER TABLE part ALTER bytes SET STORAGE EXTERNAL;
+       ALTER TABLE batch ADD parts bigint NOT NULL DEFAULT 0;)",
 };
 
 absl::Status Refused(const absl::Status& status, const char* doing) {

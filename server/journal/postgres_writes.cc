@@ -14,9 +14,18 @@ namespace {
 constexpr char kInsertBatch[] =
     "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $9 AND epoch = "
     "$10 FOR SHARE), added AS (INSERT INTO batch SELECT $1, $2, $3::bytea, $4, $5, $6, $7, $8, "
-    "octet_length($3::bytea) + coalesce((SELECT place_bytes FROM batch WHERE session = $1 AND "
-    "sequence = $2 - 1), 0) FROM held "
-    "WHERE $2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = $1) RETURNING 1) "
+    "$11::bigint + coalesce((SELECT place_bytes FROM batch WHERE session = $1 AND sequence = $2 - "
+    "1), 0), $12::bigint FROM held "
+    "WHERE $2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = $1) AND ($12 = 0 "
+    "OR $12 = (SELECT count(*) FROM part WHERE session = $1 AND sequence = $2 AND number <= $12)) "
+    "RETURNING 1) "
+    "SELECT EXISTS (SELECT 1 FROM added), EXISTS (SELECT 1 FROM held), EXISTS (SELECT 1 FROM "
+    "session WHERE number = $1)";
+constexpr char kInsertPart[] =
+    "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $5 AND epoch = "
+    "$6 FOR SHARE), added AS (INSERT INTO part SELECT $1, $2, $3, $4 FROM held "
+    "WHERE $2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = $1) ON CONFLICT "
+    "(session, sequence, number) DO UPDATE SET bytes = excluded.bytes RETURNING 1) "
     "SELECT EXISTS (SELECT 1 FROM added), EXISTS (SELECT 1 FROM held), EXISTS (SELECT 1 FROM "
     "session WHERE number = $1)";
 constexpr char kInsertSession[] =
@@ -64,6 +73,16 @@ absl::Status JudgeOwned(const PostgresResult& result) {
                 {.reason = kOwnedElsewhere, .retry_delay = kTakenDelay});
 }
 
+// Judges a statement that adds to batch `sequence`.
+PostgresWriter::Judge JudgeBatch(int64_t sequence) {
+  return [sequence](const PostgresResult& result) -> absl::Status {
+    const absl::Status judged = JudgeOwned(result);
+    if (!absl::IsFailedPrecondition(judged)) return judged;
+    return absl::FailedPreconditionError(
+        absl::StrFormat("batch %d does not follow what the journal has", sequence));
+  };
+}
+
 }  // namespace
 
 void SendSession(PostgresWriter& writer, const SessionHead& head, bool hidden,
@@ -98,25 +117,36 @@ void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& ow
               JudgeOwned);
 }
 
-void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const PostgresOwner& owner) {
+void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& last,
+               const PostgresOwner& owner) {
   writer.Send(kInsertBatch,
               PostgresParameters()
                   .Add(entry.session)
                   .Add(entry.place.sequence)
-                  .AddBytes(entry.measurements)
+                  .AddBytes(last.bytes)
                   .AddBytes(entry.digest)
                   .Add(entry.place.samples)
                   .Add(entry.place.rows)
                   .Add(int64_t{entry.place.last_row.run})
                   .Add(entry.place.last_row.time_s)
                   .Add(owner.node)
+                  .Add(owner.epoch)
+                  .Add(std::ssize(entry.measurements))
+                  .Add(last.number - 1),
+              JudgeBatch(entry.place.sequence));
+}
+
+void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
+              const PostgresOwner& owner) {
+  writer.Send(kInsertPart,
+              PostgresParameters()
+                  .Add(entry.session)
+                  .Add(entry.place.sequence)
+                  .Add(part.number)
+                  .AddBytes(part.bytes)
+                  .Add(owner.node)
                   .Add(owner.epoch),
-              [sequence = entry.place.sequence](const PostgresResult& result) -> absl::Status {
-                const absl::Status judged = JudgeOwned(result);
-                if (!absl::IsFailedPrecondition(judged)) return judged;
-                return absl::FailedPreconditionError(
-                    absl::StrFormat("batch %d does not follow what the journal has", sequence));
-              });
+              JudgeBatch(entry.place.sequence));
 }
 
 void SendSnapshot(PostgresWriter& writer, int64_t session, const JournalSnapshot& snapshot,

@@ -5,6 +5,7 @@
 
 #include <string_view>
 
+#include "server/journal/batch_parts.h"
 #include "server/journal/postgres_writer.h"
 #include "server/journal/session_journal.h"
 
@@ -26,7 +27,11 @@ void SendShow(PostgresWriter& writer, int64_t session, std::string_view digest,
               const PostgresOwner& owner);
 void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& owner);
 // FAILED_PRECONDITION when the batch does not follow the last one.
-void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const PostgresOwner& owner);
+void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& last,
+               const PostgresOwner& owner);
+// Sends a part that is not the last one; it replaces one that is left of an earlier attempt.
+void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
+              const PostgresOwner& owner);
 // Do nothing when there is no such session, owner or batch.
 void SendSnapshot(PostgresWriter& writer, int64_t session, const JournalSnapshot& snapshot,
                   const PostgresOwner& owner);

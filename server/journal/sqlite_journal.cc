@@ -12,6 +12,7 @@
 #include "server/journal/journal_check.h"
 #include "server/journal/seal_check.h"
 #include "server/journal/session_digest.h"
+#include "server/journal/sqlite_parts.h"
 #include "server/journal/sqlite_schema.h"
 #include "server/journal/sqlite_writes.h"
 
@@ -20,8 +21,9 @@ namespace {
 
 // The largest number of pages that SQLite knows.
 constexpr int64_t kUnlimitedPages = 0x3fffffff;
-// The most pages of the write-ahead log before they are copied into the file.
-constexpr int kMaxCheckpointPages = 4'000;
+// The most pages of the write-ahead log before they are copied into the file: 4 MB. The disk keeps
+// commits waiting while it takes the copies.
+constexpr int kMaxCheckpointPages = 1'000;
 // Bytes of the reserve for each of these pages, so that the log has room in half of it.
 constexpr int64_t kReserveOfPage = 4 * 4'096;
 
@@ -33,6 +35,7 @@ absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_pages) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
   POLYEST_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
   POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", max_pages)));
+  POLYEST_RETURN_IF_ERROR(DeleteUnfinishedParts(database));
   return DeleteHidden(database);
 }
 
@@ -204,17 +207,16 @@ absl::Status SqliteJournal::Delete(int64_t session) {
 
 void SqliteJournal::Append(JournalEntry entry, Done done) {
   const std::string lane = LaneOf(entry.session);
-  const auto bytes = static_cast<int64_t>(entry.measurements.size());
-  queue_->Submit(
-      [this, entry = std::move(entry)](SqliteDatabase& database) -> absl::Status {
-        POLYEST_RETURN_IF_ERROR(InsertBatch(database, entry));
-        auto& seal = unsealed_[entry.session];
-        if (!seal) seal = seals_->Of(entry.session);
-        if (!seal) seal = Seal::At(entry.session, "", "", entry.place.sequence - 1);
-        seal->Add(entry.place.sequence, entry.digest);
-        return absl::OkStatus();
-      },
-      std::move(done), lane, bytes);
+  const auto insert = [this](SqliteDatabase& database, const JournalEntry& batch,
+                             const BatchPart& last) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(InsertBatch(database, batch, last));
+    auto& seal = unsealed_[batch.session];
+    if (!seal) seal = seals_->Of(batch.session);
+    if (!seal) seal = Seal::At(batch.session, "", "", batch.place.sequence - 1);
+    seal->Add(batch.place.sequence, batch.digest);
+    return absl::OkStatus();
+  };
+  SubmitInParts(*queue_, std::move(entry), lane, InsertPart, insert, std::move(done));
 }
 
 void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {

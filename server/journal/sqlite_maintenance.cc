@@ -10,14 +10,16 @@
 
 #include "core/common/status.h"
 #include "server/journal/sqlite_journal.h"
+#include "server/journal/sqlite_parts.h"
 #include "server/journal/sqlite_writes.h"
 
 namespace polyest::internal {
 namespace {
 
-// Largest number of batches of a deleted session, and of their bytes, that one commit removes.
+// Largest number of batches of a deleted session, and of their bytes, that one commit removes: it
+// writes as much as it removes, and others wait for it.
 constexpr int64_t kRemovedBatches = 256;
-constexpr int64_t kRemovedBytes = 16 << 20;
+constexpr int64_t kRemovedBytes = CommitQueue<SqliteDatabase>::kMaxBytes;
 // Share of the reserve on the disk that this commit may need: Debian's SQLite writes zeros over
 // what it removes.
 constexpr int64_t kRemovalShare = 8;
@@ -135,8 +137,10 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
   }
   const int64_t most_bytes = std::min(kRemovedBytes, reserve_->bytes() / kRemovalShare);
   const auto remove = [=](SqliteDatabase& database) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(const bool removed, RemoveSomeBatches(database, session, most_bytes));
-    if (removed) return absl::OkStatus();
+    for (const auto remove_some : {RemoveSomeBatches, RemoveSomeParts}) {
+      POLYEST_ASSIGN_OR_RETURN(const bool removed, remove_some(database, session, most_bytes));
+      if (removed) return absl::OkStatus();
+    }
     POLYEST_RETURN_IF_ERROR(
         RunForSession(database, "DELETE FROM snapshot WHERE session = ?", session));
     POLYEST_RETURN_IF_ERROR(

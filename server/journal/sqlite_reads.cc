@@ -9,7 +9,7 @@
 #include "server/digest/digest.h"
 #include "server/journal/session_digest.h"
 #include "server/journal/sqlite_journal.h"
-#include "server/journal/sqlite_writes.h"
+#include "server/journal/sqlite_parts.h"
 
 namespace polyest::internal {
 namespace {
@@ -120,15 +120,19 @@ absl::StatusOr<std::vector<SqliteJournal::KeptBatch>> SqliteJournal::ReadPage(in
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   // Without batches there is one row, which has no sequence.
-  SqliteQuery query(*database,
-                    "SELECT sequence, measurements, batch.digest FROM session LEFT JOIN batch ON "
-                    "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
+  SqliteQuery query(
+      *database,
+      "SELECT sequence, measurements, batch.digest, parts FROM session LEFT JOIN batch ON "
+      "batch.session = number AND sequence > ?2 WHERE number = ?1 ORDER BY sequence");
   query.Bind(session).Bind(after);
   POLYEST_ASSIGN_OR_RETURN(bool row, query.Step());
   if (!row) return NoSuchSession();
   std::vector<KeptBatch> page;
   for (size_t read = 0; row && query.Integer(0) > 0 && read < bytes;) {
-    page.push_back({query.Integer(0), query.Bytes(1), query.Bytes(2)});
+    POLYEST_ASSIGN_OR_RETURN(
+        std::string measurements,
+        JoinParts(*database, session, query.Integer(0), query.Integer(3), query.Bytes(1)));
+    page.push_back({query.Integer(0), std::move(measurements), query.Bytes(2)});
     read += page.back().measurements.size();
     POLYEST_ASSIGN_OR_RETURN(row, query.Step());
   }

@@ -61,6 +61,14 @@ constexpr const char* kMigrations[] = {
        UPDATE batch SET place_bytes = (SELECT sum(length(measurements)) FROM batch AS other
          WHERE other.session = batch.session) WHERE sequence = (SELECT max(sequence)
          FROM batch AS other WHERE other.session = batch.session);)",
+    // The parts of large batches but their last ones, and how many a batch has (batch_parts.h).
+    R"(CREATE TABLE part (
+         session INTEGER NOT NULL,
+         sequence INTEGER NOT NULL,
+         number INTEGER NOT NULL,
+         bytes BLOB NOT NULL);
+       CREATE UNIQUE INDEX part_by_number ON part (session, sequence, number);
+       ALTER TABLE batch ADD COLUMN parts INTEGER NOT NULL DEFAULT 0;)",
 };
 constexpr int64_t kVersionWithDigests = 5;
 

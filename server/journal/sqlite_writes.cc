@@ -12,29 +12,36 @@ absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t se
   return query.Run();
 }
 
-absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry) {
-  SqliteQuery query(
-      database,
-      "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, length(?3) + coalesce("
-      "(SELECT place_bytes FROM batch WHERE session = ?1 AND sequence = ?2 - 1), 0) "
-      "WHERE ?2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
-      "EXISTS (SELECT 1 FROM session WHERE number = ?1)");
-  query.Bind(entry.session)
-      .Bind(entry.place.sequence)
-      .BindBlob(entry.measurements)
-      .BindBlob(entry.digest)
-      .Bind(entry.place.samples)
-      .Bind(entry.place.rows)
-      .Bind(static_cast<int64_t>(entry.place.last_row.run))
-      .Bind(entry.place.last_row.time_s);
-  POLYEST_RETURN_IF_ERROR(query.Run());
-  if (database.changes() > 0) return absl::OkStatus();
+absl::Status BatchRefused(SqliteDatabase& database, const JournalEntry& entry) {
   SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
   session.Bind(entry.session);
   POLYEST_ASSIGN_OR_RETURN(const bool there, session.Step());
   if (!there) return NoSuchSession();
   return absl::FailedPreconditionError(
       absl::StrFormat("batch %d does not follow what the journal has", entry.place.sequence));
+}
+
+absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry,
+                         const BatchPart& last) {
+  SqliteQuery query(
+      database,
+      "INSERT INTO batch SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9 + coalesce("
+      "(SELECT place_bytes FROM batch WHERE session = ?1 AND sequence = ?2 - 1), 0), ?10 "
+      "WHERE ?2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = ?1) AND "
+      "EXISTS (SELECT 1 FROM session WHERE number = ?1) AND (?10 = 0 OR ?10 = "
+      "(SELECT count(*) FROM part WHERE session = ?1 AND sequence = ?2 AND number <= ?10))");
+  query.Bind(entry.session)
+      .Bind(entry.place.sequence)
+      .BindBlob(last.bytes)
+      .BindBlob(entry.digest)
+      .Bind(entry.place.samples)
+      .Bind(entry.place.rows)
+      .Bind(static_cast<int64_t>(entry.place.last_row.run))
+      .Bind(entry.place.last_row.time_s)
+      .Bind(static_cast<int64_t>(entry.measurements.size()))
+      .Bind(last.number - 1);
+  POLYEST_RETURN_IF_ERROR(query.Run());
+  return database.changes() > 0 ? absl::OkStatus() : BatchRefused(database, entry);
 }
 
 absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,

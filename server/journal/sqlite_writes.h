@@ -4,16 +4,21 @@
 
 #include <absl/status/status.h>
 
+#include "server/journal/batch_parts.h"
 #include "server/journal/session_journal.h"
 #include "server/journal/sqlite_database.h"
 
 namespace polyest::internal {
 
+// Says why a batch, or a part of one, could not be inserted.
+absl::Status BatchRefused(SqliteDatabase& database, const JournalEntry& entry);
+
 // Runs a statement whose one parameter is the number of a session.
 absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t session);
 
 // These do what SessionJournal::Append, SaveSnapshot and SaveHistoryPoint say.
-absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry);
+absl::Status InsertBatch(SqliteDatabase& database, const JournalEntry& entry,
+                         const BatchPart& last);
 absl::Status ReplaceSnapshot(SqliteDatabase& database, int64_t session,
                              const JournalSnapshot& snapshot);
 absl::Status InsertHistoryPoint(SqliteDatabase& database, int64_t session,

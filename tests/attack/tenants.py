@@ -4,7 +4,8 @@
 
     memory     creates session after session with a large expansion, to hold more memory than a tenant
                may have
-    batches    sends batches of a hundred thousand rows, one after the other
+    batches    sends batches of a hundred thousand rows that no model fits, one after the other
+    bulk       sends 18 batches at once, each of as many rows as there may be, 46 MiB
     computing  asks for expansions with 1,953 terms and ten points each, which take 20 s to factor
 
 All attacks unless some are named. Prints the rig's p50 and p99, ms, idle and under attack, and the
@@ -15,6 +16,7 @@ again, or if the rig is not served. Everything happens on loopback, and ends aft
 
 import argparse
 import contextlib
+from concurrent import futures
 import pathlib
 import re
 import subprocess
@@ -33,6 +35,12 @@ ORDER = 25
 # Enough sessions to pass the limit four times.
 LEAST_SESSIONS = 60
 BATCH_ROWS = 100_000
+# As many rows as a batch may have (--max-batch-rows), of a car at rest.
+BULK_BATCHES, BULK_ROWS, BULK_DEADLINE_S = 18, 1_000_000, 300.0
+CAR = {"model": {"builtin": "quarter_car"},
+       "uncertain": [{"name": "ks", "uniform": {"lower": 15000, "upper": 18000}}],
+       "measured": [{"output": output, "noise": {"absolute": 0.01}}
+                    for output in ("zs", "zu", "travel", "travel_rate", "zs_accel")]}
 # The largest expansion there may be, and how long the attacker waits for it, s.
 LARGE_EXPANSION = {"order": 61, "pointsPerTerm": 10}
 DEADLINE_S = 1.0
@@ -113,6 +121,33 @@ def send_batches(attacker, end):
     return f"{batches} batches of {BATCH_ROWS} rows"
 
 
+def send_bulk(attacker, end):
+    """Sends all batches, however long it takes: the daemon must take or refuse each of them."""
+    request = attacker.messages("AddMeasurementsRequest")(sequence=1)
+    request.measurements.time_s.extend(1e-3 * row for row in range(1, BULK_ROWS + 1))
+    for measured in CAR["measured"]:
+        request.measurements.channels.add(name=measured["output"]).values.extend([0.0] * BULK_ROWS)
+
+    def send(number):
+        own = type(request)(session=f"sessions/bulk-{number}")
+        own.MergeFrom(request)
+        try:
+            attacker.call("AddMeasurements", own, BULK_DEADLINE_S)
+        except grpc.RpcError as error:
+            if error.code() != grpc.StatusCode.RESOURCE_EXHAUSTED:
+                raise
+            return False
+        return True
+
+    for number in range(BULK_BATCHES):
+        attacker.call("CreateSession", json_format.ParseDict(
+            {"sessionId": f"bulk-{number}", "session": {"problem": CAR}},
+            attacker.messages("CreateSessionRequest")()))
+    with futures.ThreadPoolExecutor(BULK_BATCHES) as threads:
+        taken = sum(threads.map(send, range(BULK_BATCHES)))
+    return f"{taken} of {BULK_BATCHES} batches of {request.ByteSize() / 2**20:.0f} MiB were taken"
+
+
 def compute(attacker, end):
     calls = 0
     while time.monotonic() < end:
@@ -125,7 +160,7 @@ def compute(attacker, end):
     return f"{calls} large expansions"
 
 
-ATTACKS = {"memory": hold_memory, "batches": send_batches, "computing": compute}
+ATTACKS = {"memory": hold_memory, "batches": send_batches, "bulk": send_bulk, "computing": compute}
 
 
 def measure(attack, arguments, process, address, tokens):

@@ -74,7 +74,7 @@ TEST_F(JournalBackupTest, HasWhatWasAcknowledgedAndIsServedAgain) {
   const int64_t a = CreateIn(*journal_, "sessions/a", SmallProblem());
   const int64_t b = CreateIn(*journal_, "sessions/b", SmallProblem());
   CreateIn(*journal_, "sessions/hidden", SmallProblem(), /*hidden=*/true);
-  for (int i = 1; i <= 5; ++i) ASSERT_TRUE(Append(a, i).ok());
+  for (int i = 1; i <= 5; ++i) ASSERT_TRUE(Append(a, i, i == 3 ? 100'000 : 1).ok());
   const std::string file = BackUp();
   EXPECT_EQ(contents_.sessions, 2);
   EXPECT_EQ(contents_.batches, 5);

@@ -149,6 +149,44 @@ TEST_P(JournalContractTest, NeverLeavesAGapNorKeepsABatchTwice) {
   EXPECT_THAT(Times(number), ElementsAre(1));
 }
 
+TEST_P(JournalContractTest, KeepsBatchesThatAreLargerThanACommit) {
+  const int64_t number = Create("t", "sessions/a");
+  constexpr int kRows = 100'000;  // 800 kB
+  const auto large = [&](int64_t sequence) {
+    v1::Measurements rows;
+    for (int row = 1; row <= kRows; ++row) rows.add_time_s(static_cast<double>(sequence) * row);
+    JournalEntry entry = Entry(number, sequence, 1);
+    entry.measurements = DeterministicBytes(rows);
+    entry.digest = Digest(entry.measurements);
+    return entry;
+  };
+  // Nobody waits for one before the next is appended.
+  std::promise<void> all;
+  for (const int64_t sequence : {1, 2, 3}) {
+    journal_->Append(sequence == 2 ? Entry(number, 2, 2) : large(sequence),
+                     [&, sequence](const absl::Status& kept) {
+                       EXPECT_TRUE(kept.ok()) << kept;
+                       if (sequence == 3) all.set_value();
+                     });
+  }
+  all.get_future().wait();
+  EXPECT_TRUE(absl::IsFailedPrecondition(Append(large(3))));
+  EXPECT_TRUE(absl::IsFailedPrecondition(Append(large(5))));
+  std::vector<std::string> kept;
+  const absl::Status read = journal_->ReadBatches(number, 0, [&](const JournalBatch& batch) {
+    kept.push_back(DeterministicBytes(batch.measurements));
+    return absl::OkStatus();
+  });
+  EXPECT_TRUE(read.ok()) << read;
+  EXPECT_TRUE((kept == std::vector{large(1).measurements, Entry(number, 2, 2).measurements,
+                                   large(3).measurements}));
+  EXPECT_EQ(journal_->Heads()->front().bytes,
+            static_cast<int64_t>(DeterministicBytes(SmallProblem()).size() + kept[0].size() +
+                                 kept[1].size() + kept[2].size()));
+  ASSERT_TRUE(journal_->Delete(number).ok());
+  EXPECT_TRUE(absl::IsNotFound(Append(large(4))));
+}
+
 TEST_P(JournalContractTest, CallsBackInTheOrderOfTheCalls) {
   const int64_t number = Create("t", "sessions/a");
   constexpr int64_t kBatches = 2'000;

@@ -50,9 +50,9 @@ TEST_F(JournalReadingTest, KeepsTheWriteAheadLogShortWhileALongSessionIsRead) {
   const absl::Status status = journal_->ReadBatches(read, 0, [&](const JournalBatch& batch) {
     if (batch.sequence != 2 && batch.sequence != kBatches / 2) return absl::OkStatus();
     ++in_the_middle;
-    for (int i = 0; i < 200 && LogBytes() < 15'000'000; ++i) append();
-    for (int i = 0; i < 200 && LogBytes() >= 15'000'000; ++i) append();
-    shortened += LogBytes() < 15'000'000 ? 1 : 0;
+    for (int i = 0; i < 200 && LogBytes() < 3'000'000; ++i) append();
+    for (int i = 0; i < 200 && LogBytes() >= 3'000'000; ++i) append();
+    shortened += LogBytes() < 3'000'000 ? 1 : 0;
     return absl::OkStatus();
   });
   EXPECT_TRUE(status.ok()) << status;

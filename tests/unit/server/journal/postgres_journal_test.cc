@@ -151,10 +151,12 @@ TEST_F(PostgresJournalTest, RemovesWhatDeletedSessionsLeave) {
   for (int64_t sequence = 1; sequence <= 3; ++sequence) {
     ASSERT_TRUE(AppendTo(*journal, session, sequence, RowAt(1)).ok());
   }
+  ASSERT_TRUE(AppendTo(*journal, session, 4, RowAt(1, /*bytes=*/1'000'000)).ok());
   journal->SaveSnapshot(session, {1, 1, "state"});
   ASSERT_TRUE(journal->Delete(session).ok());
   const std::string left =
-      "SELECT (SELECT count(*) FROM polyest.batch) + (SELECT count(*) FROM polyest.snapshot) + "
+      "SELECT (SELECT count(*) FROM polyest.batch) + (SELECT count(*) FROM polyest.part) + (SELECT "
+      "count(*) FROM polyest.snapshot) + "
       "(SELECT count(*) FROM polyest.owner) + (SELECT count(*) FROM polyest.deleted)";
   while (server_.Number(uri_, left) > 0) {
   }

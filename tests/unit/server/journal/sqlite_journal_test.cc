@@ -28,6 +28,9 @@ constexpr fs::perms kOpenFolder = fs::perms(0755);
 constexpr fs::perms kOpenFile = fs::perms(0644);
 const std::vector<std::string> kFiles{"lock", "journal.db", "journal.db-wal", "journal.db-shm"};
 
+// Rows of a batch that takes more than two commits; each has 8 bytes.
+constexpr size_t kRowsOfThreeParts = CommitQueue<SqliteDatabase>::kMaxBytes * 5 / 16;
+
 class SqliteJournalTest : public testing::Test {
  protected:
   absl::Status Open(int64_t max_mb = 0) {
@@ -73,6 +76,11 @@ class SqliteJournalTest : public testing::Test {
     auto database = SqliteDatabase::Open(file_);
     ASSERT_TRUE(database.ok());
     ASSERT_TRUE((*database)->Execute(sql).ok());
+  }
+
+  int64_t Number(const char* sql) {
+    auto database = SqliteDatabase::Open(file_);
+    return database.ok() ? (*database)->Number(sql).value_or(-1) : -1;
   }
 
   TestFolder folder_;
@@ -192,6 +200,33 @@ TEST_F(SqliteJournalTest, BringsAFileOfTheFirstFormatUpToDate) {
   EXPECT_EQ((*journal_->ReadSnapshot(5))->state, "state");
 }
 
+TEST_F(SqliteJournalTest, ForgetsThePartsOfABatchThatNeverCame) {
+  ASSERT_TRUE(Open().ok());
+  const int64_t number = Create("sessions/a");
+  ASSERT_TRUE(Append(number, 1, kRowsOfThreeParts).ok());
+  // As after a crash in the middle of batch 2, and with a rest of batch 3 of another attempt.
+  Change(
+      "INSERT INTO part SELECT session, 2, number, x'01' FROM part WHERE number = 1; "
+      "INSERT INTO part SELECT session, 3, 7, x'01' FROM part WHERE sequence = 1 AND number = 1");
+  ASSERT_TRUE(Append(number, 2, kRowsOfThreeParts).ok());
+  EXPECT_EQ(*CountBatches(number), 2);
+  ASSERT_TRUE(Open().ok());
+  EXPECT_EQ(*CountBatches(number), 2);
+  EXPECT_EQ(Number("SELECT count(*) FROM part"), 4);
+  Change("UPDATE part SET bytes = x'00' WHERE sequence = 2 AND number = 2");
+  EXPECT_EQ(CountBatches(number).status(),
+            absl::DataLossError("batch 2 of the session is damaged or missing in the journal"));
+}
+
+TEST_F(SqliteJournalTest, RefusesTheWholeOfABatchWhosePartsDoNotFitOnTheDisk) {
+  ASSERT_TRUE(Open(/*max_mb=*/1).ok());
+  const int64_t number = Create("sessions/a");
+  EXPECT_EQ(Append(number, 1, 2 * kRowsOfThreeParts).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(*CountBatches(number), 0);
+  EXPECT_TRUE(Append(number, 1).ok());
+  EXPECT_EQ(*CountBatches(number), 1);
+}
+
 TEST_F(SqliteJournalTest, SaysWhichBatchIsDamagedAndLeavesTheOthersAlone) {
   ASSERT_TRUE(Open().ok());
   const int64_t a = Create("sessions/a"), b = Create("sessions/b");
@@ -293,13 +328,14 @@ TEST_F(SqliteJournalTest, KeepsTheWriteAheadLogShort) {
   const int64_t number = Create("sessions/a");
   const auto log_size = [&] { return fs::file_size(file_ + "-wal"); };
   int64_t sequence = 1;
-  while (log_size() < 15'000'000) ASSERT_TRUE(Append(number, sequence++, 5'000).ok());
-  // Another thread copies the log into the file once it has passed 16 MB, while batches go on.
-  while (log_size() > 15'000'000 && sequence < 50'000) {
+  while (log_size() < 3'000'000 && sequence < 1'000)
+    ASSERT_TRUE(Append(number, sequence++, 5'000).ok());
+  // Another thread copies the log into the file once it has passed 4 MB, while batches go on.
+  while (log_size() > 3'000'000 && sequence < 50'000) {
     ASSERT_TRUE(Append(number, sequence++, 100).ok());
   }
-  EXPECT_LT(log_size(), uintmax_t{15'000'000});
-  EXPECT_GT(fs::file_size(file_), uintmax_t{10'000'000});
+  EXPECT_LT(log_size(), uintmax_t{3'000'000});
+  EXPECT_GT(fs::file_size(file_), uintmax_t{2'000'000});
 }
 
 TEST_F(SqliteJournalTest, IsMadeForItsOwnerOnlyWhateverTheUmask) {

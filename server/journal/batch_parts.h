@@ -1,0 +1,47 @@
+#pragma once
+
+// A batch that is larger than a commit is kept in parts, each with a commit of its own, so that
+// others need not wait for the whole of it. The last part stands in the row of the batch: the batch
+// is kept once that row is. Parts whose batch never came are nothing.
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/journal/commit_queue.h"
+#include "server/journal/session_journal.h"
+
+namespace polyest::internal {
+
+// A piece of a batch's serialized measurements.
+struct BatchPart {
+  int64_t number = 1;  // ≥ 1, in order
+  std::string_view bytes;
+};
+
+// Submits a batch to the lane, part by part. `write_part` and `write_last`, called with the
+// database, the entry and a part, write one. `done` hears of the last one, which is refused as the
+// first part that was.
+template <typename Database, typename WritePart, typename WriteLast>
+void SubmitInParts(CommitQueue<Database>& queue, JournalEntry entry, const std::string& lane,
+                   WritePart write_part, WriteLast write_last, SessionJournal::Done done) {
+  constexpr size_t kMost = CommitQueue<Database>::kMaxBytes;
+  const auto kept = std::make_shared<const JournalEntry>(std::move(entry));
+  const auto refusal = std::make_shared<absl::Status>();  // used by the queue's thread only
+  const auto submit = [&](const BatchPart& part, const auto& write, SessionJournal::Done heard) {
+    queue.Submit(
+        [kept, refusal, part, write](Database& database) {
+          return refusal->ok() ? write(database, *kept, part) : *refusal;
+        },
+        std::move(heard), lane, static_cast<int64_t>(part.bytes.size()));
+  };
+  BatchPart part{.bytes = kept->measurements};
+  for (; part.bytes.size() > kMost; ++part.number, part.bytes.remove_prefix(kMost)) {
+    submit({part.number, part.bytes.substr(0, kMost)}, write_part,
+           [refusal](const absl::Status& status) { refusal->Update(status); });
+  }
+  submit(part, write_last, std::move(done));
+}
+
+}  // namespace polyest::internal
