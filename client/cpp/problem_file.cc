@@ -6,6 +6,7 @@
 #include <absl/strings/str_join.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -75,13 +76,15 @@ absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path) {
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": cannot be opened: ", std::strerror(errno)));
   }
-  std::string json(kMaxFileBytes + 1, '\0');
-  in.read(json.data(), static_cast<std::streamsize>(json.size()));
-  if (in.bad()) return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
-  json.resize(static_cast<size_t>(in.gcount()));
-  if (json.size() > kMaxFileBytes) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": is longer than 16 MiB"));
+  std::string json;
+  std::array<char, 4096> block;
+  while (in.read(block.data(), block.size()), in.gcount() > 0) {
+    json.append(block.data(), static_cast<size_t>(in.gcount()));
+    if (json.size() > kMaxFileBytes) {
+      return absl::InvalidArgumentError(absl::StrCat(path, ": is longer than 16 MiB"));
+    }
   }
+  if (in.bad()) return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
   return ParseProblem(json, path);
 }
 

@@ -23,12 +23,12 @@ void DifferentialEvolution::Evaluate(const Matrix& etas, Vector& costs) const {
   thread_local Matrix inside, xis;
   thread_local Vector inside_costs;
   thread_local std::vector<Eigen::Index> rows;
-  xis.resize(etas.rows(), etas.cols());
-  xis.noalias() = etas * cost_.region().axes().transpose();
-  xis.rowwise() += cost_.region().centre().transpose();
+  xis.resize(etas.cols(), etas.rows());  // a point a column
+  xis.noalias() = cost_.region().axes() * etas.transpose();
+  xis.colwise() += cost_.region().centre();
   rows.clear();
   for (Eigen::Index i = 0; i < etas.rows(); ++i) {
-    if (IsInBox(etas, i) && cost_.prior().Contains(xis.row(i).transpose())) rows.push_back(i);
+    if (IsInBox(etas, i) && cost_.prior().Contains(xis.col(i))) rows.push_back(i);
   }
   if (std::ssize(rows) == etas.rows()) {
     cost_.EvaluateMany(etas, costs);

@@ -78,9 +78,10 @@ Matrix CoverOfDomain(const Region& region, const Prior& prior, const Vector& low
   const Vector inside = PointInside(region, prior, lower, upper, guesses);
   const Vector local = region.ToLocal(inside);
   double uniform = 0;
+  const Matrix xis = region.ManyToGerm(cover).transpose();
   for (Eigen::Index i = 0; i < cover.rows(); ++i) {
-    const Vector xi = region.ToGerm(cover.row(i).transpose());
-    if (prior.Contains(xi)) continue;
+    if (prior.Contains(xis.col(i))) continue;
+    const Vector xi = xis.col(i);
     // With s = U^{1/n}, evenly distributed U, the points on a ray are as dense as in the volume.
     uniform = std::fmod(uniform + kGoldenRatio, 1);
     const double fraction =

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
 
 #include "core/bayes/differential_evolution.h"
 #include "core/chaos/collocation_points.h"
@@ -25,27 +29,51 @@ Mixture MixtureOf(int dimension) {
   return {{{0.85, std::min(1.1, narrow)}, {0.15, 2.0}}};
 }
 
-// Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²}.
-double LogProposal(const Mixture& mixture, double squared_radius, int dimension) {
-  double density = 0;
+// Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²} for each r².
+Vector LogDensity(const Mixture& mixture, const Vector& squared_radii, int dimension) {
   // The sum is relative to the widest component, whose exponential underflows last.
-  const double widest = 0.5 * squared_radius / std::pow(mixture.back().scale, 2);
+  const Eigen::ArrayXd widest =
+      0.5 * squared_radii.array() / (mixture.back().scale * mixture.back().scale);
+  Eigen::ArrayXd density = Eigen::ArrayXd::Zero(squared_radii.size());
   for (const Component& c : mixture) {
     density += c.share * std::pow(c.scale, -dimension) *
-               std::exp(widest - 0.5 * squared_radius / (c.scale * c.scale));
+               (widest - 0.5 * squared_radii.array() / (c.scale * c.scale)).exp();
   }
-  return std::log(density) - widest;
+  return density.log() - widest;
 }
 
-// Returns standard normal points, the first share of them scaled for the first component and so on.
+// Points u of the mixture before L⁻ᵀ, and log q at each.
+struct Proposal {
+  Matrix points;
+  Vector log_density;
+};
+
+// Takes standard normal points, the first share of them scaled for the first component and so on.
 // Stretches of a Halton sequence are themselves low-discrepancy points.
-Matrix MixturePoints(const Mixture& mixture, int dimension, int points) {
+Proposal MakeProposal(int dimension, int points) {
+  const Mixture mixture = MixtureOf(dimension);
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
-  Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, points).value();
+  Proposal proposal{CollocationPoints(PointSet::kHalton, germs, 0, points).value(), {}};
   const auto first = static_cast<Eigen::Index>(mixture.front().share * points);
-  normal.topRows(first) *= mixture.front().scale;
-  normal.bottomRows(points - first) *= mixture.back().scale;
-  return normal;
+  proposal.points.topRows(first) *= mixture.front().scale;
+  proposal.points.bottomRows(points - first) *= mixture.back().scale;
+  proposal.log_density = LogDensity(mixture, proposal.points.rowwise().squaredNorm(), dimension);
+  return proposal;
+}
+
+// Returns the proposal, which is the same for all posteriors and takes longer to make than the
+// costs of a small problem. Those of usual sizes are kept, at most 15 MB.
+std::shared_ptr<const Proposal> ProposalOf(int dimension, int points) {
+  constexpr int kMostDimensions = 12, kMostPoints = 16'384;
+  if (dimension > kMostDimensions || points > kMostPoints) {
+    return std::make_shared<const Proposal>(MakeProposal(dimension, points));
+  }
+  static std::mutex mutex;
+  static std::map<std::pair<int, int>, std::shared_ptr<const Proposal>> kept;
+  const std::lock_guard lock(mutex);
+  std::shared_ptr<const Proposal>& proposal = kept[{dimension, points}];
+  if (!proposal) proposal = std::make_shared<const Proposal>(MakeProposal(dimension, points));
+  return proposal;
 }
 
 }  // namespace
@@ -55,10 +83,9 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
                                int points) {
   POLYEST_CHECK(points >= 100);
   const int n = cost.dimension();
-  const Mixture mixture = MixtureOf(n);
-  const Matrix normal = MixturePoints(mixture, n, points);
+  const std::shared_ptr<const Proposal> proposal = ProposalOf(n, points);
   // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
-  Matrix etas = SolveLowerTransposedRows(hessian_factor, normal);
+  Matrix etas = SolveLowerTransposedRows(hessian_factor, proposal->points);
   etas.rowwise() += minimum.transpose();
   WeightedDraws draws;
   Vector costs;
@@ -66,11 +93,8 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   box.Evaluate(etas, costs);
   const double least = costs.minCoeff();
   if (!std::isfinite(least)) return draws;
-  Vector log_weights(points);
-  for (Eigen::Index i = 0; i < points; ++i) {
-    // log w = −J − log q
-    log_weights[i] = least - costs[i] - LogProposal(mixture, normal.row(i).squaredNorm(), n);
-  }
+  // log w = −J − log q
+  const Vector log_weights = least - costs.array() - proposal->log_density.array();
   Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
   Eigen::Index kept = 0;
   for (Eigen::Index i = 0; i < points; ++i) {

@@ -90,12 +90,6 @@ double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
-MismatchSums ChannelSums::Known() const {
-  MismatchSums sums = samples;
-  if (log_variance.size() > 0) sums.AddLinear(log_variance, log_variance_at_reference);
-  return sums;
-}
-
 struct Mismatch::Factors {
   std::once_flag once;
   std::vector<FactoredSums> known;        // one
@@ -106,16 +100,19 @@ struct Mismatch::Factors {
 Mismatch::Mismatch(MismatchSums sums)
     : known_(std::move(sums)), count_(known_.count()), factors_(std::make_shared<Factors>()) {}
 
-Mismatch::Mismatch(std::vector<ChannelSums> channels)
+Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
     : known_(channels.empty() ? 0 : channels.front().samples.terms()),
       factors_(std::make_shared<Factors>()) {
   POLYEST_CHECK(!channels.empty());
-  for (ChannelSums& channel : channels) {
+  for (const ChannelSums& channel : channels) {
     count_ += channel.samples.count();
-    if (channel.IsKnown()) {
-      known_.Add(channel.Known());
-    } else {
-      other_.push_back(std::move(channel));
+    if (!channel.IsKnown()) {
+      other_.push_back(channel);
+      continue;
+    }
+    known_.Add(channel.samples);
+    if (channel.log_variance.size() > 0) {
+      known_.AddLinear(channel.log_variance, channel.log_variance_at_reference);
     }
   }
 }

@@ -52,8 +52,6 @@ struct ChannelSums {
   double spent = 0;           // degrees of freedom used up by parameters that are eliminated
 
   bool IsKnown() const { return !scale_unknown && !correlation_unknown; }
-  // Returns the sums of J_mismatch of a channel with known noise.
-  MismatchSums Known() const;
   // Returns the expected χ² if the working noise is right: N, or less if outliers are handled or
   // parameters have been eliminated.
   double Degrees() const { return degrees_factor * static_cast<double>(samples.count()) - spent; }
@@ -65,7 +63,7 @@ class Mismatch {
  public:
   // Takes the sums of channels with known noise.
   Mismatch(MismatchSums sums);  // NOLINT(google-explicit-constructor): the plain case
-  explicit Mismatch(std::vector<ChannelSums> channels);
+  explicit Mismatch(const std::vector<ChannelSums>& channels);
 
   int terms() const { return known_.terms(); }
 

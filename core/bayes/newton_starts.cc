@@ -38,7 +38,10 @@ std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProble
     if (!factor.positive_definite()) return std::nullopt;
     const Vector move = -factor.Solve(gradient);
     if (!move.allFinite()) return std::nullopt;
-    if ((move.array().abs() <= kConvergedStep * width.array()).all()) return eta;
+    if ((move.array().abs() <= kConvergedStep * width.array()).all()) {
+      const Vector last = eta + move;
+      return IsInside(problem, last) ? last : eta;
+    }
     const double slope = gradient.dot(move);
     double fraction = 1;
     const bool hidden = -slope <= kRounding * std::abs(value);
@@ -71,6 +74,12 @@ Matrix ImprovedStarts(const Cost& cost, const MinimizationProblem& problem, cons
     if (!known) improved.row(count++) = eta.transpose();
   }
   return improved.topRows(count);
+}
+
+std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& problem,
+                                  const Matrix& starts, const Stop& stop) {
+  const MinimizerOptions options;
+  return FindMinima(problem, ImprovedStarts(cost, problem, starts, options), options, stop);
 }
 
 }  // namespace polyest::internal

@@ -1,10 +1,11 @@
 #pragma once
 
-// Starts for the search of minima, moved to where Newton's method leads from them. With the exact
-// Hessian a few steps reach a minimum that has no active bound, where a search by gradients alone
-// takes many, each of which costs O(n³) for n parameters with bounds.
+// Minima of the cost, by Newton's method where it leads to one. With the exact Hessian a few steps
+// reach a minimum that has no active bound, where a search by gradients alone takes many, each of
+// which costs O(n³) for n parameters with bounds.
 
 #include <optional>
+#include <vector>
 
 #include "core/bayes/cost.h"
 #include "core/bayes/minimizer.h"
@@ -22,5 +23,9 @@ std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProble
 // starts that lead to the same point. The others stay.
 Matrix ImprovedStarts(const Cost& cost, const MinimizationProblem& problem, const Matrix& starts,
                       const MinimizerOptions& options);
+
+// Returns what FindMinima finds from the improved starts, ≥ 1 row.
+std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& problem,
+                                  const Matrix& starts, const Stop& stop);
 
 }  // namespace polyest::internal

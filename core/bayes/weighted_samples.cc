@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <utility>
 
 #include "core/common/check.h"
 
@@ -58,16 +58,17 @@ double WeightedStandardDeviation(const ConstVectorRef& draws, const ConstVectorR
 WeightedQuantiles::WeightedQuantiles(const ConstVectorRef& draws, const ConstVectorRef& weights)
     : draws_(draws.size()), cumulative_(draws.size()) {
   POLYEST_CHECK(draws.size() > 0 && draws.size() == weights.size());
-  std::vector<Eigen::Index> order(static_cast<size_t>(draws.size()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::sort(order.begin(), order.end(),
-            [&](Eigen::Index a, Eigen::Index b) { return draws[a] < draws[b]; });
+  std::vector<std::pair<double, double>> sorted(static_cast<size_t>(draws.size()));
+  for (Eigen::Index i = 0; i < draws.size(); ++i) {
+    sorted[static_cast<size_t>(i)] = {draws[i], weights[i]};
+  }
+  std::sort(sorted.begin(), sorted.end());
   double below = 0;
   for (Eigen::Index i = 0; i < draws.size(); ++i) {
-    const Eigen::Index source = order[static_cast<size_t>(i)];
-    draws_[i] = draws[source];
-    cumulative_[i] = below + weights[source] / 2;
-    below += weights[source];
+    const auto [draw, weight] = sorted[static_cast<size_t>(i)];
+    draws_[i] = draw;
+    cumulative_[i] = below + weight / 2;
+    below += weight;
   }
 }
 

@@ -80,10 +80,9 @@ class RadicalInverses {
 
   double Next() {
     CountUp();
-    double value = 0, weight = 1;
-    for (const int digit : digits_) {
-      weight /= base_;
-      value += weight * permutation_[static_cast<size_t>(digit)];
+    double value = 0;
+    for (size_t i = 0; i < digits_.size(); ++i) {
+      value += weights_[i] * permutation_[static_cast<size_t>(digits_[i])];
     }
     return value;
   }
@@ -95,11 +94,13 @@ class RadicalInverses {
       digit = 0;
     }
     digits_.push_back(1);
+    weights_.push_back((weights_.empty() ? 1 : weights_.back()) / base_);
   }
 
   const int base_;
   const std::vector<int> permutation_;
-  std::vector<int> digits_;  // of the index, the lowest first
+  std::vector<int> digits_;      // of the index, the lowest first
+  std::vector<double> weights_;  // base^(−i−1) of each
 };
 
 constexpr int kPlainDimensions = 3;

@@ -156,6 +156,9 @@ absl::Status Daemon::OpenSessions() {
   POLYEST_ASSIGN_OR_RETURN(sessions_, SessionRegistry::Open(services, Now));
   housekeeper_ =
       std::make_unique<Housekeeper>(*sessions_, HousekeepingOptions{.idle = options_.unload_after});
+  if (SharedJournal* const shared = journal_->shared(); shared != nullptr && nodes_ != nullptr) {
+    placement_ = std::make_unique<Placement>(shared->node(), [shared] { return shared->Nodes(); });
+  }
   services_ = MakeServices({.executor = executor_,
                             .intake = intake_,
                             .sessions = *sessions_,
@@ -165,7 +168,8 @@ absl::Status Daemon::OpenSessions() {
                             .models = models_,
                             .max_computing = std::chrono::seconds(options_.max_computing_s),
                             .wall_clock = Now,
-                            .nodes = nodes_.get()});
+                            .nodes = nodes_.get(),
+                            .placement = placement_.get()});
   return absl::OkStatus();
 }
 

@@ -23,6 +23,7 @@
 #include "server/daemon/self_check.h"
 #include "server/execution/executor.h"
 #include "server/forwarding/node_forwarder.h"
+#include "server/forwarding/placement.h"
 #include "server/journal/postgres_journal.h"
 #include "server/security/access_control.h"
 #include "server/security/file_watch.h"
@@ -148,6 +149,7 @@ class Daemon {
   Executor executor_;
   Executor intake_;
   std::unique_ptr<NodeForwarder> nodes_;  // null if calls are not passed on
+  std::unique_ptr<Placement> placement_;  // null if new sessions are this daemon's
   std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<Housekeeper> housekeeper_;
   std::unique_ptr<Handover> handover_;  // null without a database

@@ -37,9 +37,13 @@ bool IsOwnedElsewhere(const grpc::Status& outcome) {
   return false;
 }
 
+bool IsUnreached(const grpc::ClientContext& call, const grpc::Status& outcome) {
+  return outcome.error_code() == grpc::StatusCode::UNAVAILABLE && !HasAnswered(call);
+}
+
 grpc::Status OutcomeFrom(const std::string& owner, const grpc::ClientContext& call,
                          const grpc::Status& outcome) {
-  if (outcome.error_code() != grpc::StatusCode::UNAVAILABLE || HasAnswered(call)) return outcome;
+  if (!IsUnreached(call, outcome)) return outcome;
   return ToGrpc(
       Refuse(absl::StatusCode::kUnavailable,
              absl::StrCat("the daemon at ", owner,

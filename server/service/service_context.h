@@ -10,6 +10,7 @@
 #include "core/external/model_library.h"
 #include "server/execution/executor.h"
 #include "server/forwarding/node_forwarder.h"
+#include "server/forwarding/placement.h"
 #include "server/security/access_control.h"
 #include "server/service/open_calls.h"
 #include "server/sessions/session_registry.h"
@@ -38,6 +39,8 @@ struct ServiceContext {
   int64_t held_bytes = 32 << 20;
   // Passes calls on to other daemons of the database; null: they are refused.
   const NodeForwarder* nodes = nullptr;
+  // Chooses the daemon for a new session; null: it is this one.
+  Placement* placement = nullptr;
 };
 
 }  // namespace polyest::internal

@@ -3,6 +3,7 @@
 #include "proto/wire/convert/annotate.h"
 #include "proto/wire/operations/names.h"
 #include "proto/wire/operations/pages.h"
+#include "proto/wire/refusal/refusal.h"
 #include "server/service/calls.h"
 #include "server/service/catch_up.h"
 #include "server/service/export_call.h"
@@ -92,14 +93,28 @@ class SessionService final : public v1::SessionService::CallbackService {
     });
   }
 
+  // Refuses a new session that another daemon is to have, so that the call is passed on to that.
+  absl::Status CheckPlacedHere(const Context& call) const {
+    if (context_.placement == nullptr || context_.access.IsPassedOn(call)) return absl::OkStatus();
+    const std::optional<std::string> address = context_.placement->Elsewhere();
+    if (!address) return absl::OkStatus();
+    return Refuse(absl::StatusCode::kUnavailable, "another daemon has less to do",
+                  {.reason = kOwnedElsewhere, .owner = *address});
+  }
+
   ServiceContext context_;
 };
 
 SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::Session* response) {
-  return ForCaller({call, "CreateSession", request, response},
+  // Where the daemon that was chosen does not take it, this one does.
+  const auto placed = std::make_shared<bool>(false);
+  return ForCaller({call, "CreateSession", request, response, /*anywhere=*/true},
                    [=, this](const Caller& caller, const Stop& stop) -> absl::Status {
+                     if (!std::exchange(*placed, true)) {
+                       POLYEST_RETURN_IF_ERROR(CheckPlacedHere(*call));
+                     }
                      const v1::Problem& problem = request->session().problem();
                      POLYEST_ASSIGN_OR_RETURN(
                          const auto session,

@@ -53,8 +53,10 @@ void UnaryCall::End(const std::shared_ptr<State>& state, const absl::Status& sta
 void UnaryCall::PassOn(const std::shared_ptr<State>& state, NodeForwarder::Passage passage) {
   const auto on_end = [state, owner = passage.owner](const grpc::ClientContext& context,
                                                      const grpc::Status& outcome) {
-    // The owner has let go of the session: the database knows the next one.
-    if (IsOwnedElsewhere(outcome) && state->attempts < kAttempts) return SubmitWork(state);
+    // If the owner has let go of the session, the database knows the next one.
+    const bool again =
+        IsOwnedElsewhere(outcome) || (state->call.anywhere && IsUnreached(context, outcome));
+    if (again && state->attempts < kAttempts) return SubmitWork(state);
     PassOnTrailers(context, *state->call.context);
     Finish(*state, OutcomeFrom(owner, context, outcome));
   };

@@ -38,6 +38,9 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
     Method method;
     const google::protobuf::Message* request;
     google::protobuf::Message* answer;
+    // Whether this daemon can do the work itself if the one that it is passed on to does not
+    // answer.
+    bool anywhere = false;
   };
 
   // Starts a call of a tenant whose work is handed to `submit` and fills the answer. Work that is

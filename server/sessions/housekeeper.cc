@@ -31,12 +31,15 @@ Housekeeper::Housekeeper(SessionRegistry& registry, const HousekeepingOptions& o
 
 void Housekeeper::Run(std::stop_token stop) {
   auto pause = std::max(kShortestPause, std::min(options_.idle / kLooks, options_.trim));
+  if (registry_.shared()) pause = std::min(pause, options_.follow);
   if (registry_.services().memory.limited()) pause = std::min(pause, options_.memory_pause);
   std::unique_lock lock(mutex_);
   while (!stopping_.wait_for(lock, stop, pause, [&] { return stop.stop_requested(); })) {
     UnloadIdle();
     if (registry_.services().memory.Exceeded()) MakeRoom();
-    if (std::chrono::steady_clock::now() - trimmed_ >= options_.trim) Trim();
+    const auto now = std::chrono::steady_clock::now();
+    if (now - trimmed_ >= options_.trim) Trim();
+    if (now - followed_ >= options_.follow) FollowOthers();
   }
 }
 
@@ -59,6 +62,11 @@ void Housekeeper::MakeRoom() {
   for (const auto& [time, session] : idle) Unload(session);
   // The sessions that were unloaded since the last look have freed theirs.
   Trim();
+}
+
+void Housekeeper::FollowOthers() {
+  registry_.FollowOthers();
+  followed_ = std::chrono::steady_clock::now();
 }
 
 // The allocator would keep what was freed between blocks that are still in use.

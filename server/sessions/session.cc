@@ -185,21 +185,20 @@ absl::Status Session::Own() {
   }
   if (place->sequence == kept.sequence && ledger_.all_kept()) return absl::OkStatus();
   Drop();
-  GoOnFrom(*place);
+  if (services_.stored != nullptr) {
+    services_.stored->Count(number(), tenant(), {place->rows - kept.rows, 0});
+  }
+  ledger_.Restart(*place);
   return absl::OkStatus();
-}
-
-void Session::GoOnFrom(const SessionPlace& place, bool anew) {
-  const int64_t more = place.rows - ledger_.kept().rows;
-  if (services_.stored != nullptr) services_.stored->Count(number(), tenant(), {more, 0});
-  ledger_.Restart(place, anew);
 }
 
 void Session::Follow(const SessionPlace& place) {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr || shared->Owns(number())) return;
   // An estimator that is still in memory, because this daemon was the owner once, lacks batches.
-  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) GoOnFrom(place, loaded());
+  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) {
+    ledger_.Restart(place, loaded());
+  }
 }
 
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,

@@ -103,7 +103,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void ReleaseWriter(const SessionObserver* writer);
 
   // Goes on to the place that a journal shared with other daemons has told, if that is a later one
-  // and this daemon does not own the session.
+  // and this daemon does not own the session. The caller counts what is stored.
   void Follow(const SessionPlace& place);
 
   // Tells its observers and its writer that the session moves to another daemon.
@@ -181,8 +181,6 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status CheckOpen() const;
   // Makes this daemon the session's owner if it may be another one's.
   absl::Status Own();
-  // Goes on from the place that the journal has told; as BatchLedger::Restart does.
-  void GoOnFrom(const SessionPlace& place, bool anew = false);
   // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
                         int64_t bytes) const;

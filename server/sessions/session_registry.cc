@@ -16,6 +16,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr size_t kLongestId = 63;
+// Number of heads that one question to a shared journal asks for.
+constexpr int64_t kFollowedAtOnce = 500;
 
 absl::Status NotFound(const std::string& name) {
   return absl::NotFoundError(absl::StrFormat("there is no session \"%s\"", name));
@@ -150,6 +152,7 @@ absl::Status SessionRegistry::CheckFree(const Key& key) const {
 }
 
 absl::Status SessionRegistry::CheckCount(const std::string& tenant) const {
+  services_.stored->NoteActive(tenant);
   if (static_cast<int64_t>(sessions_.size()) >= services_.limits.sessions) {
     return LimitExceeded(
         "--max-sessions",
@@ -201,14 +204,17 @@ std::shared_ptr<Session> SessionRegistry::Follow(SessionHead head) {
   {
     const std::lock_guard lock(mutex_);
     std::shared_ptr<Session>& session = sessions_[key];
+    // What this daemon stores itself it has counted.
+    if (!services_.journal.shared()->Owns(head.number)) {
+      services_.stored->Recount(head.number, head.tenant, {head.place.rows, head.bytes},
+                                head.snapshot_bytes);
+    }
     if (session != nullptr && session->number() == head.number) {
       session->Follow(head.place);
       return session;
     }
     if (session == nullptr) ++count_[key.first];
     before = std::exchange(session, nullptr);
-    services_.stored->Count(head.number, head.tenant, {head.place.rows, head.bytes},
-                            head.snapshot_bytes);
     session = std::make_shared<Session>(services_, std::move(head));
     if (before == nullptr) return session;
   }
@@ -229,6 +235,40 @@ void SessionRegistry::Forget(const Key& key) {
   }
   services_.stored->Forget(forgotten->number());
   forgotten->Close();
+}
+
+void SessionRegistry::FollowOthers() {
+  SharedJournal* const shared = services_.journal.shared();
+  if (shared == nullptr) return;
+  for (const std::string& tenant : services_.stored->TakeActive()) FollowOthers(*shared, tenant);
+}
+
+void SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& tenant) {
+  // Those that are known before the journal is asked and that it does not tell of are deleted.
+  std::map<int64_t, std::string> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto it = sessions_.lower_bound({tenant, ""});
+         it != sessions_.end() && it->first.first == tenant; ++it) {
+      gone[it->second->number()] = it->first.second;
+    }
+  }
+  std::string after;
+  while (true) {
+    auto heads = shared.HeadsAfter(tenant, after, kFollowedAtOnce);
+    if (!heads.ok()) return;
+    const bool last = std::ssize(*heads) < kFollowedAtOnce;
+    for (SessionHead& head : *heads) {
+      after = head.name;
+      gone.erase(head.number);
+      Follow(std::move(head));
+    }
+    if (last) break;
+  }
+  for (const auto& [number, name] : gone) {
+    const auto session = Get(tenant, name);
+    if (session.ok() && (*session)->number() == number) Forget({tenant, name});
+  }
 }
 
 absl::StatusOr<std::vector<std::shared_ptr<Session>>> SessionRegistry::List(

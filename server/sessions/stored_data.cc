@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "proto/wire/refusal/refusal.h"
 
@@ -49,6 +50,7 @@ absl::Status StoredData::Check(const StoredAmount& of_tenant, const StoredAmount
 absl::Status StoredData::Take(int64_t session, const std::string& tenant,
                               const StoredAmount& more) {
   const std::lock_guard lock(mutex_);
+  active_.insert(tenant);
   const auto found = tenants_.find(tenant);
   const absl::Status room = Check(found == tenants_.end() ? StoredAmount() : found->second, more);
   if (room.ok()) Add(session, tenant, more);
@@ -72,6 +74,25 @@ void StoredData::Count(int64_t session, const std::string& tenant, const StoredA
   const std::lock_guard lock(mutex_);
   Add(session, tenant, {amount.rows, amount.bytes + snapshot_bytes});
   if (snapshot_bytes > 0) sessions_[session].snapshot_bytes = snapshot_bytes;
+}
+
+void StoredData::Recount(int64_t session, const std::string& tenant, const StoredAmount& amount,
+                         int64_t snapshot_bytes) {
+  const std::lock_guard lock(mutex_);
+  const auto share = sessions_.find(session);
+  if (share != sessions_.end()) Remove(share, StoredAmount(share->second.amount));
+  Add(session, tenant, {amount.rows, amount.bytes + snapshot_bytes});
+  if (snapshot_bytes > 0) sessions_[session].snapshot_bytes = snapshot_bytes;
+}
+
+void StoredData::NoteActive(const std::string& tenant) {
+  const std::lock_guard lock(mutex_);
+  active_.insert(tenant);
+}
+
+std::set<std::string> StoredData::TakeActive() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(active_, {});
 }
 
 void StoredData::Release(int64_t session, const StoredAmount& amount) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "server/sessions/limits.h"
@@ -34,6 +35,13 @@ class StoredData {
   // Counts what is stored already, within the limits or not; the bytes of the snapshot apart.
   void Count(int64_t session, const std::string& tenant, const StoredAmount& amount,
              int64_t snapshot_bytes = 0);
+  // Counts anew what another daemon has stored in a session, the bytes of the snapshot apart.
+  void Recount(int64_t session, const std::string& tenant, const StoredAmount& amount,
+               int64_t snapshot_bytes);
+  // Notes that a tenant uses this daemon, as one does that takes room.
+  void NoteActive(const std::string& tenant);
+  // Returns the tenants that have been noted since the last call.
+  std::set<std::string> TakeActive();
   // Gives back the room of what was taken and then not stored. Does nothing when the session has
   // been forgotten meanwhile.
   void Release(int64_t session, const StoredAmount& amount);
@@ -61,6 +69,7 @@ class StoredData {
   std::map<int64_t, Share> sessions_;
   std::map<std::string, StoredAmount> tenants_;
   StoredAmount in_all_;
+  std::set<std::string> active_;
 };
 
 }  // namespace polyest::internal

@@ -219,6 +219,30 @@ TEST_F(ForwardingTest, NamesAnOwnerThatItCannotReach) {
   EXPECT_EQ(InfoOf(refused).metadata().at("owner"), "127.0.0.1:1");
 }
 
+TEST_F(ForwardingTest, GivesNewSessionsToTheDaemonWithLessToDo) {
+  Node first(Sharing()), second(Sharing());
+  for (int i = 1; i <= 24; ++i) {
+    const std::string id = "rig-" + std::to_string(i);
+    const grpc::Status created = first.Create(id);
+    ASSERT_TRUE(created.ok()) << created.error_message();
+    ASSERT_TRUE(first.Add(1, "sessions/" + id).ok());
+  }
+  const std::string least =
+      "SELECT min(sessions) FROM (SELECT count(owner.session) AS sessions FROM polyest.node LEFT "
+      "JOIN polyest.owner ON owner.node = node.node GROUP BY node.node) AS counted";
+  EXPECT_GE(server_.Number(uri_, least), 6);
+  EXPECT_EQ(second.Names().size(), 24u);
+  EXPECT_EQ(first.Create("rig-20").error_code(), StatusCode::ALREADY_EXISTS);
+}
+
+TEST_F(ForwardingTest, TakesNewSessionsItselfThatAnotherDaemonDoesNotTake) {
+  Node first(Sharing()), second(Sharing({"--advertise", "127.0.0.1:1"}));
+  for (int i = 1; i <= 12; ++i) {
+    const grpc::Status created = first.Create("rig-" + std::to_string(i));
+    ASSERT_TRUE(created.ok()) << created.error_message();
+  }
+}
+
 TEST_F(ForwardingTest, BelievesNobodyWithoutTheSecret) {
   Node owner(Sharing()), stranger(Arguments());
   const auto refuse = [](Node& node, const std::string& secret) {

@@ -53,9 +53,7 @@ class GuardedImportance {
     AddStarts(0, kCover, starts);
     AddStarts(kCover, guesses_.rows(), starts);
     if (starts.rows() == 0) return;
-    const MinimizerOptions options;
-    starts = ImprovedStarts(cost_, search_, starts, options);
-    result_.minima = FindMinima(search_, starts, options, stop_);
+    result_.minima = FindMinimaOf(cost_, search_, starts, stop_);
   }
 
   // Adds starts spread over the best of the known points [first, first + count).

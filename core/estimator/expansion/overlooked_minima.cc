@@ -76,14 +76,12 @@ Matrix BestOutside(const Cost& cost, const Matrix& guesses, const Region& region
 Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
                         const Matrix& particles, const Matrix& guesses, const Stop& stop) {
   const MinimizationProblem search = SearchOf(cost, expansion.design());
-  const MinimizerOptions options;
   const Region kept = RegionOfParticles(particles);
   const Matrix points = BestPoints(expansion, cost);
   const Matrix outside = BestOutside(cost, guesses, kept);
   Matrix starts(points.rows() + outside.rows(), cost.dimension());
   starts << points, outside;
-  const std::vector<Minimum> minima =
-      FindMinima(search, ImprovedStarts(cost, search, starts, options), options, stop);
+  const std::vector<Minimum> minima = FindMinimaOf(cost, search, starts, stop);
   Matrix found(1, cost.dimension());
   found.row(0) = minima.front().point.transpose();
   for (const Minimum& minimum : minima) {

@@ -154,8 +154,8 @@ Cost Elimination::OwnCost() const {
   std::vector<ChannelSums> sums = expansion_->sums();
   for (ChannelSums& channel : sums) channel.scale_unknown = channel.correlation_unknown = false;
   const ExpansionDesign& design = expansion_->design();
-  Cost cost(design.basis, design.region, design.reference, Mismatch(std::move(sums)),
-            problem_.prior(), problem_.problem().regularization);
+  Cost cost(design.basis, design.region, design.reference, Mismatch(sums), problem_.prior(),
+            problem_.problem().regularization);
   return cost;
 }
 

@@ -113,9 +113,7 @@ class Drawing {
       starts.conservativeResize(starts.rows() + 1, starts.cols());
       starts.bottomRows(1) = minimum.point.transpose();
     }
-    const MinimizerOptions options;
-    starts = ImprovedStarts(cost_, search_, starts, options);
-    draws_.minima = FindMinima(search_, starts, options, stop_);
+    draws_.minima = FindMinimaOf(cost_, search_, starts, stop_);
   }
 
   Matrix ToScores(const Matrix& etas) const {

@@ -43,10 +43,8 @@ class PieceFinder {
         search_(SearchOf(cost, design)),
         least_(static_cast<size_t>(std::ceil(kMinShare * static_cast<double>(particles.rows())))) {
     cost.EvaluateMany(particles_, costs_);
-    const MinimizerOptions options;
-    const Matrix starts =
-        ImprovedStarts(cost, search_, SpreadStarts(particles_, costs_, kStartsOfPieces), options);
-    for (Minimum& minimum : FindMinima(search_, starts, options, Stop())) {
+    const Matrix starts = SpreadStarts(particles_, costs_, kStartsOfPieces);
+    for (Minimum& minimum : FindMinimaOf(cost, search_, starts, Stop())) {
       if (minimum.converged) minima_.push_back(std::move(minimum));
     }
   }
