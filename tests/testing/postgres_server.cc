@@ -7,6 +7,7 @@
 #include <pwd.h>
 #include <signal.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -104,7 +105,7 @@ std::pair<pid_t, int> PostgresServer::Spawn(const std::vector<std::string>& comm
 
 void PostgresServer::Start() {
   const auto [pid, errors] =
-      Spawn({"postgres", "-D", folder_ / "data", "-k", folder_.path(), "-h", "", "-c",
+      Spawn({"postgres", "-D", folder_ / "data", "-k", folder_.path(), "-h", address_, "-c",
              "max_connections=60", "-c", "shared_buffers=16MB", "-c", "log_min_messages=log", "-c",
              "log_checkpoints=off", "-c", "lc_messages=C"});
   pid_ = pid;
@@ -122,6 +123,39 @@ void PostgresServer::Stop(int signal) {
   POLYEST_CHECK(waitpid(pid_, nullptr, 0) == pid_);
   close(errors_);
   pid_ = -1;
+}
+
+void PostgresServer::Write(const std::string& name, const std::string& text) const {
+  const std::string path = folder_.Write("data/" + name, text);
+  POLYEST_CHECK(chmod(path.c_str(), S_IRUSR | S_IWUSR) == 0);
+  if (geteuid() == 0) {
+    POLYEST_CHECK(chown(path.c_str(), ServerUser().pw_uid, ServerUser().pw_gid) == 0);
+  }
+}
+
+std::string PostgresServer::ServeTls(const std::string& certificate, const std::string& key,
+                                     const std::string& client_ca, const std::string& password) {
+  const std::string uri = absl::StrCat("postgresql:///postgres?user=polyest&host=", folder_.path());
+  Execute(uri, absl::StrCat("CREATE ROLE rig LOGIN PASSWORD '", password, "'"));
+  Execute(uri, "CREATE ROLE lab LOGIN");
+  for (int database = 1; database <= databases_; ++database) {
+    Execute(uri, absl::StrCat("GRANT ALL ON DATABASE test", database, " TO rig, lab"));
+  }
+  Write("server.crt", certificate);
+  Write("server.key", key);
+  Write("ca.crt", client_ca);
+  Write("pg_hba.conf",
+        "local all all trust\nhostssl all rig 127.0.0.0/8 scram-sha-256\n"
+        "hostssl all lab 127.0.0.0/8 cert\n");
+  Execute(uri, "ALTER SYSTEM SET ssl = on");
+  Execute(uri, "ALTER SYSTEM SET ssl_ca_file = 'ca.crt'");
+  // The port is the one that names the socket; no other process has this address of loopback.
+  const int process = getpid();
+  address_ = absl::StrCat("127.", 2 + process / 62'500 % 250, ".", process / 250 % 250, ".",
+                          1 + process % 250);
+  Stop(SIGINT);
+  Start();
+  return address_;
 }
 
 std::string PostgresServer::MakeDatabase() {

@@ -1,7 +1,7 @@
 #pragma once
 
 // A PostgreSQL server of its own for tests: in a temporary folder, reachable over a Unix socket in
-// that folder and nowhere else.
+// that folder and, unless it is told so, nowhere else.
 
 #include <sys/types.h>
 
@@ -35,6 +35,12 @@ class PostgresServer {
   // Returns the number that a query gives.
   int64_t Number(const std::string& uri, const std::string& sql) const;
 
+  // Starts the server again so that it can be reached by TLS on loopback, too, at the address that
+  // this returns, with its certificate and key (PEM). Role `rig` shows a password, and role `lab` a
+  // certificate of `client_ca` with its name; both may do everything in the databases made so far.
+  std::string ServeTls(const std::string& certificate, const std::string& key,
+                       const std::string& client_ca, const std::string& password);
+
   // Starts the server again; returns when it takes connections.
   void Start();
   // Ends the server as a crash would: nothing more is written, and connections break off.
@@ -42,11 +48,14 @@ class PostgresServer {
 
  private:
   void Stop(int signal);
+  // Writes a file of the server's that nobody else may read.
+  void Write(const std::string& name, const std::string& text) const;
   // Runs a program of PostgreSQL's as the user that it may run as. Returns its process, and the
   // descriptor of its stderr.
   std::pair<pid_t, int> Spawn(const std::vector<std::string>& command) const;
 
   TestFolder folder_;
+  std::string address_;  // empty: the Unix socket only
   pid_t pid_ = -1;
   int errors_ = -1;
   int databases_ = 0;
