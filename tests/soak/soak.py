@@ -4,9 +4,10 @@
 
 N rigs stream to their sessions all the time; beside them, R sessions a second are created, streamed
 to, asked for their estimate and their history, left alone and, two hundred sessions later, deleted.
-Prints the daemon's resident memory each minute: the median of that minute. Exits with status 1 if a
-minute after the first sixth of the time (ten minutes of an hour) has more than 5 % above the last
-minute of that sixth, or if a call fails.
+Prints the daemon's resident memory each minute: the median of that minute. Exits with status 1 if
+the memory is not flat within 5 % after the first sixth of the time (ten minutes of an hour), or if
+a call fails. Flat means that no minute is further than that from the median of all, and that the
+median of the last sixth is not that much above the median of the second.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from google.protobuf import json_format
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "attack"))
 import probe  # noqa: E402  (the messages and the problem are the probe's)
 
-GROWTH = 1.05
+FLAT = 0.05
 BATCH_ROWS = 10
 STEP_S = 0.01
 BATCHES_PER_S = 20
@@ -165,13 +166,27 @@ def watch(process, load, minutes):
     return medians
 
 
+def is_flat(medians):
+    """Says, and returns, whether the memory has been flat after the first sixth of the minutes."""
+    sixth = max(1, len(medians) // 6)
+    after = medians[sixth:]
+    middle = statistics.median(after)
+    furthest = max(after, key=lambda one: abs(one - middle)) / middle - 1
+    growth = statistics.median(after[-sixth:]) / statistics.median(after[:sixth]) - 1
+    print(f"{middle:.1f} MiB after the first {sixth} minutes (median), a minute at most "
+          f"{100 * furthest:+.1f} % from it; the last sixth {100 * growth:+.1f} % from the second")
+    return abs(furthest) <= FLAT and growth <= FLAT
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("polyestd")
-    parser.add_argument("--minutes", type=int, default=60)
+    parser.add_argument("--minutes", type=int, default=60, help="≥ 2")
     parser.add_argument("--streams", type=int, default=3)
     parser.add_argument("--sessions-per-s", type=float, default=5)
     arguments = parser.parse_args()
+    if arguments.minutes < 2:
+        parser.error(f"--minutes {arguments.minutes} must be at least 2")
     with tempfile.TemporaryDirectory() as folder, \
          daemon(arguments.polyestd, folder) as (process, address):
         load = Load(Client(address))
@@ -185,11 +200,7 @@ def main():
             print(f"a call has failed: {load.failure}")
             print(pathlib.Path(f"{folder}/log").read_text(encoding="utf-8")[-2000:])
             return 1
-    settled = medians[max(0, arguments.minutes // 6 - 1)]
-    highest = max(medians[arguments.minutes // 6:], default=settled)
-    print(f"{settled:.1f} MiB after the first {arguments.minutes // 6} minutes, at most "
-          f"{highest:.1f} MiB after them ({100 * (highest / settled - 1):+.1f} %)")
-    return 0 if highest <= GROWTH * settled else 1
+    return 0 if is_flat(medians) else 1
 
 
 if __name__ == "__main__":
