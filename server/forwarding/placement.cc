@@ -24,10 +24,10 @@ double MeanSessions(const std::vector<JournalNode>& nodes) {
 }  // namespace
 
 void Placement::Look() {
-  const Clock::time_point now = now_();
-  if (looked_ && now - *looked_ < kLook) return;
-  looked_ = now;
+  if (looked_ && now_() - *looked_ < kLook) return;
   auto nodes = read_nodes_();
+  // However long that took: others wait for it.
+  looked_ = now_();
   nodes_ = nodes.ok() ? *std::move(nodes) : std::vector<JournalNode>();
   std::erase_if(nodes_, [this](const JournalNode& node) {
     if (node.number == here_) return false;

@@ -146,7 +146,11 @@ void PostgresJournal::Append(JournalEntry entry, Done done) {
       return absl::OkStatus();
     };
   };
-  SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(SendBatch),
+  const auto remove = [owner = owner](PostgresWriter& writer, const JournalEntry& batch, bool&) {
+    SendRemovalOfParts(writer, batch, owner);
+    return absl::OkStatus();
+  };
+  SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(SendBatch), remove,
                 std::move(done));
 }
 

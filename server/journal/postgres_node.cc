@@ -61,7 +61,8 @@ constexpr char kRemoveParts[] =
     "(SELECT session FROM deleted ORDER BY session LIMIT 1) LIMIT 256))";
 constexpr char kRemoveRest[] =
     "WITH done AS (DELETE FROM deleted WHERE NOT EXISTS (SELECT 1 FROM batch WHERE batch.session = "
-    "deleted.session) RETURNING session), history AS (DELETE FROM history USING done WHERE "
+    "deleted.session) AND NOT EXISTS (SELECT 1 FROM part WHERE part.session = deleted.session) "
+    "RETURNING session), history AS (DELETE FROM history USING done WHERE "
     "history.session = done.session) DELETE FROM snapshot USING done WHERE snapshot.session = "
     "done.session";
 
@@ -279,6 +280,13 @@ absl::StatusOr<SessionPlace> PostgresNode::Claim(int64_t session) {
   POLYEST_RETURN_IF_ERROR(Take(session));
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult last,
                            pool_.Query(kLastPlace, PostgresParameters().Add(session)));
+  const int64_t sequence = last.rows() == 0 ? 0 : last.Integer(0, 0);
+  // Parts of a batch that never came: whoever sent them can send no more.
+  pool_
+      .Query("DELETE FROM part WHERE session = $1 AND sequence > $2",
+             PostgresParameters().Add(session).Add(sequence))
+      .status()
+      .IgnoreError();
   if (last.rows() == 0) return SessionPlace();
   return SessionPlace{last.Integer(0, 0),
                       last.Integer(0, 1),

@@ -28,6 +28,10 @@ constexpr char kInsertPart[] =
     "(session, sequence, number) DO UPDATE SET bytes = excluded.bytes RETURNING 1) "
     "SELECT EXISTS (SELECT 1 FROM added), EXISTS (SELECT 1 FROM held), EXISTS (SELECT 1 FROM "
     "session WHERE number = $1)";
+constexpr char kRemoveParts[] =
+    "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $3 AND epoch = "
+    "$4 FOR SHARE) DELETE FROM part USING held WHERE session = $1 AND sequence = $2 AND NOT EXISTS "
+    "(SELECT 1 FROM batch WHERE session = $1 AND sequence = $2)";
 constexpr char kInsertSession[] =
     "INSERT INTO session VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT DO NOTHING";
 constexpr char kInsertOwner[] =
@@ -147,6 +151,15 @@ void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart
                   .Add(owner.node)
                   .Add(owner.epoch),
               JudgeBatch(entry.place.sequence));
+}
+
+void SendRemovalOfParts(PostgresWriter& writer, const JournalEntry& entry,
+                        const PostgresOwner& owner) {
+  writer.Send(kRemoveParts, PostgresParameters()
+                                .Add(entry.session)
+                                .Add(entry.place.sequence)
+                                .Add(owner.node)
+                                .Add(owner.epoch));
 }
 
 void SendSnapshot(PostgresWriter& writer, int64_t session, const JournalSnapshot& snapshot,

@@ -32,6 +32,9 @@ void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const BatchPar
 // Sends a part that is not the last one; it replaces one that is left of an earlier attempt.
 void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
               const PostgresOwner& owner);
+// Sends the removal of the parts of a batch that was refused.
+void SendRemovalOfParts(PostgresWriter& writer, const JournalEntry& entry,
+                        const PostgresOwner& owner);
 // Do nothing when there is no such session, owner or batch.
 void SendSnapshot(PostgresWriter& writer, int64_t session, const JournalSnapshot& snapshot,
                   const PostgresOwner& owner);

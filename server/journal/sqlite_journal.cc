@@ -35,7 +35,8 @@ absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_pages) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
   POLYEST_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
   POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", max_pages)));
-  POLYEST_RETURN_IF_ERROR(DeleteUnfinishedParts(database));
+  // What a full disk does not let go of is nothing all the same.
+  DeleteUnfinishedParts(database).IgnoreError();
   return DeleteHidden(database);
 }
 
@@ -216,7 +217,8 @@ void SqliteJournal::Append(JournalEntry entry, Done done) {
     seal->Add(batch.place.sequence, batch.digest);
     return absl::OkStatus();
   };
-  SubmitInParts(*queue_, std::move(entry), lane, InsertPart, insert, std::move(done));
+  SubmitInParts(*queue_, std::move(entry), lane, InsertPart, insert, RemoveSomeRefused,
+                std::move(done));
 }
 
 void SqliteJournal::SaveSnapshot(int64_t session, JournalSnapshot snapshot) {

@@ -7,6 +7,32 @@
 #include "server/journal/sqlite_writes.h"
 
 namespace polyest::internal {
+namespace {
+
+constexpr int64_t kRemovedBytes = CommitQueue<SqliteDatabase>::kMaxBytes;
+
+using Rows = std::vector<int64_t>;
+
+// Returns the first rows that a query of them and of their sizes finds, of about so many bytes.
+absl::StatusOr<Rows> FirstRows(SqliteQuery& query, int64_t most_bytes) {
+  Rows parts;
+  for (int64_t bytes = 0; bytes < most_bytes; bytes += query.Integer(1)) {
+    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
+    if (!row) break;
+    parts.push_back(query.Integer(0));
+  }
+  return parts;
+}
+
+// Returns false when there are none to remove.
+absl::StatusOr<bool> Remove(SqliteDatabase& database, const Rows& parts) {
+  for (const int64_t part : parts) {
+    POLYEST_RETURN_IF_ERROR(RunForSession(database, "DELETE FROM part WHERE rowid = ?", part));
+  }
+  return !parts.empty();
+}
+
+}  // namespace
 
 absl::Status InsertPart(SqliteDatabase& database, const JournalEntry& entry,
                         const BatchPart& part) {
@@ -37,27 +63,47 @@ absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session,
 
 absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session,
                                      int64_t most_bytes) {
-  std::vector<int64_t> parts;
+  Rows rows;
   {
     SqliteQuery query(database, "SELECT rowid, length(bytes) FROM part WHERE session = ?");
     query.Bind(session);
-    for (int64_t bytes = 0; bytes < most_bytes; bytes += query.Integer(1)) {
-      POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-      if (!row) break;
-      parts.push_back(query.Integer(0));
-    }
+    POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, most_bytes));
   }
-  for (const int64_t part : parts) {
-    POLYEST_RETURN_IF_ERROR(RunForSession(database, "DELETE FROM part WHERE rowid = ?", part));
+  return Remove(database, rows);
+}
+
+absl::Status RemoveSomeRefused(SqliteDatabase& database, const JournalEntry& entry, bool& more) {
+  Rows rows;
+  {
+    SqliteQuery query(database,
+                      "SELECT rowid, length(bytes) FROM part WHERE session = ?1 AND sequence = ?2 "
+                      "AND NOT EXISTS (SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?2)");
+    query.Bind(entry.session).Bind(entry.place.sequence);
+    POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, kRemovedBytes));
   }
-  return !parts.empty();
+  POLYEST_ASSIGN_OR_RETURN(more, Remove(database, rows));
+  return absl::OkStatus();
 }
 
 absl::Status DeleteUnfinishedParts(SqliteDatabase& database) {
-  // Those of deleted sessions are removed with them, a few at a time.
-  return database.Execute(
-      "DELETE FROM part WHERE session IN (SELECT number FROM session) AND NOT EXISTS (SELECT 1 "
-      "FROM batch WHERE batch.session = part.session AND batch.sequence = part.sequence)");
+  while (true) {
+    Rows rows;
+    {
+      // Those of deleted sessions are removed with them.
+      SqliteQuery query(database,
+                        "SELECT rowid, length(bytes) FROM part WHERE session IN (SELECT number "
+                        "FROM session) AND NOT EXISTS (SELECT 1 FROM batch WHERE batch.session = "
+                        "part.session AND batch.sequence = part.sequence)");
+      POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, kRemovedBytes));
+    }
+    if (rows.empty()) return absl::OkStatus();
+    POLYEST_RETURN_IF_ERROR(database.Execute("BEGIN IMMEDIATE"));
+    const absl::Status removed = Remove(database, rows).status();
+    const absl::Status kept = removed.ok() ? database.Execute("COMMIT") : removed;
+    if (kept.ok()) continue;
+    database.Execute("ROLLBACK").IgnoreError();
+    return kept;
+  }
 }
 
 }  // namespace polyest::internal

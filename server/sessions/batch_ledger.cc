@@ -93,16 +93,34 @@ void BatchLedger::Settle(uint64_t losses, int64_t sequence, const absl::Status& 
 
 void BatchLedger::Restart(const SessionPlace& place, bool anew) {
   std::multimap<int64_t, Done> lost;
-  const absl::Status loss = absl::UnavailableError(
-      "the session has been taken anew from the journal; send what was not acknowledged again");
+  absl::Status loss;
   {
     const std::lock_guard lock(mutex_);
-    kept_ = taken_ = place;
-    if (under_way_.empty() && !anew) return;
-    ++losses_;
-    last_loss_ = loss;
-    under_way_.clear();
-    lost.swap(waiting_);
+    loss = RestartLocked(place, anew, lost);
+  }
+  for (const auto& [waited_for, done] : lost) done(loss);
+}
+
+// Called with the mutex held. Returns why those that wait have lost their batches.
+absl::Status BatchLedger::RestartLocked(const SessionPlace& place, bool anew,
+                                        std::multimap<int64_t, Done>& lost) {
+  kept_ = taken_ = place;
+  if (under_way_.empty() && !anew) return absl::OkStatus();
+  ++losses_;
+  last_loss_ = absl::UnavailableError(
+      "the session has been taken anew from the journal; send what was not acknowledged again");
+  under_way_.clear();
+  lost.swap(waiting_);
+  return last_loss_;
+}
+
+void BatchLedger::Follow(const SessionPlace& place, bool anew) {
+  std::multimap<int64_t, Done> lost;
+  absl::Status loss;
+  {
+    const std::lock_guard lock(mutex_);
+    if (place.sequence <= kept_.sequence || !under_way_.empty()) return;
+    loss = RestartLocked(place, anew, lost);
   }
   for (const auto& [waited_for, done] : lost) done(loss);
 }

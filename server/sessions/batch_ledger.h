@@ -58,6 +58,8 @@ class BatchLedger {
   // tells of those that are kept all the same. With `anew`, whoever has seen the losses until now
   // must begin anew, too, because what he holds lacks batches.
   void Restart(const SessionPlace& place, bool anew = false);
+  // Does the same if the place is a later one and no batch is under way.
+  void Follow(const SessionPlace& place, bool anew);
   // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
   // when one of them is lost. If there were more losses since the caller saw `losses` of them,
   // calls it with the reason of the last one, because another batch may have the number now.
@@ -71,6 +73,9 @@ class BatchLedger {
     SessionPlace place;
     std::string digest;
   };
+
+  absl::Status RestartLocked(const SessionPlace& place, bool anew,
+                             std::multimap<int64_t, Done>& lost);
 
   mutable std::mutex mutex_;
   SessionPlace kept_;

@@ -39,7 +39,7 @@ void Housekeeper::Run(std::stop_token stop) {
     if (registry_.services().memory.Exceeded()) MakeRoom();
     const auto now = std::chrono::steady_clock::now();
     if (now - trimmed_ >= options_.trim) Trim();
-    if (now - followed_ >= options_.follow) FollowOthers();
+    if (now - followed_ >= options_.follow) FollowOthers(stop);
   }
 }
 
@@ -64,8 +64,8 @@ void Housekeeper::MakeRoom() {
   Trim();
 }
 
-void Housekeeper::FollowOthers() {
-  registry_.FollowOthers();
+void Housekeeper::FollowOthers(std::stop_token stop) {
+  registry_.FollowOthers(std::move(stop));
   followed_ = std::chrono::steady_clock::now();
 }
 

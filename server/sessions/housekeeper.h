@@ -35,7 +35,7 @@ class Housekeeper {
   void UnloadIdle();
   void MakeRoom();
   void Trim();
-  void FollowOthers();
+  void FollowOthers(std::stop_token stop);
 
   SessionRegistry& registry_;
   const HousekeepingOptions options_;

@@ -186,7 +186,7 @@ absl::Status Session::Own() {
   if (place->sequence == kept.sequence && ledger_.all_kept()) return absl::OkStatus();
   Drop();
   if (services_.stored != nullptr) {
-    services_.stored->Count(number(), tenant(), {place->rows - kept.rows, 0});
+    services_.stored->RecountRows(number(), tenant(), place->rows);
   }
   ledger_.Restart(*place);
   return absl::OkStatus();
@@ -196,9 +196,7 @@ void Session::Follow(const SessionPlace& place) {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr || shared->Owns(number())) return;
   // An estimator that is still in memory, because this daemon was the owner once, lacks batches.
-  if (place.sequence > ledger_.kept().sequence && ledger_.all_kept()) {
-    ledger_.Restart(place, loaded());
-  }
+  ledger_.Follow(place, loaded());
 }
 
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,

@@ -200,7 +200,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
 
 std::shared_ptr<Session> SessionRegistry::Follow(SessionHead head) {
   const Key key(head.tenant, head.name);
-  std::shared_ptr<Session> before;
+  std::shared_ptr<Session> before, followed;
   {
     const std::lock_guard lock(mutex_);
     std::shared_ptr<Session>& session = sessions_[key];
@@ -215,12 +215,13 @@ std::shared_ptr<Session> SessionRegistry::Follow(SessionHead head) {
     }
     if (session == nullptr) ++count_[key.first];
     before = std::exchange(session, nullptr);
-    session = std::make_shared<Session>(services_, std::move(head));
-    if (before == nullptr) return session;
+    session = followed = std::make_shared<Session>(services_, std::move(head));
   }
-  services_.stored->Forget(before->number());
-  before->Close();
-  return *Get(key.first, key.second);
+  if (before != nullptr) {
+    services_.stored->Forget(before->number());
+    before->Close();
+  }
+  return followed;
 }
 
 void SessionRegistry::Forget(const Key& key) {
@@ -237,13 +238,17 @@ void SessionRegistry::Forget(const Key& key) {
   forgotten->Close();
 }
 
-void SessionRegistry::FollowOthers() {
+void SessionRegistry::FollowOthers(std::stop_token stop) {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr) return;
-  for (const std::string& tenant : services_.stored->TakeActive()) FollowOthers(*shared, tenant);
+  absl::Status answered;
+  for (const std::string& tenant : services_.stored->TakeActive()) {
+    if (answered.ok() && !stop.stop_requested()) answered = FollowOthers(*shared, tenant);
+    if (!answered.ok()) services_.stored->NoteActive(tenant);
+  }
 }
 
-void SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& tenant) {
+absl::Status SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& tenant) {
   // Those that are known before the journal is asked and that it does not tell of are deleted.
   std::map<int64_t, std::string> gone;
   {
@@ -255,10 +260,10 @@ void SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& ten
   }
   std::string after;
   while (true) {
-    auto heads = shared.HeadsAfter(tenant, after, kFollowedAtOnce);
-    if (!heads.ok()) return;
-    const bool last = std::ssize(*heads) < kFollowedAtOnce;
-    for (SessionHead& head : *heads) {
+    POLYEST_ASSIGN_OR_RETURN(std::vector<SessionHead> heads,
+                             shared.HeadsAfter(tenant, after, kFollowedAtOnce));
+    const bool last = std::ssize(heads) < kFollowedAtOnce;
+    for (SessionHead& head : heads) {
       after = head.name;
       gone.erase(head.number);
       Follow(std::move(head));
@@ -269,6 +274,7 @@ void SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& ten
     const auto session = Get(tenant, name);
     if (session.ok() && (*session)->number() == number) Forget({tenant, name});
   }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<std::shared_ptr<Session>>> SessionRegistry::List(
@@ -305,6 +311,8 @@ absl::Status SessionRegistry::Delete(const std::string& tenant, const std::strin
   }
   services_.stored->Forget(session->number());
   session->Close();
+  // What others tell of just before may bring it back; the next look then drops it.
+  services_.stored->NoteActive(tenant);
   return absl::OkStatus();
 }
 

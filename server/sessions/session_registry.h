@@ -60,8 +60,9 @@ class SessionRegistry {
 
   // Brings what is known of the tenants that have used this daemon since the last call up to date
   // with the journal that it shares, so that their limits hold over all daemons. Waits for the
-  // journal; what it does not tell stays as it was.
-  void FollowOthers();
+  // journal; what it does not tell stays as it was. Ends early when the journal does not answer, or
+  // on a stop request.
+  void FollowOthers(std::stop_token stop = {});
 
   // Returns the sessions of all tenants.
   std::vector<std::shared_ptr<Session>> All() const;
@@ -72,7 +73,7 @@ class SessionRegistry {
   using Key = std::pair<std::string, std::string>;  // tenant, name
 
   SessionRegistry(const SessionServices& services, WallClock clock);
-  void FollowOthers(SharedJournal& shared, const std::string& tenant);
+  absl::Status FollowOthers(SharedJournal& shared, const std::string& tenant);
   // Returns the session whose head the shared journal has told.
   std::shared_ptr<Session> Follow(SessionHead head);
   // Forgets a session that another daemon has deleted.

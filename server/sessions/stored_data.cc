@@ -85,6 +85,13 @@ void StoredData::Recount(int64_t session, const std::string& tenant, const Store
   if (snapshot_bytes > 0) sessions_[session].snapshot_bytes = snapshot_bytes;
 }
 
+void StoredData::RecountRows(int64_t session, const std::string& tenant, int64_t rows) {
+  const std::lock_guard lock(mutex_);
+  const auto share = sessions_.find(session);
+  const int64_t counted = share == sessions_.end() ? 0 : share->second.amount.rows;
+  Add(session, tenant, {rows - counted, 0});
+}
+
 void StoredData::NoteActive(const std::string& tenant) {
   const std::lock_guard lock(mutex_);
   active_.insert(tenant);

@@ -38,6 +38,8 @@ class StoredData {
   // Counts anew what another daemon has stored in a session, the bytes of the snapshot apart.
   void Recount(int64_t session, const std::string& tenant, const StoredAmount& amount,
                int64_t snapshot_bytes);
+  // Counts the rows of a session anew.
+  void RecountRows(int64_t session, const std::string& tenant, int64_t rows);
   // Notes that a tenant uses this daemon, as one does that takes room.
   void NoteActive(const std::string& tenant);
   // Returns the tenants that have been noted since the last call.

@@ -223,6 +223,9 @@ TEST_F(SqliteJournalTest, RefusesTheWholeOfABatchWhosePartsDoNotFitOnTheDisk) {
   const int64_t number = Create("sessions/a");
   EXPECT_EQ(Append(number, 1, 2 * kRowsOfThreeParts).code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(*CountBatches(number), 0);
+  EXPECT_EQ(Number("SELECT count(*) FROM part"), 0);
+  // What others write has the room that it has left.
+  EXPECT_TRUE(Append(Create("sessions/b"), 1, 2 * kRowsOfThreeParts / 5).ok());
   EXPECT_TRUE(Append(number, 1).ok());
   EXPECT_EQ(*CountBatches(number), 1);
 }
