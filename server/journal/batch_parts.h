@@ -4,7 +4,6 @@
 // others need not wait for the whole of it. The last part stands in the row of the batch: the batch
 // is kept once that row is. Parts whose batch never came are nothing.
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -21,28 +20,13 @@ struct BatchPart {
   std::string_view bytes;
 };
 
-// Removes the parts of a batch that was refused, one commit after the other, and calls `then`.
-// `remove_some(database, entry, more)` removes some, and says whether there may be more.
-template <typename Database, typename RemoveSome>
-void SubmitRemoval(CommitQueue<Database>& queue, const std::shared_ptr<const JournalEntry>& entry,
-                   const std::string& lane, const RemoveSome& remove_some,
-                   const std::function<void()>& then) {
-  const auto more = std::make_shared<bool>(false);
-  queue.Submit([entry, remove_some,
-                more](Database& database) { return remove_some(database, *entry, *more); },
-               [&queue, entry, lane, remove_some, then, more](const absl::Status& removed) {
-                 if (!removed.ok() || !*more) return then();
-                 SubmitRemoval(queue, entry, lane, remove_some, then);
-               },
-               lane, 0, DiskUse::kFreesRoom);
-}
-
 // Submits a batch to the lane, part by part. `write_part` and `write_last`, called with the
 // database, the entry and a part, write one. `done` hears of the last one, which is refused as the
-// first part that was; before that, the parts of a refused batch are removed.
-template <typename Database, typename WritePart, typename WriteLast, typename RemoveSome>
+// first part that was. `remove(database, entry)` removes the parts of a batch that is refused,
+// before anything that is submitted later.
+template <typename Database, typename WritePart, typename WriteLast, typename Remove>
 void SubmitInParts(CommitQueue<Database>& queue, JournalEntry entry, const std::string& lane,
-                   WritePart write_part, WriteLast write_last, RemoveSome remove_some,
+                   WritePart write_part, WriteLast write_last, Remove remove,
                    SessionJournal::Done done) {
   constexpr size_t kMost = CommitQueue<Database>::kMaxBytes;
   const auto kept = std::make_shared<const JournalEntry>(std::move(entry));
@@ -63,11 +47,14 @@ void SubmitInParts(CommitQueue<Database>& queue, JournalEntry entry, const std::
   }
   const bool in_parts = part.number > 1;
   submit(part, write_last,
-         [&queue, kept, refusal, lane, remove_some, in_parts,
+         [&queue, kept, refusal, lane, remove, in_parts,
           done = std::move(done)](const absl::Status& status) {
            const absl::Status outcome = refusal->ok() ? status : *refusal;
-           if (outcome.ok() || !in_parts) return done(outcome);
-           SubmitRemoval(queue, kept, lane, remove_some, [done, outcome] { done(outcome); });
+           if (!outcome.ok() && in_parts) {
+             queue.Submit([kept, remove](Database& database) { return remove(database, *kept); },
+                          [](const absl::Status&) {}, lane, 0, DiskUse::kFreesRoom);
+           }
+           done(outcome);
          });
 }
 

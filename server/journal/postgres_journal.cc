@@ -146,7 +146,7 @@ void PostgresJournal::Append(JournalEntry entry, Done done) {
       return absl::OkStatus();
     };
   };
-  const auto remove = [owner = owner](PostgresWriter& writer, const JournalEntry& batch, bool&) {
+  const auto remove = [owner = owner](PostgresWriter& writer, const JournalEntry& batch) {
     SendRemovalOfParts(writer, batch, owner);
     return absl::OkStatus();
   };

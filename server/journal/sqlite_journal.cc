@@ -217,7 +217,7 @@ void SqliteJournal::Append(JournalEntry entry, Done done) {
     seal->Add(batch.place.sequence, batch.digest);
     return absl::OkStatus();
   };
-  SubmitInParts(*queue_, std::move(entry), lane, InsertPart, insert, RemoveSomeRefused,
+  SubmitInParts(*queue_, std::move(entry), lane, InsertPart, insert, RemoveRefused,
                 std::move(done));
 }
 

@@ -72,17 +72,13 @@ absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session,
   return Remove(database, rows);
 }
 
-absl::Status RemoveSomeRefused(SqliteDatabase& database, const JournalEntry& entry, bool& more) {
-  Rows rows;
-  {
-    SqliteQuery query(database,
-                      "SELECT rowid, length(bytes) FROM part WHERE session = ?1 AND sequence = ?2 "
-                      "AND NOT EXISTS (SELECT 1 FROM batch WHERE session = ?1 AND sequence = ?2)");
-    query.Bind(entry.session).Bind(entry.place.sequence);
-    POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, kRemovedBytes));
-  }
-  POLYEST_ASSIGN_OR_RETURN(more, Remove(database, rows));
-  return absl::OkStatus();
+absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry) {
+  SqliteQuery query(
+      database,
+      "DELETE FROM part WHERE session = ?1 AND sequence = ?2 AND NOT EXISTS (SELECT 1 "
+      "FROM batch WHERE session = ?1 AND sequence = ?2)");
+  query.Bind(entry.session).Bind(entry.place.sequence);
+  return query.Run();
 }
 
 absl::Status DeleteUnfinishedParts(SqliteDatabase& database) {

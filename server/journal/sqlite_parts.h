@@ -20,8 +20,8 @@ absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session,
                                       int64_t part_count, std::string last);
 // Removes parts of a session, of about so many bytes. Returns false when it has none left.
 absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session, int64_t most_bytes);
-// Removes some parts of a batch that was refused; says whether there may be more.
-absl::Status RemoveSomeRefused(SqliteDatabase& database, const JournalEntry& entry, bool& more);
+// Removes the parts of a batch that was refused.
+absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry);
 // Removes the parts whose batch never came, in several commits.
 absl::Status DeleteUnfinishedParts(SqliteDatabase& database);
 

@@ -221,11 +221,31 @@ TEST_F(SqliteJournalTest, ForgetsThePartsOfABatchThatNeverCame) {
 TEST_F(SqliteJournalTest, RefusesTheWholeOfABatchWhosePartsDoNotFitOnTheDisk) {
   ASSERT_TRUE(Open(/*max_mb=*/1).ok());
   const int64_t number = Create("sessions/a");
-  EXPECT_EQ(Append(number, 1, 2 * kRowsOfThreeParts).code(), absl::StatusCode::kResourceExhausted);
+  // The next batch is sent before the outcome is known, and its own comes after it.
+  std::vector<absl::StatusCode> outcomes;
+  std::promise<void> both;
+  for (const int64_t sequence : {1, 2}) {
+    v1::Measurements batch;
+    for (size_t row = 0; row < (sequence == 1 ? 2 * kRowsOfThreeParts : 1); ++row) {
+      batch.add_time_s(static_cast<double>(row + 1));
+    }
+    JournalEntry entry;
+    entry.session = number;
+    entry.measurements = DeterministicBytes(batch);
+    entry.digest = Digest(entry.measurements);
+    entry.place.sequence = sequence;
+    journal_->Append(std::move(entry), [&, sequence](const absl::Status& kept) {
+      outcomes.push_back(kept.code());
+      if (sequence == 2) both.set_value();
+    });
+  }
+  both.get_future().wait();
+  EXPECT_THAT(outcomes, testing::ElementsAre(absl::StatusCode::kResourceExhausted,
+                                             absl::StatusCode::kFailedPrecondition));
   EXPECT_EQ(*CountBatches(number), 0);
+  // What is written later has the room that it has left.
+  EXPECT_TRUE(Append(Create("sessions/b"), 1, kRowsOfThreeParts / 5).ok());
   EXPECT_EQ(Number("SELECT count(*) FROM part"), 0);
-  // What others write has the room that it has left.
-  EXPECT_TRUE(Append(Create("sessions/b"), 1, 2 * kRowsOfThreeParts / 5).ok());
   EXPECT_TRUE(Append(number, 1).ok());
   EXPECT_EQ(*CountBatches(number), 1);
 }
