@@ -172,15 +172,14 @@ Matrix ReducedHessian(UnitProblem& problem, const Vector& u, const Matrix& z) {
 
 enum class Polish { kConverged, kSaddle, kUnsure };
 
-// Applies up to `steps` steps of Newton's method, by the gradient alone, in the free directions:
-// near a minimum rounding spoils differences of values long before it spoils the gradient. Moves
-// `u` down from a saddle.
-Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, int steps, Vector& u) {
+// Applies Newton's method, by the gradient alone, in the free directions: near a minimum rounding
+// spoils differences of values long before it spoils the gradient. Moves `u` down from a saddle.
+Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, Vector& u) {
   constexpr double kFlat = 1e-13;  // × the largest curvature: less counts as no curvature
   constexpr double kKick = 1e-3;
   Vector gradient(u.size());
   double value = problem.Value(u, &gradient);
-  for (int step = 0; step < steps && std::isfinite(value); ++step) {
+  for (int step = 0; step < kMaxNewtonSteps && std::isfinite(value); ++step) {
     const Matrix z = FreeDirections(problem, u, gradient);
     if (z.cols() == 0) return Polish::kConverged;
     const Matrix hessian = ReducedHessian(problem, u, z);
@@ -213,11 +212,6 @@ Polish PolishPoint(UnitProblem& problem, const MinimizerOptions& options, int st
     gradient = next_gradient;
   }
   return Polish::kUnsure;
-}
-
-// Returns whether a point is a minimum already, as one is that Newton's method has found.
-bool IsMinimum(UnitProblem& problem, const MinimizerOptions& options, Vector u) {
-  return PolishPoint(problem, options, /*steps=*/1, u) == Polish::kConverged;
 }
 
 // Returns the first point on the way from the start to the middle of the box at which f is finite.
@@ -256,15 +250,12 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
   Vector u = PrepareStart(problem, problem.Project(problem.ToUnit(start)));
   double value = problem.Value(u, nullptr);
   Minimum minimum;
-  minimum.converged = std::isfinite(value) && IsMinimum(problem, options, u);
-  if (minimum.converged) minimum.code = nlopt::SUCCESS;
-  for (int restart = 0; !minimum.converged && restart <= kMaxRestarts && std::isfinite(value);
-       ++restart) {
+  for (int restart = 0; restart <= kMaxRestarts && std::isfinite(value); ++restart) {
     const Run run = RunSolver(problem, u, options);
     minimum.code = run.code;
     Vector next = run.point;
     Polish polish = Polish::kUnsure;
-    if (!problem.PollStop()) polish = PolishPoint(problem, options, kMaxNewtonSteps, next);
+    if (!problem.PollStop()) polish = PolishPoint(problem, options, next);
     const double next_value = problem.Value(next, nullptr);
     const bool moved = (next - u).cwiseAbs().maxCoeff() > options.relative_step;
     const bool lower = next_value < value;
@@ -274,7 +265,7 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
     }
     minimum.converged = polish == Polish::kConverged ||
                         (polish == Polish::kUnsure && !(moved && lower) && IsSuccess(run.code));
-    if (problem.stopped() || !std::isfinite(next_value)) break;
+    if (minimum.converged || problem.stopped() || !std::isfinite(next_value)) break;
     if (problem.evaluations() >= options.max_evaluations) break;
   }
   minimum.point = problem.ToPoint(problem.Project(OnBounds(problem, u)));

@@ -38,10 +38,7 @@ std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProble
     if (!factor.positive_definite()) return std::nullopt;
     const Vector move = -factor.Solve(gradient);
     if (!move.allFinite()) return std::nullopt;
-    if ((move.array().abs() <= kConvergedStep * width.array()).all()) {
-      const Vector last = eta + move;
-      return IsInside(problem, last) ? last : eta;
-    }
+    if ((move.array().abs() <= kConvergedStep * width.array()).all()) return eta;
     const double slope = gradient.dot(move);
     double fraction = 1;
     const bool hidden = -slope <= kRounding * std::abs(value);

@@ -16,7 +16,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/bayes/newton_starts.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/new_runs.h"
@@ -96,7 +95,8 @@ std::optional<GermSummary> MixtureComponent::GaussianPosterior(const Stop& stop)
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   const ExpansionDesign& design = expansion_->design();
   const Minimum minimum =
-      FindMinimaOf(cost, SearchOf(cost, design), design.reference.transpose(), stop).front();
+      FindMinima(SearchOf(cost, design), design.reference.transpose(), MinimizerOptions(), stop)
+          .front();
   Vector gradient(minimum.point.size());
   cost.EvaluateWithGradient(minimum.point, gradient);
   const Matrix hessian = cost.Hessian(minimum.point);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/bayes/differential_evolution.h"
-#include "core/bayes/newton_starts.h"
 #include "core/chaos/collocation_points.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/mixture_share.h"
@@ -39,7 +38,8 @@ double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const 
   double least = costs[order.front()];
   if (!std::isfinite(least)) return -kInfinity;
   const Matrix starts = etas(order, Eigen::all);
-  for (const Minimum& minimum : FindMinimaOf(cost, SearchOf(cost, design), starts, Stop())) {
+  for (const Minimum& minimum :
+       FindMinima(SearchOf(cost, design), starts, MinimizerOptions(), Stop())) {
     least = std::min(least, minimum.value);
   }
   // ∫ e^{−J} dξ ≤ |box| e^{−min J}
