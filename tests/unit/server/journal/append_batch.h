@@ -24,16 +24,21 @@ inline int64_t CreateIn(SessionJournal& journal, const std::string& name,
   return number.value_or(0);
 }
 
-// Appends a batch and waits until it is kept, or not.
-inline absl::Status AppendTo(SessionJournal& journal, int64_t session, int64_t sequence,
-                             const v1::Measurements& batch) {
+inline JournalEntry EntryOf(int64_t session, int64_t sequence, const v1::Measurements& batch) {
   JournalEntry entry;
   entry.session = session;
   entry.measurements = DeterministicBytes(batch);
   entry.digest = Digest(entry.measurements);
   entry.place.sequence = sequence;
+  return entry;
+}
+
+// Appends a batch and waits until it is kept, or not.
+inline absl::Status AppendTo(SessionJournal& journal, int64_t session, int64_t sequence,
+                             const v1::Measurements& batch) {
   std::promise<absl::Status> kept;
-  journal.Append(std::move(entry), [&](const absl::Status& status) { kept.set_value(status); });
+  journal.Append(EntryOf(session, sequence, batch),
+                 [&](const absl::Status& status) { kept.set_value(status); });
   return kept.get_future().get();
 }
 

@@ -28,9 +28,6 @@ constexpr fs::perms kOpenFolder = fs::perms(0755);
 constexpr fs::perms kOpenFile = fs::perms(0644);
 const std::vector<std::string> kFiles{"lock", "journal.db", "journal.db-wal", "journal.db-shm"};
 
-// Rows of a batch that takes more than two commits; each has 8 bytes.
-constexpr size_t kRowsOfThreeParts = CommitQueue<SqliteDatabase>::kMaxBytes * 5 / 16;
-
 class SqliteJournalTest : public testing::Test {
  protected:
   absl::Status Open(int64_t max_mb = 0) {
@@ -76,11 +73,6 @@ class SqliteJournalTest : public testing::Test {
     auto database = SqliteDatabase::Open(file_);
     ASSERT_TRUE(database.ok());
     ASSERT_TRUE((*database)->Execute(sql).ok());
-  }
-
-  int64_t Number(const char* sql) {
-    auto database = SqliteDatabase::Open(file_);
-    return database.ok() ? (*database)->Number(sql).value_or(-1) : -1;
   }
 
   TestFolder folder_;
@@ -198,56 +190,6 @@ TEST_F(SqliteJournalTest, BringsAFileOfTheFirstFormatUpToDate) {
   journal_->SaveSnapshot(5, {1, 4, "state"});
   ASSERT_TRUE(Append(5, 2).ok());
   EXPECT_EQ((*journal_->ReadSnapshot(5))->state, "state");
-}
-
-TEST_F(SqliteJournalTest, ForgetsThePartsOfABatchThatNeverCame) {
-  ASSERT_TRUE(Open().ok());
-  const int64_t number = Create("sessions/a");
-  ASSERT_TRUE(Append(number, 1, kRowsOfThreeParts).ok());
-  // As after a crash in the middle of batch 2, and with a rest of batch 3 of another attempt.
-  Change(
-      "INSERT INTO part SELECT session, 2, number, x'01' FROM part WHERE number = 1; "
-      "INSERT INTO part SELECT session, 3, 7, x'01' FROM part WHERE sequence = 1 AND number = 1");
-  ASSERT_TRUE(Append(number, 2, kRowsOfThreeParts).ok());
-  EXPECT_EQ(*CountBatches(number), 2);
-  ASSERT_TRUE(Open().ok());
-  EXPECT_EQ(*CountBatches(number), 2);
-  EXPECT_EQ(Number("SELECT count(*) FROM part"), 4);
-  Change("UPDATE part SET bytes = x'00' WHERE sequence = 2 AND number = 2");
-  EXPECT_EQ(CountBatches(number).status(),
-            absl::DataLossError("batch 2 of the session is damaged or missing in the journal"));
-}
-
-TEST_F(SqliteJournalTest, RefusesTheWholeOfABatchWhosePartsDoNotFitOnTheDisk) {
-  ASSERT_TRUE(Open(/*max_mb=*/1).ok());
-  const int64_t number = Create("sessions/a");
-  // The next batch is sent before the outcome is known, and its own comes after it.
-  std::vector<absl::StatusCode> outcomes;
-  std::promise<void> both;
-  for (const int64_t sequence : {1, 2}) {
-    v1::Measurements batch;
-    for (size_t row = 0; row < (sequence == 1 ? 2 * kRowsOfThreeParts : 1); ++row) {
-      batch.add_time_s(static_cast<double>(row + 1));
-    }
-    JournalEntry entry;
-    entry.session = number;
-    entry.measurements = DeterministicBytes(batch);
-    entry.digest = Digest(entry.measurements);
-    entry.place.sequence = sequence;
-    journal_->Append(std::move(entry), [&, sequence](const absl::Status& kept) {
-      outcomes.push_back(kept.code());
-      if (sequence == 2) both.set_value();
-    });
-  }
-  both.get_future().wait();
-  EXPECT_THAT(outcomes, testing::ElementsAre(absl::StatusCode::kResourceExhausted,
-                                             absl::StatusCode::kFailedPrecondition));
-  EXPECT_EQ(*CountBatches(number), 0);
-  // What is written later has the room that it has left.
-  EXPECT_TRUE(Append(Create("sessions/b"), 1, kRowsOfThreeParts / 5).ok());
-  EXPECT_EQ(Number("SELECT count(*) FROM part"), 0);
-  EXPECT_TRUE(Append(number, 1).ok());
-  EXPECT_EQ(*CountBatches(number), 1);
 }
 
 TEST_F(SqliteJournalTest, SaysWhichBatchIsDamagedAndLeavesTheOthersAlone) {
