@@ -1,5 +1,7 @@
 """A rig that streams 100 rows a second and measures how long each takes to be acknowledged."""
 
+import argparse
+import os
 import pathlib
 import queue
 import subprocess
@@ -16,6 +18,13 @@ PROBLEM = {"model": {"builtin": "mass_spring_damper"}, "fixed": {"m": 1, "x0": 1
 INTERVAL_S = 0.01
 # From one estimate to the next, s: one after each row would keep a core busy by itself.
 ESTIMATE_INTERVAL_S = 1.0
+
+
+def program(path):
+    """Takes an argument of a command line that names a program."""
+    if not pathlib.Path(path).is_file() or not os.access(path, os.X_OK):
+        raise argparse.ArgumentTypeError(f"{path} is no program that can be run")
+    return path
 
 
 def messages():

@@ -192,7 +192,7 @@ def measure(arguments, process, port, certificate):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("polyestd")
+    parser.add_argument("polyestd", type=rig.program)
     parser.add_argument("attack", choices=ATTACKS)
     parser.add_argument("--edge")
     parser.add_argument("--seconds", type=float, default=3)

@@ -208,7 +208,7 @@ def run(attack, arguments):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("polyestd")
+    parser.add_argument("polyestd", type=rig.program)
     parser.add_argument("attacks", nargs="*", metavar="ATTACK", help=", ".join(ATTACKS))
     parser.add_argument("--seconds", type=float, default=3)
     parser.add_argument("--bound-ms", type=float, default=BOUND_MS, help="of the rig's p99")

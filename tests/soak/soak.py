@@ -176,7 +176,7 @@ def is_flat(medians):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("polyestd")
+    parser.add_argument("polyestd", type=probe.program)
     parser.add_argument("--minutes", type=int, default=60, help="≥ 2")
     parser.add_argument("--streams", type=int, default=3)
     parser.add_argument("--sessions-per-s", type=float, default=5)
