@@ -25,12 +25,13 @@ class Placement {
 
   using ReadNodes = std::function<absl::StatusOr<std::vector<JournalNode>>()>;
 
-  // Takes the number of this daemon and what SharedJournal::Nodes is called by.
+  // `here` is the number of this daemon; `read_nodes` returns what SharedJournal::Nodes does.
   Placement(int64_t here, ReadNodes read_nodes, std::function<Clock::time_point()> now = Clock::now)
       : here_(here), read_nodes_(std::move(read_nodes)), now_(std::move(now)) {}
 
-  // Returns the address of the daemon that is to have a new session, which counts from then on;
-  // nothing if that is this one, or the journal does not tell. Waits for the journal once a second.
+  // Returns the address of the daemon that is to have a new session, and counts the session there.
+  // Returns nothing if that daemon is this one, or if the journal cannot be read. Reads the journal
+  // at most once a second.
   std::optional<std::string> Elsewhere();
 
  private:

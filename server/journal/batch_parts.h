@@ -2,7 +2,7 @@
 
 // A batch that is larger than a commit is kept in parts, each with a commit of its own, so that
 // others need not wait for the whole of it. The last part stands in the row of the batch: the batch
-// is kept once that row is. Parts whose batch never came are nothing.
+// is kept once that row is. Parts without such a row are never read.
 
 #include <memory>
 #include <string>
@@ -20,10 +20,10 @@ struct BatchPart {
   std::string_view bytes;
 };
 
-// Submits a batch to the lane, part by part. `write_part` and `write_last`, called with the
-// database, the entry and a part, write one. `done` hears of the last one, which is refused as the
-// first part that was. `remove(database, entry)` removes the parts of a batch that is refused,
-// before anything that is submitted later.
+// Submits a batch to the lane, part by part. `write_part(database, entry, part)` writes a part, and
+// `write_last` the last one with the row of the batch. When a part is refused, the batch is refused
+// for the same reason, and `remove(database, entry)` removes its parts before anything that is
+// submitted later is written.
 template <typename Database, typename WritePart, typename WriteLast, typename Remove>
 void SubmitInParts(CommitQueue<Database>& queue, JournalEntry entry, const std::string& lane,
                    WritePart write_part, WriteLast write_last, Remove remove,
@@ -34,7 +34,7 @@ void SubmitInParts(CommitQueue<Database>& queue, JournalEntry entry, const std::
   const auto submit = [&](const BatchPart& part, const auto& write, SessionJournal::Done heard) {
     queue.Submit(
         [kept, refusal, part, write](Database& database) -> absl::Status {
-          // Says nothing of the database, so that others in the same commit are kept.
+          // This status fails this write only, not the others of the same commit.
           if (!refusal->ok()) return absl::FailedPreconditionError("another part was refused");
           return write(database, *kept, part);
         },

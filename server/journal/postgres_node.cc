@@ -281,7 +281,8 @@ absl::StatusOr<SessionPlace> PostgresNode::Claim(int64_t session) {
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult last,
                            pool_.Query(kLastPlace, PostgresParameters().Add(session)));
   const int64_t sequence = last.rows() == 0 ? 0 : last.Integer(0, 0);
-  // Parts of a batch that never came: whoever sent them can send no more.
+  // Removes the parts of a batch that was never completed. The claim keeps its sender from adding
+  // more.
   pool_
       .Query("DELETE FROM part WHERE session = $1 AND sequence > $2",
              PostgresParameters().Add(session).Add(sequence))

@@ -35,7 +35,7 @@ absl::Status SetUpWriter(SqliteDatabase& database, int64_t max_pages) {
   POLYEST_RETURN_IF_ERROR(PrepareSchema(database));
   POLYEST_RETURN_IF_ERROR(database.Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL"));
   POLYEST_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA max_page_count = ", max_pages)));
-  // What a full disk does not let go of is nothing all the same.
+  // A full disk may refuse this. The parts that stay are never read.
   DeleteUnfinishedParts(database).IgnoreError();
   return DeleteHidden(database);
 }

@@ -36,16 +36,9 @@ absl::StatusOr<bool> RemoveSomeBatches(SqliteDatabase& database, int64_t session
     SqliteQuery query(database,
                       "SELECT rowid, length(measurements) FROM batch WHERE session = ? LIMIT ?");
     query.Bind(session).Bind(kRemovedBatches);
-    for (int64_t bytes = 0; bytes < most_bytes; bytes += query.Integer(1)) {
-      POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-      if (!row) break;
-      batches.push_back(query.Integer(0));
-    }
+    POLYEST_ASSIGN_OR_RETURN(batches, FirstRows(query, most_bytes));
   }
-  for (const int64_t batch : batches) {
-    POLYEST_RETURN_IF_ERROR(RunForSession(database, "DELETE FROM batch WHERE rowid = ?", batch));
-  }
-  return !batches.empty();
+  return RunForRows(database, "DELETE FROM batch WHERE rowid = ?", batches);
 }
 
 }  // namespace

@@ -9,28 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kRemovedBytes = CommitQueue<SqliteDatabase>::kMaxBytes;
-
-using Rows = std::vector<int64_t>;
-
-// Returns the first rows that a query of them and of their sizes finds, of about so many bytes.
-absl::StatusOr<Rows> FirstRows(SqliteQuery& query, int64_t most_bytes) {
-  Rows parts;
-  for (int64_t bytes = 0; bytes < most_bytes; bytes += query.Integer(1)) {
-    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
-    if (!row) break;
-    parts.push_back(query.Integer(0));
-  }
-  return parts;
-}
-
-// Returns false when there are none to remove.
-absl::StatusOr<bool> Remove(SqliteDatabase& database, const Rows& parts) {
-  for (const int64_t part : parts) {
-    POLYEST_RETURN_IF_ERROR(RunForSession(database, "DELETE FROM part WHERE rowid = ?", part));
-  }
-  return !parts.empty();
-}
+constexpr char kRemovePart[] = "DELETE FROM part WHERE rowid = ?";
 
 }  // namespace
 
@@ -63,13 +42,13 @@ absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session,
 
 absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session,
                                      int64_t most_bytes) {
-  Rows rows;
+  std::vector<int64_t> rows;
   {
     SqliteQuery query(database, "SELECT rowid, length(bytes) FROM part WHERE session = ?");
     query.Bind(session);
     POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, most_bytes));
   }
-  return Remove(database, rows);
+  return RunForRows(database, kRemovePart, rows);
 }
 
 absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry) {
@@ -83,18 +62,18 @@ absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry) 
 
 absl::Status DeleteUnfinishedParts(SqliteDatabase& database) {
   while (true) {
-    Rows rows;
+    std::vector<int64_t> rows;
     {
       // Those of deleted sessions are removed with them.
       SqliteQuery query(database,
                         "SELECT rowid, length(bytes) FROM part WHERE session IN (SELECT number "
                         "FROM session) AND NOT EXISTS (SELECT 1 FROM batch WHERE batch.session = "
                         "part.session AND batch.sequence = part.sequence)");
-      POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, kRemovedBytes));
+      POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, CommitQueue<SqliteDatabase>::kMaxBytes));
     }
     if (rows.empty()) return absl::OkStatus();
     POLYEST_RETURN_IF_ERROR(database.Execute("BEGIN IMMEDIATE"));
-    const absl::Status removed = Remove(database, rows).status();
+    const absl::Status removed = RunForRows(database, kRemovePart, rows).status();
     const absl::Status kept = removed.ok() ? database.Execute("COMMIT") : removed;
     if (kept.ok()) continue;
     database.Execute("ROLLBACK").IgnoreError();

@@ -15,14 +15,14 @@ namespace polyest::internal {
 // Inserts a part that is not the last one; replaces one that is left of an earlier attempt. Errors:
 // those of InsertBatch.
 absl::Status InsertPart(SqliteDatabase& database, const JournalEntry& entry, const BatchPart& part);
-// Returns the measurements of a batch, of whose last part `part_count` others are kept apart.
+// Returns the measurements of a batch: the `part_count` parts that are kept apart, then `last`.
 absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session, int64_t sequence,
                                       int64_t part_count, std::string last);
 // Removes parts of a session, of about so many bytes. Returns false when it has none left.
 absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session, int64_t most_bytes);
 // Removes the parts of a batch that was refused.
 absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry);
-// Removes the parts whose batch never came, in several commits.
+// Removes parts without the row of a batch, in several commits.
 absl::Status DeleteUnfinishedParts(SqliteDatabase& database);
 
 }  // namespace polyest::internal

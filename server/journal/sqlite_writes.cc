@@ -12,6 +12,26 @@ absl::Status RunForSession(SqliteDatabase& database, const char* sql, int64_t se
   return query.Run();
 }
 
+absl::StatusOr<std::vector<int64_t>> FirstRows(SqliteQuery& query, int64_t bytes) {
+  std::vector<int64_t> rows;
+  for (int64_t found = 0; found < bytes; found += query.Integer(1)) {
+    POLYEST_ASSIGN_OR_RETURN(const bool row, query.Step());
+    if (!row) break;
+    rows.push_back(query.Integer(0));
+  }
+  return rows;
+}
+
+absl::StatusOr<bool> RunForRows(SqliteDatabase& database, const char* sql,
+                                const std::vector<int64_t>& rows) {
+  for (const int64_t row : rows) {
+    SqliteQuery query(database, sql);
+    query.Bind(row);
+    POLYEST_RETURN_IF_ERROR(query.Run());
+  }
+  return !rows.empty();
+}
+
 absl::Status BatchRefused(SqliteDatabase& database, const JournalEntry& entry) {
   SqliteQuery session(database, "SELECT 1 FROM session WHERE number = ?");
   session.Bind(entry.session);

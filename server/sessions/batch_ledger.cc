@@ -101,7 +101,6 @@ void BatchLedger::Restart(const SessionPlace& place, bool anew) {
   for (const auto& [waited_for, done] : lost) done(loss);
 }
 
-// Called with the mutex held. Returns why those that wait have lost their batches.
 absl::Status BatchLedger::RestartLocked(const SessionPlace& place, bool anew,
                                         std::multimap<int64_t, Done>& lost) {
   kept_ = taken_ = place;

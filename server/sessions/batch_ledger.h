@@ -74,6 +74,7 @@ class BatchLedger {
     std::string digest;
   };
 
+  // Called with the mutex held. Returns why those that wait have lost their batches.
   absl::Status RestartLocked(const SessionPlace& place, bool anew,
                              std::multimap<int64_t, Done>& lost);
 

@@ -249,7 +249,7 @@ void SessionRegistry::FollowOthers(std::stop_token stop) {
 }
 
 absl::Status SessionRegistry::FollowOthers(SharedJournal& shared, const std::string& tenant) {
-  // Those that are known before the journal is asked and that it does not tell of are deleted.
+  // Sessions that are known before the journal is asked, and that it does not name, are deleted.
   std::map<int64_t, std::string> gone;
   {
     const std::lock_guard lock(mutex_);
@@ -311,7 +311,7 @@ absl::Status SessionRegistry::Delete(const std::string& tenant, const std::strin
   }
   services_.stored->Forget(session->number());
   session->Close();
-  // What others tell of just before may bring it back; the next look then drops it.
+  // A list that was read just before the deletion may add it again; the next look removes it.
   services_.stored->NoteActive(tenant);
   return absl::OkStatus();
 }
