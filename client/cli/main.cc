@@ -1,5 +1,6 @@
 // The `polyest` command.
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <unistd.h>
 
@@ -32,8 +33,9 @@ int Run(const polyest::internal::Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // gRPC's own messages are suppressed: errors that matter are returned as a status.
+  // The libraries' own messages are suppressed: errors that matter are returned as a status.
   gpr_set_log_function([](gpr_log_func_args*) {});
+  google::protobuf::SetLogHandler(nullptr);
   try {
     const auto parsed = polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr);
     if (const int* status = std::get_if<int>(&parsed)) return *status;

@@ -13,7 +13,7 @@
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
 #include "server/daemon/service_manager.h"
-#include "server/telemetry/grpc_log.h"
+#include "server/telemetry/library_log.h"
 #include "server/telemetry/structured_log.h"
 
 namespace {
@@ -23,7 +23,7 @@ void StartLog(const polyest::internal::CommandLine& command_line) {
                                   ? polyest::internal::LogFormat::kJson
                                   : polyest::internal::LogFormat::kText,
                               spdlog::level::from_str(command_line.log_level));
-  polyest::internal::StartGrpcLog();
+  polyest::internal::StartLibraryLog();
 }
 
 // Keeps the heap from growing for days. Memory that was freed is used again only within its arena,

@@ -2,6 +2,7 @@
 
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/impl/codegen/proto_utils.h>
+#include <grpcpp/support/byte_buffer.h>
 
 #include <utility>
 
@@ -14,12 +15,23 @@ namespace {
 
 using Message = google::protobuf::MessageLite;
 
-// What a unary call needs until it ends.
+// What a unary call needs until it ends. The answer comes as bytes: for gRPC, a call may succeed
+// without any.
 struct UnderWay {
   std::unique_ptr<grpc::ClientContext> context;
-  grpc::TemplatedGenericStub<Message, Message> stub;
+  grpc::TemplatedGenericStub<Message, grpc::ByteBuffer> stub;
+  grpc::ByteBuffer bytes;
+  Message* answer;
   NodeForwarder::Done done;
 };
+
+// Reads the answer of a call that has succeeded.
+grpc::Status ReadAnswer(UnderWay& call) {
+  if (call.bytes.Valid()) {
+    return grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&call.bytes, call.answer);
+  }
+  return {grpc::StatusCode::INTERNAL, "the daemon to which the call went on has answered nothing"};
+}
 
 }  // namespace
 
@@ -42,12 +54,15 @@ std::optional<NodeForwarder::Passage> NodeForwarder::PassageFor(
 void NodeForwarder::Call(Passage passage, const std::string& path, const Message* request,
                          Message* answer, Done done) {
   auto* const call =
-      new UnderWay{std::move(passage.context),
-                   grpc::TemplatedGenericStub<Message, Message>(passage.channel), std::move(done)};
-  call->stub.UnaryCall(call->context.get(), path, grpc::StubOptions(), request, answer,
+      new UnderWay{.context = std::move(passage.context),
+                   .stub = grpc::TemplatedGenericStub<Message, grpc::ByteBuffer>(passage.channel),
+                   .bytes = {},
+                   .answer = answer,
+                   .done = std::move(done)};
+  call->stub.UnaryCall(call->context.get(), path, grpc::StubOptions(), request, &call->bytes,
                        [owned = call](const grpc::Status& outcome) {
                          const std::unique_ptr<UnderWay> ended(owned);
-                         ended->done(*ended->context, outcome);
+                         ended->done(*ended->context, outcome.ok() ? ReadAnswer(*ended) : outcome);
                        });
 }
 

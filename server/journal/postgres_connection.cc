@@ -19,6 +19,7 @@ using Deadline = std::chrono::steady_clock::time_point;
 
 // PostgreSQL's numbers of types (pg_type.dat), which never change.
 constexpr Oid kBool = 16, kBytea = 17, kInt8 = 20, kText = 25, kFloat8 = 701;
+constexpr Oid kByteaArray = 1001, kInt8Array = 1016, kFloat8Array = 1022;
 
 // Longest time for connecting to one host, s.
 constexpr char kConnectTimeoutS[] = "5";
@@ -46,6 +47,36 @@ uint64_t BigEndian(const char* bytes) {
   return bits;
 }
 
+// Appends a number as PostgreSQL's binary format has it, its highest byte first.
+void AppendBigEndian(uint64_t bits, int size, std::string& bytes) {
+  for (int i = size - 1; i >= 0; --i) bytes += static_cast<char>(bits >> 8 * i);
+}
+
+std::string BytesOf(int64_t value) {
+  std::string bytes;
+  AppendBigEndian(static_cast<uint64_t>(value), 8, bytes);
+  return bytes;
+}
+std::string BytesOf(double value) { return BytesOf(std::bit_cast<int64_t>(value)); }
+std::string_view BytesOf(std::string_view bytes) { return bytes; }
+
+// Returns an array in PostgreSQL's binary format: the number of dimensions, whether any element is
+// NULL, the type, the number of elements, the index of the first, and each with its size.
+template <typename Element>
+std::string ArrayOf(Oid type, const std::vector<Element>& elements) {
+  std::string bytes;
+  for (const uint64_t word :
+       {uint64_t{1}, uint64_t{0}, uint64_t{type}, elements.size(), size_t{1}}) {
+    AppendBigEndian(word, 4, bytes);
+  }
+  for (const Element& element : elements) {
+    const auto& inside = BytesOf(element);
+    AppendBigEndian(inside.size(), 4, bytes);
+    bytes += inside;
+  }
+  return bytes;
+}
+
 std::string OneLine(const char* text) {
   std::string line = text;
   while (!line.empty() && line.back() == '\n') line.pop_back();
@@ -57,28 +88,36 @@ std::string OneLine(const char* text) {
 
 }  // namespace
 
-PostgresParameters& PostgresParameters::AddBigEndian(unsigned type, uint64_t bits) {
+PostgresParameters& PostgresParameters::AddInside(unsigned type, std::string bytes) {
   Value& value = values_.emplace_back();
   value.type = type;
-  value.size = 8;
-  for (size_t i = 0; i < 8; ++i) value.inside[i] = static_cast<char>(bits >> (56 - 8 * i));
+  value.size = static_cast<int>(bytes.size());
+  value.inside = std::move(bytes);
   return *this;
 }
 
 PostgresParameters& PostgresParameters::Add(int64_t value) {
-  return AddBigEndian(kInt8, static_cast<uint64_t>(value));
+  return AddInside(kInt8, BytesOf(value));
 }
 
 PostgresParameters& PostgresParameters::Add(double value) {
-  return AddBigEndian(kFloat8, std::bit_cast<uint64_t>(value));
+  return AddInside(kFloat8, BytesOf(value));
 }
 
 PostgresParameters& PostgresParameters::AddFlag(bool flag) {
-  Value& value = values_.emplace_back();
-  value.type = kBool;
-  value.size = 1;
-  value.inside[0] = flag ? 1 : 0;
-  return *this;
+  return AddInside(kBool, std::string(1, flag ? '\1' : '\0'));
+}
+
+PostgresParameters& PostgresParameters::Add(const std::vector<int64_t>& values) {
+  return AddInside(kInt8Array, ArrayOf(kInt8, values));
+}
+
+PostgresParameters& PostgresParameters::Add(const std::vector<double>& values) {
+  return AddInside(kFloat8Array, ArrayOf(kFloat8, values));
+}
+
+PostgresParameters& PostgresParameters::AddBytes(const std::vector<std::string_view>& all) {
+  return AddInside(kByteaArray, ArrayOf(kBytea, all));
 }
 
 PostgresParameters& PostgresParameters::AddText(std::string_view text) {

@@ -6,7 +6,6 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -31,6 +30,10 @@ class PostgresParameters {
   // The text or bytes must stay valid until the statement has run.
   PostgresParameters& AddText(std::string_view text);
   PostgresParameters& AddBytes(std::string_view bytes);
+  // Add an array with at least one element; of what it holds, nothing needs to stay valid.
+  PostgresParameters& Add(const std::vector<int64_t>& values);             // bigint[]
+  PostgresParameters& Add(const std::vector<double>& values);              // double precision[]
+  PostgresParameters& AddBytes(const std::vector<std::string_view>& all);  // bytea[]
 
  private:
   friend class PostgresConnection;
@@ -39,12 +42,12 @@ class PostgresParameters {
     const char* data() const { return outside != nullptr ? outside : inside.data(); }
 
     unsigned type = 0;  // PostgreSQL's number of the type
-    std::array<char, 8> inside{};
+    std::string inside{};
     const char* outside = nullptr;
     int size = 0;
   };
 
-  PostgresParameters& AddBigEndian(unsigned type, uint64_t bits);
+  PostgresParameters& AddInside(unsigned type, std::string bytes);
 
   std::vector<Value> values_;
 };

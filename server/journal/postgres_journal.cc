@@ -150,7 +150,10 @@ void PostgresJournal::Append(JournalEntry entry, Done done) {
     SendRemovalOfParts(writer, batch, owner);
     return absl::OkStatus();
   };
-  SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(SendBatch), remove,
+  const auto send_last = [](PostgresWriter& writer, const JournalEntry& batch,
+                            const BatchPart& last,
+                            const PostgresOwner& of) { writer.SendBatch(batch, last, of); };
+  SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(send_last), remove,
                 std::move(done));
 }
 

@@ -1,26 +1,10 @@
 #include "server/journal/postgres_writes.h"
 
-#include <absl/strings/str_format.h>
-
-#include <chrono>
-
-#include "proto/wire/refusal/refusal.h"
-
 namespace polyest::internal {
 namespace {
 
 // Each statement locks the row of the owner until its transaction ends. Who takes the session
 // meanwhile waits for that, and a statement that has waited for a taking finds another epoch.
-constexpr char kInsertBatch[] =
-    "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $9 AND epoch = "
-    "$10 FOR SHARE), added AS (INSERT INTO batch SELECT $1, $2, $3::bytea, $4, $5, $6, $7, $8, "
-    "$11::bigint + coalesce((SELECT place_bytes FROM batch WHERE session = $1 AND sequence = $2 - "
-    "1), 0), $12::bigint FROM held "
-    "WHERE $2 = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE session = $1) AND ($12 = 0 "
-    "OR $12 = (SELECT count(*) FROM part WHERE session = $1 AND sequence = $2 AND number <= $12)) "
-    "RETURNING 1) "
-    "SELECT EXISTS (SELECT 1 FROM added), EXISTS (SELECT 1 FROM held), EXISTS (SELECT 1 FROM "
-    "session WHERE number = $1)";
 constexpr char kInsertPart[] =
     "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $5 AND epoch = "
     "$6 FOR SHARE), added AS (INSERT INTO part SELECT $1, $2, $3, $4 FROM held "
@@ -64,29 +48,6 @@ constexpr char kThinHistory[] =
     "WITH held AS MATERIALIZED (SELECT 1 FROM owner WHERE session = $1 AND node = $3 AND epoch = "
     "$4 FOR SHARE) DELETE FROM history USING held WHERE session = $1 AND ordinal % $2 <> 0";
 
-// Time after which the session's present owner is known.
-constexpr std::chrono::milliseconds kTakenDelay{200};
-
-// Judges a statement that tells whether it has changed something, whether the owner was right, and
-// whether the session is there.
-absl::Status JudgeOwned(const PostgresResult& result) {
-  if (result.Flag(0, 0)) return absl::OkStatus();
-  if (!result.Flag(0, 2)) return NoSuchSession();
-  if (result.Flag(0, 1)) return absl::FailedPreconditionError("the journal is as it was");
-  return Refuse(absl::StatusCode::kUnavailable, "another daemon has taken the session over",
-                {.reason = kOwnedElsewhere, .retry_delay = kTakenDelay});
-}
-
-// Judges a statement that adds to batch `sequence`.
-PostgresWriter::Judge JudgeBatch(int64_t sequence) {
-  return [sequence](const PostgresResult& result) -> absl::Status {
-    const absl::Status judged = JudgeOwned(result);
-    if (!absl::IsFailedPrecondition(judged)) return judged;
-    return absl::FailedPreconditionError(
-        absl::StrFormat("batch %d does not follow what the journal has", sequence));
-  };
-}
-
 }  // namespace
 
 void SendSession(PostgresWriter& writer, const SessionHead& head, bool hidden,
@@ -121,25 +82,6 @@ void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& ow
               JudgeOwned);
 }
 
-void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& last,
-               const PostgresOwner& owner) {
-  writer.Send(kInsertBatch,
-              PostgresParameters()
-                  .Add(entry.session)
-                  .Add(entry.place.sequence)
-                  .AddBytes(last.bytes)
-                  .AddBytes(entry.digest)
-                  .Add(entry.place.samples)
-                  .Add(entry.place.rows)
-                  .Add(int64_t{entry.place.last_row.run})
-                  .Add(entry.place.last_row.time_s)
-                  .Add(owner.node)
-                  .Add(owner.epoch)
-                  .Add(std::ssize(entry.measurements))
-                  .Add(last.number - 1),
-              JudgeBatch(entry.place.sequence));
-}
-
 void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
               const PostgresOwner& owner) {
   writer.Send(kInsertPart,
@@ -150,7 +92,9 @@ void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart
                   .AddBytes(part.bytes)
                   .Add(owner.node)
                   .Add(owner.epoch),
-              JudgeBatch(entry.place.sequence));
+              [sequence = entry.place.sequence](const PostgresResult& result) {
+                return JudgeBatch(result, sequence);
+              });
 }
 
 void SendRemovalOfParts(PostgresWriter& writer, const JournalEntry& entry,

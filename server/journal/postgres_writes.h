@@ -6,16 +6,11 @@
 #include <string_view>
 
 #include "server/journal/batch_parts.h"
+#include "server/journal/postgres_owner.h"
 #include "server/journal/postgres_writer.h"
 #include "server/journal/session_journal.h"
 
 namespace polyest::internal {
-
-// Identifies the owner for which a session is changed.
-struct PostgresOwner {
-  int64_t node = 0;
-  int64_t epoch = 0;
-};
 
 // Inserts the row of a session and that of its owner, with epoch 1. ALREADY_EXISTS when the name is
 // taken.
@@ -26,10 +21,8 @@ void SendSession(PostgresWriter& writer, const SessionHead& head, bool hidden,
 void SendShow(PostgresWriter& writer, int64_t session, std::string_view digest,
               const PostgresOwner& owner);
 void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& owner);
-// FAILED_PRECONDITION when the batch does not follow the last one.
-void SendBatch(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& last,
-               const PostgresOwner& owner);
 // Sends a part that is not the last one; it replaces one that is left of an earlier attempt.
+// FAILED_PRECONDITION when the batch does not follow the last one.
 void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
               const PostgresOwner& owner);
 // Sends the removal of the parts of a batch that was refused.

@@ -2,6 +2,11 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "core/common/status.h"
 #include "polyest/v1/operation_service.grpc.pb.h"
 #include "proto/wire/operations/names.h"
@@ -14,30 +19,60 @@
 namespace polyest::internal {
 namespace {
 
-absl::StatusOr<v1::ListOperationsResponse> ListPage(OperationStore& operations,
-                                                    const std::string& tenant,
-                                                    const v1::ListOperationsRequest& request) {
-  POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
-  // The token is a number, so that it outlives the operation.
-  int64_t after = 0;
-  if (!request.page_token().empty() &&
-      !(absl::SimpleAtoi(request.page_token(), &after) && after > 0)) {
-    return UnknownPageToken(request.page_token());
-  }
-  OperationStore::Page page = operations.List(tenant, after, page_size);
-  v1::ListOperationsResponse response;
-  for (v1::Operation& operation : page.operations) {
-    *response.add_operations() = std::move(operation);
-  }
-  if (page.more) response.set_next_page_token(absl::StrCat(page.last));
-  return response;
-}
-
 // Returns how the names of a daemon's operations begin, so that any daemon of the database knows
 // whose they are.
 std::string PrefixOf(int64_t node) { return absl::StrCat("node", node, "-"); }
 std::string PrefixOf(const SharedJournal* journal) {
   return journal == nullptr ? "" : PrefixOf(journal->node());
+}
+
+// Where a page of operations begins: behind the operation `after` of the daemon `node`. Its token
+// is "node-after", or "after" where daemons do not pass calls on. Both are numbers, so that the
+// token outlives the operation.
+struct PageStart {
+  int64_t node = 0;  // 0: that lists only its own
+  int64_t after = 0;
+};
+
+std::string TokenOf(const PageStart& start) {
+  return start.node == 0 ? absl::StrCat(start.after) : absl::StrCat(start.node, "-", start.after);
+}
+
+// Returns the daemons that live and whose number is at least `first`, in the order of their
+// numbers.
+absl::StatusOr<std::vector<JournalNode>> NodesFrom(SharedJournal& journal, int64_t first) {
+  POLYEST_ASSIGN_OR_RETURN(std::vector<JournalNode> nodes, journal.Nodes());
+  std::erase_if(nodes, [&](const JournalNode& node) {
+    return node.number < first || (node.address.empty() && node.number != journal.node());
+  });
+  std::ranges::sort(nodes, {}, &JournalNode::number);
+  return nodes;
+}
+
+// Returns where a page begins by its token; nothing for the first page.
+absl::StatusOr<std::optional<PageStart>> ParsePageToken(const std::string& token, bool shared) {
+  if (token.empty()) return std::nullopt;
+  PageStart start;
+  absl::string_view after = token;
+  if (shared) {
+    const size_t dash = std::min(token.find('-'), token.size());
+    if (!absl::SimpleAtoi(after.substr(0, dash), &start.node) || start.node < 1) {
+      return UnknownPageToken(token);
+    }
+    after.remove_prefix(std::min(dash + 1, token.size()));
+  }
+  if (!absl::SimpleAtoi(after, &start.after) || start.after < (shared ? 0 : 1)) {
+    return UnknownPageToken(token);
+  }
+  return start;
+}
+
+// Returns the refusal of a call about operations of another daemon, which passes it on to that one.
+absl::Status OperationsOf(const JournalNode& node) {
+  return Refuse(
+      absl::StatusCode::kUnavailable,
+      absl::StrCat("these operations are those of the daemon at ", node.address),
+      {.reason = kOwnedElsewhere, .retry_delay = std::chrono::seconds(1), .owner = node.address});
 }
 
 class OperationService final : public v1::OperationService::CallbackService {
@@ -68,9 +103,8 @@ class OperationService final : public v1::OperationService::CallbackService {
 
   Unary* ListOperations(Context* call, const v1::ListOperationsRequest* request,
                         v1::ListOperationsResponse* response) override {
-    return Soon(call, "ListOperations", request, response, [=, this](const Caller& caller) {
-      return ListPage(operations_, caller.tenant, *request);
-    });
+    return Soon(call, "ListOperations", request, response,
+                [=, this](const Caller& caller) { return ListPage(caller.tenant, *request); });
   }
 
   Unary* CancelOperation(Context* call, const v1::CancelOperationRequest* request,
@@ -104,13 +138,41 @@ class OperationService final : public v1::OperationService::CallbackService {
     POLYEST_ASSIGN_OR_RETURN(const std::vector<JournalNode> nodes, journal->Nodes());
     for (const JournalNode& node : nodes) {
       if (!absl::StartsWith(name, "operations/" + PrefixOf(node.number))) continue;
-      return Refuse(absl::StatusCode::kUnavailable,
-                    absl::StrCat("the operation is one of the daemon at ", node.address),
-                    {.reason = kOwnedElsewhere,
-                     .retry_delay = std::chrono::seconds(1),
-                     .owner = node.address});
+      return OperationsOf(node);
     }
     return absl::OkStatus();
+  }
+
+  // Returns a page of the operations of the daemon that its token names, by default the first of
+  // those that live. Refuses, naming the daemon, if that is another one. A daemon that passes no
+  // calls on lists its own.
+  absl::StatusOr<v1::ListOperationsResponse> ListPage(const std::string& tenant,
+                                                      const v1::ListOperationsRequest& request) {
+    SharedJournal* const journal =
+        context_.nodes == nullptr ? nullptr : context_.sessions.services().journal.shared();
+    POLYEST_ASSIGN_OR_RETURN(const size_t page_size, PageSize(request.page_size()));
+    POLYEST_ASSIGN_OR_RETURN(const std::optional<PageStart> given,
+                             ParsePageToken(request.page_token(), journal != nullptr));
+    PageStart start = given.value_or(PageStart());
+    std::vector<JournalNode> nodes;  // that have operations to list, from that of the page on
+    if (journal != nullptr) {
+      POLYEST_ASSIGN_OR_RETURN(nodes, NodesFrom(*journal, start.node));
+      if (nodes.empty()) return v1::ListOperationsResponse();
+      // The operations of a daemon that has ended are gone.
+      if (nodes.front().number != start.node) start = {.node = nodes.front().number};
+      if (start.node != journal->node()) return OperationsOf(nodes.front());
+    }
+    OperationStore::Page page = operations_.List(tenant, start.after, page_size);
+    v1::ListOperationsResponse response;
+    for (v1::Operation& operation : page.operations) {
+      *response.add_operations() = std::move(operation);
+    }
+    if (page.more) {
+      response.set_next_page_token(TokenOf({.node = start.node, .after = page.last}));
+    } else if (nodes.size() > 1) {
+      response.set_next_page_token(TokenOf({.node = nodes[1].number}));
+    }
+    return response;
   }
 
   absl::StatusOr<v1::Operation> Start(const Caller& caller,

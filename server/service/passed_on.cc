@@ -47,7 +47,7 @@ grpc::Status OutcomeFrom(const std::string& owner, const grpc::ClientContext& ca
   return ToGrpc(
       Refuse(absl::StatusCode::kUnavailable,
              absl::StrCat("the daemon at ", owner,
-                          ", which serves the session, is not reached: ", outcome.error_message()),
+                          ", to which the call goes on, is not reached: ", outcome.error_message()),
              {.reason = kOwnedElsewhere, .retry_delay = std::chrono::seconds(1), .owner = owner}));
 }
 

@@ -23,7 +23,7 @@ class Database:
         self.folder.mkdir()
         if os.getuid() == 0:
             folder.chmod(0o755)
-            shutil.chown(self.folder, "postgres")
+        self.give(self.folder)
         self.socket = str(self.folder / ".s.PGSQL.5432")
         self._run("initdb", "--pgdata", self.folder / "data", "--auth", "trust", "--username", "polyest",
                   "--encoding", "UTF8")
@@ -31,15 +31,35 @@ class Database:
         self._run("createdb", "--host", self.folder, "--username", "polyest", "polyest")
 
     def _run(self, program, *arguments):
-        command = [str(self.bin / program), *map(str, arguments)]
+        self.run_as_server([self.bin / program, *arguments])
+
+    @staticmethod
+    def run_as_server(command):
+        """Runs a command as the user that the server runs as, which is not root."""
+        command = [str(part) for part in command]
         if os.getuid() == 0:
-            # It does not run as root.
             command = ["runuser", "-u", "postgres", "--", *command]
         subprocess.run(command, check=True, cwd="/", stdout=subprocess.DEVNULL)
 
+    @staticmethod
+    def give(path):
+        """Makes the user that the server runs as the owner of a folder."""
+        if os.getuid() == 0:
+            shutil.chown(path, "postgres")
+
+    def options(self):
+        return f"-c listen_addresses= -c unix_socket_directories={self.folder}"
+
     def start(self):
         self._run("pg_ctl", "--pgdata", self.folder / "data", "--log", self.folder / "log", "--wait",
-                  "--options", f"-c listen_addresses= -c unix_socket_directories={self.folder}", "start")
+                  "--options", self.options(), "start")
+
+    def ask(self, query):
+        """Returns the only value that a query gives, as text."""
+        answer = subprocess.run(
+            [str(self.bin / "psql"), "--host", str(self.folder), "--username", "polyest", "--tuples-only",
+             "--no-align", "--command", query, "polyest"], check=True, capture_output=True, text=True)
+        return answer.stdout.strip()
 
     def stop(self):
         self._run("pg_ctl", "--pgdata", self.folder / "data", "--mode", "immediate", "stop")

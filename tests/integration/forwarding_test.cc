@@ -48,6 +48,41 @@ class ForwardingTest : public PostgresTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
+  // Starts a computation that belongs to no session; returns its name.
+  static std::string StartComputation(Node& node) {
+    grpc::ClientContext context;
+    v1::StartComputationRequest request;
+    v1::ComputePropagationRequest& propagation = *request.mutable_propagation();
+    *propagation.mutable_subject()->mutable_experiment()->mutable_problem() = Oscillator();
+    propagation.set_until_s(1);
+    propagation.set_step_s(1);
+    v1::Operation operation;
+    const grpc::Status started = v1::OperationService::NewStub(node.channel())
+                                     ->StartComputation(&context, request, &operation);
+    EXPECT_TRUE(started.ok()) << started.error_message();
+    return operation.name();
+  }
+  static grpc::Status ListPage(Node& node, int size, const std::string& token,
+                               v1::ListOperationsResponse& page) {
+    grpc::ClientContext context;
+    v1::ListOperationsRequest request;
+    request.set_page_size(size);
+    request.set_page_token(token);
+    return v1::OperationService::NewStub(node.channel())->ListOperations(&context, request, &page);
+  }
+  // Returns the names of all operations, from pages of this size.
+  static std::vector<std::string> Operations(Node& node, int page_size) {
+    std::vector<std::string> names;
+    v1::ListOperationsResponse page;
+    do {
+      const std::string token = page.next_page_token();
+      const grpc::Status listed = ListPage(node, page_size, token, page);
+      EXPECT_TRUE(listed.ok()) << listed.error_message();
+      if (!listed.ok()) return names;
+      for (const v1::Operation& operation : page.operations()) names.push_back(operation.name());
+    } while (!page.next_page_token().empty());
+    return names;
+  }
   // Returns the details of a refusal because of another owner; none of any other status.
   static rpc::ErrorInfo InfoOf(const grpc::Status& status) {
     rpc::Status details;
@@ -215,7 +250,7 @@ TEST_F(ForwardingTest, NamesAnOwnerThatItCannotReach) {
   ASSERT_TRUE(first.Create("rig").ok());
   const grpc::Status refused = second.Add(1);
   EXPECT_EQ(refused.error_code(), StatusCode::UNAVAILABLE);
-  EXPECT_THAT(refused.error_message(), HasSubstr("127.0.0.1:1, which serves the session, is not"));
+  EXPECT_THAT(refused.error_message(), HasSubstr("127.0.0.1:1, to which the call goes on, is not"));
   EXPECT_EQ(InfoOf(refused).metadata().at("owner"), "127.0.0.1:1");
 }
 
@@ -240,6 +275,30 @@ TEST_F(ForwardingTest, TakesNewSessionsItselfThatAnotherDaemonDoesNotTake) {
   for (int i = 1; i <= 12; ++i) {
     const grpc::Status created = first.Create("rig-" + std::to_string(i));
     ASSERT_TRUE(created.ok()) << created.error_message();
+  }
+}
+
+TEST_F(ForwardingTest, ListsTheOperationsOfAllDaemons) {
+  Node first(Sharing());
+  auto second = std::make_unique<Node>(Sharing());
+  Node third(Sharing());
+  const std::vector<std::string> started = {StartComputation(first), StartComputation(third),
+                                            StartComputation(first), StartComputation(*second)};
+  const std::vector<std::string> in_order = {started[0], started[2], started[3], started[1]};
+  for (Node* node : {&first, second.get(), &third}) {
+    EXPECT_EQ(Operations(*node, 1), in_order);
+    EXPECT_EQ(Operations(*node, 50), in_order);
+  }
+  second->process().Signal(SIGTERM);
+  EXPECT_EQ(second->process().Wait(), 0);
+  EXPECT_THAT(Operations(third, 1), ElementsAre(started[0], started[2], started[1]));
+  v1::ListOperationsResponse page;
+  EXPECT_TRUE(ListPage(first, 1, "999-0", page).ok());
+  EXPECT_EQ(page.operations_size(), 0);
+  for (const char* token : {"1", "-", "1-", "-1", "0-1", "1--1", "1-2-3", "x-1", "1-9e9"}) {
+    const grpc::Status refused = ListPage(first, 1, token, page);
+    EXPECT_EQ(refused.error_code(), StatusCode::INVALID_ARGUMENT) << token;
+    EXPECT_THAT(refused.error_message(), HasSubstr("is not the nextPageToken")) << token;
   }
 }
 

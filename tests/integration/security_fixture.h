@@ -41,15 +41,12 @@ inline std::string MethodPath(const std::string& method) {
   return "/" + FindMethod(method).service()->full_name() + "/" + method;
 }
 
-// Makes a call and returns its status. Every kind of method looks the same on the wire. `request`
-// and `answer` are messages as bytes.
-inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
-                            const std::string& token, const std::string& request = "",
-                            std::string* answer = nullptr) {
+// Makes a call in this context and returns its status. Every kind of method looks the same on the
+// wire. `request` and `answer` are messages as bytes.
+inline grpc::Status CallRaw(grpc::ClientContext& context,
+                            const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+                            const std::string& request, std::string* answer) {
   grpc::GenericStub stub(channel);
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kPatience);
-  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
   grpc::CompletionQueue queue;
   const auto next = [&queue] {
     void* tag = nullptr;
@@ -76,6 +73,16 @@ inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const
   call->Finish(&status, nullptr);
   next();
   return status;
+}
+
+// Makes a call with a token.
+inline grpc::Status CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::string& path,
+                            const std::string& token, const std::string& request = "",
+                            std::string* answer = nullptr) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kPatience);
+  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
+  return CallRaw(context, channel, path, request, answer);
 }
 
 // Returns the names of all methods of all services, from the contract.

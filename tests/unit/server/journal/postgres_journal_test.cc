@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <future>
+#include <latch>
+#include <map>
 
 #include "proto/wire/refusal/refusal.h"
 #include "server/journal/postgres_schema.h"
@@ -143,6 +146,46 @@ TEST_F(PostgresJournalTest, KeepsTheOthersOfAGroupWhenANameIsTaken) {
   }
   all.get_future().wait();
   EXPECT_EQ(kept, 100);
+}
+
+TEST_F(PostgresJournalTest, JudgesEachBatchOfAGroup) {
+  const auto journal = Open();
+  constexpr int64_t kBatches = 100, kGap = 40;
+  const int64_t whole = CreateIn(*journal, "sessions/whole", SmallProblem());
+  const int64_t gap = CreateIn(*journal, "sessions/gap", SmallProblem());
+  const int64_t taken = CreateIn(*journal, "sessions/taken", SmallProblem());
+  const int64_t none = taken + 1;
+  ASSERT_TRUE(AppendTo(*journal, taken, 1, RowAt(1)).ok());
+  Execute("UPDATE polyest.owner SET epoch = 2 WHERE session = " + std::to_string(taken));
+  std::map<int64_t, std::vector<absl::StatusCode>> outcomes;
+  std::latch left(4 * kBatches);
+  const auto append = [&](int64_t session, int64_t sequence) {
+    journal->Append(EntryOf(session, sequence, RowAt(1, static_cast<size_t>(sequence))),
+                    [&, session](const absl::Status& status) {
+                      outcomes[session].push_back(status.code());
+                      left.count_down();
+                    });
+  };
+  for (int64_t sequence = 1; sequence <= kBatches; ++sequence) {
+    append(whole, sequence);
+    append(gap, sequence < kGap ? sequence : sequence + 1);
+    append(taken, sequence + 1);
+    append(none, sequence);
+  }
+  left.wait();
+  using Code = absl::StatusCode;
+  std::vector<Code> broken(kBatches, Code::kFailedPrecondition);
+  std::fill_n(broken.begin(), kGap - 1, Code::kOk);
+  EXPECT_EQ(outcomes[whole], std::vector<Code>(kBatches, Code::kOk));
+  EXPECT_EQ(outcomes[gap], broken);
+  EXPECT_EQ(outcomes[taken], std::vector<Code>(kBatches, Code::kUnavailable));
+  EXPECT_EQ(outcomes[none], std::vector<Code>(kBatches, Code::kNotFound));
+  EXPECT_EQ(server_.Number(uri_, "SELECT count(*) FROM polyest.batch"), kBatches + kGap - 1 + 1);
+  EXPECT_EQ(server_.Number(uri_,
+                           "SELECT count(*) FROM (SELECT place_bytes - sum(octet_length("
+                           "measurements)) OVER (PARTITION BY session ORDER BY sequence) AS wrong "
+                           "FROM polyest.batch) AS each WHERE wrong <> 0"),
+            0);
 }
 
 TEST_F(PostgresJournalTest, RemovesWhatDeletedSessionsLeave) {

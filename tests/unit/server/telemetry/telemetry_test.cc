@@ -8,7 +8,7 @@
 
 #include <set>
 
-#include "server/telemetry/grpc_log.h"
+#include "server/telemetry/library_log.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"

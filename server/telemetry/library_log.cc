@@ -1,7 +1,8 @@
-#include "server/telemetry/grpc_log.h"
+#include "server/telemetry/library_log.h"
 
 #include <absl/strings/match.h>
 #include <absl/strings/strip.h>
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/spdlog.h>
 
@@ -54,11 +55,15 @@ std::string FailedHandshake(absl::string_view message) {
   return std::string(message.substr(0, message.find(kDetails)));
 }
 
-void StartGrpcLog() {
+void StartLibraryLog() {
   gpr_set_log_function(OnMessage);
   verbose = std::getenv("GRPC_VERBOSITY") != nullptr;
   // gRPC reports handshakes at this level only.
   gpr_set_log_verbosity(GPR_LOG_SEVERITY_DEBUG);
+  google::protobuf::SetLogHandler(
+      [](google::protobuf::LogLevel, const char*, int, const std::string& message) {
+        spdlog::debug("protobuf: {}", message);
+      });
 }
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-// Puts gRPC's own messages into the daemon's log.
+// Puts the messages of gRPC and Protocol Buffers into the daemon's log.
 
 #include <absl/strings/string_view.h>
 
@@ -9,9 +9,10 @@
 namespace polyest::internal {
 
 // Sends gRPC's messages to the log, at level debug: its errors, or those that GRPC_VERBOSITY asks
-// for. A connection that fails in its TLS handshake is logged as a warning, at most one a second:
-// gRPC says nothing of it to the program, and nothing by default to the log.
-void StartGrpcLog();
+// for; those of Protocol Buffers, too, which anybody can cause by a malformed request. A connection
+// that fails in its TLS handshake is logged as a warning, at most one a second: gRPC says nothing
+// of it to the program, and nothing by default to the log.
+void StartLibraryLog();
 
 // Returns why a handshake failed, out of gRPC's message about it; empty for any other message.
 std::string FailedHandshake(absl::string_view message);
