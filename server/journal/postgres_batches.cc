@@ -1,134 +1,86 @@
 #include "server/journal/postgres_batches.h"
 
 #include <iterator>
-#include <set>
-#include <string_view>
-#include <utility>
+#include <vector>
 
 namespace polyest::internal {
 namespace {
 
-constexpr char kLockOwners[] =
-    "SELECT 1 FROM unnest($1::bigint[], $2::bigint[], $3::bigint[]) AS wanted (session, node, "
-    "epoch) JOIN owner USING (session, node, epoch) FOR SHARE OF owner";
-// The statement does not see what it inserts: the batches ahead of one are counted by the client.
-constexpr char kInsertBatches[] =
-    "INSERT INTO batch "
-    "SELECT given.session, given.sequence, given.measurements, given.digest, given.samples, "
-    "given.rows, given.run, given.time_s, given.bytes + coalesce((SELECT place_bytes FROM batch "
-    "WHERE batch.session = given.session AND batch.sequence = given.sequence - 1 - given.ahead), "
-    "0), given.parts "
-    "FROM unnest($1::bigint[], $2::bigint[], $3::bytea[], $4::bytea[], $5::bigint[], $6::bigint[], "
-    "$7::bigint[], $8::double precision[], $9::bigint[], $10::bigint[], $11::bigint[], "
-    "$12::bigint[], $13::bigint[]) AS given (session, sequence, measurements, digest, samples, "
-    "rows, run, time_s, bytes, parts, ahead, node, epoch) JOIN owner USING (session, node, epoch) "
-    "WHERE given.sequence - given.ahead = 1 + (SELECT coalesce(max(sequence), 0) FROM batch WHERE "
-    "batch.session = given.session) AND (given.parts = 0 OR given.parts = (SELECT count(*) FROM "
-    "part WHERE part.session = given.session AND part.sequence = given.sequence AND number <= "
-    "given.parts)) "
-    "RETURNING session, sequence";
-constexpr char kWhyRefused[] =
-    "SELECT false, EXISTS (SELECT 1 FROM owner WHERE session = $1 AND node = $2 AND epoch = $3), "
-    "EXISTS (SELECT 1 FROM session WHERE number = $1)";
+constexpr char kLookAtSessions[] =
+    "WITH held AS MATERIALIZED (SELECT session FROM unnest($1::bigint[], $2::bigint[], "
+    "$3::bigint[]) AS wanted (session, node, epoch) JOIN owner USING (session, node, epoch) "
+    "FOR SHARE OF owner) "
+    "SELECT wanted.session, wanted.session IN (SELECT session FROM held), EXISTS (SELECT 1 FROM "
+    "session WHERE number = wanted.session), last.sequence, last.place_bytes "
+    "FROM unnest($1::bigint[]) AS wanted (session) LEFT JOIN LATERAL (SELECT sequence, place_bytes "
+    "FROM batch WHERE batch.session = wanted.session ORDER BY sequence DESC LIMIT 1) AS last ON "
+    "true";
+constexpr char kInsertBatch[] =
+    "INSERT INTO batch VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)";
+// Where a batch in parts is concerned, whether all of them are there is known in the database only.
+constexpr char kInsertBatchIfWhole[] =
+    "INSERT INTO batch SELECT $1, $2, $3, $4, $5, $6, $7, $8, $9, $10 WHERE ($2 = 1 OR EXISTS "
+    "(SELECT 1 FROM batch WHERE session = $1 AND sequence = $2 - 1)) AND $10 = (SELECT count(*) "
+    "FROM part WHERE session = $1 AND sequence = $2 AND number <= $10)";
 
 }  // namespace
 
-const PostgresBatches::Batch* PostgresBatches::LastOf(int64_t session) const {
-  const auto found = last_.find(session);
-  return found == last_.end() ? nullptr : &batches_[found->second];
+void PostgresBatches::Add(const PostgresBatch& batch) {
+  sessions_.try_emplace(batch.entry->session, Session{.owner = batch.owner});
 }
 
-bool PostgresBatches::Take(const JournalEntry& entry, const BatchPart& last,
-                           const PostgresOwner& owner) const {
-  if (batches_.empty()) return true;
-  if (last.number > 1 || batches_.back().last.number > 1) return false;
-  const Batch* const before = LastOf(entry.session);
-  return before == nullptr ||
-         (before->owner == owner && before->entry->place.sequence + 1 == entry.place.sequence);
-}
-
-void PostgresBatches::Add(const JournalEntry& entry, const BatchPart& last,
-                          const PostgresOwner& owner) {
-  Batch batch{.entry = &entry, .last = last, .owner = owner};
-  if (const Batch* const before = LastOf(entry.session)) {
-    batch.ahead = before->ahead + 1;
-    batch.bytes_ahead = before->bytes_ahead + std::ssize(before->entry->measurements);
+PostgresStatement PostgresBatches::Look() const {
+  std::vector<int64_t> numbers, nodes, epochs;
+  for (const auto& [number, session] : sessions_) {
+    numbers.push_back(number);
+    nodes.push_back(session.owner.node);
+    epochs.push_back(session.owner.epoch);
   }
-  last_[entry.session] = batches_.size();
-  batches_.push_back(batch);
+  return {kLookAtSessions, PostgresParameters().Add(numbers).Add(nodes).Add(epochs)};
 }
 
-std::vector<PostgresStatement> PostgresBatches::Statements() const { return {Lock(), Insert()}; }
-
-PostgresStatement PostgresBatches::Lock() const {
-  std::vector<int64_t> sessions, nodes, epochs;
-  for (const Batch& batch : batches_) {
-    if (batch.ahead > 0) continue;
-    sessions.push_back(batch.entry->session);
-    nodes.push_back(batch.owner.node);
-    epochs.push_back(batch.owner.epoch);
-  }
-  return {kLockOwners, PostgresParameters().Add(sessions).Add(nodes).Add(epochs)};
-}
-
-PostgresStatement PostgresBatches::Insert() const {
-  std::vector<int64_t> sessions, sequences, samples, rows, runs, bytes, parts, ahead, nodes, epochs;
-  std::vector<double> times;
-  std::vector<std::string_view> measurements, digests;
-  for (const Batch& batch : batches_) {
-    const JournalEntry& entry = *batch.entry;
-    sessions.push_back(entry.session);
-    sequences.push_back(entry.place.sequence);
-    measurements.push_back(batch.last.bytes);
-    digests.push_back(entry.digest);
-    samples.push_back(entry.place.samples);
-    rows.push_back(entry.place.rows);
-    runs.push_back(entry.place.last_row.run);
-    times.push_back(entry.place.last_row.time_s);
-    bytes.push_back(batch.bytes_ahead + std::ssize(entry.measurements));
-    parts.push_back(batch.last.number - 1);
-    ahead.push_back(batch.ahead);
-    nodes.push_back(batch.owner.node);
-    epochs.push_back(batch.owner.epoch);
-  }
-  return {kInsertBatches, PostgresParameters()
-                              .Add(sessions)
-                              .Add(sequences)
-                              .AddBytes(measurements)
-                              .AddBytes(digests)
-                              .Add(samples)
-                              .Add(rows)
-                              .Add(runs)
-                              .Add(times)
-                              .Add(bytes)
-                              .Add(parts)
-                              .Add(ahead)
-                              .Add(nodes)
-                              .Add(epochs)};
-}
-
-std::vector<bool> PostgresBatches::Inserted(const PostgresResult& result) const {
-  std::set<std::pair<int64_t, int64_t>> inserted;
+void PostgresBatches::Found(const PostgresResult& result) {
   for (int row = 0; row < result.rows(); ++row) {
-    inserted.emplace(result.Integer(row, 0), result.Integer(row, 1));
+    Session& session = sessions_.at(result.Integer(row, 0));
+    session.held = result.Flag(row, 1);
+    session.exists = result.Flag(row, 2);
+    session.sequence = result.Integer(row, 3);
+    session.bytes = result.Integer(row, 4);
   }
-  std::vector<bool> each;
-  for (const Batch& batch : batches_) {
-    each.push_back(inserted.count({batch.entry->session, batch.entry->place.sequence}) > 0);
-  }
-  return each;
 }
 
-PostgresStatement PostgresBatches::Why(size_t batch) const {
-  const Batch& refused = batches_[batch];
-  return {kWhyRefused, PostgresParameters()
-                           .Add(refused.entry->session)
-                           .Add(refused.owner.node)
-                           .Add(refused.owner.epoch)};
+absl::StatusOr<PostgresStatement> PostgresBatches::Insert(const PostgresBatch& batch) {
+  const JournalEntry& entry = *batch.entry;
+  Session& session = sessions_.at(entry.session);
+  if (!session.exists) return NoSuchSession();
+  if (!session.held || session.owner != batch.owner) return TakenOver();
+  if (entry.place.sequence != session.sequence + 1) return DoesNotFollow(entry.place.sequence);
+  ++session.sequence;
+  session.bytes += std::ssize(entry.measurements);
+  session.in_parts = session.in_parts || batch.last.number > 1;
+  return PostgresStatement{session.in_parts ? kInsertBatchIfWhole : kInsertBatch,
+                           PostgresParameters()
+                               .Add(entry.session)
+                               .Add(entry.place.sequence)
+                               .AddBytes(batch.last.bytes)
+                               .AddBytes(entry.digest)
+                               .Add(entry.place.samples)
+                               .Add(entry.place.rows)
+                               .Add(int64_t{entry.place.last_row.run})
+                               .Add(entry.place.last_row.time_s)
+                               .Add(session.bytes)
+                               .Add(batch.last.number - 1)};
 }
 
-absl::Status PostgresBatches::Judge(size_t batch, const PostgresResult& why) const {
-  return JudgeBatch(why, batches_[batch].entry->place.sequence);
+absl::Status PostgresBatches::JudgeInsert(const PostgresBatch& batch,
+                                          const PostgresResult& result) {
+  return result.changes() > 0 ? absl::OkStatus() : DoesNotFollow(batch.entry->place.sequence);
+}
+
+void PostgresBatches::Delete(int64_t session) {
+  if (const auto found = sessions_.find(session); found != sessions_.end()) {
+    found->second.exists = false;
+  }
 }
 
 }  // namespace polyest::internal

@@ -1,11 +1,15 @@
 #pragma once
 
-// Batches that PostgreSQL inserts by one statement. A statement of its own for each would take it
-// twice the time: nearly all of it goes into beginning and ending statements.
+// Adds batches to sessions in PostgreSQL. One statement looks first, for all batches of a
+// transaction together, who owns their sessions and what these have, and locks the owners' rows;
+// nothing can then change until the transaction ends. What does not follow is refused here, and the
+// rest is inserted without conditions, which would cost the database more than the inserting.
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <cstdint>
 #include <map>
-#include <vector>
 
 #include "server/journal/batch_parts.h"
 #include "server/journal/postgres_connection.h"
@@ -14,44 +18,46 @@
 
 namespace polyest::internal {
 
-// What it is given must outlive it.
+// A batch for a session; `last` is the last of its parts. What it refers to must live as long as
+// the statements.
+struct PostgresBatch {
+  const JournalEntry* entry;
+  BatchPart last;
+  PostgresOwner owner;
+};
+
+// The sessions to which a transaction adds batches.
 class PostgresBatches {
  public:
-  bool empty() const { return batches_.empty(); }
-  // Returns whether a batch can be inserted together with those before it. It follows the last one
-  // of its session, if that has one here, and none of them is in parts, since whether all parts are
-  // there is found out only while they are inserted.
-  bool Take(const JournalEntry& entry, const BatchPart& last, const PostgresOwner& owner) const;
-  // Adds a batch; `last` is the last of its parts.
-  void Add(const JournalEntry& entry, const BatchPart& last, const PostgresOwner& owner);
+  bool empty() const { return sessions_.empty(); }
+  void Add(const PostgresBatch& batch);
 
-  // Returns two statements. The first one locks the rows of the sessions' owners until the
-  // transaction ends; who takes a session meanwhile waits for that. The second one inserts the
-  // batches that follow the last ones of their sessions where the owners are these: it finds
-  // another epoch where the first one has waited for a taking.
-  std::vector<PostgresStatement> Statements() const;
-  // Returns for each batch whether it was inserted, by what the second statement has given.
-  std::vector<bool> Inserted(const PostgresResult& result) const;
+  // Returns the statement that looks, and takes what it has given. It must run before any of the
+  // others. Who takes a session meanwhile waits for the end of the transaction; where the statement
+  // has waited for a taking, it finds another epoch.
+  PostgresStatement Look() const;
+  void Found(const PostgresResult& result);
 
-  // Returns the statement that tells why a batch was not inserted, and judges what it tells.
-  PostgresStatement Why(size_t batch) const;
-  absl::Status Judge(size_t batch, const PostgresResult& why) const;
+  // Returns the statement that inserts a batch, in the order of the batches. NOT_FOUND when there
+  // is no such session, UNAVAILABLE when it has another owner or epoch, FAILED_PRECONDITION when
+  // the batch does not follow the last one.
+  absl::StatusOr<PostgresStatement> Insert(const PostgresBatch& batch);
+  // Judges what that statement has given: FAILED_PRECONDITION when parts of the batch are missing.
+  static absl::Status JudgeInsert(const PostgresBatch& batch, const PostgresResult& result);
+  // Must be called when the transaction has deleted a session: it has no more batches.
+  void Delete(int64_t session);
 
  private:
-  struct Batch {
-    const JournalEntry* entry;
-    BatchPart last;
+  struct Session {
     PostgresOwner owner;
-    int64_t ahead = 0;        // number of batches of the session before it
-    int64_t bytes_ahead = 0;  // bytes of their measurements
+    bool held = false;  // whether it has that owner
+    bool exists = false;
+    int64_t sequence = 0;   // of its last batch
+    int64_t bytes = 0;      // of the measurements up to that
+    bool in_parts = false;  // whether the transaction adds a batch in parts to it
   };
 
-  const Batch* LastOf(int64_t session) const;
-  PostgresStatement Lock() const;
-  PostgresStatement Insert() const;
-
-  std::vector<Batch> batches_;
-  std::map<int64_t, size_t> last_;  // numbers of the last batches, by session
+  std::map<int64_t, Session> sessions_;  // by their numbers
 };
 
 }  // namespace polyest::internal

@@ -19,7 +19,7 @@ using Deadline = std::chrono::steady_clock::time_point;
 
 // PostgreSQL's numbers of types (pg_type.dat), which never change.
 constexpr Oid kBool = 16, kBytea = 17, kInt8 = 20, kText = 25, kFloat8 = 701;
-constexpr Oid kByteaArray = 1001, kInt8Array = 1016, kFloat8Array = 1022;
+constexpr Oid kInt8Array = 1016;
 
 // Longest time for connecting to one host, s.
 constexpr char kConnectTimeoutS[] = "5";
@@ -58,21 +58,17 @@ std::string BytesOf(int64_t value) {
   return bytes;
 }
 std::string BytesOf(double value) { return BytesOf(std::bit_cast<int64_t>(value)); }
-std::string_view BytesOf(std::string_view bytes) { return bytes; }
 
 // Returns an array in PostgreSQL's binary format: the number of dimensions, whether any element is
 // NULL, the type, the number of elements, the index of the first, and each with its size.
-template <typename Element>
-std::string ArrayOf(Oid type, const std::vector<Element>& elements) {
+std::string ArrayOf(const std::vector<int64_t>& elements) {
   std::string bytes;
-  for (const uint64_t word :
-       {uint64_t{1}, uint64_t{0}, uint64_t{type}, elements.size(), size_t{1}}) {
+  for (const uint64_t word : {size_t{1}, size_t{0}, size_t{kInt8}, elements.size(), size_t{1}}) {
     AppendBigEndian(word, 4, bytes);
   }
-  for (const Element& element : elements) {
-    const auto& inside = BytesOf(element);
-    AppendBigEndian(inside.size(), 4, bytes);
-    bytes += inside;
+  for (const int64_t element : elements) {
+    AppendBigEndian(8, 4, bytes);
+    AppendBigEndian(static_cast<uint64_t>(element), 8, bytes);
   }
   return bytes;
 }
@@ -109,15 +105,7 @@ PostgresParameters& PostgresParameters::AddFlag(bool flag) {
 }
 
 PostgresParameters& PostgresParameters::Add(const std::vector<int64_t>& values) {
-  return AddInside(kInt8Array, ArrayOf(kInt8, values));
-}
-
-PostgresParameters& PostgresParameters::Add(const std::vector<double>& values) {
-  return AddInside(kFloat8Array, ArrayOf(kFloat8, values));
-}
-
-PostgresParameters& PostgresParameters::AddBytes(const std::vector<std::string_view>& all) {
-  return AddInside(kByteaArray, ArrayOf(kBytea, all));
+  return AddInside(kInt8Array, ArrayOf(values));
 }
 
 PostgresParameters& PostgresParameters::AddText(std::string_view text) {

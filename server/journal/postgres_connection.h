@@ -30,10 +30,7 @@ class PostgresParameters {
   // The text or bytes must stay valid until the statement has run.
   PostgresParameters& AddText(std::string_view text);
   PostgresParameters& AddBytes(std::string_view bytes);
-  // Add an array with at least one element; of what it holds, nothing needs to stay valid.
-  PostgresParameters& Add(const std::vector<int64_t>& values);             // bigint[]
-  PostgresParameters& Add(const std::vector<double>& values);              // double precision[]
-  PostgresParameters& AddBytes(const std::vector<std::string_view>& all);  // bytea[]
+  PostgresParameters& Add(const std::vector<int64_t>& values);  // bigint[], not empty
 
  private:
   friend class PostgresConnection;

@@ -151,8 +151,9 @@ void PostgresJournal::Append(JournalEntry entry, Done done) {
     return absl::OkStatus();
   };
   const auto send_last = [](PostgresWriter& writer, const JournalEntry& batch,
-                            const BatchPart& last,
-                            const PostgresOwner& of) { writer.SendBatch(batch, last, of); };
+                            const BatchPart& last, const PostgresOwner& of) {
+    writer.SendBatch({.entry = &batch, .last = last, .owner = of});
+  };
   SubmitInParts(*queue_, std::move(entry), lane, send_with(SendPart), send_with(send_last), remove,
                 std::move(done));
 }

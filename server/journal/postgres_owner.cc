@@ -15,19 +15,21 @@ constexpr std::chrono::milliseconds kTakenDelay{200};
 
 }  // namespace
 
-absl::Status JudgeOwned(const PostgresResult& result) {
-  if (result.Flag(0, 0)) return absl::OkStatus();
-  if (!result.Flag(0, 2)) return NoSuchSession();
-  if (result.Flag(0, 1)) return absl::FailedPreconditionError("the journal is as it was");
+absl::Status TakenOver() {
   return Refuse(absl::StatusCode::kUnavailable, "another daemon has taken the session over",
                 {.reason = kOwnedElsewhere, .retry_delay = kTakenDelay});
 }
 
-absl::Status JudgeBatch(const PostgresResult& result, int64_t sequence) {
-  const absl::Status judged = JudgeOwned(result);
-  if (!absl::IsFailedPrecondition(judged)) return judged;
+absl::Status DoesNotFollow(int64_t sequence) {
   return absl::FailedPreconditionError(
       absl::StrFormat("batch %d does not follow what the journal has", sequence));
+}
+
+absl::Status JudgeOwned(const PostgresResult& result) {
+  if (result.Flag(0, 0)) return absl::OkStatus();
+  if (!result.Flag(0, 2)) return NoSuchSession();
+  return result.Flag(0, 1) ? absl::FailedPreconditionError("the journal is as it was")
+                           : TakenOver();
 }
 
 }  // namespace polyest::internal

@@ -1,7 +1,6 @@
 #pragma once
 
-// Who changes a session in PostgreSQL, and what statements tell of it: three flags, whether they
-// have changed something, whether the owner was right, and whether the session is there.
+// Who changes a session in PostgreSQL, and with what others are refused.
 
 #include <absl/status/status.h>
 
@@ -19,11 +18,15 @@ struct PostgresOwner {
   int64_t epoch = 0;
 };
 
-// Judges the flags: NOT_FOUND when there is no such session, UNAVAILABLE when it has another owner
-// or epoch, FAILED_PRECONDITION when nothing has changed for another reason.
-absl::Status JudgeOwned(const PostgresResult& result);
+// Returns the error when another daemon has become the owner of a session: UNAVAILABLE.
+absl::Status TakenOver();
+// Returns the error for a batch that does not follow the last one: FAILED_PRECONDITION.
+absl::Status DoesNotFollow(int64_t sequence);
 
-// Judges the flags of a statement that adds to a batch, in the same way.
-absl::Status JudgeBatch(const PostgresResult& result, int64_t sequence);
+// Judges what a statement tells in three flags: whether it has changed something, whether the owner
+// was right, and whether the session is there. NOT_FOUND when there is no such session, UNAVAILABLE
+// when it has another owner or epoch, FAILED_PRECONDITION when nothing has changed for another
+// reason.
+absl::Status JudgeOwned(const PostgresResult& result);
 
 }  // namespace polyest::internal

@@ -12,26 +12,17 @@ constexpr std::chrono::milliseconds kPauseBetweenAttempts{250};
 }  // namespace
 
 void PostgresWriter::Send(const char* sql, PostgresParameters parameters, Judge judge) {
-  SendGathered();
-  statements_.push_back({sql, std::move(parameters)});
-  sent_.push_back({write_, std::move(judge)});
+  sent_.push_back(
+      {.write = write_, .statement = {sql, std::move(parameters)}, .judge = std::move(judge)});
 }
 
-void PostgresWriter::SendBatch(const JournalEntry& entry, const BatchPart& last,
-                               const PostgresOwner& owner) {
-  if (!gathered_.batches.Take(entry, last, owner)) SendGathered();
-  gathered_.batches.Add(entry, last, owner);
-  gathered_.writes.push_back(write_);
+void PostgresWriter::SendBatch(const PostgresBatch& batch) {
+  batches_.Add(batch);
+  sent_.push_back({.write = write_, .batch = batch});
 }
 
-void PostgresWriter::SendGathered() {
-  if (gathered_.batches.empty()) return;
-  for (PostgresStatement& statement : gathered_.batches.Statements()) {
-    statements_.push_back(std::move(statement));
-    sent_.push_back({});
-  }
-  gathered_.statement = statements_.size() - 1;
-  together_.push_back(std::exchange(gathered_, {}));
+void PostgresWriter::EndBatches(int64_t session) {
+  sent_.push_back({.write = write_, .ended = session});
 }
 
 absl::Status PostgresWriter::Connect() {
@@ -41,7 +32,9 @@ absl::Status PostgresWriter::Connect() {
   next_attempt_ = std::chrono::steady_clock::now() + kPauseBetweenAttempts;
   POLYEST_RETURN_IF_ERROR(connection.status());
   connection_ = *std::move(connection);
-  return absl::OkStatus();
+  // The same plan for all groups: the server would plan anew for the sessions of each, which takes
+  // it longer than to look at them.
+  return connection_->Execute("SET plan_cache_mode = force_generic_plan");
 }
 
 absl::Status PostgresWriter::Commit(const std::vector<Write>& writes,
@@ -61,52 +54,76 @@ absl::Status PostgresWriter::Commit(const std::vector<Write>& writes,
 
 void PostgresWriter::Collect(const std::vector<Write>& writes,
                              std::vector<absl::Status>& outcomes) {
-  statements_ = {{"BEGIN"}};
   sent_.clear();
-  together_.clear();
+  batches_ = {};
   for (write_ = 0; write_ < writes.size(); ++write_) {
     if (outcomes[write_].ok()) outcomes[write_] = writes[write_](*this);
   }
-  SendGathered();
-  statements_.push_back({"COMMIT"});
+}
+
+absl::Status PostgresWriter::Begin() {
+  if (batches_.empty()) return absl::OkStatus();
+  PostgresConnection::Refused refused;
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<PostgresResult> results,
+                           connection_->Pipeline({{"BEGIN"}, batches_.Look()}, refused));
+  batches_.Found(results.back());
+  return absl::OkStatus();
+}
+
+std::vector<PostgresStatement> PostgresWriter::Statements(std::vector<absl::Status>& outcomes,
+                                                          std::vector<size_t>& sent) {
+  std::vector<PostgresStatement> statements;
+  for (size_t i = 0; i < sent_.size(); ++i) {
+    Sent& one = sent_[i];
+    if (one.ended) {
+      batches_.Delete(*one.ended);
+      continue;
+    }
+    if (one.batch) {
+      auto insert = batches_.Insert(*one.batch);
+      if (!insert.ok()) {
+        outcomes[one.write] = insert.status();
+        continue;
+      }
+      one.statement = *std::move(insert);
+      one.judge = [batch = *one.batch](const PostgresResult& result) {
+        return PostgresBatches::JudgeInsert(batch, result);
+      };
+    }
+    statements.push_back(std::move(one.statement));
+    sent.push_back(i);
+  }
+  statements.push_back({"COMMIT"});
+  return statements;
 }
 
 // Runs the group. Sets `again` when it has been undone because of one write, whose outcome is known
 // now, and the others can be tried without it.
 absl::Status PostgresWriter::Run(std::vector<absl::Status>& outcomes, bool& again) {
   connection_->TakeWarning();
+  POLYEST_RETURN_IF_ERROR(Begin());
+  std::vector<size_t> sent;
+  std::vector<PostgresStatement> statements = Statements(outcomes, sent);
+  const size_t begin = batches_.empty() ? 1 : 0;  // number of statements before those of sent_
+  if (begin > 0) statements.insert(statements.begin(), {"BEGIN"});
   PostgresConnection::Refused refused;
-  const auto results = connection_->Pipeline(statements_, refused);
+  const auto results = connection_->Pipeline(statements, refused);
   if (!results.ok()) {
-    const bool one = refused.taken && refused.statement > 0 && refused.statement <= sent_.size() &&
-                     sent_[refused.statement - 1].write;
-    again = one && !connection_->broken() && connection_->Execute("ROLLBACK").ok();
-    if (again) outcomes[*sent_[refused.statement - 1].write] = results.status();
+    again = !connection_->broken() && refused.taken && refused.statement >= begin &&
+            refused.statement < begin + sent.size() && connection_->Execute("ROLLBACK").ok();
+    if (again) outcomes[sent_[sent[refused.statement - begin]].write] = results.status();
     return results.status();
   }
   // A server that no longer waits for its standby, because it was told to shut down, only warns.
   if (results->back().command() != "COMMIT" || connection_->TakeWarning()) {
     return DatabaseAway("it has not confirmed a commit");
   }
-  for (size_t i = 0; i < sent_.size(); ++i) {
-    if (!sent_[i].judge || !outcomes[*sent_[i].write].ok()) continue;
-    outcomes[*sent_[i].write] = sent_[i].judge((*results)[i + 1]);
+  for (size_t i = 0; i < sent.size(); ++i) {
+    const Sent& one = sent_[sent[i]];
+    if (!one.judge || !outcomes[one.write].ok()) continue;
+    outcomes[one.write] = one.judge((*results)[begin + i]);
   }
-  for (const Together& sent : together_) JudgeBatches(sent, (*results)[sent.statement], outcomes);
   return absl::OkStatus();
-}
-
-// Asks the database why a batch was not inserted, which is rare.
-void PostgresWriter::JudgeBatches(const Together& sent, const PostgresResult& result,
-                                  std::vector<absl::Status>& outcomes) {
-  const std::vector<bool> inserted = sent.batches.Inserted(result);
-  for (size_t i = 0; i < inserted.size(); ++i) {
-    if (inserted[i]) continue;
-    const PostgresStatement question = sent.batches.Why(i);
-    const auto why = connection_->broken() ? DatabaseAway("the connection was lost")
-                                           : connection_->Query(question.sql, question.parameters);
-    outcomes[sent.writes[i]] = why.ok() ? sent.batches.Judge(i, *why) : why.status();
-  }
 }
 
 }  // namespace polyest::internal

@@ -30,10 +30,11 @@ class PostgresWriter {
 
   // Adds a statement to the group. What its parameters refer to must live as long as the write.
   void Send(const char* sql, PostgresParameters parameters, Judge judge = {});
-  // Adds a batch to the group; `last` is the last of its parts. The entry must live as long as the
-  // write. FAILED_PRECONDITION when the batch does not follow the last one, NOT_FOUND when there is
-  // no such session, and UNAVAILABLE when it has another owner or epoch.
-  void SendBatch(const JournalEntry& entry, const BatchPart& last, const PostgresOwner& owner);
+  // Adds a batch to the group. FAILED_PRECONDITION when it does not follow the last one, NOT_FOUND
+  // when there is no such session, and UNAVAILABLE when it has another owner or epoch.
+  void SendBatch(const PostgresBatch& batch);
+  // Must be called after a statement that deletes a session.
+  void EndBatches(int64_t session);
 
   // Commits the group, as CommitQueue asks of its database. UNAVAILABLE when the database is away;
   // the group may then have been committed all the same, unless its sessions are claimed again
@@ -41,35 +42,33 @@ class PostgresWriter {
   absl::Status Commit(const std::vector<Write>& writes, std::vector<absl::Status>& outcomes);
 
  private:
+  // What a write has added to the group: a statement, a batch, or the end of a session's batches.
   struct Sent {
-    std::optional<size_t> write;  // number of the write in the group; nothing: of several ones
-    Judge judge;
-  };
-  // Batches that one statement inserts, and the numbers of their writes.
-  struct Together {
-    size_t statement = 0;
-    PostgresBatches batches;
-    std::vector<size_t> writes;
+    size_t write = 0;  // number of the write in the group
+    PostgresStatement statement{};
+    Judge judge{};
+    std::optional<PostgresBatch> batch{};
+    std::optional<int64_t> ended{};
   };
 
   absl::Status Connect();
   // Lets the writes that have no outcome yet add their statements.
   void Collect(const std::vector<Write>& writes, std::vector<absl::Status>& outcomes);
-  // Adds the statements of the batches gathered, so that those of later writes come behind them.
-  void SendGathered();
   absl::Status Run(std::vector<absl::Status>& outcomes, bool& again);
-  void JudgeBatches(const Together& sent, const PostgresResult& result,
-                    std::vector<absl::Status>& outcomes);
+  // Begins the transaction and looks at the sessions of its batches.
+  absl::Status Begin();
+  // Returns the statements of the transaction but BEGIN, and sets `sent` to the number in sent_ of
+  // each but COMMIT. Judges the batches that cannot be added.
+  std::vector<PostgresStatement> Statements(std::vector<absl::Status>& outcomes,
+                                            std::vector<size_t>& sent);
 
   const PostgresTarget target_;
   std::unique_ptr<PostgresConnection> connection_;
   std::chrono::steady_clock::time_point next_attempt_{};  // not before is another one made
   // The group under way.
   size_t write_ = 0;
-  std::vector<PostgresStatement> statements_;
-  std::vector<Sent> sent_;  // describes each statement but BEGIN and COMMIT
-  Together gathered_;       // whose statements are still to be added
-  std::vector<Together> together_;
+  std::vector<Sent> sent_;
+  PostgresBatches batches_;
 };
 
 }  // namespace polyest::internal

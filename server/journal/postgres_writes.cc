@@ -80,6 +80,7 @@ void SendShow(PostgresWriter& writer, int64_t session, std::string_view digest,
 void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& owner) {
   writer.Send(kDelete, PostgresParameters().Add(session).Add(owner.node).Add(owner.epoch),
               JudgeOwned);
+  writer.EndBatches(session);
 }
 
 void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,
@@ -93,7 +94,8 @@ void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart
                   .Add(owner.node)
                   .Add(owner.epoch),
               [sequence = entry.place.sequence](const PostgresResult& result) {
-                return JudgeBatch(result, sequence);
+                const absl::Status judged = JudgeOwned(result);
+                return absl::IsFailedPrecondition(judged) ? DoesNotFollow(sequence) : judged;
               });
 }
 
