@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/common/check.h"
@@ -9,6 +10,11 @@
 #include "core/common/status.h"
 
 namespace polyest::internal {
+namespace {
+
+constexpr Eigen::Index kColumnsAtOnce = 32;
+
+}  // namespace
 
 absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
                                                             const ConstMatrixRef& points,
@@ -26,9 +32,11 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   CollocationMatrix result;
   basis.EvaluateMany(points, result.matrix_);
   POLYEST_ASSIGN_OR_RETURN(ThinQr factors, DecomposeThinQr(result.matrix_, stop));
-  result.thin_q_ = std::move(factors.q);
   result.triangular_ = std::move(factors.r);
-  result.workspace_.resize(points.rows());
+  result.packed_ = PackedMatrix(result.matrix_);
+  result.packed_q_ = PackedMatrix(factors.q.transpose());
+  // Columns of whole vectors, so that the squares of each are summed in the same order.
+  result.residuals_.setZero((points.rows() + 7) / 8 * 8, kColumnsAtOnce);
   // R has the singular values of A.
   const Conditioning conditioning = ConditioningOfTriangular(result.triangular_);
   result.condition_ = conditioning.number;
@@ -45,20 +53,25 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
                               VectorRef residual_variance) {
   POLYEST_CHECK(values.rows() == points() && coefficients.rows() == terms());
   POLYEST_CHECK(coefficients.cols() == values.cols() && residual_variance.size() == values.cols());
-  const int freedom = points() - terms();
-  // Matrix-vector products, one column at a time, need no buffers, unlike products of matrices.
+  packed_q_.Multiply(values, coefficients);
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
     auto solution = coefficients.col(j);
-    solution.noalias() = thin_q_.transpose() * values.col(j);
     triangular_.triangularView<Eigen::Upper>().solveInPlace(solution);
-    if (freedom == 0) {
-      residual_variance[j] = 0;
-      continue;
+  }
+  const int freedom = points() - terms();
+  if (freedom == 0) {
+    residual_variance.setZero();
+    return;
+  }
+  // ‖Y − A c‖² / (Q − S)
+  for (Eigen::Index first = 0; first < values.cols(); first += kColumnsAtOnce) {
+    const Eigen::Index count = std::min<Eigen::Index>(kColumnsAtOnce, values.cols() - first);
+    auto residuals = residuals_.topLeftCorner(points(), count);
+    residuals = values.middleCols(first, count);
+    packed_.Subtract(coefficients.middleCols(first, count), residuals);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      residual_variance[first + j] = residuals_.col(j).squaredNorm() / freedom;
     }
-    // ‖Y − A c‖² / (Q − S)
-    workspace_ = values.col(j);
-    workspace_.noalias() -= matrix_ * coefficients.col(j);
-    residual_variance[j] = workspace_.squaredNorm() / freedom;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include "core/chaos/basis.h"
+#include "core/chaos/packed_matrix.h"
 #include "core/common/types.h"
 #include "polyest/stop.h"
 
@@ -34,9 +35,10 @@ class CollocationMatrix {
   CollocationMatrix() = default;
 
   Matrix matrix_;
-  Matrix thin_q_;      // Q × S
-  Matrix triangular_;  // S × S, upper
-  Vector workspace_;   // Q
+  PackedMatrix packed_;    // A
+  PackedMatrix packed_q_;  // Qᵀ, S × Q
+  Matrix triangular_;      // S × S, upper
+  Matrix residuals_;       // Q and more × the number of columns at once
   double condition_ = 0;
 };
 

@@ -1,0 +1,94 @@
+#include "core/chaos/packed_matrix.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/common/check.h"
+
+namespace polyest::internal {
+namespace {
+
+// So many columns, or tiles of one column, are multiplied together: as many as have room in
+// registers, and enough for their sums not to wait for each other.
+constexpr int kTogether = 4;
+// So many columns pass a tile before the next one is read: as many as the second cache holds.
+constexpr Eigen::Index kPassing = 32;
+
+}  // namespace
+
+PackedMatrix::PackedMatrix(const ConstMatrixRef& a) : rows_(a.rows()), cols_(a.cols()) {
+  const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
+  tiles_.setZero(kTile, tiles * cols_);
+  for (Eigen::Index tile = 0; tile < tiles; ++tile) {
+    const Eigen::Index first = tile * kTile;
+    const Eigen::Index count = std::min<Eigen::Index>(kTile, rows_ - first);
+    tiles_.block(0, tile * cols_, count, cols_) = a.middleRows(first, count).array();
+  }
+}
+
+void PackedMatrix::Multiply(const ConstMatrixRef& x, MatrixRef product) const {
+  Run<false>(x, product);
+}
+
+void PackedMatrix::Subtract(const ConstMatrixRef& x, MatrixRef product) const {
+  Run<true>(x, product);
+}
+
+template <bool kSubtracts>
+void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
+  POLYEST_CHECK(x.rows() == cols_ && product.rows() == rows_ && product.cols() == x.cols());
+  const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
+  for (Eigen::Index begin = 0; begin < x.cols(); begin += kPassing) {
+    const Eigen::Index end = std::min(begin + kPassing, x.cols());
+    const Eigen::Index whole = end - (end - begin) % kTogether;
+    for (Eigen::Index tile = 0; tile < tiles; ++tile) {
+      for (Eigen::Index column = begin; column < whole; column += kTogether) {
+        RunSome<kSubtracts, 1, kTogether>(tile, x, column, product);
+      }
+    }
+    for (Eigen::Index column = whole; column < end; ++column) {
+      Eigen::Index tile = 0;
+      for (; tile + kTogether <= tiles; tile += kTogether) {
+        RunSome<kSubtracts, kTogether, 1>(tile, x, column, product);
+      }
+      for (; tile < tiles; ++tile) RunSome<kSubtracts, 1, 1>(tile, x, column, product);
+    }
+  }
+}
+
+template <bool kSubtracts, int kTiles, int kColumns>
+void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first,
+                           MatrixRef product) const {
+  std::array<std::array<TileColumn, kColumns>, kTiles> sums;
+  std::array<const double*, kColumns> factors;
+  const auto place = [&](int t, int i) {
+    const Eigen::Index row = (tile + t) * kTile;
+    return product.col(first + i).segment(row, std::min<Eigen::Index>(kTile, rows_ - row));
+  };
+  for (int i = 0; i < kColumns; ++i) {
+    factors[i] = x.col(first + i).data();
+    for (int t = 0; t < kTiles; ++t) {
+      sums[t][i].setZero();
+      if constexpr (kSubtracts) sums[t][i].head(place(t, i).size()) = place(t, i);
+    }
+  }
+  for (Eigen::Index k = 0; k < cols_; ++k) {
+    for (int t = 0; t < kTiles; ++t) {
+      const TileColumn values = tiles_.col((tile + t) * cols_ + k);
+      for (int i = 0; i < kColumns; ++i) {
+        if constexpr (kSubtracts) {
+          sums[t][i] -= values * factors[i][k];
+        } else {
+          sums[t][i] += values * factors[i][k];
+        }
+      }
+    }
+  }
+  for (int t = 0; t < kTiles; ++t) {
+    for (int i = 0; i < kColumns; ++i) {
+      place(t, i) = sums[t][i].head(place(t, i).size()).matrix();
+    }
+  }
+}
+
+}  // namespace polyest::internal
