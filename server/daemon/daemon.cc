@@ -31,8 +31,8 @@
 namespace polyest::internal {
 namespace {
 
-// The clients ping every 20 s, also while no call is open.
-constexpr int kShortestPingIntervalMs = 10'000;
+// Clients ping every 20 s, also while no call is open, and other daemons every 2 s.
+constexpr int kShortestPingIntervalMs = 1'000;
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 // Memory of gRPC for what clients send where the daemon's memory is not limited, MiB.

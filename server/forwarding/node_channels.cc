@@ -15,9 +15,10 @@ namespace {
 // A daemon takes 1,000 calls of a connection at a time; more would wait without a word. A call
 // holds at least one reference to its channel.
 constexpr int kMaxReferences = 900;
-// As the daemon's own clients do, so that a dead connection is noticed.
-constexpr int kPingMs = 20'000;
-constexpr int kPingTimeoutMs = 10'000;
+// While calls are passed on, a daemon whose computer is away or stands still is noticed soon after
+// its lease has ended, so that the calls end and their clients come back to the next owner.
+constexpr int kPingMs = 2'000;
+constexpr int kPingTimeoutMs = 3'000;
 // Longest time until the next attempt to reach a daemon that was away.
 constexpr int kLongestBackoffMs = 1'000;
 
@@ -63,6 +64,7 @@ std::shared_ptr<grpc::Channel> NodeChannels::Connect(const std::string& address)
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kPingMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingTimeoutMs);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as are due
   const auto credentials =
       options_.ca.empty()
           ? grpc::InsecureChannelCredentials()

@@ -32,8 +32,9 @@ from cluster import Database, ProxiedNode, write_secret
 from proxy import Proxy
 
 EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / "client" / "examples" / "oscillator"
-RECORD_S = 50.0  # of the example
-BATCH_ROWS = 4
+RECORD_S, RECORD_ROWS = 50.0, 1000  # of the example
+# Batches of a rig, 1/s, so that one that goes on is seen to go on between two faults.
+BATCH_RATE = 1.0
 NODES = 3
 # How long a fault lasts, and from its end to the next one, s; a lease lasts 3 s.
 FAULT_S, REST_S = (3.5, 6.0), (2.0, 4.0)
@@ -45,13 +46,13 @@ PATIENCE_S = 120.0
 class Rig:
     """A recording that is streamed; notes when its estimates come."""
 
-    def __init__(self, number, polyest, port, rate, folder):
+    def __init__(self, number, polyest, port, rate, batch_rows, folder):
         self.number = number
         self.times, self.last = [time.monotonic()], None
         self._log = open(folder / f"rig{number}.log", "wb")
         self.process = subprocess.Popen(
             [polyest, "stream", f"{EXAMPLE}.json", f"{EXAMPLE}.csv", "--server", f"127.0.0.1:{port}",
-             "--session", f"rig-{number}", "--batch", str(BATCH_ROWS), "--rate", str(rate),
+             "--session", f"rig-{number}", "--batch", str(batch_rows), "--rate", str(rate),
              "--format", "jsonl"], stdout=subprocess.PIPE, stderr=self._log, text=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -135,7 +136,7 @@ def stopped(processes):
                 os.kill(process, signal.SIGCONT)
 
 
-def undisturbed(polyestd, polyest):
+def undisturbed(polyestd, polyest, batch_rows):
     """Returns the last estimate of the record by a daemon without a fault."""
     with subprocess.Popen([polyestd, "--listen", "127.0.0.1:0", "--durability", "memory"],
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as daemon:
@@ -143,7 +144,7 @@ def undisturbed(polyestd, polyest):
             address = daemon.stdout.readline().split()[-1]
             answer = subprocess.run(
                 [polyest, "stream", f"{EXAMPLE}.json", f"{EXAMPLE}.csv", "--server", address, "--session",
-                 "rig", "--batch", str(BATCH_ROWS), "--format", "jsonl"], check=True,
+                 "rig", "--batch", str(batch_rows), "--format", "jsonl"], check=True,
                 capture_output=True, text=True)
         finally:
             daemon.terminate()
@@ -151,7 +152,9 @@ def undisturbed(polyestd, polyest):
 
 
 def run(arguments, folder, stack):
-    expected = undisturbed(arguments.polyestd, arguments.polyest)
+    seconds = 1.1 * arguments.faults * (sum(FAULT_S) + sum(REST_S)) / 2 + 30
+    rate, batch_rows = RECORD_S / seconds, max(1, round(RECORD_ROWS / seconds / BATCH_RATE))
+    expected = undisturbed(arguments.polyestd, arguments.polyest, batch_rows)
     database = Database(folder)
     stack.callback(database.close)
     write_secret(folder)
@@ -160,10 +163,9 @@ def run(arguments, folder, stack):
         nodes.append(ProxiedNode(number, arguments.polyestd, folder, database))
         stack.callback(nodes[-1].kill)
     to_rigs = Proxy(*[lambda node=node: node.port for node in nodes])
-    seconds = arguments.faults * (sum(FAULT_S) + sum(REST_S)) / 2
     rigs = []
     for number in range(arguments.rigs):
-        rigs.append(Rig(number, arguments.polyest, to_rigs.port, RECORD_S / (1.1 * seconds + 30), folder))
+        rigs.append(Rig(number, arguments.polyest, to_rigs.port, rate, batch_rows, folder))
         stack.callback(rigs[-1].close)
     faults, chance = Faults(database, nodes, to_rigs), random.Random(arguments.seed)
     order = [kind for _ in range(arguments.faults // len(faults.kinds) + 1)

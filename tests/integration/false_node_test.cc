@@ -11,10 +11,8 @@
 #include <mutex>
 #include <random>
 
-#include "polyest/rpc/error_details.pb.h"
+#include "tests/integration/forwarding_fixture.h"
 #include "tests/integration/operations_fixture.h"
-#include "tests/integration/postgres_fixture.h"
-#include "tests/integration/security_fixture.h"
 
 namespace polyest::internal {
 namespace {
@@ -182,14 +180,8 @@ bool Parses(const google::protobuf::Descriptor& type, const std::string& bytes) 
   return message->ParseFromString(bytes);
 }
 
-class FalseNodeTest : public PostgresTest {
+class FalseNodeTest : public ForwardingTest {
  protected:
-  std::vector<std::string> Sharing(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = Arguments();
-    arguments.insert(arguments.end(), {"--node-secret", secret_});
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
   // Returns the methods that are about a session, and only read it.
   static std::vector<std::string> Reads() {
     std::vector<std::string> methods = AllMethods();
@@ -198,9 +190,6 @@ class FalseNodeTest : public PostgresTest {
     });
     return methods;
   }
-
-  const TestFolder folder_;
-  const std::string secret_ = folder_.Write("node.secret", std::string(32, 's') + "\n");
 };
 
 TEST_F(FalseNodeTest, AnswersWhateverTheOwnerSays) {

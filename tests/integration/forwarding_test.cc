@@ -2,100 +2,13 @@
 
 #include <signal.h>
 
-#include "polyest/rpc/error_details.pb.h"
-#include "tests/integration/postgres_fixture.h"
-#include "tests/integration/security_fixture.h"
+#include "tests/integration/forwarding_fixture.h"
 
 namespace polyest::internal {
 namespace {
 
 using grpc::StatusCode;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-// A stream that a test reads from with a token.
-class WatchOf {
- public:
-  WatchOf(v1::SessionService::Stub& stub, const std::string& session) {
-    v1::WatchSessionRequest request;
-    request.set_session(session);
-    reader_ = stub.WatchSession(&context_, request);
-  }
-  // Returns the number of the last batch of the next estimate; 0 at the end.
-  int64_t Next() {
-    v1::WatchSessionResponse response;
-    return reader_->Read(&response) ? response.estimate().sequence() : 0;
-  }
-  // Reads on until the estimate of a batch, or a later one; returns its number, 0 at the end.
-  int64_t ReadTo(int64_t sequence) {
-    int64_t last = Next();
-    while (last > 0 && last < sequence) last = Next();
-    return last;
-  }
-  grpc::Status Finish() { return reader_->Finish(); }
-  void Cancel() { context_.TryCancel(); }
-
- private:
-  grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReader<v1::WatchSessionResponse>> reader_;
-};
-
-class ForwardingTest : public PostgresTest {
- protected:
-  std::vector<std::string> Sharing(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = Arguments();
-    arguments.insert(arguments.end(), {"--node-secret", secret_});
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-  // Starts a computation that belongs to no session; returns its name.
-  static std::string StartComputation(Node& node) {
-    grpc::ClientContext context;
-    v1::StartComputationRequest request;
-    v1::ComputePropagationRequest& propagation = *request.mutable_propagation();
-    *propagation.mutable_subject()->mutable_experiment()->mutable_problem() = Oscillator();
-    propagation.set_until_s(1);
-    propagation.set_step_s(1);
-    v1::Operation operation;
-    const grpc::Status started = v1::OperationService::NewStub(node.channel())
-                                     ->StartComputation(&context, request, &operation);
-    EXPECT_TRUE(started.ok()) << started.error_message();
-    return operation.name();
-  }
-  static grpc::Status ListPage(Node& node, int size, const std::string& token,
-                               v1::ListOperationsResponse& page) {
-    grpc::ClientContext context;
-    v1::ListOperationsRequest request;
-    request.set_page_size(size);
-    request.set_page_token(token);
-    return v1::OperationService::NewStub(node.channel())->ListOperations(&context, request, &page);
-  }
-  // Returns the names of all operations, from pages of this size.
-  static std::vector<std::string> Operations(Node& node, int page_size) {
-    std::vector<std::string> names;
-    v1::ListOperationsResponse page;
-    do {
-      const std::string token = page.next_page_token();
-      const grpc::Status listed = ListPage(node, page_size, token, page);
-      EXPECT_TRUE(listed.ok()) << listed.error_message();
-      if (!listed.ok()) return names;
-      for (const v1::Operation& operation : page.operations()) names.push_back(operation.name());
-    } while (!page.next_page_token().empty());
-    return names;
-  }
-  // Returns the details of a refusal because of another owner; none of any other status.
-  static rpc::ErrorInfo InfoOf(const grpc::Status& status) {
-    rpc::Status details;
-    rpc::ErrorInfo info;
-    if (details.ParseFromString(status.error_details()) && details.details_size() > 0) {
-      info.ParseFromString(details.details(0).value());
-    }
-    return info;
-  }
-
-  const TestFolder folder_;
-  const std::string secret_ = folder_.Write("node.secret", std::string(32, 's') + "\n");
-};
 
 TEST_F(ForwardingTest, AnswersAtAnyDaemonToTheSameBits) {
   Node owner(Sharing()), other(Sharing());
@@ -206,6 +119,19 @@ TEST_F(ForwardingTest, GoesOnElsewhereWhenTheOwnerOfAStreamIsKilled) {
   EXPECT_EQ(EstimateAt(other), Undisturbed(4));
 }
 
+TEST_F(ForwardingTest, NoticesAnOwnerThatStandsStill) {
+  Node owner(Sharing()), other(Sharing());
+  ASSERT_TRUE(owner.Create("rig").ok());
+  ASSERT_TRUE(owner.Add(1).ok());
+  WatchOf watch(other.sessions(), "sessions/rig", std::chrono::seconds(20));
+  EXPECT_EQ(watch.ReadTo(1), 1);
+  owner.process().Signal(SIGSTOP);
+  EXPECT_EQ(watch.ReadTo(2), 0);
+  const grpc::Status ended = watch.Finish();
+  EXPECT_EQ(ended.error_code(), StatusCode::UNAVAILABLE) << ended.error_message();
+  owner.process().Signal(SIGCONT);
+}
+
 TEST_F(ForwardingTest, EndsPassedOnStreamsInOrderWhenItStops) {
   Node owner(Sharing());
   auto other = std::make_unique<Node>(Sharing());
@@ -275,30 +201,6 @@ TEST_F(ForwardingTest, TakesNewSessionsItselfThatAnotherDaemonDoesNotTake) {
   for (int i = 1; i <= 12; ++i) {
     const grpc::Status created = first.Create("rig-" + std::to_string(i));
     ASSERT_TRUE(created.ok()) << created.error_message();
-  }
-}
-
-TEST_F(ForwardingTest, ListsTheOperationsOfAllDaemons) {
-  Node first(Sharing());
-  auto second = std::make_unique<Node>(Sharing());
-  Node third(Sharing());
-  const std::vector<std::string> started = {StartComputation(first), StartComputation(third),
-                                            StartComputation(first), StartComputation(*second)};
-  const std::vector<std::string> in_order = {started[0], started[2], started[3], started[1]};
-  for (Node* node : {&first, second.get(), &third}) {
-    EXPECT_EQ(Operations(*node, 1), in_order);
-    EXPECT_EQ(Operations(*node, 50), in_order);
-  }
-  second->process().Signal(SIGTERM);
-  EXPECT_EQ(second->process().Wait(), 0);
-  EXPECT_THAT(Operations(third, 1), ElementsAre(started[0], started[2], started[1]));
-  v1::ListOperationsResponse page;
-  EXPECT_TRUE(ListPage(first, 1, "999-0", page).ok());
-  EXPECT_EQ(page.operations_size(), 0);
-  for (const char* token : {"1", "-", "1-", "-1", "0-1", "1--1", "1-2-3", "x-1", "1-9e9"}) {
-    const grpc::Status refused = ListPage(first, 1, token, page);
-    EXPECT_EQ(refused.error_code(), StatusCode::INVALID_ARGUMENT) << token;
-    EXPECT_THAT(refused.error_message(), HasSubstr("is not the nextPageToken")) << token;
   }
 }
 
