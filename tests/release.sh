@@ -22,7 +22,7 @@
 #   sbibm        compares posteriors with the reference draws of a public benchmark, which it downloads
 #   can          streams through a real SocketCAN interface, in user-mode Linux (a minute)
 #   cluster      lets daemons that share a database, and their connections, fail 100 times while rigs
-#                stream; lets Patroni replace a database's primary, and brings one back from an archive by
+#                stream; lies to a daemon 3,000 times as another one; lets Patroni replace a database's primary, and brings one back from an archive by
 #                pgBackRest (20 minutes)
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
@@ -136,7 +136,8 @@ cluster() {
   deploy/install-packages.sh --tests
   apt-get install --yes --no-install-recommends patroni etcd-server pgbackrest
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
-  cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest
+  cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest postgres_test
+  POLYEST_TEST_ROUNDS=3000 build/release/bin/postgres_test --gtest_filter='FalseNodeTest.*'
   python3 -B tests/cluster/faults.py build/release/bin/polyestd build/release/bin/polyest --faults 100 \
     --bound
   # 77: a program is missing, as the step has said.

@@ -132,7 +132,7 @@ void RegionalExpansion::Compare(int column, double z, double variance) {
       absorbed_.check_valid[static_cast<size_t>(i)] = false;
       continue;
     }
-    const double difference = y - check_phi_.row(i).dot(coefficients_.col(column));
+    const double difference = y - check_predictions_(i, column);
     absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
     absorbed_.check_residual[i] += difference * difference / variance;
   }

@@ -19,6 +19,8 @@ absl::Status RegionalExpansion::FitRows(int first, int count, const Stop& stop) 
     while (end < first + count && !FailsAt(end)) ++end;
     const int columns = (end - begin) * channels_;
     FitColumns(begin * channels_, columns, outputs_, coefficients_, residual_variance_);
+    check_basis_.Multiply(coefficients_.middleCols(begin * channels_, columns),
+                          check_predictions_.middleCols(begin * channels_, columns));
     if (filters_) {
       FitColumns(begin * channels_, columns, log_variances_, log_variance_coefficients_,
                  log_variance_residual_);

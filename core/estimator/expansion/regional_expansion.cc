@@ -80,6 +80,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
   design_.basis->EvaluateMany(design_.check_points, check_phi_);
+  check_basis_ = PackedMatrix(check_phi_);
   for (int c = 0; c < channels_; ++c) {
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
@@ -152,6 +153,7 @@ absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& sto
   outputs_.resize(thetas_.rows() + controls_, channels_ * block.count());
   coefficients_.resize(design_.basis->size(), channels_ * block.count());
   residual_variance_.resize(channels_ * block.count());
+  check_predictions_.resize(check_phi_.rows(), channels_ * block.count());
   for (int first = 0; first < block.count() && fitted_rows_ == first;) {
     int count = 1;
     const int run = block.rows[static_cast<size_t>(first)].run;

@@ -28,6 +28,7 @@
 #include "core/bayes/relative_noise.h"
 #include "core/bayes/window_sums.h"
 #include "core/chaos/collocation_matrix.h"
+#include "core/chaos/packed_matrix.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
@@ -275,7 +276,8 @@ class RegionalExpansion {
   int threads_;
   int channels_;
   Vector reference_phi_;
-  Matrix check_phi_;  // C × S
+  Matrix check_phi_;          // C × S
+  PackedMatrix check_basis_;  // the same
 
   Matrix thetas_;          // (Q + C) × n
   std::vector<int> kept_;  // collocation points that are still in the fit
@@ -298,6 +300,7 @@ class RegionalExpansion {
   Matrix outputs_;            // (Q + C + K) × (m · rows)
   Matrix coefficients_;       // S × (m · rows)
   Vector residual_variance_;  // m · rows
+  Matrix check_predictions_;  // of the outputs at the check points, C × (m · rows)
   // With filters, as those above: log(S/σ²), its coefficients and the residual variance of its fit.
   Matrix log_variances_;
   Matrix log_variance_coefficients_;
