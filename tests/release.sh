@@ -22,8 +22,8 @@
 #   sbibm        compares posteriors with the reference draws of a public benchmark, which it downloads
 #   can          streams through a real SocketCAN interface, in user-mode Linux (a minute)
 #   cluster      lets daemons that share a database, and their connections, fail 100 times while rigs
-#                stream; lies to a daemon 3,000 times as another one; lets Patroni replace a database's primary, and brings one back from an archive by
-#                pgBackRest (20 minutes)
+#                stream; lies to a daemon 3,000 times as another one; lets Patroni replace a database's
+#                primary, and brings one back from an archive by pgBackRest (20 minutes)
 #   package      builds the packages, installs, uses, upgrades and removes them, boots a machine with
 #                them, and compares their speed with a native build
 #
