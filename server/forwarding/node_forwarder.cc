@@ -28,7 +28,11 @@ struct UnderWay {
 // Reads the answer of a call that has succeeded.
 grpc::Status ReadAnswer(UnderWay& call) {
   if (call.bytes.Valid()) {
-    return grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&call.bytes, call.answer);
+    const grpc::Status read =
+        grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&call.bytes, call.answer);
+    if (read.ok()) return read;
+    return {grpc::StatusCode::INTERNAL,
+            "the daemon to which the call went on has answered what is no message of its type"};
   }
   return {grpc::StatusCode::INTERNAL, "the daemon to which the call went on has answered nothing"};
 }

@@ -26,7 +26,12 @@ constexpr char kInsertBatchIfWhole[] =
 }  // namespace
 
 void PostgresBatches::Add(const PostgresBatch& batch) {
-  sessions_.try_emplace(batch.entry->session, Session{.owner = batch.owner});
+  const auto [session, is_new] =
+      sessions_.try_emplace(batch.entry->session, Session{.owner = batch.owner});
+  // Of two owners only the later one can be the present one.
+  if (!is_new && batch.owner.epoch > session->second.owner.epoch) {
+    session->second.owner = batch.owner;
+  }
 }
 
 PostgresStatement PostgresBatches::Look() const {
@@ -77,10 +82,11 @@ absl::Status PostgresBatches::JudgeInsert(const PostgresBatch& batch,
   return result.changes() > 0 ? absl::OkStatus() : DoesNotFollow(batch.entry->place.sequence);
 }
 
-void PostgresBatches::Delete(int64_t session) {
-  if (const auto found = sessions_.find(session); found != sessions_.end()) {
-    found->second.exists = false;
-  }
+void PostgresBatches::Delete(int64_t session, const PostgresOwner& owner) {
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end()) return;
+  Session& deleted = found->second;
+  if (deleted.held && deleted.owner == owner) deleted.exists = false;
 }
 
 }  // namespace polyest::internal

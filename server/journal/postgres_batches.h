@@ -44,8 +44,9 @@ class PostgresBatches {
   absl::StatusOr<PostgresStatement> Insert(const PostgresBatch& batch);
   // Judges what that statement has given: FAILED_PRECONDITION when parts of the batch are missing.
   static absl::Status JudgeInsert(const PostgresBatch& batch, const PostgresResult& result);
-  // Must be called when the transaction has deleted a session: it has no more batches.
-  void Delete(int64_t session);
+  // Must be called when the transaction deletes a session for an owner: if that is the right one,
+  // the session has no more batches.
+  void Delete(int64_t session, const PostgresOwner& owner);
 
  private:
   struct Session {

@@ -11,7 +11,8 @@ namespace {
 constexpr char kNodes[] =
     "SELECT node, address, (SELECT count(*) FROM owner WHERE owner.node = node.node), streams, "
     "busy_cores, (extract(epoch FROM clock_timestamp() - lease_until) + 3)::double precision, "
-    "draining FROM node WHERE lease_until > clock_timestamp() OR EXISTS (SELECT 1 FROM owner WHERE "
+    "draining, lease_until > clock_timestamp() FROM node WHERE lease_until > clock_timestamp() OR "
+    "EXISTS (SELECT 1 FROM owner WHERE "
     "owner.node = node.node) ORDER BY node";
 constexpr char kTaker[] =
     "SELECT address FROM node WHERE node <> $1 AND NOT draining AND address <> '' AND lease_until "
@@ -33,7 +34,8 @@ absl::StatusOr<std::vector<JournalNode>> ReadNodes(PostgresPool& pool) {
                      .streams = result.Integer(row, 3),
                      .busy_cores = result.Real(row, 4),
                      .lease_age_s = result.Real(row, 5),
-                     .draining = result.Flag(row, 6)});
+                     .draining = result.Flag(row, 6),
+                     .alive = result.Flag(row, 7)});
   }
   return nodes;
 }

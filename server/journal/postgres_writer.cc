@@ -21,8 +21,8 @@ void PostgresWriter::SendBatch(const PostgresBatch& batch) {
   sent_.push_back({.write = write_, .batch = batch});
 }
 
-void PostgresWriter::EndBatches(int64_t session) {
-  sent_.push_back({.write = write_, .ended = session});
+void PostgresWriter::EndBatches(int64_t session, const PostgresOwner& owner) {
+  sent_.push_back({.write = write_, .ended = session, .owner = owner});
 }
 
 absl::Status PostgresWriter::Connect() {
@@ -31,10 +31,14 @@ absl::Status PostgresWriter::Connect() {
   auto connection = PostgresConnection::Open(target_);
   next_attempt_ = std::chrono::steady_clock::now() + kPauseBetweenAttempts;
   POLYEST_RETURN_IF_ERROR(connection.status());
-  connection_ = *std::move(connection);
   // The same plan for all groups: the server would plan anew for the sessions of each, which takes
-  // it longer than to look at them.
-  return connection_->Execute("SET plan_cache_mode = force_generic_plan");
+  // it longer than to look at them. And it gives up a daemon that stands still between the look and
+  // the rest before the lease ends, so that no taker waits for the locks.
+  POLYEST_RETURN_IF_ERROR((*connection)
+                              ->Execute("SET plan_cache_mode = force_generic_plan; "
+                                        "SET idle_in_transaction_session_timeout = 2000"));
+  connection_ = *std::move(connection);
+  return absl::OkStatus();
 }
 
 absl::Status PostgresWriter::Commit(const std::vector<Write>& writes,
@@ -76,7 +80,7 @@ std::vector<PostgresStatement> PostgresWriter::Statements(std::vector<absl::Stat
   for (size_t i = 0; i < sent_.size(); ++i) {
     Sent& one = sent_[i];
     if (one.ended) {
-      batches_.Delete(*one.ended);
+      batches_.Delete(*one.ended, one.owner);
       continue;
     }
     if (one.batch) {

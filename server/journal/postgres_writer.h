@@ -1,7 +1,8 @@
 #pragma once
 
-// Commits writes to PostgreSQL in groups: all statements of a group travel in one pipeline, as one
-// transaction. Connects again by itself after the connection was lost.
+// Commits writes to PostgreSQL in groups: the statements of a group travel in one pipeline, as one
+// transaction; where it has batches, a look at their sessions goes ahead. Connects again by itself
+// after the connection was lost.
 
 #include <absl/status/status.h>
 
@@ -33,8 +34,8 @@ class PostgresWriter {
   // Adds a batch to the group. FAILED_PRECONDITION when it does not follow the last one, NOT_FOUND
   // when there is no such session, and UNAVAILABLE when it has another owner or epoch.
   void SendBatch(const PostgresBatch& batch);
-  // Must be called after a statement that deletes a session.
-  void EndBatches(int64_t session);
+  // Must be called after a statement that deletes a session for an owner.
+  void EndBatches(int64_t session, const PostgresOwner& owner);
 
   // Commits the group, as CommitQueue asks of its database. UNAVAILABLE when the database is away;
   // the group may then have been committed all the same, unless its sessions are claimed again
@@ -49,6 +50,7 @@ class PostgresWriter {
     Judge judge{};
     std::optional<PostgresBatch> batch{};
     std::optional<int64_t> ended{};
+    PostgresOwner owner{};  // for whom it ends
   };
 
   absl::Status Connect();

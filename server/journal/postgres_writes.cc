@@ -80,7 +80,7 @@ void SendShow(PostgresWriter& writer, int64_t session, std::string_view digest,
 void SendDelete(PostgresWriter& writer, int64_t session, const PostgresOwner& owner) {
   writer.Send(kDelete, PostgresParameters().Add(session).Add(owner.node).Add(owner.epoch),
               JudgeOwned);
-  writer.EndBatches(session);
+  writer.EndBatches(session, owner);
 }
 
 void SendPart(PostgresWriter& writer, const JournalEntry& entry, const BatchPart& part,

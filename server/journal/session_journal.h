@@ -93,6 +93,7 @@ struct JournalNode {
   double busy_cores = 0;   // processor time a second that it used before that
   double lease_age_s = 0;  // time since it renewed its lease
   bool draining = false;   // whether it hands its sessions over
+  bool alive = false;      // whether its lease holds
 };
 
 // A journal that several daemons share. Each session belongs to one of them, its owner, and

@@ -43,7 +43,8 @@ std::string TokenOf(const PageStart& start) {
 absl::StatusOr<std::vector<JournalNode>> NodesFrom(SharedJournal& journal, int64_t first) {
   POLYEST_ASSIGN_OR_RETURN(std::vector<JournalNode> nodes, journal.Nodes());
   std::erase_if(nodes, [&](const JournalNode& node) {
-    return node.number < first || (node.address.empty() && node.number != journal.node());
+    const bool here = node.number == journal.node();
+    return node.number < first || !(here || (node.alive && !node.address.empty()));
   });
   std::ranges::sort(nodes, {}, &JournalNode::number);
   return nodes;

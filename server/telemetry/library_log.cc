@@ -61,8 +61,9 @@ void StartLibraryLog() {
   // gRPC reports handshakes at this level only.
   gpr_set_log_verbosity(GPR_LOG_SEVERITY_DEBUG);
   google::protobuf::SetLogHandler(
-      [](google::protobuf::LogLevel, const char*, int, const std::string& message) {
-        spdlog::debug("protobuf: {}", message);
+      [](google::protobuf::LogLevel level, const char*, int, const std::string& message) {
+        const bool ends = level == google::protobuf::LOGLEVEL_FATAL;
+        spdlog::log(ends ? spdlog::level::critical : spdlog::level::debug, "protobuf: {}", message);
       });
 }
 

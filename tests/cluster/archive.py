@@ -36,7 +36,7 @@ class ArchivedDatabase(Database):
             self.give(own)
         self.configuration.write_text(
             f"[global]\nrepo1-path={repository}\nrepo1-retention-full=2\nlog-level-file=off\n"
-            f"log-level-console=warn\nlog-level-stderr=off\nlock-path={spool}\nstart-fast=y\n"
+            f"log-level-console=off\nlog-level-stderr=warn\nlock-path={spool}\nstart-fast=y\n"
             f"spool-path={spool}\n"
             f"[polyest]\npg1-path={folder / 'database' / 'data'}\npg1-socket-path={folder / 'database'}\n"
             "pg1-user=polyest\npg1-database=polyest\n", encoding="ascii")
@@ -128,7 +128,8 @@ def main():
         try:
             problems = run(arguments, folder, stack)
         except subprocess.CalledProcessError:
-            print((folder / "database" / "log").read_text(encoding="utf-8")[-2000:], file=sys.stderr)
+            if (log := folder / "database" / "log").exists():
+                print(log.read_text(encoding="utf-8")[-2000:], file=sys.stderr)
             raise
     for problem in problems:
         print(f"failed: {problem}")

@@ -33,7 +33,7 @@ from proxy import Proxy
 
 EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / "client" / "examples" / "oscillator"
 RECORD_S, RECORD_ROWS = 50.0, 1000  # of the example
-# Batches of a rig, 1/s, so that one that goes on is seen to go on between two faults.
+# Batches of a rig, 1/s, so that a rig that goes on shows it between two faults.
 BATCH_RATE = 1.0
 NODES = 3
 # How long a fault lasts, and from its end to the next one, s; a lease lasts 3 s.

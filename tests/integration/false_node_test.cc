@@ -203,16 +203,19 @@ TEST_F(FalseNodeTest, AnswersWhateverTheOwnerSays) {
   }
   std::vector<std::string> methods = Reads();
   methods.push_back("WatchSession");
+  int patient = 0;
   for (int round = 0; round < Rounds(); ++round) {
     SCOPED_TRACE(round);
     Random random(static_cast<uint32_t>(round));
     const std::string& method = methods[Choose(random, methods.size())];
     const Lie lie = MakeLie(random, truths[method], owner.address());
     owner.Set(lie);
-    // gRPC does not see the end of a call behind an answer that nobody reads: the second one of a
-    // unary call, or one behind another that is no message. The caller's deadline ends it then.
+    // gRPC sees the end of a call only when all answers have been read. Nobody reads the second one
+    // of a unary call, or those after one that cannot be parsed; the caller's deadline ends it
+    // then.
     const bool may_hang = lie.endless || lie.messages.size() > 1;
     const bool unary = !FindMethod(method).server_streaming();
+    if (!may_hang) ++patient;
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() +
                          (may_hang ? std::chrono::milliseconds(50) : kPatience));
@@ -225,7 +228,8 @@ TEST_F(FalseNodeTest, AnswersWhateverTheOwnerSays) {
     EXPECT_FALSE(lie.messages.empty());
     EXPECT_TRUE(Parses(*FindMethod(method).output_type(), answer));
   }
-  EXPECT_GE(owner.calls(), Rounds());
+  EXPECT_GE(owner.calls(), patient);
+  EXPECT_GT(patient, 0);
   EXPECT_EQ(real.Names(), asked.Names());
   asked.process().Signal(SIGTERM);
   EXPECT_EQ(asked.process().Wait(), 0);

@@ -11,6 +11,9 @@
 #include "proto/wire/refusal/refusal.h"
 #include "server/journal/postgres_schema.h"
 #include "server/journal/postgres_status.h"
+#include "server/journal/postgres_target.h"
+#include "server/journal/postgres_writer.h"
+#include "server/journal/postgres_writes.h"
 #include "tests/testing/postgres_server.h"
 #include "tests/testing/problem_json.h"
 #include "tests/unit/server/journal/append_batch.h"
@@ -186,6 +189,39 @@ TEST_F(PostgresJournalTest, JudgesEachBatchOfAGroup) {
                            "measurements)) OVER (PARTITION BY session ORDER BY sequence) AS wrong "
                            "FROM polyest.batch) AS each WHERE wrong <> 0"),
             0);
+}
+
+TEST_F(PostgresJournalTest, JudgesTheBatchesOfTwoOwnersInOneGroup) {
+  const auto journal = Open();
+  const int64_t session = CreateIn(*journal, "sessions/a", SmallProblem());
+  Execute("UPDATE polyest.owner SET epoch = 2");
+  const int64_t node = server_.Number(uri_, "SELECT node FROM polyest.owner");
+  const PostgresOwner before{node, 1}, now{node, 2};
+  const JournalEntry first = EntryOf(session, 1, RowAt(1)), second = EntryOf(session, 2, RowAt(2)),
+                     third = EntryOf(session, 3, RowAt(3));
+  const auto add = [](const JournalEntry& entry, const PostgresOwner& owner) {
+    return [&](PostgresWriter& writer) {
+      writer.SendBatch({.entry = &entry, .last = {.bytes = entry.measurements}, .owner = owner});
+      return absl::OkStatus();
+    };
+  };
+  const auto remove = [&](const PostgresOwner& owner) {
+    return [&](PostgresWriter& writer) {
+      SendDelete(writer, session, owner);
+      return absl::OkStatus();
+    };
+  };
+  std::vector<absl::Status> outcomes(6);
+  PostgresWriter writer(*PostgresTarget::Parse(uri_));
+  const absl::Status committed = writer.Commit({add(first, before), add(first, now), remove(before),
+                                                add(second, now), remove(now), add(third, now)},
+                                               outcomes);
+  ASSERT_TRUE(committed.ok()) << committed;
+  std::vector<absl::StatusCode> codes;
+  for (const absl::Status& outcome : outcomes) codes.push_back(outcome.code());
+  using Code = absl::StatusCode;
+  EXPECT_THAT(codes, ElementsAre(Code::kUnavailable, Code::kOk, Code::kUnavailable, Code::kOk,
+                                 Code::kOk, Code::kNotFound));
 }
 
 TEST_F(PostgresJournalTest, RemovesWhatDeletedSessionsLeave) {
