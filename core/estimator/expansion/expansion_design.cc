@@ -148,7 +148,11 @@ Region RegionOfParticles(const Matrix& xis) {
   const Vector scale = covariance.diagonal().cwiseSqrt().cwiseMax(kMinHalfWidth);
   const Matrix correlation =
       scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-  const Matrix axes = DecomposeSymmetric(correlation).vectors;
+  Matrix axes = DecomposeSymmetric(correlation).vectors;
+  if (axes.rows() == 2) {
+    // Whatever the correlation, the axes are (∓1, 1) and (1, 1): rounding would choose their signs.
+    for (auto axis : axes.colwise()) axis *= axis[1] < 0 ? -1 : 1;
+  }
   const Matrix along = centred * scale.cwiseInverse().asDiagonal() * axes;
   const Vector low = along.colwise().minCoeff().transpose();
   const Vector high = along.colwise().maxCoeff().transpose();
