@@ -30,11 +30,12 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   }
   POLYEST_CHECK(points.allFinite());
   CollocationMatrix result;
-  basis.EvaluateMany(points, result.matrix_);
-  POLYEST_ASSIGN_OR_RETURN(ThinQr factors, DecomposeThinQr(result.matrix_, stop));
+  Matrix matrix;
+  basis.EvaluateMany(points, matrix);
+  POLYEST_ASSIGN_OR_RETURN(ThinQr factors, DecomposeThinQr(matrix, stop));
   result.triangular_ = std::move(factors.r);
-  result.packed_ = PackedMatrix(result.matrix_);
-  result.packed_q_ = PackedMatrix(factors.q.transpose());
+  result.matrix_ = PackedMatrix(matrix);
+  result.thin_q_ = PackedMatrix(factors.q.transpose());
   // Columns of whole vectors, so that the squares of each are summed in the same order.
   result.residuals_.setZero((points.rows() + 7) / 8 * 8, kColumnsAtOnce);
   // R has the singular values of A.
@@ -53,7 +54,7 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
                               VectorRef residual_variance) {
   POLYEST_CHECK(values.rows() == points() && coefficients.rows() == terms());
   POLYEST_CHECK(coefficients.cols() == values.cols() && residual_variance.size() == values.cols());
-  packed_q_.Multiply(values, coefficients);
+  thin_q_.Multiply(values, coefficients);
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
     auto solution = coefficients.col(j);
     triangular_.triangularView<Eigen::Upper>().solveInPlace(solution);
@@ -68,7 +69,7 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
     const Eigen::Index count = std::min<Eigen::Index>(kColumnsAtOnce, values.cols() - first);
     auto residuals = residuals_.topLeftCorner(points(), count);
     residuals = values.middleCols(first, count);
-    packed_.Subtract(coefficients.middleCols(first, count), residuals);
+    matrix_.Subtract(coefficients.middleCols(first, count), residuals);
     for (Eigen::Index j = 0; j < count; ++j) {
       residual_variance[first + j] = residuals_.col(j).squaredNorm() / freedom;
     }

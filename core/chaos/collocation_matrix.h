@@ -23,8 +23,8 @@ class CollocationMatrix {
 
   int points() const { return static_cast<int>(matrix_.rows()); }  // Q
   int terms() const { return static_cast<int>(matrix_.cols()); }   // S
-  double condition() const { return condition_; }                  // from the triangular factor
-  const Matrix& matrix() const { return matrix_; }
+  Matrix matrix() const { return matrix_.Unpacked(); }
+  double condition() const { return condition_; }  // from the triangular factor
 
   // Writes the least-squares coefficients (S × m) of the values (Q × m) at the points, and the
   // residual variance ‖Y − A c‖² / (Q − S) of each column; 0 if Q = S, because interpolation leaves
@@ -34,11 +34,10 @@ class CollocationMatrix {
  private:
   CollocationMatrix() = default;
 
-  Matrix matrix_;
-  PackedMatrix packed_;    // A
-  PackedMatrix packed_q_;  // Qᵀ, S × Q
-  Matrix triangular_;      // S × S, upper
-  Matrix residuals_;       // Q and more × the number of columns at once
+  PackedMatrix matrix_;
+  PackedMatrix thin_q_;  // transposed, S × Q
+  Matrix triangular_;    // S × S, upper
+  Matrix residuals_;     // Q and more × the number of columns at once
   double condition_ = 0;
 };
 

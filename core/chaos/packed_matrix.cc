@@ -26,6 +26,15 @@ PackedMatrix::PackedMatrix(const ConstMatrixRef& a) : rows_(a.rows()), cols_(a.c
   }
 }
 
+Matrix PackedMatrix::Unpacked() const {
+  Matrix a(rows_, cols_);
+  for (Eigen::Index first = 0; first < rows_; first += kTile) {
+    const Eigen::Index count = std::min<Eigen::Index>(kTile, rows_ - first);
+    a.middleRows(first, count) = tiles_.block(0, first / kTile * cols_, count, cols_).matrix();
+  }
+  return a;
+}
+
 void PackedMatrix::Multiply(const ConstMatrixRef& x, MatrixRef product) const {
   Run<false>(x, product);
 }

@@ -21,6 +21,7 @@ class PackedMatrix {
 
   Eigen::Index rows() const { return rows_; }
   Eigen::Index cols() const { return cols_; }
+  Matrix Unpacked() const;
   // Writes A X into `product` (m × n), or subtracts it from that; X is k × n.
   void Multiply(const ConstMatrixRef& x, MatrixRef product) const;
   void Subtract(const ConstMatrixRef& x, MatrixRef product) const;

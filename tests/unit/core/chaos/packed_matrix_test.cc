@@ -16,6 +16,7 @@ TEST(PackedMatrix, MultipliesAsAMatrixDoes) {
       for (const int columns : kSizes) {
         const Matrix a = Matrix::Random(rows, inner), x = Matrix::Random(inner, columns);
         const PackedMatrix packed(a);
+        EXPECT_EQ(packed.Unpacked(), a);
         Matrix product(rows, columns);
         packed.Multiply(x, product);
         Matrix left = Matrix::Random(rows, columns);
