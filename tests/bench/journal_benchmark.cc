@@ -158,13 +158,14 @@ void Run(const std::string& uri, const Size& size) {
 }  // namespace polyest::internal
 
 int main(int argc, char** argv) {
-  if (argc < 2) {
-    std::fprintf(stderr, "usage: journal_benchmark URI [SESSIONS [BATCHES [ROWS]]]\n");
-    return 2;
-  }
   polyest::internal::Size size;
   if (argc > 2) size.sessions = std::atoi(argv[2]);
   if (argc > 3) size.batches = std::atoi(argv[3]);
   if (argc > 4) size.rows = std::atoi(argv[4]);
+  if (argc < 2 || size.sessions < 1 || size.batches < 1 || size.rows < 1) {
+    std::fprintf(stderr,
+                 "usage: journal_benchmark URI [SESSIONS [BATCHES [ROWS]]], each at least 1\n");
+    return 2;
+  }
   polyest::internal::Run(argv[1], size);
 }
