@@ -36,7 +36,8 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   result.triangular_ = std::move(factors.r);
   result.matrix_ = PackedMatrix(matrix);
   result.thin_q_ = PackedMatrix(factors.q.transpose());
-  // Columns of whole vectors, so that the squares of each are summed in the same order.
+  // Columns are filled up with zeros to whole vectors: the order in which their squares are summed
+  // would otherwise depend on where they begin in memory.
   result.residuals_.setZero((points.rows() + 7) / 8 * 8, kColumnsAtOnce);
   // R has the singular values of A.
   const Conditioning conditioning = ConditioningOfTriangular(result.triangular_);

@@ -1,9 +1,9 @@
 #pragma once
 
-// A matrix that many columns are multiplied by. Its rows lie together in tiles as wide as the
-// processor's vectors, a tile stays in the nearest cache while columns pass, and no memory is
-// needed for a product. Each element of a product is summed in the order of the inner index: what
-// comes out for a column depends neither on the others nor on its place among them.
+// A matrix A that multiplies many columns. It is kept in tiles of a few rows, as wide as the
+// processor's vectors; a tile stays in the nearest cache while it multiplies some columns, and a
+// product allocates nothing. Each element of a product is summed in the order of the inner index,
+// so that the product of a column depends neither on the other columns nor on its place among them.
 //
 // Source: Goto and van de Geijn, Anatomy of High-Performance Matrix Multiplication, ACM Trans.
 // Math. Softw. 34 (2008).
@@ -17,12 +17,13 @@ namespace polyest::internal {
 class PackedMatrix {
  public:
   PackedMatrix() = default;
-  explicit PackedMatrix(const ConstMatrixRef& a);
+  explicit PackedMatrix(const ConstMatrixRef& a);  // copies A, m × k
 
-  Eigen::Index rows() const { return rows_; }
-  Eigen::Index cols() const { return cols_; }
+  Eigen::Index rows() const { return rows_; }  // m
+  Eigen::Index cols() const { return cols_; }  // k
+  // Returns A.
   Matrix Unpacked() const;
-  // Writes A X into `product` (m × n), or subtracts it from that; X is k × n.
+  // Multiply writes A X into `product` (m × n), Subtract subtracts it from `product`; X is k × n.
   void Multiply(const ConstMatrixRef& x, MatrixRef product) const;
   void Subtract(const ConstMatrixRef& x, MatrixRef product) const;
 
@@ -37,7 +38,8 @@ class PackedMatrix {
                MatrixRef product) const;
 
   Eigen::Index rows_ = 0, cols_ = 0;
-  Eigen::Array<double, kTile, Eigen::Dynamic> tiles_;  // one behind the other, filled up with 0
+  Eigen::Array<double, kTile, Eigen::Dynamic>
+      tiles_;  // the tiles in order; the last is filled up with zeros
 };
 
 }  // namespace polyest::internal

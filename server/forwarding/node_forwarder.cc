@@ -32,9 +32,10 @@ grpc::Status ReadAnswer(UnderWay& call) {
         grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&call.bytes, call.answer);
     if (read.ok()) return read;
     return {grpc::StatusCode::INTERNAL,
-            "the daemon to which the call went on has answered what is no message of its type"};
+            "the answer of the daemon to which the call was passed on cannot be read"};
   }
-  return {grpc::StatusCode::INTERNAL, "the daemon to which the call went on has answered nothing"};
+  return {grpc::StatusCode::INTERNAL,
+          "the daemon to which the call was passed on has ended it without an answer"};
 }
 
 }  // namespace

@@ -32,10 +32,11 @@ class PostgresBatches {
   bool empty() const { return sessions_.empty(); }
   void Add(const PostgresBatch& batch);
 
-  // Returns the statement that looks, and takes what it has given. It must run before any of the
-  // others. Who takes a session meanwhile waits for the end of the transaction; where the statement
-  // has waited for a taking, it finds another epoch.
+  // Returns the statement that looks at the sessions. It must run first in the transaction. A
+  // daemon that takes a session over meanwhile waits for the end of the transaction; where this
+  // statement has waited for such a daemon, it finds another epoch.
   PostgresStatement Look() const;
+  // Takes what that statement has given.
   void Found(const PostgresResult& result);
 
   // Returns the statement that inserts a batch, in the order of the batches. NOT_FOUND when there

@@ -31,9 +31,9 @@ absl::Status PostgresWriter::Connect() {
   auto connection = PostgresConnection::Open(target_);
   next_attempt_ = std::chrono::steady_clock::now() + kPauseBetweenAttempts;
   POLYEST_RETURN_IF_ERROR(connection.status());
-  // The same plan for all groups: the server would plan anew for the sessions of each, which takes
-  // it longer than to look at them. And it gives up a daemon that stands still between the look and
-  // the rest before the lease ends, so that no taker waits for the locks.
+  // The server keeps one plan for all groups, since planning anew for each takes longer than the
+  // look itself. It ends the transaction of a daemon that stands still after the look before the
+  // daemon's lease is over, so that nobody who takes a session over waits for its locks.
   POLYEST_RETURN_IF_ERROR((*connection)
                               ->Execute("SET plan_cache_mode = force_generic_plan; "
                                         "SET idle_in_transaction_session_timeout = 2000"));

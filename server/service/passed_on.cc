@@ -44,11 +44,11 @@ bool IsUnreached(const grpc::ClientContext& call, const grpc::Status& outcome) {
 grpc::Status OutcomeFrom(const std::string& owner, const grpc::ClientContext& call,
                          const grpc::Status& outcome) {
   if (!IsUnreached(call, outcome)) return outcome;
-  return ToGrpc(
-      Refuse(absl::StatusCode::kUnavailable,
-             absl::StrCat("the daemon at ", owner,
-                          ", to which the call goes on, is not reached: ", outcome.error_message()),
-             {.reason = kOwnedElsewhere, .retry_delay = std::chrono::seconds(1), .owner = owner}));
+  return ToGrpc(Refuse(
+      absl::StatusCode::kUnavailable,
+      absl::StrCat("the daemon at ", owner,
+                   ", to which the call was passed on, is not reached: ", outcome.error_message()),
+      {.reason = kOwnedElsewhere, .retry_delay = std::chrono::seconds(1), .owner = owner}));
 }
 
 void PassOnTrailers(const grpc::ClientContext& from, grpc::CallbackServerContext& to) {

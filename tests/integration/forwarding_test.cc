@@ -176,7 +176,8 @@ TEST_F(ForwardingTest, NamesAnOwnerThatItCannotReach) {
   ASSERT_TRUE(first.Create("rig").ok());
   const grpc::Status refused = second.Add(1);
   EXPECT_EQ(refused.error_code(), StatusCode::UNAVAILABLE);
-  EXPECT_THAT(refused.error_message(), HasSubstr("127.0.0.1:1, to which the call goes on, is not"));
+  EXPECT_THAT(refused.error_message(),
+              HasSubstr("127.0.0.1:1, to which the call was passed on, is not"));
   EXPECT_EQ(InfoOf(refused).metadata().at("owner"), "127.0.0.1:1");
 }
 

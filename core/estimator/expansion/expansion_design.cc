@@ -150,7 +150,8 @@ Region RegionOfParticles(const Matrix& xis) {
       scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
   Matrix axes = DecomposeSymmetric(correlation).vectors;
   if (axes.rows() == 2) {
-    // Whatever the correlation, the axes are (∓1, 1) and (1, 1): rounding would choose their signs.
+    // The axes of a 2 × 2 correlation matrix are (−1, 1) and (1, 1), whatever the correlation is,
+    // and the decomposition leaves their signs to rounding.
     for (auto axis : axes.colwise()) axis *= axis[1] < 0 ? -1 : 1;
   }
   const Matrix along = centred * scale.cwiseInverse().asDiagonal() * axes;
