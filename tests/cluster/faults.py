@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Streams rigs to three daemons of one database while these fail, again and again.
 
-    faults.py POLYESTD POLYEST [--faults N] [--rigs N] [--seed N] [--bound]
+    faults.py POLYESTD POLYEST [--faults N] [--kind KIND]... [--rigs N] [--seed N] [--bound]
 
 The faults come in random order: a daemon is killed, or stopped for longer than its lease; its
 connections to the database, to the other daemons or to the rigs are cut, or silent; the database crashes,
 or stands still. Every rig must go on by itself, and its last estimate must have the bits of an undisturbed
-run over the same record: no acknowledged batch is lost, and none is taken twice.
+run over the same record: no acknowledged batch is lost, and none is taken twice. A fault comes when all rigs
+have gone on after the one before, so that each silence is that of one fault.
 Prints the longest silence of a rig's estimates that began with each kind of fault. Exits with status 1
 if a rig has not gone on to that estimate; with --bound, which asks for a machine that is not busy, also
 if a silence is longer than 10 s or, after a fault of the database, than the fault and 5 s more.
@@ -38,9 +39,14 @@ BATCH_RATE = 1.0
 NODES = 3
 # How long a fault lasts, and from its end to the next one, s; a lease lasts 3 s.
 FAULT_S, REST_S = (3.5, 6.0), (2.0, 4.0)
+# Longest wait for the rigs to go on, s, and the pause between two looks.
+SETTLE_S, LOOK_S = 30.0, 0.1
 # A silence of the rigs, s: after a fault of a daemon, and beyond one of the database.
 DAEMON_SILENCE_S, DATABASE_SILENCE_S = 10.0, 5.0
 PATIENCE_S = 120.0
+KINDS = ["daemon killed", "daemon stopped", "database cut from a daemon", "database silent to a daemon",
+         "daemon cut from the others", "daemon silent to the others", "daemon cut from the rigs",
+         "daemon silent to the rigs", "database crashed", "database stopped"]
 
 
 class Rig:
@@ -61,6 +67,10 @@ class Rig:
         for line in self.process.stdout:
             self.last = line
             self.times.append(time.monotonic())
+
+    def has_gone_on(self, since):
+        """Returns whether there was an estimate since then, or there will be none."""
+        return self.times[-1] > since or self.process.poll() is not None
 
     def silences(self, spans):
         """Returns the number of the fault with which each silence began, and how long it was."""
@@ -92,10 +102,6 @@ class Faults:
 
     def __init__(self, database, nodes, to_rigs):
         self.database, self.nodes, self.to_rigs = database, nodes, to_rigs
-        self.kinds = ["daemon killed", "daemon stopped", "database cut from a daemon",
-                      "database silent to a daemon", "daemon cut from the others",
-                      "daemon silent to the others", "daemon cut from the rigs",
-                      "daemon silent to the rigs", "database crashed", "database stopped"]
 
     @contextlib.contextmanager
     def one(self, kind, node):
@@ -168,11 +174,13 @@ def run(arguments, folder, stack):
         rigs.append(Rig(number, arguments.polyest, to_rigs.port, rate, batch_rows, folder))
         stack.callback(rigs[-1].close)
     faults, chance = Faults(database, nodes, to_rigs), random.Random(arguments.seed)
-    order = [kind for _ in range(arguments.faults // len(faults.kinds) + 1)
-             for kind in chance.sample(faults.kinds, len(faults.kinds))][:arguments.faults]
+    kinds = arguments.kind or KINDS
+    order = [kind for _ in range(arguments.faults // len(kinds) + 1)
+             for kind in chance.sample(kinds, len(kinds))][:arguments.faults]
     spans = []
     for i, kind in enumerate(order, 1):
         time.sleep(chance.uniform(*REST_S))
+        settle(rigs, spans)
         node = chance.choice(nodes)
         begin = time.monotonic()
         with faults.one(kind, node):
@@ -187,11 +195,19 @@ def run(arguments, folder, stack):
             problem = "has another last estimate than the undisturbed run"
         if problem is not None:
             problems.append(f"rig {rig.number} {problem}")
-    too_long = report(faults.kinds, spans, rigs)
+    too_long = report(spans, rigs)
     return problems + (too_long if arguments.bound else [])
 
 
-def report(kinds, spans, rigs):
+def settle(rigs, spans):
+    """Waits until all rigs have gone on after the last fault."""
+    deadline = time.monotonic() + SETTLE_S
+    while spans and time.monotonic() < deadline and not all(
+            rig.has_gone_on(spans[-1].end) for rig in rigs):
+        time.sleep(LOOK_S)
+
+
+def report(spans, rigs):
     """Prints a line for each kind of fault; returns what is too long."""
     longest = collections.Counter()
     for rig in rigs:
@@ -199,7 +215,7 @@ def report(kinds, spans, rigs):
             longest[fault] = max(longest[fault], silence)
     print("number  longest, s  longest silence, s  fault")
     problems = []
-    for kind in kinds:
+    for kind in KINDS:
         those = {i: span.end - span.begin for i, span in enumerate(spans) if span.kind == kind}
         if not those:
             continue
@@ -217,6 +233,7 @@ def main():
     parser.add_argument("polyestd")
     parser.add_argument("polyest")
     parser.add_argument("--faults", type=int, default=20)
+    parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--rigs", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--bound", action="store_true")
