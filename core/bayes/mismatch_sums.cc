@@ -6,23 +6,60 @@
 
 namespace polyest::internal {
 
-MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {}
+MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {
+  SetNoneWaiting();
+}
+
+void MismatchSums::SetNoneWaiting() {
+  waiting_ = 0;
+  is_whole_ = true;
+  coefficients_.setZero(b_.size(), kTogether);
+  weighted_.setZero(kTogether, b_.size());
+}
 
 void MismatchSums::Add(const ConstVectorRef& coefficients, double error, double variance) {
   POLYEST_CHECK(coefficients.size() == b_.size() && variance > 0);
   const double weight = 1 / variance;
-  // G += c cᵀ/R, a column at a time: both triangles, so that all memory is walked in order
-  for (Eigen::Index j = 0; j < b_.size(); ++j) {
-    g_.col(j) += weight * (coefficients[j] * coefficients);
-  }
+  coefficients_.col(waiting_) = coefficients;
+  weighted_.row(waiting_) = weight * coefficients.transpose();
+  if (++waiting_ == kTogether) AddWaiting();
   b_ += (weight * error) * coefficients;  // b += c e/R
   w_ += weight * error * error;           // w += e²/R
   ++count_;
 }
 
+const Matrix& MismatchSums::G() const {
+  if (waiting_ > 0) AddWaiting();
+  if (!is_whole_) g_.triangularView<Eigen::StrictlyUpper>() = g_.transpose();
+  is_whole_ = true;
+  return g_;
+}
+
+// G += c cᵀ/R for each sample that waits, in their order.
+void MismatchSums::AddWaiting() const {
+  using Rows = Eigen::Array<double, 8, 1>;
+  const Eigen::Index terms = b_.size();
+  for (Eigen::Index j = 0; j < terms; ++j) {
+    const auto weights = weighted_.col(j);
+    double* const column = &g_(0, j);
+    Eigen::Index i = j;
+    for (; i + Rows::SizeAtCompileTime <= terms; i += Rows::SizeAtCompileTime) {
+      Rows sum = Rows::Map(column + i);
+      for (int k = 0; k < waiting_; ++k) sum += weights[k] * Rows::Map(&coefficients_(i, k));
+      Rows::Map(column + i) = sum;
+    }
+    for (; i < terms; ++i) {
+      for (int k = 0; k < waiting_; ++k) column[i] += weights[k] * coefficients_(i, k);
+    }
+  }
+  waiting_ = 0;
+  is_whole_ = false;
+}
+
 void MismatchSums::Add(const MismatchSums& other) {
   POLYEST_CHECK(other.b_.size() == b_.size());
-  g_ += other.g_;
+  G();
+  g_ += other.G();
   b_ += other.b_;
   w_ += other.w_;
   count_ += other.count_;
@@ -38,7 +75,7 @@ void MismatchSums::AddLinear(const ConstVectorRef& coefficients, double at_refer
 MismatchSums MismatchSums::Substituted(const ConstMatrixRef& t, const ConstVectorRef& shift,
                                        double variance) const {
   POLYEST_CHECK(t.cols() == b_.size() && shift.size() == b_.size() && variance > 0);
-  const Vector moved = b_ - g_ * shift;
+  const Vector moved = b_ - G() * shift;
   MismatchSums sums(static_cast<int>(t.rows()));
   sums.g_ = t * g_ * t.transpose();
   sums.g_ = (0.5 / variance * (sums.g_ + sums.g_.transpose())).eval();
@@ -50,11 +87,11 @@ MismatchSums MismatchSums::Substituted(const ConstMatrixRef& t, const ConstVecto
 
 double MismatchSums::ChiSquared(const ConstVectorRef& d) const {
   // The χ² is dᵀ G d − 2 bᵀ d + w; as a sum of squares it is below 0 only by rounding.
-  return std::max(0.0, d.dot(g_ * d) - 2 * b_.dot(d) + w_);
+  return std::max(0.0, d.dot(G() * d) - 2 * b_.dot(d) + w_);
 }
 
 double MismatchSums::ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
-  gradient.noalias() = g_ * d;
+  gradient.noalias() = G() * d;
   const double value = std::max(0.0, d.dot(gradient) - 2 * b_.dot(d) + w_);
   gradient = 2 * (gradient - b_);  // 2 (G d − b)
   return value;

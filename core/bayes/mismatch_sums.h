@@ -8,7 +8,12 @@
 //
 // The sums are taken about the reference and not about zero, because w would otherwise be the
 // energy of the signal and the far smaller energy of the residual would be lost to rounding.
+//
+// G is most of the work, and it is too large for the nearest cache: samples wait until there are
+// eight of them, which then pass through its lower triangle together. Every element is summed in
+// the order of the samples, so that the bits do not depend on when G is read.
 
+#include <Eigen/Core>
 #include <cstdint>
 
 #include "core/common/types.h"
@@ -21,7 +26,8 @@ class MismatchSums {
 
   int terms() const { return static_cast<int>(b_.size()); }
   int64_t count() const { return count_; }
-  const Matrix& G() const { return g_; }
+  // Adds the samples that wait. Until it has been called, two threads must not read the same sums.
+  const Matrix& G() const;
   const Vector& b() const { return b_; }
   double w() const { return w_; }
 
@@ -41,14 +47,28 @@ class MismatchSums {
   // Returns χ² at d; `gradient` (S) is with respect to d.
   double ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
 
-  // Writes to or reads from a cereal archive. The shapes of what is read are not checked.
+  // Write to or read from a cereal archive. The shapes of what is read are not checked.
   template <class Archive>
-  void serialize(Archive& archive) {
+  void save(Archive& archive) const {
+    archive(G(), b_, w_, count_);
+  }
+  template <class Archive>
+  void load(Archive& archive) {
     archive(g_, b_, w_, count_);
+    SetNoneWaiting();
   }
 
  private:
-  Matrix g_;  // symmetric, both triangles kept
+  static constexpr int kTogether = 8;
+
+  void SetNoneWaiting();
+  void AddWaiting() const;
+
+  mutable Matrix g_;  // symmetric; the upper triangle lacks what waits since the last reading
+  mutable int waiting_ = 0;       // samples that g_ lacks
+  mutable bool is_whole_ = true;  // whether the upper triangle is that of the lower one
+  Matrix coefficients_;           // S × kTogether: c of those samples
+  Eigen::Matrix<double, kTogether, Eigen::Dynamic> weighted_;  // kTogether × S: c/R of each
   Vector b_;
   double w_ = 0;
   int64_t count_ = 0;

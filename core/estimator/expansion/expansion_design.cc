@@ -19,7 +19,6 @@ constexpr double kMargin = 1.35;              // widening of a region beyond its
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
 constexpr double kGoesOnFraction = 0.2;  // minimum fraction of the particles at an edge
-constexpr double kWiden = 1.5;
 constexpr int kPointsPerDrawnCheck = 6;
 constexpr int kMaxDrawnChecks = 200;
 constexpr int kChecksPastDimension = 3;
@@ -200,14 +199,14 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, 
 }
 
 Region WidenedRegion(const ExpansionDesign& design, const Matrix& etas,
-                     const std::vector<int>& axes) {
+                     const std::vector<int>& axes, double factor) {
   const Region trusted = TrustedRegion(design);
   const Vector mean = InBoxUnits(design, etas).colwise().mean().transpose();
   Vector shift = Vector::Zero(mean.size());
   Matrix widened = trusted.axes();
   for (const int j : axes) {
     shift[j] = mean[j];
-    widened.col(j) *= kWiden;
+    widened.col(j) *= factor;
   }
   return Region(trusted.ToGerm(shift), widened);
 }

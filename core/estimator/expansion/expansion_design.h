@@ -85,9 +85,9 @@ inline constexpr double kLeaningFraction = 0.01;
 std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas,
                              double fraction = kLeaningFraction);
 
-// Returns the trusted region, widened by half along `axes` and shifted along them to the particles'
-// mean (particles in local coordinates).
+// Returns the trusted region, `factor` times as wide along `axes` and shifted along them to the
+// particles' mean (particles in local coordinates).
 Region WidenedRegion(const ExpansionDesign& design, const Matrix& etas,
-                     const std::vector<int>& axes);
+                     const std::vector<int>& axes, double factor);
 
 }  // namespace polyest::internal

@@ -29,8 +29,11 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 }
 
 double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
-  return std::sqrt(cost.power() * expansion.OwnError()) +
-         cost.power() * expansion.LogVarianceError();
+  return LargestShift(expansion, cost.power());
+}
+
+double LargestShift(const RegionalExpansion& expansion, double power) {
+  return std::sqrt(power * expansion.OwnError()) + power * expansion.LogVarianceError();
 }
 
 CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const Cost& cost) {
@@ -54,7 +57,7 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
     return Vector(Eigen::Map<const Vector>(values.data(), std::ssize(values)));
   };
   return {design.check_points(rows, Eigen::all), vector(log_weights), vector(differences),
-          vector(residuals)};
+          vector(residuals), LargestShift(expansion, /*power=*/1)};
 }
 
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {

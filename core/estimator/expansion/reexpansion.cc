@@ -4,10 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/likelihood_power.h"
+#include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/overlooked_minima.h"
 #include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
@@ -31,6 +34,8 @@ constexpr int kFewDimensions = 3;
 constexpr double kShareOfOverlooked = 0.03;
 // Up to such errors in the cost at its minima an expansion can tell the pieces around them apart.
 constexpr double kMaxErrorAtMinima = 1;
+// The factor by which a region is widened: the least and the most.
+constexpr double kWiden = 1.5, kWidest = 4;
 constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
@@ -52,9 +57,13 @@ class Settler {
       const std::vector<int> leaning =
           LeaningAxes(design, request_.problem->prior(), particles_.etas);
       if (!leaning.empty()) {
+        const auto widened = [&](double factor) {
+          return WidenedRegion(design, particles_.etas, leaning, factor);
+        };
         POLYEST_ASSIGN_OR_RETURN(const bool moved,
-                                 Move(WidenedRegion(design, particles_.etas, leaning), present()));
+                                 Move(widened(kWiden), present(), widened(ReplayedWidening())));
         if (!moved) break;
+        has_widened_ = true;
         result_.memory.costs.resize(0);  // the particles end at the edge
         continue;
       }
@@ -172,8 +181,18 @@ class Settler {
     return true;
   }
 
-  // Returns whether a contraction to the region saves enough.
+  // Returns how much wider a region can be over which the record is propagated again, so that the
+  // posterior does not soon come to its edge once more. The expansion's error over a region grows
+  // as the power p + 1 of its width.
+  double ReplayedWidening() const {
+    const double room = kNegligibleShift / LargestShift(expansion(), /*power=*/1);
+    return std::clamp(std::pow(room, 1.0 / (present().order + 1)), kWiden, kWidest);
+  }
+
+  // Returns whether a contraction to the region saves enough. A region that has just been widened
+  // stays as it is if the expansion is as good as the model all over it.
   bool Pays(const Region& region) const {
+    if (has_widened_ && LargestShift(expansion(), /*power=*/1) <= kNegligibleShift) return false;
     return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
   }
 
@@ -241,12 +260,15 @@ class Settler {
     return carried;
   }
 
-  // Returns false when the new expansion cannot be built; the present one then stays.
-  absl::StatusOr<bool> Move(Region region, const Truncation& truncation) {
+  // Moves the expansion to the region, or to `replayed`, if that is given, where the record must be
+  // propagated again. Returns false when no expansion can be built; the present one then stays.
+  absl::StatusOr<bool> Move(Region region, const Truncation& truncation,
+                            std::optional<Region> replayed = std::nullopt) {
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
     if (absl::IsFailedPrecondition(moved.status()) && request_.may_replay) {
       result_.postponed = Withheld();
       if (Withheld()) return false;
+      if (replayed) region = *std::move(replayed);
       moved = Replay(*request_.problem, DesignOn(std::move(region), truncation),
                      present_.noise().ForNewExpansion(), *request_.store, request_.rows,
                      request_.threads, stop_);
@@ -265,6 +287,7 @@ class Settler {
   const SettleRequest& request_;
   const Stop& stop_;
   double power_ = 1;  // of the likelihood from which the particles were drawn
+  bool has_widened_ = false;
   Particles particles_;
   Settlement result_;
 };

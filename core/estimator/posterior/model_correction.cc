@@ -13,6 +13,8 @@ constexpr int kMaxDegree = 2;
 constexpr double kChecksPerTerm = 2;
 // Part of the mean square left over that a higher degree must do without.
 constexpr double kGain = 0.7;
+// Shape of the tail of importance weights beyond which these cannot be trusted.
+constexpr double kTrustedShape = 0.7;
 // Mean square left over that is worth no higher degree: a thousandth of a standard deviation.
 constexpr double kNegligible = 1e-6;
 // Part of the draws' effective number that the correction must leave.
@@ -88,7 +90,11 @@ ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrix
                                const ConstVectorRef& weights) {
   ModelCorrection correction;
   if (checks.differences.size() < 2) return correction;
-  correction.pareto_shape = TailShape(checks.log_weights - checks.differences);
+  // Draws that the posterior has left behind are unlike it, however good the expansion is.
+  const bool left_behind = TailShape(checks.log_weights).value_or(0) > kTrustedShape;
+  if (!left_behind || checks.largest_shift > kNegligibleShift) {
+    correction.pareto_shape = TailShape(checks.log_weights - checks.differences);
+  }
   const Standardization standard(etas, weights);
   if (!standard.possible()) return correction;
   Vector at_checks = (checks.log_weights.array() - checks.log_weights.maxCoeff()).exp();

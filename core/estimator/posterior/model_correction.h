@@ -24,7 +24,8 @@ struct ModelCorrection {
   // Meaningful only if the degree is above 0.
   double shift = 0;
   // Shape of the tail of the check points' importance weights by the model itself
-  // (bayes/pareto_tail.h); none for fewer than 25 check points.
+  // (bayes/pareto_tail.h); none for fewer than 25 check points, and none where the posterior has
+  // left them behind and the expansion is as good as the model over its region.
   std::optional<double> pareto_shape;
 };
 

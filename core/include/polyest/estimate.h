@@ -145,7 +145,9 @@ struct ExpansionSummary {
   double residual_to_noise = 0;
   // Shape k̂ of the generalized Pareto distribution that the largest importance weights of those
   // draws follow, by the model itself against the expansion: below 0.5 all is well, above 0.7 the
-  // draws do not represent the model's posterior. None for fewer than 25 draws.
+  // draws do not represent the model's posterior. None for fewer than 25 draws, and none where the
+  // posterior has moved away from them within a region over which the expansion moves no estimate
+  // by more than 0.01 standard deviations.
   std::optional<double> pareto_shape;
   int reexpansions = 0;      // how often the outputs were expanded again
   int64_t trajectories = 0;  // runs of the model in all, each over the whole record so far

@@ -193,11 +193,11 @@ TEST(LeaningAxes, TakeMoreThanOneParticleInAHundred) {
   EXPECT_THAT(LeaningAxes(design, problem.prior(), ParticlesWith(11, {0, 0.99})), ElementsAre(1));
 }
 
-TEST(WidenedRegion, IsHalfAsWideAgainAndShiftedAlongItsAxesAlone) {
+TEST(WidenedRegion, IsWiderAndShiftedAlongItsAxesAlone) {
   const ResolvedProblem problem = TwoUniforms();
   const ExpansionDesign design = AtTheBound(problem);
   const Matrix etas = Eigen::RowVector2d(-0.5, 0.6).replicate(100, 1);
-  const Region region = WidenedRegion(design, etas, {1});
+  const Region region = WidenedRegion(design, etas, {1}, 1.5);
   EXPECT_NEAR(region.centre()[0], 0.8, 1e-14);
   EXPECT_NEAR(region.centre()[1], 0.6 * 0.3, 1e-14);
   EXPECT_NEAR(region.axes()(0, 0), 0.2, 1e-14);

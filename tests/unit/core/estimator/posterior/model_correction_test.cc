@@ -101,6 +101,24 @@ TEST(ModelCorrection, ReportsTheTailOfTheWeights) {
   EXPECT_GT(*wild.correction.pareto_shape, 0.7);
 }
 
+// The posterior that weights e^{c x²} make of a normal distribution has left its draws behind. They
+// say nothing of the expansion then, and need not if it follows the model everywhere.
+TEST(ModelCorrection, LeavesOutTheTailOfDrawsLeftBehindByAnExactExpansion) {
+  CheckDifferences checks;
+  checks.etas = NormalPoints(10, 60);
+  checks.log_weights = 1.5 * checks.etas.col(0).cwiseAbs2();
+  checks.differences = Vector::Zero(60);
+  checks.residuals = Vector::Zero(60);
+  const Matrix draws = NormalPoints(1000, 100);
+  const Vector weights = Vector::Constant(100, 1.0 / 100);
+  checks.largest_shift = 0.02;
+  const auto shape = CorrectByModel(checks, draws, weights).pareto_shape;
+  ASSERT_TRUE(shape);
+  EXPECT_GT(*shape, 0.7);
+  checks.largest_shift = 0.005;
+  EXPECT_EQ(CorrectByModel(checks, draws, weights).pareto_shape, std::nullopt);
+}
+
 TEST(ModelCorrection, NeedsChecksForEachTerm) {
   CheckDifferences checks;
   checks.etas = NormalPoints(10, 5);
