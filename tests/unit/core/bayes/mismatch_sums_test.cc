@@ -36,7 +36,7 @@ MismatchSums SummedUp(const std::vector<SampleToSum>& samples, int terms) {
 }
 
 // Whole numbers and powers of two are added without rounding.
-TEST(MismatchSums, AreTheSumsOverTheSamples) {
+TEST(WaitingSamples, AreSummedExactlyWhereNothingIsRounded) {
   for (const int terms : kTermsOfSums) {
     MismatchSums sums(terms);
     Matrix g = Matrix::Zero(terms, terms);
@@ -54,7 +54,7 @@ TEST(MismatchSums, AreTheSumsOverTheSamples) {
   }
 }
 
-TEST(MismatchSums, HaveTheSameBitsWheneverTheyAreRead) {
+TEST(WaitingSamples, GiveTheSameBitsWheneverTheSumsAreRead) {
   for (const int terms : kTermsOfSums) {
     const std::vector<SampleToSum> samples = SamplesToSum(45, terms);
     const Matrix at_the_end = SummedUp(samples, terms).G();
@@ -67,7 +67,7 @@ TEST(MismatchSums, HaveTheSameBitsWheneverTheyAreRead) {
   }
 }
 
-TEST(MismatchSums, AreCopiedAndAddedWithTheSamplesThatWait) {
+TEST(WaitingSamples, AreCopiedAndAddedWithTheSums) {
   const int terms = 21;
   const std::vector<SampleToSum> samples = SamplesToSum(45, terms);
   const MismatchSums sums = SummedUp({samples.begin(), samples.begin() + 11}, terms);
