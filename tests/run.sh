@@ -51,4 +51,4 @@ cd "$root"
 # Said outright, since a build folder remembers what it was last configured with.
 cmake --preset "$preset" -DPOLYEST_BUILD_TESTS=ON -DPOLYEST_WARNINGS_AS_ERRORS="$werror"
 cmake --build --preset "$preset" --parallel "$(nproc)" "${targets[@]}"
-exec ctest --preset "$preset" --parallel 2 "${ctest_arguments[@]}"
+exec ctest --preset "$preset" "${ctest_arguments[@]}"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/estimator/expansion/model_agreement.h"
 #include "tests/testing/records.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
@@ -40,7 +41,8 @@ TEST(Reexpansion, IsRareForAPosteriorThatWanders) {
     squares += sine * sine;
   }
   const ParameterEstimate& amplitude = estimate.parameters[0];
-  EXPECT_NEAR(amplitude.map, products / squares, 1e-3 * kNoiseOfSine / std::sqrt(squares));
+  EXPECT_NEAR(amplitude.map, products / squares,
+              kNegligibleShift * kNoiseOfSine / std::sqrt(squares));
   // An expansion runs 25 trajectories, 20 at collocation points and 5 at checks, and each move runs
   // as many again over the rows so far. Regions that are widened by half and contracted at once
   // take 13 times as many as one expansion, here and with other noise.
