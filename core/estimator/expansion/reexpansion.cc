@@ -36,6 +36,8 @@ constexpr double kShareOfOverlooked = 0.03;
 constexpr double kMaxErrorAtMinima = 1;
 // The factor by which a region is widened: the least and the most.
 constexpr double kWiden = 1.5, kWidest = 4;
+// The largest shift that a widened region is to have: it grows with the record.
+constexpr double kWidenedShift = 0.1 * kNegligibleShift;
 constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
@@ -185,7 +187,7 @@ class Settler {
   // posterior does not soon come to its edge once more. The expansion's error over a region grows
   // as the power p + 1 of its width.
   double ReplayedWidening() const {
-    const double room = kNegligibleShift / LargestShift(expansion(), /*power=*/1);
+    const double room = kWidenedShift / LargestShift(expansion(), /*power=*/1);
     return std::clamp(std::pow(room, 1.0 / (present().order + 1)), kWiden, kWidest);
   }
 
