@@ -29,13 +29,17 @@ void MismatchSums::Add(const ConstVectorRef& coefficients, double error, double 
 }
 
 const Matrix& MismatchSums::G() const {
-  if (waiting_ > 0) AddWaiting();
-  if (!is_whole_) g_.triangularView<Eigen::StrictlyUpper>() = g_.transpose();
-  is_whole_ = true;
+  Complete();
   return g_;
 }
 
-// G += c cᵀ/R for each sample that waits, in their order.
+void MismatchSums::Complete() const {
+  if (waiting_ > 0) AddWaiting();
+  if (!is_whole_) g_.triangularView<Eigen::StrictlyUpper>() = g_.transpose();
+  is_whole_ = true;
+}
+
+// Adds c cᵀ/R to the lower triangle of G for each sample that waits, in their order.
 void MismatchSums::AddWaiting() const {
   using Rows = Eigen::Array<double, 8, 1>;
   const Eigen::Index terms = b_.size();
@@ -58,7 +62,7 @@ void MismatchSums::AddWaiting() const {
 
 void MismatchSums::Add(const MismatchSums& other) {
   POLYEST_CHECK(other.b_.size() == b_.size());
-  G();
+  Complete();
   g_ += other.G();
   b_ += other.b_;
   w_ += other.w_;
@@ -77,7 +81,7 @@ MismatchSums MismatchSums::Substituted(const ConstMatrixRef& t, const ConstVecto
   POLYEST_CHECK(t.cols() == b_.size() && shift.size() == b_.size() && variance > 0);
   const Vector moved = b_ - G() * shift;
   MismatchSums sums(static_cast<int>(t.rows()));
-  sums.g_ = t * g_ * t.transpose();
+  sums.g_ = t * G() * t.transpose();
   sums.g_ = (0.5 / variance * (sums.g_ + sums.g_.transpose())).eval();
   sums.b_ = t * moved / variance;
   sums.w_ = std::max(0.0, w_ - shift.dot(b_ + moved)) / variance;

@@ -9,9 +9,9 @@
 // The sums are taken about the reference and not about zero, because w would otherwise be the
 // energy of the signal and the far smaller energy of the residual would be lost to rounding.
 //
-// G is most of the work, and it is too large for the nearest cache: samples wait until there are
-// eight of them, which then pass through its lower triangle together. Every element is summed in
-// the order of the samples, so that the bits do not depend on when G is read.
+// Adding to G is most of the work, and G is larger than the nearest cache. Samples therefore wait
+// until there are eight, which are added in one pass over the lower triangle. Each element is
+// summed in the order of the samples, so that the bits do not depend on when G is read.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -26,7 +26,8 @@ class MismatchSums {
 
   int terms() const { return static_cast<int>(b_.size()); }
   int64_t count() const { return count_; }
-  // Adds the samples that wait. Until it has been called, two threads must not read the same sums.
+  // Returns G (S × S). The first reading after Add completes G, as do the functions below that need
+  // it: two threads must not do that to the same sums at once.
   const Matrix& G() const;
   const Vector& b() const { return b_; }
   double w() const { return w_; }
@@ -59,16 +60,18 @@ class MismatchSums {
   }
 
  private:
-  static constexpr int kTogether = 8;
+  static constexpr int kTogether = 8;  // so many samples are added to G in one pass
 
   void SetNoneWaiting();
   void AddWaiting() const;
+  // Adds the samples that wait and copies the lower triangle of G to the upper one.
+  void Complete() const;
 
-  mutable Matrix g_;  // symmetric; the upper triangle lacks what waits since the last reading
-  mutable int waiting_ = 0;       // samples that g_ lacks
-  mutable bool is_whole_ = true;  // whether the upper triangle is that of the lower one
-  Matrix coefficients_;           // S × kTogether: c of those samples
-  Eigen::Matrix<double, kTogether, Eigen::Dynamic> weighted_;  // kTogether × S: c/R of each
+  mutable Matrix g_;              // without the samples that wait
+  mutable int waiting_ = 0;       // their number
+  mutable bool is_whole_ = true;  // whether the upper triangle of g_ is that of the lower one
+  Matrix coefficients_;           // S × kTogether: c of the samples that wait
+  Eigen::Matrix<double, kTogether, Eigen::Dynamic> weighted_;  // kTogether × S: their c/R
   Vector b_;
   double w_ = 0;
   int64_t count_ = 0;

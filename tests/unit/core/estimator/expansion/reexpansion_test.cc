@@ -45,7 +45,7 @@ TEST(Reexpansion, IsRareForAPosteriorThatWanders) {
               kNegligibleShift * kNoiseOfSine / std::sqrt(squares));
   // An expansion runs 25 trajectories, 20 at collocation points and 5 at checks, and each move runs
   // as many again over the rows so far. Regions that are widened by half and contracted at once
-  // take 13 times as many as one expansion, here and with other noise.
+  // take 290 in all.
   EXPECT_GT(estimate.expansion.reexpansions, 2);
   EXPECT_LT(estimate.expansion.trajectories, 8 * 25);
 }
