@@ -98,7 +98,9 @@ struct Mismatch::Factors {
 };
 
 Mismatch::Mismatch(MismatchSums sums)
-    : known_(std::move(sums)), count_(known_.count()), factors_(std::make_shared<Factors>()) {}
+    : known_(std::move(sums)), count_(known_.count()), factors_(std::make_shared<Factors>()) {
+  known_.Complete();
+}
 
 Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
     : known_(channels.empty() ? 0 : channels.front().samples.terms()),
@@ -107,6 +109,9 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
   for (const ChannelSums& channel : channels) {
     count_ += channel.samples.count();
     if (!channel.IsKnown()) {
+      // Completed here, so that no copy has to be.
+      channel.samples.Complete();
+      channel.differences.Complete();
       other_.push_back(channel);
       continue;
     }

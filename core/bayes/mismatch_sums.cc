@@ -5,23 +5,20 @@
 #include "core/common/check.h"
 
 namespace polyest::internal {
+namespace {
 
-MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {
-  SetNoneWaiting();
-}
+constexpr Eigen::Index kRowsAtOnce = 8;  // of a column of G: as wide as the processor's vectors
 
-void MismatchSums::SetNoneWaiting() {
-  waiting_ = 0;
-  is_whole_ = true;
-  coefficients_.setZero(b_.size(), kTogether);
-  weighted_.setZero(kTogether, b_.size());
-}
+}  // namespace
+
+MismatchSums::MismatchSums(int terms) : g_(Matrix::Zero(terms, terms)), b_(Vector::Zero(terms)) {}
 
 void MismatchSums::Add(const ConstVectorRef& coefficients, double error, double variance) {
   POLYEST_CHECK(coefficients.size() == b_.size() && variance > 0);
   const double weight = 1 / variance;
+  coefficients_.resize(b_.size(), kTogether);
   coefficients_.col(waiting_) = coefficients;
-  weighted_.row(waiting_) = weight * coefficients.transpose();
+  weights_[static_cast<size_t>(waiting_)] = weight;
   if (++waiting_ == kTogether) AddWaiting();
   b_ += (weight * error) * coefficients;  // b += c e/R
   w_ += weight * error * error;           // w += e²/R
@@ -41,19 +38,20 @@ void MismatchSums::Complete() const {
 
 // Adds c cᵀ/R to the lower triangle of G for each sample that waits, in their order.
 void MismatchSums::AddWaiting() const {
-  using Rows = Eigen::Array<double, 8, 1>;
+  using Rows = Eigen::Array<double, kRowsAtOnce, 1>;
   const Eigen::Index terms = b_.size();
+  std::array<double, kTogether> factors;
   for (Eigen::Index j = 0; j < terms; ++j) {
-    const auto weights = weighted_.col(j);
+    for (int k = 0; k < waiting_; ++k) factors[k] = weights_[k] * coefficients_(j, k);  // c_j/R
     double* const column = &g_(0, j);
     Eigen::Index i = j;
-    for (; i + Rows::SizeAtCompileTime <= terms; i += Rows::SizeAtCompileTime) {
+    for (; i + kRowsAtOnce <= terms; i += kRowsAtOnce) {
       Rows sum = Rows::Map(column + i);
-      for (int k = 0; k < waiting_; ++k) sum += weights[k] * Rows::Map(&coefficients_(i, k));
+      for (int k = 0; k < waiting_; ++k) sum += factors[k] * Rows::Map(&coefficients_(i, k));
       Rows::Map(column + i) = sum;
     }
     for (; i < terms; ++i) {
-      for (int k = 0; k < waiting_; ++k) column[i] += weights[k] * coefficients_(i, k);
+      for (int k = 0; k < waiting_; ++k) column[i] += factors[k] * coefficients_(i, k);
     }
   }
   waiting_ = 0;

@@ -13,7 +13,7 @@
 // until there are eight, which are added in one pass over the lower triangle. Each element is
 // summed in the order of the samples, so that the bits do not depend on when G is read.
 
-#include <Eigen/Core>
+#include <array>
 #include <cstdint>
 
 #include "core/common/types.h"
@@ -26,14 +26,17 @@ class MismatchSums {
 
   int terms() const { return static_cast<int>(b_.size()); }
   int64_t count() const { return count_; }
-  // Returns G (S × S). The first reading after Add completes G, as do the functions below that need
-  // it: two threads must not do that to the same sums at once.
+  // Returns G (S × S), completed.
   const Matrix& G() const;
   const Vector& b() const { return b_; }
   double w() const { return w_; }
 
+  // Adds the samples that wait to G. All functions that need G do so first: until it has been done
+  // once after the last Add, the sums are not safe to read from two threads.
+  void Complete() const;
+
   // Adds one sample: coefficients c (S), error e = z − cᵀφ_0, variance R > 0. Takes O(S²)
-  // operations and does not allocate.
+  // operations. The first call allocates memory for the samples that wait, later ones none.
   void Add(const ConstVectorRef& coefficients, double error, double variance);
   void Add(const MismatchSums& other);
   // Adds lᵀφ = lᵀd + lᵀφ_0 to J_mismatch: `coefficients` = l (S), `at_reference` = lᵀφ_0.
@@ -56,22 +59,20 @@ class MismatchSums {
   template <class Archive>
   void load(Archive& archive) {
     archive(g_, b_, w_, count_);
-    SetNoneWaiting();
+    waiting_ = 0;
+    is_whole_ = true;
   }
 
  private:
   static constexpr int kTogether = 8;  // so many samples are added to G in one pass
 
-  void SetNoneWaiting();
   void AddWaiting() const;
-  // Adds the samples that wait and copies the lower triangle of G to the upper one.
-  void Complete() const;
 
   mutable Matrix g_;              // without the samples that wait
   mutable int waiting_ = 0;       // their number
-  mutable bool is_whole_ = true;  // whether the upper triangle of g_ is that of the lower one
+  mutable bool is_whole_ = true;  // whether the upper triangle of g_ mirrors the lower one
   Matrix coefficients_;           // S × kTogether: c of the samples that wait
-  Eigen::Matrix<double, kTogether, Eigen::Dynamic> weighted_;  // kTogether × S: their c/R
+  std::array<double, kTogether> weights_ = {};  // their 1/R
   Vector b_;
   double w_ = 0;
   int64_t count_ = 0;

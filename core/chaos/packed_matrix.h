@@ -38,8 +38,8 @@ class PackedMatrix {
                MatrixRef product) const;
 
   Eigen::Index rows_ = 0, cols_ = 0;
-  Eigen::Array<double, kTile, Eigen::Dynamic>
-      tiles_;  // the tiles in order; the last is filled up with zeros
+  // The tiles in order; the last is filled up with zeros.
+  Eigen::Array<double, kTile, Eigen::Dynamic> tiles_;
 };
 
 }  // namespace polyest::internal

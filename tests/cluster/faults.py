@@ -41,8 +41,8 @@ BATCH_RATE = 1.0
 NODES = 3
 # How long a fault lasts, and from its end to the next one, s; a lease lasts 3 s.
 FAULT_S, REST_S = (3.5, 6.0), (2.0, 4.0)
-# Longest wait for the rigs to go on, s, and the pause between two looks.
-SETTLE_S, LOOK_S = 30.0, 0.1
+# Usual and longest wait for the rigs to go on after that, and the pause between two looks, s.
+SETTLED_S, SETTLE_S, LOOK_S = 1.0, 30.0, 0.1
 # A silence of the rigs, s: after a fault of a daemon, and beyond one of the database.
 DAEMON_SILENCE_S, DATABASE_SILENCE_S = 10.0, 5.0
 PATIENCE_S = 120.0
@@ -160,7 +160,8 @@ def undisturbed(polyestd, polyest, batch_rows):
 
 
 def run(arguments, folder, stack):
-    seconds = 1.1 * arguments.faults * (sum(FAULT_S) + sum(REST_S)) / 2 + 30
+    of_a_fault = (sum(FAULT_S) + sum(REST_S)) / 2 + (SETTLED_S if arguments.bound else 0)
+    seconds = 1.1 * arguments.faults * of_a_fault + 30
     rate, batch_rows = RECORD_S / seconds, max(1, round(RECORD_ROWS / seconds / BATCH_RATE))
     expected = undisturbed(arguments.polyestd, arguments.polyest, batch_rows)
     database = Database(folder)
@@ -175,22 +176,7 @@ def run(arguments, folder, stack):
     for number in range(arguments.rigs):
         rigs.append(Rig(number, arguments.polyest, to_rigs.port, rate, batch_rows, folder))
         stack.callback(rigs[-1].close)
-    faults, chance = Faults(database, nodes, to_rigs), random.Random(arguments.seed)
-    kinds = arguments.kind or KINDS
-    order = [kind for _ in range(arguments.faults // len(kinds) + 1)
-             for kind in chance.sample(kinds, len(kinds))][:arguments.faults]
-    spans = []
-    for i, kind in enumerate(order, 1):
-        time.sleep(chance.uniform(*REST_S))
-        if arguments.bound:
-            settle(rigs, spans)
-        node = chance.choice(nodes)
-        begin = time.monotonic()
-        with faults.one(kind, node):
-            time.sleep(chance.uniform(*FAULT_S))
-        spans.append(Span(kind, begin, time.monotonic()))
-        if sys.stderr.isatty():
-            print(f"\r{i} of {arguments.faults} faults", end="", file=sys.stderr, flush=True)
+    spans = disturb(arguments, Faults(database, nodes, to_rigs), rigs)
     problems = []
     for rig in rigs:
         problem = rig.wait()
@@ -198,8 +184,33 @@ def run(arguments, folder, stack):
             problem = "has another last estimate than the undisturbed run"
         if problem is not None:
             problems.append(f"rig {rig.number} {problem}")
-    too_long = report(spans, rigs)
-    return problems + (too_long if arguments.bound else [])
+    beyond_bound = report(spans, rigs)
+    if len(spans) < arguments.faults:
+        print(f"the rigs ended before {arguments.faults - len(spans)} of {arguments.faults} faults came")
+        beyond_bound.append("the rigs ended too early: the machine is too busy")
+    return problems + (beyond_bound if arguments.bound else [])
+
+
+def disturb(arguments, faults, rigs):
+    """Causes the faults one after the other while a rig streams. Returns their spans."""
+    chance, kinds = random.Random(arguments.seed), arguments.kind or KINDS
+    order = [kind for _ in range(arguments.faults // len(kinds) + 1)
+             for kind in chance.sample(kinds, len(kinds))][:arguments.faults]
+    spans = []
+    for i, kind in enumerate(order, 1):
+        time.sleep(chance.uniform(*REST_S))
+        if arguments.bound:
+            settle(rigs, spans)
+        if all(rig.process.poll() is not None for rig in rigs):
+            break
+        node = chance.choice(faults.nodes)
+        begin = time.monotonic()
+        with faults.one(kind, node):
+            time.sleep(chance.uniform(*FAULT_S))
+        spans.append(Span(kind, begin, time.monotonic()))
+        if sys.stderr.isatty():
+            print(f"\r{i} of {arguments.faults} faults", end="", file=sys.stderr, flush=True)
+    return spans
 
 
 def settle(rigs, spans):

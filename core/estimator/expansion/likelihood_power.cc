@@ -59,7 +59,7 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
 }  // namespace
 
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
-  if (LargestShift(expansion, cost) <= kMaxShift) return cost.power();
+  if (LargestShift(expansion, cost.power()) <= kMaxShift) return cost.power();
   if (expansion.design().checks_are_draws &&
       AgreementWithModel(expansion, cost).shift <= kMaxShift) {
     return cost.power();

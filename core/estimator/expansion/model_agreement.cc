@@ -28,10 +28,6 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
   return mismatch;
 }
 
-double LargestShift(const RegionalExpansion& expansion, const Cost& cost) {
-  return LargestShift(expansion, cost.power());
-}
-
 double LargestShift(const RegionalExpansion& expansion, double power) {
   return std::sqrt(power * expansion.OwnError()) + power * expansion.LogVarianceError();
 }
@@ -57,14 +53,14 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
     return Vector(Eigen::Map<const Vector>(values.data(), std::ssize(values)));
   };
   return {design.check_points(rows, Eigen::all), vector(log_weights), vector(differences),
-          vector(residuals), LargestShift(expansion, /*power=*/1)};
+          vector(residuals)};
 }
 
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
   const CheckDifferences checks = DifferencesAtChecks(expansion, cost);
   Agreement agreement;
   if (checks.log_weights.size() == 0) {
-    agreement.shift = LargestShift(expansion, cost);
+    agreement.shift = LargestShift(expansion, cost.power());
     return agreement;
   }
   Vector weights = (checks.log_weights.array() - checks.log_weights.maxCoeff()).exp();

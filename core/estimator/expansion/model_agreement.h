@@ -14,13 +14,11 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
                      const ConstVectorRef& chi_squared);
 
 // Returns √(β Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
-// deviations, that the residuals of the expansion at its collocation points allow; β is the cost's
-// power. With filters, β times the error of ½ Σ log(S/σ²) is added.
-double LargestShift(const RegionalExpansion& expansion, const Cost& cost);
+// deviations, that the residuals of the expansion at its collocation points allow; β is `power`,
+// that of the likelihood. With filters, β times the error of ½ Σ log(S/σ²) is added.
 double LargestShift(const RegionalExpansion& expansion, double power);
-
-// Up to this largest shift at the power 1, an expansion is as good as the model all over its
-// region.
+// An expansion whose LargestShift at the power 1 is at most this is as good as the model, all over
+// its region.
 inline constexpr double kNegligibleShift = 0.01;
 
 // What the check points say that could be integrated and have a finite cost, C' of them.
@@ -30,7 +28,6 @@ struct CheckDifferences {
       log_weights;  // log of e^{−J} over the density that they were drawn from, J of the expansion
   Vector differences;  // ΔJ = J_mismatch of the model − of the expansion, times the cost's power
   Vector residuals;    // root mean square of (model − expansion)/σ, times the root of the power
-  double largest_shift = kInfinity;  // of the expansion, at the power 1
 };
 CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const Cost& cost);
 

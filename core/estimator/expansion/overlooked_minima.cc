@@ -121,7 +121,7 @@ absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, 
                                             ConfirmedMinima& confirmed) {
   std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
   if (request.rows > RowsOfShortRecord(*request.problem) &&
-      LargestShift(expansion, cost) <= kMaxCarriedShift) {
+      LargestShift(expansion, cost.power()) <= kMaxCarriedShift) {
     for (size_t i = 0; i < costs.size(); ++i) {
       costs[i] = cost.Evaluate(etas.row(static_cast<Eigen::Index>(i)).transpose()).total;
     }

@@ -36,7 +36,8 @@ constexpr double kShareOfOverlooked = 0.03;
 constexpr double kMaxErrorAtMinima = 1;
 // The factor by which a region is widened: the least and the most.
 constexpr double kWiden = 1.5, kWidest = 4;
-// The largest shift that a widened region is to have: it grows with the record.
+// The expansion over a widened region should have at most this LargestShift, which grows as rows
+// are added.
 constexpr double kWidenedShift = 0.1 * kNegligibleShift;
 constexpr int64_t kReplayRows = 256;
 
@@ -59,11 +60,7 @@ class Settler {
       const std::vector<int> leaning =
           LeaningAxes(design, request_.problem->prior(), particles_.etas);
       if (!leaning.empty()) {
-        const auto widened = [&](double factor) {
-          return WidenedRegion(design, particles_.etas, leaning, factor);
-        };
-        POLYEST_ASSIGN_OR_RETURN(const bool moved,
-                                 Move(widened(kWiden), present(), widened(ReplayedWidening())));
+        POLYEST_ASSIGN_OR_RETURN(const bool moved, Widen(leaning));
         if (!moved) break;
         has_widened_ = true;
         result_.memory.costs.resize(0);  // the particles end at the edge
@@ -183,16 +180,25 @@ class Settler {
     return true;
   }
 
-  // Returns how much wider a region can be over which the record is propagated again, so that the
-  // posterior does not soon come to its edge once more. The expansion's error over a region grows
-  // as the power p + 1 of its width.
-  double ReplayedWidening() const {
+  // Widens the region along the axes on whose edges particles lean. Where the record is propagated
+  // again, the region becomes as wide as the expansion's error allows, so that the posterior does
+  // not soon come to an edge once more: the error grows as the power p + 1 of the width.
+  absl::StatusOr<bool> Widen(const std::vector<int>& leaning) {
+    const auto widened = [&](double factor) {
+      return WidenedRegion(expansion().design(), particles_.etas, leaning, factor);
+    };
     const double room = kWidenedShift / LargestShift(expansion(), /*power=*/1);
-    return std::clamp(std::pow(room, 1.0 / (present().order + 1)), kWiden, kWidest);
+    const double factor = std::min(std::pow(room, 1.0 / (present().order + 1)), kWidest);
+    std::optional<Region> wider;
+    // The record may have to be propagated once more, over the region that is less wide.
+    if (factor > kWiden && result_.allowance.Allows(request_.rows, 2 * request_.rows)) {
+      wider = widened(factor);
+    }
+    return Move(widened(kWiden), present(), wider);
   }
 
-  // Returns whether a contraction to the region saves enough. A region that has just been widened
-  // stays as it is if the expansion is as good as the model all over it.
+  // Returns whether a contraction to the region saves enough. A region that this settlement has
+  // widened stays as it is if the expansion is as good as the model all over it.
   bool Pays(const Region& region) const {
     if (has_widened_ && LargestShift(expansion(), /*power=*/1) <= kNegligibleShift) return false;
     return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
@@ -262,19 +268,40 @@ class Settler {
     return carried;
   }
 
-  // Moves the expansion to the region, or to `replayed`, if that is given, where the record must be
-  // propagated again. Returns false when no expansion can be built; the present one then stays.
-  absl::StatusOr<bool> Move(Region region, const Truncation& truncation,
-                            std::optional<Region> replayed = std::nullopt) {
+  // Propagates the record over the region.
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replayed(const Region& region,
+                                                              const Truncation& truncation) {
+    auto replayed =
+        Replay(*request_.problem, DesignOn(region, truncation), present_.noise().ForNewExpansion(),
+               *request_.store, request_.rows, request_.threads, stop_);
+    result_.allowance.Use(request_.rows, request_.rows);
+    return replayed;
+  }
+
+  // Propagates the record over the wider region, or over `region` where more trajectories fail in
+  // the wider one than in the present.
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWide(const Region& wider,
+                                                                  const Region& region,
+                                                                  const Truncation& truncation) {
+    auto replayed = Replayed(wider, truncation);
+    if (replayed.ok()) {
+      if ((*replayed)->failures().size() <= expansion().failures().size()) return replayed;
+      result_.propagated_rows += (*replayed)->propagated_rows();
+    } else if (!absl::IsFailedPrecondition(replayed.status())) {
+      return replayed;
+    }
+    return Replayed(region, truncation);
+  }
+
+  // Moves the expansion to the region, or to the wider one, if there is one, where the record must
+  // be propagated again. Returns false when no expansion can be built; the present one then stays.
+  absl::StatusOr<bool> Move(const Region& region, const Truncation& truncation,
+                            const std::optional<Region>& wider = std::nullopt) {
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
     if (absl::IsFailedPrecondition(moved.status()) && request_.may_replay) {
       result_.postponed = Withheld();
       if (Withheld()) return false;
-      if (replayed) region = *std::move(replayed);
-      moved = Replay(*request_.problem, DesignOn(std::move(region), truncation),
-                     present_.noise().ForNewExpansion(), *request_.store, request_.rows,
-                     request_.threads, stop_);
-      result_.allowance.Use(request_.rows, request_.rows);
+      moved = wider ? ReplayedWide(*wider, region, truncation) : Replayed(region, truncation);
     }
     if (absl::IsFailedPrecondition(moved.status())) return false;
     if (!moved.ok()) return moved.status();

@@ -4,21 +4,21 @@
 // the region in which the polynomial interpolates moves.
 //
 // A settlement samples the posterior on the present expansion and then moves the region as needed.
-// If particles lean on an edge of the region that is not an edge of Ω, that axis is widened and the
-// record is propagated again: by half, or by as much as the expansion stays accurate for, since a
-// posterior that wanders would soon be at the edge again. If the region of the particles has less
-// than half the volume of the present one, the expansion moves there and the record is propagated
-// again; particles are added first at minima that the model confirms and the sampler overlooked
-// (overlooked_minima.h). This repeats until neither is needed. A region that has just been widened
-// does not contract while its expansion is as good as the model. If moving gains nothing, an
-// expansion of automatic order stays in place and tries higher orders; it takes the first one that
-// follows the model there, if any. What the previous settlements tried in vain is not tried again
-// (settlement_memory.h). Each move lowers the order by one. Where the record is long and the
-// present expansion is accurate the sums are carried over instead of propagating the record, with
-// the order as it is (carry_over.h), with a larger error if the record may not be propagated again
-// (replay_allowance.h). The region is derived from particles and never from a minimum and its
-// Hessian: in a direction that the data do not inform yet, the position of the minimum is
-// arbitrary.
+// If particles lean on an edge of the region that is not an edge of Ω, that axis is made wider: 1.5
+// times as wide where the sums are carried over, and 1.5 to 4 times, as far as the expansion's
+// error allows, where the record is propagated again. If the region of the particles has less than
+// half the volume of the present one, the expansion moves there and the record is propagated again;
+// particles are added first at minima that the model confirms and the sampler overlooked
+// (overlooked_minima.h). This repeats until neither is needed. A settlement that has widened the
+// region does not contract it if the expansion is as good as the model: the posterior wanders, and
+// would soon be at an edge again. If moving gains nothing, an expansion of automatic order stays in
+// place and tries higher orders; it takes the first one that follows the model there, if any. What
+// the previous settlements tried in vain is not tried again (settlement_memory.h). Each move lowers
+// the order by one. Where the record is long and the present expansion is accurate the sums are
+// carried over instead of propagating the record, with the order as it is (carry_over.h), with a
+// larger error if the record may not be propagated again (replay_allowance.h). The region is
+// derived from particles and never from a minimum and its Hessian: in a direction that the data do
+// not inform yet, the position of the minimum is arbitrary.
 
 #include <absl/status/statusor.h>
 

@@ -172,7 +172,8 @@ class Assessment {
     if (!design_.checks_are_draws) return;
     const Matrix etas = design_.region.ManyToLocal(posterior_.Germs(prior_));
     const ModelCorrection correction =
-        CorrectByModel(DifferencesAtChecks(*request_.expansion, cost), etas, posterior_.weights);
+        CorrectByModel(DifferencesAtChecks(*request_.expansion, cost), etas, posterior_.weights,
+                       LargestShift(*request_.expansion, /*power=*/1));
     estimate_.expansion.pareto_shape = correction.pareto_shape;
     if (correction.degree == 0) return;
     findings_.shift = std::min(findings_.shift, correction.shift + findings_.carried_shift);

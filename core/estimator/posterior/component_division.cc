@@ -127,7 +127,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const 
   united->whole_until_ = 0;
   united->bisected_ = false;
   const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
-  if (!(LargestShift(*united->expansion_, cost) <= kMinShiftToBisect)) return nullptr;
+  if (!(LargestShift(*united->expansion_, cost.power()) <= kMinShiftToBisect)) return nullptr;
   return united;
 }
 

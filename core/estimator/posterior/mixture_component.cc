@@ -281,7 +281,7 @@ bool MixtureComponent::LooksAhead() const {
 
 absl::StatusOr<bool> MixtureComponent::SettleAhead(const Stop& stop) {
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  const double shift = LargestShift(*expansion_, cost);
+  const double shift = LargestShift(*expansion_, cost.power());
   const bool is_short = taken_ <= RowsOfShortRecord(problem_);
   const bool may_carry = shift <= kMaxCarriedShift || is_short || IsReplayWithheld();
   if (shift < kAheadOfNeed * kMaxCarriedShift || !may_carry) {
@@ -298,7 +298,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
     return bisected_ && !expansion_->design().checks_are_draws
-               ? LargestShift(*expansion_, cost)
+               ? LargestShift(*expansion_, cost.power())
                : AgreementWithModel(*expansion_, cost).shift;
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };

@@ -13,8 +13,6 @@ constexpr int kMaxDegree = 2;
 constexpr double kChecksPerTerm = 2;
 // Part of the mean square left over that a higher degree must do without.
 constexpr double kGain = 0.7;
-// Shape of the tail of importance weights beyond which these cannot be trusted.
-constexpr double kTrustedShape = 0.7;
 // Mean square left over that is worth no higher degree: a thousandth of a standard deviation.
 constexpr double kNegligible = 1e-6;
 // Part of the draws' effective number that the correction must leave.
@@ -87,12 +85,12 @@ double EffectiveNumber(const ConstVectorRef& log_weights) {
 }  // namespace
 
 ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrixRef& etas,
-                               const ConstVectorRef& weights) {
+                               const ConstVectorRef& weights, double largest_shift) {
   ModelCorrection correction;
   if (checks.differences.size() < 2) return correction;
-  // Draws that the posterior has left behind are unlike it, however good the expansion is.
-  const bool left_behind = TailShape(checks.log_weights).value_or(0) > kTrustedShape;
-  if (!left_behind || checks.largest_shift > kNegligibleShift) {
+  // Where the posterior has moved away from the draws, their weights tell nothing of the model.
+  const bool represent = TailShape(checks.log_weights).value_or(0) <= kLargestTrustedShape;
+  if (represent || !(largest_shift <= kNegligibleShift)) {
     correction.pareto_shape = TailShape(checks.log_weights - checks.differences);
   }
   const Standardization standard(etas, weights);

@@ -24,15 +24,16 @@ struct ModelCorrection {
   // Meaningful only if the degree is above 0.
   double shift = 0;
   // Shape of the tail of the check points' importance weights by the model itself
-  // (bayes/pareto_tail.h); none for fewer than 25 check points, and none where the posterior has
-  // left them behind and the expansion is as good as the model over its region.
+  // (bayes/pareto_tail.h). None for fewer than 25 check points, and none where these no longer
+  // represent the posterior on the expansion while the expansion is as good as the model.
   std::optional<double> pareto_shape;
 };
 
 // Returns the correction of the posterior that the draws represent: etas (draws × n, local
 // coordinates of the expansion) with `weights`, Σ = 1. `checks` are those at the cost that they
-// were drawn from, at check points that are draws of a posterior, too.
+// were drawn from, at check points that are draws of a posterior, too. `largest_shift` is that of
+// the expansion (model_agreement.h), at the power 1.
 ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrixRef& etas,
-                               const ConstVectorRef& weights);
+                               const ConstVectorRef& weights, double largest_shift);
 
 }  // namespace polyest::internal

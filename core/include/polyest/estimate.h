@@ -146,8 +146,8 @@ struct ExpansionSummary {
   // Shape k̂ of the generalized Pareto distribution that the largest importance weights of those
   // draws follow, by the model itself against the expansion: below 0.5 all is well, above 0.7 the
   // draws do not represent the model's posterior. None for fewer than 25 draws, and none where the
-  // posterior has moved away from them within a region over which the expansion moves no estimate
-  // by more than 0.01 standard deviations.
+  // draws no longer represent the posterior on the expansion (their own k̂ is above 0.7) and the
+  // expansion's error can move no estimate by more than 0.01 of its standard deviations.
   std::optional<double> pareto_shape;
   int reexpansions = 0;      // how often the outputs were expanded again
   int64_t trajectories = 0;  // runs of the model in all, each over the whole record so far

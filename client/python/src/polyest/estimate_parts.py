@@ -131,7 +131,8 @@ class ExpansionSummary:
     reexpansions: int
     #: Runs of the model in all.
     trajectories: int
-    #: Shape k̂ of the largest importance weights; above 0.7 is bad. None: too few particles.
+    #: Shape k̂ of the largest importance weights; above 0.7 is bad. None: too few particles, or these
+    #: no longer represent the posterior and the expansion is as good as the model.
     pareto_shape: Optional[float]
 
     @classmethod

@@ -8,7 +8,7 @@
 namespace polyest::internal {
 namespace {
 
-// Numbers of terms that fill no vector, one, and some and a rest.
+// Fewer terms than a vector has, as many, and two vectors and a rest.
 constexpr int kTermsOfSums[] = {1, 3, 8, 21};
 
 struct SampleToSum {

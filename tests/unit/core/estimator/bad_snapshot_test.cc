@@ -1,7 +1,6 @@
 // Checks that snapshots which are cut off, changed, or of something else are refused by name. None
 // crashes an estimator or leaves anything in it.
 
-#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,10 +8,12 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <random>
 #include <string>
 
+#include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/snapshot.h"
 #include "tests/testing/records.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
@@ -105,6 +106,23 @@ TEST_F(BadSnapshot, CrashesNothingWhenSealedAgain) {
     EXPECT_EQ(estimator->rows_processed(), 0);
   }
   EXPECT_GT(refused, kTrials / 5);
+}
+
+// Errors of an expansion that cannot be would make every estimate wrong or NaN.
+TEST_F(BadSnapshot, HasErrorsThatCannotBe) {
+  const uint32_t fingerprint = FingerprintOf(problem_);
+  const auto changed = [&](double AbsorbedRows::*error, double value) {
+    EstimatorState state = DecodeState(good_.state, good_.rows, fingerprint).value();
+    state.mixture.components.front().expansion.absorbed.*error = value;
+    return Restored(EncodeState(state, good_.rows, fingerprint));
+  };
+  for (const auto error :
+       {&AbsorbedRows::own_error, &AbsorbedRows::carried_error, &AbsorbedRows::carried_rate}) {
+    EXPECT_TRUE(changed(error, 0.01).ok());
+    for (const double value : {-0.01, kInfinity, std::nan("")}) {
+      EXPECT_TRUE(absl::IsDataLoss(changed(error, value))) << value;
+    }
+  }
 }
 
 TEST_F(BadSnapshot, LeavesTheEstimatorToProcessTheRowsItself) {

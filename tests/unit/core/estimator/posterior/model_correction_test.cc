@@ -43,7 +43,7 @@ Corrected CorrectBy(const std::function<double(double x, double y)>& difference)
   }
   checks.residuals = Vector::Zero(kChecks);
   Corrected result;
-  result.correction = CorrectByModel(checks, draws, weights);
+  result.correction = CorrectByModel(checks, draws, weights, /*largest_shift=*/1);
   if (result.correction.degree > 0) {
     weights.array() *= result.correction.log_factors.array().exp();
     weights /= weights.sum();
@@ -101,8 +101,8 @@ TEST(ModelCorrection, ReportsTheTailOfTheWeights) {
   EXPECT_GT(*wild.correction.pareto_shape, 0.7);
 }
 
-// The posterior that weights e^{c x²} make of a normal distribution has left its draws behind. They
-// say nothing of the expansion then, and need not if it follows the model everywhere.
+// Weights e^{c x²} make a posterior of normal draws that these no longer represent. They tell
+// nothing of the model then, and need not where the expansion follows it everywhere.
 TEST(ModelCorrection, LeavesOutTheTailOfDrawsLeftBehindByAnExactExpansion) {
   CheckDifferences checks;
   checks.etas = NormalPoints(10, 60);
@@ -111,12 +111,15 @@ TEST(ModelCorrection, LeavesOutTheTailOfDrawsLeftBehindByAnExactExpansion) {
   checks.residuals = Vector::Zero(60);
   const Matrix draws = NormalPoints(1000, 100);
   const Vector weights = Vector::Constant(100, 1.0 / 100);
-  checks.largest_shift = 0.02;
-  const auto shape = CorrectByModel(checks, draws, weights).pareto_shape;
+  const auto shape = CorrectByModel(checks, draws, weights, /*largest_shift=*/0.02).pareto_shape;
   ASSERT_TRUE(shape);
   EXPECT_GT(*shape, 0.7);
-  checks.largest_shift = 0.005;
-  EXPECT_EQ(CorrectByModel(checks, draws, weights).pareto_shape, std::nullopt);
+  EXPECT_EQ(CorrectByModel(checks, draws, weights, 0.005).pareto_shape, std::nullopt);
+  // An error that is not known is not small.
+  EXPECT_TRUE(CorrectByModel(checks, draws, weights, std::nan("")).pareto_shape);
+  // Draws that still represent the posterior are told of, whatever the expansion.
+  checks.log_weights = 0.1 * checks.etas.col(0);
+  EXPECT_TRUE(CorrectByModel(checks, draws, weights, 0.005).pareto_shape);
 }
 
 TEST(ModelCorrection, NeedsChecksForEachTerm) {
@@ -127,7 +130,7 @@ TEST(ModelCorrection, NeedsChecksForEachTerm) {
   checks.residuals = Vector::Zero(5);
   const Matrix draws = NormalPoints(1000, 100);
   const ModelCorrection correction =
-      CorrectByModel(checks, draws, Vector::Constant(100, 1.0 / 100));
+      CorrectByModel(checks, draws, Vector::Constant(100, 1.0 / 100), /*largest_shift=*/1);
   EXPECT_EQ(correction.degree, 0);
   EXPECT_EQ(correction.pareto_shape, std::nullopt);
 }
