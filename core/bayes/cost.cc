@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/parallel.h"
 
 namespace polyest::internal {
 namespace {
@@ -124,31 +125,35 @@ Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
 
 void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   POLYEST_CHECK(etas.cols() == dimension());
+  totals.resize(etas.rows());
+  const auto blocks = static_cast<int>((etas.rows() + kBlock - 1) / kBlock);
+  ParallelFor(blocks, threads_, [&](int block) {
+    const Eigen::Index first = block * kBlock;
+    const Eigen::Index count = std::min(kBlock, etas.rows() - first);
+    EvaluateBlock(etas.middleRows(first, count), totals.segment(first, count));
+  });
+}
+
+void Cost::EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const {
   // The memory is kept between calls, so that a sampler's sweeps do not allocate.
   thread_local Matrix difference;  // D = Φ − 1 φ_0ᵀ
   thread_local Matrix product;
   thread_local Matrix xis;
   thread_local Vector remainders;
   thread_local Vector xi;
-  totals.resize(etas.rows());
-  for (Eigen::Index first = 0; first < etas.rows(); first += kBlock) {
-    const Eigen::Index count = std::min(kBlock, etas.rows() - first);
-    const auto block = etas.middleRows(first, count);
-    basis_->EvaluateMany(block, difference);
-    difference.rowwise() -= reference_phi_.transpose();
-    mismatch_.EvaluateMany(difference, product, totals.segment(first, count));
-    if (has_remainder()) remainders = difference * remainder_;
-    xis.resize(count, dimension());
-    xis.noalias() = block * region_.axes().transpose();
-    xis.rowwise() += region_.centre().transpose();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      double& total = totals[first + i];
-      xi = xis.row(i).transpose();
-      const double prior = prior_.NegativeLogDensity(xi);
-      total = Supports(xi) ? Total(power_ * total, prior, regularization_) : kInfinity;
-      if (has_remainder()) total += remainders[i] + remainder_constant_;
-      if (population_ != nullptr) total += population_->Evaluate(xi);
-    }
+  basis_->EvaluateMany(etas, difference);
+  difference.rowwise() -= reference_phi_.transpose();
+  mismatch_.EvaluateMany(difference, product, totals);
+  if (has_remainder()) remainders = difference * remainder_;
+  xis.resize(etas.rows(), dimension());
+  xis.noalias() = etas * region_.axes().transpose();
+  xis.rowwise() += region_.centre().transpose();
+  for (Eigen::Index i = 0; i < totals.size(); ++i) {
+    xi = xis.row(i).transpose();
+    const double prior = prior_.NegativeLogDensity(xi);
+    totals[i] = Supports(xi) ? Total(power_ * totals[i], prior, regularization_) : kInfinity;
+    if (has_remainder()) totals[i] += remainders[i] + remainder_constant_;
+    if (population_ != nullptr) totals[i] += population_->Evaluate(xi);
   }
 }
 

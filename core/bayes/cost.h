@@ -37,6 +37,10 @@ class Cost {
   double power() const { return power_; }
   void set_power(double power) { power_ = power; }
 
+  // The number of threads, ≥ 1, on which EvaluateMany computes; its results do not depend on it.
+  int threads() const { return threads_; }
+  void set_threads(int threads) { threads_ = threads; }
+
   // Sets J_0(η) = coefficientsᵀ φ(η). It enters the total and its derivatives alone.
   void set_remainder(Vector coefficients);
 
@@ -62,6 +66,8 @@ class Cost {
   Vector BasisDifference(const ConstVectorRef& eta) const;
 
  private:
+  // EvaluateMany for one block of points.
+  void EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const;
   bool has_remainder() const { return remainder_.size() > 0; }
   bool Supports(const ConstVectorRef& xi) const {
     return prior_.Contains(xi) && element_.Contains(xi);
@@ -75,6 +81,7 @@ class Cost {
   double regularization_;
   Element element_;
   double power_ = 1;
+  int threads_ = 1;
   Vector remainder_;                                  // coefficients of J_0; empty if it is 0
   double remainder_constant_ = 0;                     // J_0 at the reference
   std::shared_ptr<const PopulationCost> population_;  // J_P; null if it is 0

@@ -11,6 +11,7 @@
 #include "core/bayes/unit_problem.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
+#include "core/common/parallel.h"
 
 namespace polyest::internal {
 namespace {
@@ -282,11 +283,14 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
 std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
                                 const MinimizerOptions& options, const Stop& stop) {
   POLYEST_CHECK(starts.rows() > 0 && starts.cols() == problem.lower.size());
-  std::vector<Minimum> found;
-  for (Eigen::Index i = 0; i < starts.rows(); ++i) {
-    found.push_back(MinimizeFrom(problem, starts.row(i).transpose(), options, stop));
-    if (!stop.Check().ok()) break;
-  }
+  std::vector<Minimum> found(static_cast<size_t>(starts.rows()));
+  ParallelFor(static_cast<int>(starts.rows()), problem.threads, [&](int start) {
+    if (start > 0 && !stop.Check().ok()) return;
+    found[static_cast<size_t>(start)] =
+        MinimizeFrom(problem, starts.row(start).transpose(), options, stop);
+  });
+  // A stop request leaves out the last starts.
+  std::erase_if(found, [](const Minimum& minimum) { return minimum.evaluations == 0; });
   std::stable_sort(found.begin(), found.end(),
                    [](const Minimum& a, const Minimum& b) { return a.value < b.value; });
   const Vector tolerance = options.same_point * (problem.upper - problem.lower);

@@ -19,6 +19,7 @@ struct MinimizationProblem {
   Vector upper;
   Matrix constraint;  // rows a with aᵀx ≤ bound; may have no rows
   Vector bound;
+  int threads = 1;  // ≥ 1, on which `function` is called at a time; results do not depend on it
 };
 
 struct MinimizerOptions {

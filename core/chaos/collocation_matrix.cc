@@ -7,6 +7,7 @@
 
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
+#include "core/common/parallel.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
@@ -36,9 +37,7 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   result.triangular_ = std::move(factors.r);
   result.matrix_ = PackedMatrix(matrix);
   result.thin_q_ = PackedMatrix(factors.q.transpose());
-  // Columns are filled up with zeros to whole vectors: the order in which their squares are summed
-  // would otherwise depend on where they begin in memory.
-  result.residuals_.setZero((points.rows() + 7) / 8 * 8, kColumnsAtOnce);
+  result.ReserveResiduals(kColumnsAtOnce);
   // R has the singular values of A.
   const Conditioning conditioning = ConditioningOfTriangular(result.triangular_);
   result.condition_ = conditioning.number;
@@ -51,10 +50,28 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   return result;
 }
 
+// Columns are filled up with zeros to whole vectors: the order in which their squares are summed
+// would otherwise depend on where they begin in memory.
+void CollocationMatrix::ReserveResiduals(Eigen::Index columns) {
+  if (columns > residuals_.cols()) residuals_.setZero((points() + 7) / 8 * 8, columns);
+}
+
 void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficients,
-                              VectorRef residual_variance) {
+                              VectorRef residual_variance, int threads) {
   POLYEST_CHECK(values.rows() == points() && coefficients.rows() == terms());
   POLYEST_CHECK(coefficients.cols() == values.cols() && residual_variance.size() == values.cols());
+  ReserveResiduals(values.cols());
+  const auto parts = static_cast<int>((values.cols() + kColumnsAtOnce - 1) / kColumnsAtOnce);
+  ParallelFor(parts, threads, [&](int part) {
+    const Eigen::Index first = part * kColumnsAtOnce;
+    const Eigen::Index count = std::min(kColumnsAtOnce, values.cols() - first);
+    SolveSome(values.middleCols(first, count), coefficients.middleCols(first, count),
+              residual_variance.segment(first, count), residuals_.middleCols(first, count));
+  });
+}
+
+void CollocationMatrix::SolveSome(const ConstMatrixRef& values, MatrixRef coefficients,
+                                  VectorRef residual_variance, MatrixRef residuals) const {
   thin_q_.Multiply(values, coefficients);
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
     auto solution = coefficients.col(j);
@@ -66,14 +83,11 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
     return;
   }
   // ‖Y − A c‖² / (Q − S)
-  for (Eigen::Index first = 0; first < values.cols(); first += kColumnsAtOnce) {
-    const Eigen::Index count = std::min<Eigen::Index>(kColumnsAtOnce, values.cols() - first);
-    auto residuals = residuals_.topLeftCorner(points(), count);
-    residuals = values.middleCols(first, count);
-    matrix_.Subtract(coefficients.middleCols(first, count), residuals);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      residual_variance[first + j] = residuals_.col(j).squaredNorm() / freedom;
-    }
+  auto differences = residuals.topRows(points());
+  differences = values;
+  matrix_.Subtract(coefficients, differences);
+  for (Eigen::Index j = 0; j < values.cols(); ++j) {
+    residual_variance[j] = residuals.col(j).squaredNorm() / freedom;
   }
 }
 

@@ -28,16 +28,23 @@ class CollocationMatrix {
 
   // Writes the least-squares coefficients (S × m) of the values (Q × m) at the points, and the
   // residual variance ‖Y − A c‖² / (Q − S) of each column; 0 if Q = S, because interpolation leaves
-  // no residual. Does not allocate if the results have their sizes already.
-  void Solve(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance);
+  // no residual. Computes on so many threads. Does not allocate if the results have their sizes
+  // already, except when there are more columns than ever before.
+  void Solve(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance,
+             int threads = 1);
 
  private:
   CollocationMatrix() = default;
 
+  void ReserveResiduals(Eigen::Index columns);
+  // Solve for some of the columns, which are `residuals` in residuals_.
+  void SolveSome(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance,
+                 MatrixRef residuals) const;
+
   PackedMatrix matrix_;
   PackedMatrix thin_q_;  // transposed, S × Q
   Matrix triangular_;    // S × S, upper
-  Matrix residuals_;     // Q and more × the number of columns at once
+  Matrix residuals_;     // Q and more × the largest number of columns so far
   double condition_ = 0;
 };
 

@@ -3,12 +3,7 @@
 // A parallel loop over independent items. Any thread may do any item, so items must not share what
 // they write; then the result does not depend on the number of threads.
 
-#include <algorithm>
-#include <atomic>
-#include <exception>
-#include <mutex>
-#include <thread>
-#include <vector>
+#include "core/common/thread_pool.h"
 
 namespace polyest::internal {
 
@@ -17,29 +12,11 @@ namespace polyest::internal {
 // early and is rethrown here.
 template <typename Work>
 void ParallelFor(int items, int threads, const Work& work) {
-  threads = std::min(threads, items);
-  if (threads <= 1) {
+  if (threads > 1 && items > 1) {
+    ThreadPool::OfProcess().Run(items, threads, work);
+  } else {
     for (int item = 0; item < items; ++item) work(item);
-    return;
   }
-  std::atomic<int> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto run = [&] {
-    try {
-      for (int item = next++; item < items; item = next++) work(item);
-    } catch (...) {
-      next = items;
-      const std::lock_guard lock(failure_mutex);
-      if (!failure) failure = std::current_exception();
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (int thread = 1; thread < threads; ++thread) helpers.emplace_back(run);
-    run();
-  }
-  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace polyest::internal

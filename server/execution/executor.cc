@@ -8,6 +8,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/common/thread_pool.h"
 #include "proto/wire/refusal/refusal.h"
 
 namespace polyest::internal {
@@ -106,8 +107,11 @@ void Executor::Run() {
     ++lane.running;
     GiveTurn(name, lane);
     lock.unlock();
-    task();
-    task = nullptr;
+    {
+      const Computing here;
+      task();
+      task = nullptr;
+    }
     lock.lock();
     --lane.running;
     --lane.accepted;

@@ -49,6 +49,7 @@ class Executor {
   absl::Status Submit(const std::string& lane, Task task, Admission admission = Admission::kIfRoom);
   // Waits until no task waits or runs. Returns false if some still do at the deadline.
   bool AwaitIdle(std::chrono::steady_clock::time_point deadline);
+  int threads_per_lane() const { return options_.threads_per_lane; }
   // Returns the number of tasks that wait or run.
   int accepted() const;
   // Returns the number of tasks that wait.

@@ -13,8 +13,8 @@
 namespace polyest::internal {
 namespace {
 
-// Each call runs its propagations on one thread, because the executor's threads serve many calls.
-constexpr int kThreadsPerCall = 1;
+// Returns the number of threads on which a call computes while no other one needs them.
+int ThreadsOf(const ServiceContext& context) { return context.executor.threads_per_lane(); }
 
 // The overloads of Run give all studies one name. The arguments after the request select a study of
 // an experiment or of an estimator.
@@ -79,7 +79,7 @@ absl::Status OnStrand(const v1::ComputeExperimentDesignRequest& request, Session
     }
     POLYEST_ASSIGN_OR_RETURN(
         response,
-        ComputeExperimentDesign(request, problem, known, kThreadsPerCall, stop, context.models));
+        ComputeExperimentDesign(request, problem, known, ThreadsOf(context), stop, context.models));
     response.set_sequence(sequence);
     return absl::OkStatus();
   };
@@ -113,7 +113,7 @@ absl::Status OfStoredExperiment(Request request, const Session& session,
                              ReadRows(session, resolved, stop, *experiment.mutable_measurements()));
   }
   POLYEST_ASSIGN_OR_RETURN(response,
-                           Run(request, kThreadsPerCall, stop, context.models, ProblemLimits()));
+                           Run(request, ThreadsOf(context), stop, context.models, ProblemLimits()));
   if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
     response.set_sequence(sequence);
   }
@@ -131,8 +131,9 @@ absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller
       const SessionServices& services = context.sessions.services();
       const absl::Status room = services.memory.Check();
       if (!room.ok()) return room;
-      return Deliver(Run(*request, kThreadsPerCall, stop, context.models, services.limits.problem),
-                     response);
+      return Deliver(
+          Run(*request, ThreadsOf(context), stop, context.models, services.limits.problem),
+          response);
     });
   }
   if constexpr (RunsTheModel<Request>) {

@@ -10,6 +10,7 @@
 #include "core/common/status.h"
 #include "core/estimator/estimator_access.h"
 #include "core/estimator/memory_use.h"
+#include "core/propagation/trajectory_ensemble.h"
 #include "proto/wire/convert/estimate.h"
 
 namespace polyest::internal {
@@ -18,23 +19,35 @@ namespace {
 // A problem is held as it came, as the core's structs, and by the estimator's parts.
 constexpr int64_t kCopiesOfProblem = 4;
 
+// Returns the number of threads of a session's estimator. A model that runs in processes of its own
+// would keep as many of them as long as the session is loaded.
+int ThreadsFor(const ResolvedProblem& problem, int threads) {
+  const Model* const model = problem.problem().model.get();
+  return dynamic_cast<const SelfPropagatingModel*>(model) != nullptr ? 1 : threads;
+}
+
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(
-    v1::Problem problem, const ModelLibrary& models, const ProblemLimits& limits,
-    double reorder_window_s, const CheckMemory& check_memory, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved, ToProblem(problem, models, limits));
-  if (check_memory) POLYEST_RETURN_IF_ERROR(check_memory(ExpectedBytes(resolved)));
+absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Make(v1::Problem problem,
+                                                                   double reorder_window_s,
+                                                                   const Options& options,
+                                                                   const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved,
+                           ToProblem(problem, options.models, options.limits));
+  if (options.check_memory) {
+    POLYEST_RETURN_IF_ERROR(options.check_memory(ExpectedBytes(resolved)));
+  }
   std::unique_ptr<LoadedSession> loaded(
-      new LoadedSession(std::move(problem), resolved, reorder_window_s));
+      new LoadedSession(std::move(problem), resolved, reorder_window_s, options.threads));
   POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin({}, stop));
   return loaded;
 }
 
 LoadedSession::LoadedSession(v1::Problem problem, const ResolvedProblem& resolved,
-                             double reorder_window_s)
+                             double reorder_window_s, int threads)
     : problem_(std::move(problem)),
       reorder_window_s_(reorder_window_s),
+      threads_(threads),
       intake_(resolved, reorder_window_s) {}
 
 absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts, const Stop& stop) {
@@ -43,6 +56,7 @@ absl::StatusOr<LoadedSession::Computed> LoadedSession::Begin(RunCuts cuts, const
   computed.cuts = std::move(cuts);
   if (journal_ != nullptr) computed.store->ReadFrom(*journal_, number_);
   EstimatorOptions options;
+  options.threads = ThreadsFor(intake_.problem(), threads_);
   options.store = computed.store;
   options.snapshot = [this](EstimatorSnapshot snapshot) {
     if (save_) save_(std::move(snapshot));
@@ -76,12 +90,14 @@ std::pair<RunCuts, EstimatorSnapshot> LoadedSession::Snapshot() const {
   return {*std::move(cuts), std::move(snapshot)};
 }
 
-absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(
-    const SessionJournal& journal, const SessionHead& head, const SessionPlace& place,
-    const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop) {
+absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const SessionJournal& journal,
+                                                                   const SessionHead& head,
+                                                                   const SessionPlace& place,
+                                                                   const Options& options,
+                                                                   const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(v1::Problem problem, journal.ReadProblem(head.number));
-  POLYEST_ASSIGN_OR_RETURN(
-      auto loaded, Make(std::move(problem), models, {}, head.reorder_window_s, check_memory, stop));
+  POLYEST_ASSIGN_OR_RETURN(auto loaded,
+                           Make(std::move(problem), head.reorder_window_s, options, stop));
   loaded->ReadFrom(journal, head.number);
   auto [cuts, snapshot] = loaded->Snapshot();
   const bool any_cut = !cuts.empty();

@@ -31,19 +31,29 @@ class LoadedSession {
   // Checks whether there is memory for about so many bytes.
   using CheckMemory = std::function<absl::Status(int64_t bytes)>;
 
+  struct Options {
+    const ModelLibrary& models;
+    ProblemLimits limits = {};
+    CheckMemory check_memory = {};  // empty: memory is not checked
+    int threads = 1;                // ≥ 1, of the estimator while others do not need them
+  };
+
   // Makes a session without batches, whose rows may arrive out of order within
   // `reorder_window_s`. INVALID_ARGUMENT for a bad problem, RESOURCE_EXHAUSTED for one beyond the
-  // limits; other errors are those of `check_memory`, if it is given, and of Estimator::Make, which
-  // may take seconds.
-  static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(
-      v1::Problem problem, const ModelLibrary& models, const ProblemLimits& limits = {},
-      double reorder_window_s = 0, const CheckMemory& check_memory = {}, const Stop& stop = {});
+  // limits; other errors are those of `check_memory` and of Estimator::Make, which may take
+  // seconds.
+  static absl::StatusOr<std::unique_ptr<LoadedSession>> Make(v1::Problem problem,
+                                                             double reorder_window_s,
+                                                             const Options& options,
+                                                             const Stop& stop = {});
   // Rebuilds a session from the batches that the journal keeps. The latest snapshot in the journal,
   // if it is usable, saves most of the numerics. DATA_LOSS when the batches do not lead to `place`;
   // the errors of `check_memory`.
-  static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(
-      const SessionJournal& journal, const SessionHead& head, const SessionPlace& place,
-      const ModelLibrary& models, const CheckMemory& check_memory, const Stop& stop);
+  static absl::StatusOr<std::unique_ptr<LoadedSession>> Load(const SessionJournal& journal,
+                                                             const SessionHead& head,
+                                                             const SessionPlace& place,
+                                                             const Options& options,
+                                                             const Stop& stop);
 
   // Returns whether there is room for a snapshot of so many bytes in place of the last one.
   using TakeSnapshotRoom = std::function<bool(int64_t bytes)>;
@@ -100,7 +110,8 @@ class LoadedSession {
     double measured_s = 0;
   };
 
-  LoadedSession(v1::Problem problem, const ResolvedProblem& resolved, double reorder_window_s);
+  LoadedSession(v1::Problem problem, const ResolvedProblem& resolved, double reorder_window_s,
+                int threads);
   void ReadFrom(const SessionJournal& journal, int64_t session);
   // Makes an estimator without batches that will leave out these rows.
   absl::StatusOr<Computed> Begin(RunCuts cuts, const Stop& stop);
@@ -116,6 +127,7 @@ class LoadedSession {
 
   const v1::Problem problem_;
   const double reorder_window_s_;
+  const int threads_;
   BatchIntake intake_;
   Computed computed_;
   const SessionJournal* journal_ = nullptr;  // null until Load or Attach

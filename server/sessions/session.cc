@@ -149,10 +149,10 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   Replace({nullptr, present.losses});
   Weigh();
   // No batch is taken until the session is loaded again below.
+  const auto check_memory = [this](int64_t bytes) { return CheckMemory(bytes); };
   POLYEST_ASSIGN_OR_RETURN(std::shared_ptr<LoadedSession> loaded,
-                           LoadedSession::Load(
-                               services_.journal, head_, ledger_.kept(), services_.models,
-                               [this](int64_t bytes) { return CheckMemory(bytes); }, stop));
+                           LoadedSession::Load(services_.journal, head_, ledger_.kept(),
+                                               services_.Loading(check_memory), stop));
   loaded->Attach(services_.journal, number(), services_.SnapshotRoom(number(), tenant()));
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   passed_on_ = nullptr;

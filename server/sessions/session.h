@@ -47,6 +47,11 @@ struct SessionServices {
   // Weighs what is loaded; null: it is not weighed. The registry sets it.
   std::shared_ptr<TenantMemory> tenant_memory = nullptr;
 
+  // Returns how sessions are loaded.
+  LoadedSession::Options Loading(LoadedSession::CheckMemory check_memory,
+                                 const ProblemLimits& problem_limits = {}) const {
+    return {models, problem_limits, std::move(check_memory), executor.threads_per_lane()};
+  }
   // Returns what takes room for the snapshots of a session.
   LoadedSession::TakeSnapshotRoom SnapshotRoom(int64_t session, const std::string& tenant) const {
     return [counted = stored, session, tenant](int64_t bytes) {

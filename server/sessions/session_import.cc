@@ -77,9 +77,10 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   const auto check_memory = [&](int64_t bytes) {
     return services.tenant_memory->MakeRoom(head_.tenant, bytes);
   };
-  POLYEST_ASSIGN_OR_RETURN(auto loaded,
-                           LoadedSession::Make(problem, services.models, services.limits.problem,
-                                               head_.reorder_window_s, check_memory, stop));
+  POLYEST_ASSIGN_OR_RETURN(
+      auto loaded,
+      LoadedSession::Make(problem, head_.reorder_window_s,
+                          services.Loading(check_memory, services.limits.problem), stop));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
   loaded->Attach(services.journal, head_.number, services.SnapshotRoom(head_.number, head_.tenant));
   loaded_ = std::move(loaded);

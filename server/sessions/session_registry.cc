@@ -74,11 +74,13 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   }
   // The mutex is not held here, because a large problem takes its time, and so does the journal.
   // The journal checks again whether the name is free.
+  const auto make_room = [&](int64_t bytes) {
+    return services_.tenant_memory->MakeRoom(tenant, bytes);
+  };
   POLYEST_ASSIGN_OR_RETURN(
       auto loaded,
-      LoadedSession::Make(
-          problem, services_.models, services_.limits.problem, reorder_window_s,
-          [&](int64_t bytes) { return services_.tenant_memory->MakeRoom(tenant, bytes); }, stop));
+      LoadedSession::Make(problem, reorder_window_s,
+                          services_.Loading(make_room, services_.limits.problem), stop));
   head.create_time = clock_();
   // The address of the schema is for editors, and may be of any length.
   v1::Problem kept = problem;

@@ -84,7 +84,7 @@ class Attacker:
         self.messages, self.metadata = rig.messages(), rig.call_credentials(token)
         self.channel = grpc.insecure_channel(address)
 
-    def call(self, method, request, timeout=60):
+    def call(self, method, request, timeout=240):
         self.channel.unary_unary(f"/polyest.v1.SessionService/{method}",
                                  request_serializer=type(request).SerializeToString,
                                  response_deserializer=bytes)(request, timeout=timeout,

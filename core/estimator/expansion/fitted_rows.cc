@@ -37,9 +37,9 @@ void RegionalExpansion::FitColumns(int first, int count, const Matrix& all_value
   auto fit = coefficients.middleCols(first, count);
   auto residuals = residual.segment(first, count);
   if (matrix_.points() == points()) {
-    matrix_.Solve(values, fit, residuals);
+    matrix_.Solve(values, fit, residuals, threads_);
   } else {
-    matrix_.Solve(values(kept_, Eigen::all), fit, residuals);
+    matrix_.Solve(values(kept_, Eigen::all), fit, residuals, threads_);
   }
 }
 

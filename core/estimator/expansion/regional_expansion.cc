@@ -379,6 +379,7 @@ Cost RegionalExpansion::MakeCost(double regularization) const {
   Cost cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
             problem_.prior(), regularization, design_.element);
   cost.set_power(1 / noise_.misfit);
+  cost.set_threads(threads_);
   if (remainder_.size() > 0) cost.set_remainder(remainder_);
   // Without a prior there is no population either.
   if (regularization > 0 && problem_.population()) {

@@ -53,6 +53,7 @@ MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& pri
 
 MinimizationProblem SearchOf(const Cost& cost, const ExpansionDesign& design) {
   MinimizationProblem search = SearchDomain(design, cost.prior());
+  search.threads = cost.threads();
   search.function = [&cost](const Vector& eta, Vector* gradient) {
     if (gradient == nullptr) return cost.Evaluate(eta).total;
     return cost.EvaluateWithGradient(eta, *gradient).total;

@@ -43,7 +43,7 @@ struct EstimatorSnapshot {
 
 // How an estimator works.
 struct EstimatorOptions {
-  int threads = 1;  // ≥ 1, for model runs; results do not depend on it
+  int threads = 1;  // ≥ 1; results do not depend on it
   // Where samples are kept, empty at first; in memory when null.
   std::shared_ptr<SampleStore> store;
   // Called by Process, if given, once at each checkpoint of the record: after every

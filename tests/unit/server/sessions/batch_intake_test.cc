@@ -29,7 +29,7 @@ class BatchIntakeTest : public testing::Test {
 
   ModelLibrary models_;
   const std::unique_ptr<LoadedSession> loaded_ =
-      LoadedSession::Make(SmallProblem(), models_).value();
+      LoadedSession::Make(SmallProblem(), /*reorder_window_s=*/0, {models_}).value();
   BatchIntake& intake_ = loaded_->intake();
 };
 
