@@ -1,4 +1,4 @@
-"""The models of the examples in compiled code, as a user of the peers would write them, with numba.
+"""Problems, and their models in compiled code, as a user of the peers would write them, with numba.
 
 Each model has the names of its unknowns, the bounds of their uniform priors, the noise of a sample, and
 `outputs(unknowns, times)`, which integrates by the classical Runge–Kutta method in steps so short that
@@ -35,6 +35,43 @@ def chain_rate(state, unknowns, time, rate):
         rate[i] = state[4 + i]
         rate[4 + i] = (above - below) / unknowns[i]
         below = above
+
+
+@njit(cache=True)
+def spring_rate(state, unknowns, time, rate):
+    # A spring that hardens, let go: k, k3, c.
+    rate[0] = state[1]
+    rate[1] = (-unknowns[0] * state[0] - unknowns[1] * state[0] ** 3 - unknowns[2] * state[1])
+
+
+@njit(cache=True)
+def buoy_rate(state, unknowns, time, rate):
+    # A buoy that heaves in a swell of two periods, with quadratic drag: w2, c, d, a.
+    swell = math.sin(0.45 * time) + 0.5 * math.sin(0.62 * time)
+    rate[0] = state[1]
+    rate[1] = (-unknowns[0] * state[0] - unknowns[1] * state[1]
+               - unknowns[2] * abs(state[1]) * state[1] + unknowns[3] * swell)
+
+
+def uniform(name, lower, upper):
+    return {"name": name, "uniform": {"lower": lower, "upper": upper}}
+
+
+# The posterior is bent, and cut off by its prior.
+SPRING = {
+    "model": {"equations": {"states": {"x": "v", "v": "-k*x - k3*x^3 - c*v"}, "outputs": {"x": "x"}}},
+    "fixed": {"x_0": 1},
+    "uncertain": [uniform("k", 10, 40), uniform("k3", 0, 40), uniform("c", 0, 3)],
+    "measured": [{"output": "x", "noise": {"absolute": 0.05}}],
+}
+BUOY = {
+    "model": {"equations": {
+        "states": {"z": "v", "v": "-w2*z - c*v - d*abs(v)*v + a*(sin(0.45*t) + 0.5*sin(0.62*t))"},
+        "outputs": {"z": "z"}}},
+    "uncertain": [uniform("w2", 0.5, 1.5), uniform("c", 0.02, 0.3), uniform("d", 0, 0.5),
+                  uniform("a", 0.2, 1)],
+    "measured": [{"output": "z", "noise": {"absolute": 0.05}}],
+}
 
 
 def integrator(rate_of, states, start, measured, substeps):
@@ -75,21 +112,45 @@ def integrator(rate_of, states, start, measured, substeps):
 
 
 class Model:
-    def __init__(self, example, rate_of, states, start, measured, substeps):
-        problem = json.loads((EXAMPLES / f"{example}.json").read_text(encoding="utf-8"))
-        with open(EXAMPLES / f"{example}.csv", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-        record = numpy.array(rows[1:], dtype=float)
-        self.example = example
+    """A problem, its model, and one record of it: `times` and `samples`, an output a column."""
+
+    def __init__(self, name, problem, rate_of, start, measured, substeps):
+        self.name, self.problem = name, problem
         self.names = [unknown["name"] for unknown in problem["uncertain"]]
         bounds = [unknown["uniform"] for unknown in problem["uncertain"]]
         self.lower = numpy.array([bound["lower"] for bound in bounds])
         self.upper = numpy.array([bound["upper"] for bound in bounds])
+        self.outputs_measured = [channel["output"] for channel in problem["measured"]]
         self.noise = problem["measured"][0]["noise"]["absolute"]
+        self.start, self.states = numpy.array(start), len(start)
+        self.step, self.outputs = integrator(rate_of, self.states, self.start, measured, substeps)
+        self.outputs(self.middle(), numpy.array([0.0, 1e-3]))  # compiles
+
+    def read(self, path):
+        with open(path, encoding="utf-8") as file:
+            record = numpy.array(list(csv.reader(file))[1:], dtype=float)
         self.times, self.samples = record[:, 0].copy(), record[:, 1:].copy()
-        self.start, self.states = numpy.array(start), states
-        self.step, self.outputs = integrator(rate_of, states, self.start, measured, substeps)
-        self.outputs(self.middle(), self.times[:2])  # compiles
+        return self
+
+    def simulate(self, seed, times=None):
+        """Replaces the record by one of a truth drawn from the prior, and returns the truth."""
+        if times is not None:
+            self.times = times
+        random = numpy.random.default_rng(seed)
+        truth = random.uniform(self.lower, self.upper)
+        outputs = self.outputs(truth, self.times)
+        self.samples = outputs + self.noise * random.standard_normal(outputs.shape)
+        return truth
+
+    def write(self, folder):
+        """Writes the problem and the record as files of polyest; returns their paths."""
+        problem, record = pathlib.Path(folder, "problem.json"), pathlib.Path(folder, "record.csv")
+        problem.write_text(json.dumps(self.problem), encoding="utf-8")
+        with open(record, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["t", *self.outputs_measured])
+            writer.writerows([time, *row] for time, row in zip(self.times, self.samples))
+        return problem, record
 
     def middle(self):
         return (self.lower + self.upper) / 2
@@ -98,6 +159,19 @@ class Model:
         return ((self.outputs(unknowns, self.times) - self.samples) / self.noise).ravel()
 
 
+def of_example(name, rate_of, start, measured, substeps):
+    problem = json.loads((EXAMPLES / f"{name}.json").read_text(encoding="utf-8"))
+    return Model(name, problem, rate_of, start, measured, substeps).read(EXAMPLES / f"{name}.csv")
+
+
+def simulated(name, problem, rate_of, start, times, substeps):
+    model = Model(name, problem, rate_of, start, 1, substeps)
+    model.simulate(1, times)
+    return model
+
+
 def models():
-    yield Model("oscillator", oscillator_rate, 2, [1.0, 0.0], 1, 8)
-    yield Model("chain", chain_rate, 8, [0.0] * 8, 4, 16)
+    yield simulated("spring", SPRING, spring_rate, [1.0, 0.0], numpy.arange(1, 21) / 20, 8)
+    yield of_example("oscillator", oscillator_rate, [1.0, 0.0], 1, 8)
+    yield simulated("buoy", BUOY, buoy_rate, [0.0, 0.0], numpy.arange(1.0, 3601.0), 16)
+    yield of_example("chain", chain_rate, [0.0] * 8, 4, 16)

@@ -1,7 +1,5 @@
 #!/usr/bin/env python3
-"""Compares polyest with what its users would use else, on records of the examples, side by side.
-
-    peers.py POLYEST [--minutes M]
+"""Compares polyest with what its users would use else, on the same records, side by side.
 
     emcee     the Markov chains of 32 or more walkers, from the least-squares fit, until they are 50
               autocorrelation times long, or for M minutes
@@ -11,12 +9,17 @@
 All get the model in compiled code. Prints the CPU time, the number of model runs over the whole record,
 and how far means and standard deviations are from those of emcee, which samples the exact posterior: the
 largest of all unknowns, in standard deviations and as a ratio.
+
+Then all but emcee estimate records of truths drawn from the prior. Coverage is the part of the unknowns,
+over all records, whose truth lies in its interval of 95 %: polyest's, and mean ± 1.96 standard deviations
+of the others. Of an exact posterior it is 95 %.
 """
 
 import argparse
 import json
 import resource
 import subprocess
+import tempfile
 import time
 
 import emcee
@@ -24,29 +27,35 @@ import numpy
 import scipy.optimize
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from models import EXAMPLES, models
+from models import models
 
 
 class Found:
-    """What a method says of the unknowns, and what it took."""
+    """What a method says of the unknowns, and what it took. `interval` is of 95 %, 2 × unknowns."""
 
-    def __init__(self, method, mean, deviation, cpu_s, runs, note=""):
+    def __init__(self, method, mean, deviation, cpu_s, runs, note="", interval=None):
         self.method, self.mean, self.deviation = method, numpy.array(mean), numpy.array(deviation)
         self.cpu_s, self.runs, self.note = cpu_s, runs, note
+        self.interval = self.mean + numpy.outer([-1.96, 1.96], self.deviation)
+        if interval is not None:
+            self.interval = numpy.array(interval)
 
 
 def by_polyest(model, polyest):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    answer = subprocess.run([polyest, "estimate", EXAMPLES / f"{model.example}.json",
-                             EXAMPLES / f"{model.example}.csv", "--format", "json"], check=True,
-                            capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        problem, record = model.write(folder)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        answer = subprocess.run([polyest, "estimate", problem, record, "--format", "json"], check=True,
+                                capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
     estimate = json.loads(answer.stdout)
-    mean = [parameter["mean"] for parameter in estimate["parameters"]]
-    deviation = [parameter["posteriorStdDev"] for parameter in estimate["parameters"]]
+    parameters = estimate["parameters"]
     runs = float(estimate["expansion"]["trajectories"])
     cpu_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-    return Found("polyest", mean, deviation, cpu_s, runs)
+    return Found("polyest", [parameter["mean"] for parameter in parameters],
+                 [parameter["posteriorStdDev"] for parameter in parameters], cpu_s, runs,
+                 interval=[[parameter["lower95"] for parameter in parameters],
+                           [parameter["upper95"] for parameter in parameters]])
 
 
 def by_least_squares(model):
@@ -125,7 +134,7 @@ def by_filter(model):
 
 
 def report(model, exact, all_found):
-    print(f"\n{model.example}: {len(model.names)} unknowns, {model.samples.size} samples in "
+    print(f"\n{model.name}: {len(model.names)} unknowns, {model.samples.size} samples in "
           f"{model.times[-1]:g} s")
     print("  method    CPU time, s  model runs  mean, sd off  sd, ratio")
     for found in all_found:
@@ -137,15 +146,44 @@ def report(model, exact, all_found):
               + (f"  {found.note}" if found.note else ""), flush=True)
 
 
+def report_coverage(model, methods, records):
+    """Estimates simulated records by each method and prints how often its intervals hold the truth."""
+    held, cpu_s = {}, {}
+    for seed in range(1000, 1000 + records):
+        truth = model.simulate(seed)
+        for method in methods:
+            found = method(model)
+            inside = (found.interval[0] <= truth) & (truth <= found.interval[1])
+            held.setdefault(found.method, []).append(inside)
+            cpu_s[found.method] = cpu_s.get(found.method, 0) + found.cpu_s
+    print(f"  {records} simulated records: coverage of 95 % intervals, CPU time of a record")
+    for method, inside in held.items():
+        print(f"  {method:8s} {100 * numpy.mean(inside):11.1f} % {cpu_s[method] / records:9.2f} s",
+              flush=True)
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("polyest")
-    parser.add_argument("--minutes", type=float, default=10.0, help="longest time of emcee")
+    parser = argparse.ArgumentParser(description=__doc__, usage="run.sh POLYEST FOLDER [OPTION]...",
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("polyest", help=argparse.SUPPRESS)
+    parser.add_argument("--minutes", type=float, default=10.0, metavar="M",
+                        help="longest time of emcee (default: 10)")
+    parser.add_argument("--records", type=int, default=40, metavar="N",
+                        help="simulated records of each problem; 0: none (default: 40)")
+    parser.add_argument("--problem", action="append", help="these problems only: their names")
     arguments = parser.parse_args()
+
+    def polyest(model):
+        return by_polyest(model, arguments.polyest)
+
     for model in models():
+        if arguments.problem and model.name not in arguments.problem:
+            continue
         fit = by_least_squares(model)
         exact = by_emcee(model, fit, arguments.minutes)
-        report(model, exact, [by_polyest(model, arguments.polyest), exact, by_filter(model), fit])
+        report(model, exact, [polyest(model), exact, by_filter(model), fit])
+        if arguments.records > 0:
+            report_coverage(model, [polyest, by_filter, by_least_squares], arguments.records)
 
 
 if __name__ == "__main__":
