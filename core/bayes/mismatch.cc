@@ -109,7 +109,7 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
   for (const ChannelSums& channel : channels) {
     count_ += channel.samples.count();
     if (!channel.IsKnown()) {
-      // Completed here, so that no copy has to be.
+      // Completed before they are copied and read, by several threads at once.
       channel.samples.Complete();
       channel.differences.Complete();
       other_.push_back(channel);
@@ -120,6 +120,7 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
       known_.AddLinear(channel.log_variance, channel.log_variance_at_reference);
     }
   }
+  known_.Complete();
 }
 
 double Mismatch::Evaluate(const ConstVectorRef& d) const {

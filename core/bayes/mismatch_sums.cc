@@ -32,7 +32,8 @@ const Matrix& MismatchSums::G() const {
 
 void MismatchSums::Complete() const {
   if (waiting_ > 0) AddWaiting();
-  if (!is_whole_) g_.triangularView<Eigen::StrictlyUpper>() = g_.transpose();
+  if (is_whole_) return;  // several threads may come here
+  g_.triangularView<Eigen::StrictlyUpper>() = g_.transpose();
   is_whole_ = true;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <system_error>
 
 #include "core/common/check.h"
 
@@ -78,7 +79,11 @@ void ThreadPool::Run(int items, int threads, absl::FunctionRef<void(int)> work) 
 }
 
 void ThreadPool::MakeThreads(int count) {
-  while (std::ssize(threads_) < count) threads_.emplace_back([this] { Help(); });
+  try {
+    while (std::ssize(threads_) < count) threads_.emplace_back([this] { Help(); });
+  } catch (const std::system_error&) {
+    // The system allows no more threads: those that there are do the loop.
+  }
 }
 
 // Returns the loop with the fewest helpers of those that have work for another one; null if there

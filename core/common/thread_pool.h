@@ -35,10 +35,11 @@ class ThreadPool {
   static ThreadPool& OfProcess();
 
   // Calls work(item) once for each item of 0 … items − 1, on the calling thread and on those that
-  // help it, and returns when all are done. So many threads are made and used, the caller's
-  // included, as long as there are cores for them; if `threads` is more than the cores, as for
-  // models that wait for another machine, then all of them. Loops that run at the same time share
-  // the helpers evenly. The first exception that `work` throws ends the loop early and is rethrown.
+  // help it, and returns when all are done. At most `threads` take part, the caller included, and
+  // fewer while there are not as many cores; but if `threads` is more than the cores, as for models
+  // that wait for another machine, all of them may. Loops that run at the same time share the
+  // helpers evenly. The first exception that `work` throws ends the loop early and is rethrown. The
+  // threads are made as they are first wanted, with the priority of the caller.
   void Run(int items, int threads, absl::FunctionRef<void(int)> work);
 
  private:

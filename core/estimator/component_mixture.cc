@@ -204,9 +204,10 @@ absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const PosteriorEffort& 
   if (elements_left_out_ > 0) {
     assessed.whole.estimate.diagnostics.push_back(
         {DiagnosticCode::kPointsFailed,
-         absl::StrFormat("%d parts of the prior were left out, because in each of them too few "
-                         "trajectories could be integrated",
-                         elements_left_out_)});
+         absl::StrFormat(
+             "parts of the prior (%d) were left out, because in each too few trajectories "
+             "could be integrated",
+             elements_left_out_)});
   }
   return assessed;
 }

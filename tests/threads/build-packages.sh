@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds Debian's own Abseil, Protocol Buffers and gRPC again, with the thread sanitizer in them.
-# Without that, the sanitizer does not see how gRPC's threads synchronize, and reports data handed
-# from one thread to another as a race; and messages compiled for the sanitizer have members that
-# those in Debian's library lack.
+# Builds Debian's own Abseil, Protocol Buffers, gRPC and cpp-httplib again, with the thread sanitizer
+# in them. Without that, the sanitizer does not see how their threads synchronize, and reports data
+# handed from one thread to another as a race; and messages compiled for the sanitizer have members
+# that those in Debian's library lack.
 #   tests/threads/build-packages.sh FOLDER
 # FOLDER/lib then has the libraries, under the names of the installed ones. Takes a quarter of an
 # hour on two cores the first time, then nothing.
@@ -28,19 +28,32 @@ fetch() {
     --option Dir::Etc::SourceParts=/dev/null --option Dir::State::Lists="$PWD/lists")
   say "fetching the sources"
   "${apt_get[@]}" update
-  "${apt_get[@]}" source abseil protobuf grpc
+  "${apt_get[@]}" source abseil protobuf grpc cpp-httplib
 }
+
+# The sanitizer does not see fences, of which GCC warns: -Wno-tsan.
+flags=(-O1 -fsanitize=thread -fno-omit-frame-pointer -Wno-tsan)
 
 # build PACKAGE TARGET [OPTION-OF-CMAKE]...
 build() {
-  local package=$1 target=$2 flags="-O1 -fsanitize=thread -fno-omit-frame-pointer"
+  local package=$1 target=$2
   say "building $package"
-  # The sanitizer does not see fences, of which GCC warns: -Wno-tsan.
   cmake -G Ninja -S "$folder/sources/$package"-*/ -B "$folder/$package" -DCMAKE_BUILD_TYPE=None \
     -DBUILD_SHARED_LIBS=ON -DCMAKE_CXX_STANDARD=17 -DCMAKE_INSTALL_PREFIX="$folder" \
-    -DCMAKE_INSTALL_LIBDIR=lib -DCMAKE_C_FLAGS="$flags" -DCMAKE_CXX_FLAGS="$flags -Wno-tsan" \
+    -DCMAKE_INSTALL_LIBDIR=lib -DCMAKE_C_FLAGS="${flags[*]}" -DCMAKE_CXX_FLAGS="${flags[*]}" \
     -DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "${@:3}"
   cmake --build "$folder/$package" --target "$target"
+}
+
+# Debian builds this one by Meson, as one source split off the header.
+build_httplib() {
+  local name=libcpp-httplib.so.0.11
+  say "building cpp-httplib"
+  cd "$folder"/sources/cpp-httplib-*/
+  python3 ./split.py --out "$folder/httplib"
+  c++ "${flags[@]}" $(pkg-config --cflags cpp-httplib) -fPIC -shared -Wl,-soname,"$name" \
+    -I"$folder/httplib" "$folder/httplib/httplib.cc" -o "$folder/lib/$name" \
+    -lssl -lcrypto -lz -lbrotlidec -lbrotlienc
 }
 
 fetch
@@ -55,4 +68,5 @@ build grpc grpc++ "${providers[@]}" -DgRPC_BUILD_TESTS=OFF -DgRPC_BUILD_CODEGEN=
   -DgRPC_INSTALL=OFF -DCMAKE_PREFIX_PATH="$folder" \
   -DCMAKE_PROJECT_INCLUDE="$here/grpc_headers.cmake"
 cp --no-dereference "$folder"/grpc/lib*.so* "$folder/lib"
+build_httplib
 touch "$folder/complete"

@@ -5,6 +5,7 @@
 #include <functional>
 #include <future>
 #include <semaphore>
+#include <utility>
 
 #include "server/digest/digest.h"
 #include "server/service/export_call.h"
@@ -18,7 +19,12 @@ namespace {
 // Plays gRPC's side of an import.
 class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest> {
  public:
-  explicit Reader(ImportCall& call) : call_(call) { BindReactor(&call); }
+  using OnFinish = std::function<void(const grpc::Status&)>;
+
+  // `on_finish` may be called at once, by another thread.
+  Reader(ImportCall& call, OnFinish on_finish) : call_(call), on_finish_(std::move(on_finish)) {
+    BindReactor(&call);
+  }
 
   // Waits until the import asks for a record, and gives it this one.
   void Give(const v1::SessionRecord& record) {
@@ -31,15 +37,14 @@ class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest>
     request_ = request;
     asked_.release();
   }
-  void Finish(grpc::Status status) override { on_finish(status); }
-
-  std::function<void(const grpc::Status&)> on_finish;
+  void Finish(grpc::Status status) override { on_finish_(status); }
 
  private:
   grpc::internal::ServerReactor* reactor() override { return &call_; }
   void CallOnDone() override {}
 
   ImportCall& call_;
+  const OnFinish on_finish_;
   v1::ImportSessionRequest* request_ = nullptr;
   std::binary_semaphore asked_{0};
 };
@@ -96,13 +101,12 @@ class ImportCallTest : public testing::Test {
 TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   ServiceContext context = Context();
   auto* const import = new ImportCall(context, call_, &imported_);
-  Reader reader(*import);
   std::promise<grpc::StatusCode> finished;
-  reader.on_finish = [&](const grpc::Status& status) {
+  Reader reader(*import, [&](const grpc::Status& status) {
     // The session is gone before the call ends.
     EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
     finished.set_value(status.error_code());
-  };
+  });
   reader.Give(Head());
   journal_.Hold();
   reader.Give(Batch());
@@ -117,9 +121,9 @@ TEST_F(ImportCallTest, EndsWhereNothingComes) {
   ServiceContext context = Context();
   context.first_message = std::chrono::milliseconds(0);
   auto* const import = new ImportCall(context, call_, &imported_);
-  Reader reader(*import);
   std::promise<grpc::StatusCode> finished;
-  reader.on_finish = [&](const grpc::Status& status) { finished.set_value(status.error_code()); };
+  Reader reader(*import,
+                [&](const grpc::Status& status) { finished.set_value(status.error_code()); });
   EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::DEADLINE_EXCEEDED);
   import->OnDone();
   EXPECT_EQ(calls_.Count(OpenCalls::Kind::kWriter), 0);
