@@ -13,6 +13,7 @@
 
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "core/common/check.h"
 
@@ -68,13 +69,20 @@ void AddFile(const google::protobuf::FileDescriptor& file, google::protobuf::Des
   POLYEST_CHECK(pool.BuildFile(copy) != nullptr);
 }
 
-// Returns the types of the file's messages, and of those that it imports, for JSON.
+// Returns the types of the file's messages, and of those that it imports, for JSON. A pool that has
+// been returned does not change any more, because other threads read it: a further file makes a
+// further pool.
 const google::protobuf::DescriptorPool& JsonTypes(const google::protobuf::FileDescriptor& file) {
   static std::mutex mutex;
-  static google::protobuf::DescriptorPool pool;
+  static std::vector<const google::protobuf::FileDescriptor*> files;
+  static std::vector<std::unique_ptr<google::protobuf::DescriptorPool>> pools;  // all files: last
   const std::lock_guard lock(mutex);
-  AddFile(file, pool);
-  return pool;
+  if (pools.empty() || pools.back()->FindFileByName(file.name()) == nullptr) {
+    files.push_back(&file);
+    pools.push_back(std::make_unique<google::protobuf::DescriptorPool>());
+    for (const google::protobuf::FileDescriptor* known : files) AddFile(*known, *pools.back());
+  }
+  return *pools.back();
 }
 
 // Finds the details of errors under their standard names, google.rpc.BadRequest, which this program
