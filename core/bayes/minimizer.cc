@@ -289,7 +289,7 @@ std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix
     found[static_cast<size_t>(start)] =
         MinimizeFrom(problem, starts.row(start).transpose(), options, stop);
   });
-  // A stop request leaves out the last starts.
+  // A stop request leaves out starts from which no search had begun.
   std::erase_if(found, [](const Minimum& minimum) { return minimum.evaluations == 0; });
   std::stable_sort(found.begin(), found.end(),
                    [](const Minimum& a, const Minimum& b) { return a.value < b.value; });

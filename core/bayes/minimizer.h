@@ -19,7 +19,9 @@ struct MinimizationProblem {
   Vector upper;
   Matrix constraint;  // rows a with aᵀx ≤ bound; may have no rows
   Vector bound;
-  int threads = 1;  // ≥ 1, on which `function` is called at a time; results do not depend on it
+  // Number of threads that search at a time, ≥ 1, each from a start of its own and all by
+  // `function`. Results do not depend on it.
+  int threads = 1;
 };
 
 struct MinimizerOptions {

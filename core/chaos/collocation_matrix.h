@@ -28,8 +28,9 @@ class CollocationMatrix {
 
   // Writes the least-squares coefficients (S × m) of the values (Q × m) at the points, and the
   // residual variance ‖Y − A c‖² / (Q − S) of each column; 0 if Q = S, because interpolation leaves
-  // no residual. Computes on so many threads. Does not allocate if the results have their sizes
-  // already, except when there are more columns than ever before.
+  // no residual. At most `threads` ≥ 1 compute; results do not depend on their number. Does not
+  // allocate if the results have their sizes already, except when there are more columns than ever
+  // before.
   void Solve(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance,
              int threads = 1);
 
@@ -37,7 +38,7 @@ class CollocationMatrix {
   CollocationMatrix() = default;
 
   void ReserveResiduals(Eigen::Index columns);
-  // Solve for some of the columns, which are `residuals` in residuals_.
+  // Solves for some of the columns; `residuals` are their columns of residuals_.
   void SolveSome(const ConstMatrixRef& values, MatrixRef coefficients, VectorRef residual_variance,
                  MatrixRef residuals) const;
 

@@ -12,8 +12,8 @@
 
 namespace polyest::internal {
 
-// Says that the calling thread computes while this object lives; nested objects count once. The
-// pool's threads help only while there is a core left for each thread that computes.
+// Counts the calling thread among those that compute while this object lives; a thread with several
+// counts once. The pool's threads help only while there is a core for each thread that computes.
 class Computing {
  public:
   Computing();

@@ -13,7 +13,8 @@
 namespace polyest::internal {
 namespace {
 
-// Returns the number of threads on which a call computes while no other one needs them.
+// Returns the largest number of threads on which a call computes: that of the executor, which has
+// them while no other task needs them.
 int ThreadsOf(const ServiceContext& context) { return context.executor.threads_per_lane(); }
 
 // The overloads of Run give all studies one name. The arguments after the request select a study of

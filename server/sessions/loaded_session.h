@@ -35,7 +35,7 @@ class LoadedSession {
     const ModelLibrary& models;
     ProblemLimits limits = {};
     CheckMemory check_memory = {};  // empty: memory is not checked
-    int threads = 1;                // ≥ 1, of the estimator while others do not need them
+    int threads = 1;                // EstimatorOptions::threads, ≥ 1; one for models in processes
   };
 
   // Makes a session without batches, whose rows may arrive out of order within

@@ -75,7 +75,8 @@ void AddFile(const google::protobuf::FileDescriptor& file, google::protobuf::Des
 const google::protobuf::DescriptorPool& JsonTypes(const google::protobuf::FileDescriptor& file) {
   static std::mutex mutex;
   static std::vector<const google::protobuf::FileDescriptor*> files;
-  static std::vector<std::unique_ptr<google::protobuf::DescriptorPool>> pools;  // all files: last
+  // The last one has all `files`; the others may still be read.
+  static std::vector<std::unique_ptr<google::protobuf::DescriptorPool>> pools;
   const std::lock_guard lock(mutex);
   if (pools.empty() || pools.back()->FindFileByName(file.name()) == nullptr) {
     files.push_back(&file);

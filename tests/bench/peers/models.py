@@ -170,8 +170,11 @@ def simulated(name, problem, rate_of, start, times, substeps):
     return model
 
 
-def models():
-    yield simulated("spring", SPRING, spring_rate, [1.0, 0.0], numpy.arange(1, 21) / 20, 8)
-    yield of_example("oscillator", oscillator_rate, [1.0, 0.0], 1, 8)
-    yield simulated("buoy", BUOY, buoy_rate, [0.0, 0.0], numpy.arange(1.0, 3601.0), 16)
-    yield of_example("chain", chain_rate, [0.0] * 8, 4, 16)
+# Each makes a model when it is called, which compiles it.
+MODELS = {
+    "spring": lambda: simulated("spring", SPRING, spring_rate, [1.0, 0.0],
+                                numpy.arange(1, 21) / 20, 8),
+    "oscillator": lambda: of_example("oscillator", oscillator_rate, [1.0, 0.0], 1, 8),
+    "buoy": lambda: simulated("buoy", BUOY, buoy_rate, [0.0, 0.0], numpy.arange(1.0, 3601.0), 16),
+    "chain": lambda: of_example("chain", chain_rate, [0.0] * 8, 4, 16),
+}

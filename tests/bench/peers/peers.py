@@ -17,6 +17,7 @@ of the others. Of an exact posterior it is 95 %.
 
 import argparse
 import json
+import math
 import resource
 import subprocess
 import tempfile
@@ -27,7 +28,7 @@ import numpy
 import scipy.optimize
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from models import models
+from models import MODELS
 
 
 class Found:
@@ -162,23 +163,37 @@ def report_coverage(model, methods, records):
               flush=True)
 
 
+def number(kind, least):
+    """Returns what converts an argument that must be at least `least`."""
+    def convert(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not value >= least:
+            raise argparse.ArgumentTypeError(f"'{text}' must be a number of at least {least}")
+        return value
+
+    return convert
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, usage="run.sh POLYEST FOLDER [OPTION]...",
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("polyest", help=argparse.SUPPRESS)
-    parser.add_argument("--minutes", type=float, default=10.0, metavar="M",
+    parser.add_argument("--minutes", type=number(float, 0.01), default=10.0, metavar="M",
                         help="longest time of emcee (default: 10)")
-    parser.add_argument("--records", type=int, default=40, metavar="N",
+    parser.add_argument("--records", type=number(int, 0), default=40, metavar="N",
                         help="simulated records of each problem; 0: none (default: 40)")
-    parser.add_argument("--problem", action="append", help="these problems only: their names")
+    parser.add_argument("--problem", action="append", choices=MODELS,
+                        help="this problem; may be given several times (default: all)")
     arguments = parser.parse_args()
 
     def polyest(model):
         return by_polyest(model, arguments.polyest)
 
-    for model in models():
-        if arguments.problem and model.name not in arguments.problem:
-            continue
+    for name in arguments.problem or MODELS:
+        model = MODELS[name]()
         fit = by_least_squares(model)
         exact = by_emcee(model, fit, arguments.minutes)
         report(model, exact, [polyest(model), exact, by_filter(model), fit])

@@ -5,6 +5,10 @@
 #
 # Makes an environment with the peers, packages of PyPI, in FOLDER. Exit status 77: they cannot be fetched.
 set -euo pipefail
+if [[ $# -lt 2 ]]; then
+  sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+  [[ ${1:-} == --help ]] && exit 0 || exit 2
+fi
 here=$(cd "$(dirname "$0")" && pwd)
 polyest=$(realpath "$1") folder=$2
 shift 2
