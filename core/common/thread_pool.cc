@@ -10,8 +10,8 @@
 namespace polyest::internal {
 namespace {
 
-std::atomic<int> computing{0};        // threads
-thread_local int computing_here = 0;  // objects of the calling thread
+std::atomic<int> computing{0};        // number of threads that compute
+thread_local int computing_here = 0;  // number of the calling thread's Computing objects
 
 }  // namespace
 
@@ -28,7 +28,8 @@ struct ThreadPool::Loop {
   const int items;
   const int threads;
   std::atomic<int> next{0};
-  int helpers = 0;                       // these two with the pool's mutex held
+  // The pool's mutex guards these.
+  int helpers = 0;
   std::exception_ptr failure = nullptr;  // the first
 
   bool HasItems() const { return next.load(std::memory_order_relaxed) < items; }
@@ -99,7 +100,7 @@ ThreadPool::Loop* ThreadPool::LoopToHelp() const {
 }
 
 void ThreadPool::Help() {
-  ++computing_here;  // helping_ counts it, and loops within an item need not
+  ++computing_here;  // helping_ counts this thread; a loop within an item must not count it again
   std::unique_lock lock(mutex_);
   while (true) {
     Loop* loop = nullptr;

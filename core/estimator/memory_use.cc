@@ -12,7 +12,7 @@ namespace {
 // Vectors of a trajectory's states that its integrator holds: CVODES keeps a history of up to the
 // order 5 or 12 and some for its own work; a block of trajectories has a Jacobian besides.
 constexpr double kVectorsOfStates = 24;
-// Rows whose outputs are held at a time.
+// Rows whose outputs, and what the fit leaves of them, are held at a time.
 constexpr double kRows = 64;
 // Matrices of S × S of a channel: G of the samples and of their differences, and once more those of
 // the state that is kept and of the windows of the record.
@@ -32,7 +32,7 @@ int64_t Bytes(const Sizes& sizes) {
   // The collocation matrix and its orthogonal factor, and its triangular one.
   const double factors = 2 * points * terms + terms * terms;
   const double sums = kSumsOfChannel * channels * terms * terms;
-  const double trajectories = points * (kVectorsOfStates * states + kRows * channels);
+  const double trajectories = points * (kVectorsOfStates * states + 2 * kRows * channels);
   return static_cast<int64_t>(kBase + sizeof(double) * (factors + sums + trajectories));
 }
 
