@@ -252,10 +252,16 @@ void InputSignal::Clear() {
 }
 
 double InputSignal::Shape(double time_s) const {
+  size_t knots = 0;
+  return Shape(time_s, knots);
+}
+
+double InputSignal::Shape(double time_s, size_t& knots) const {
   return std::visit(
       [&]<class Input>(const Input& input) {
         if constexpr (kHasKnots<Input>) {
-          return BetweenKnots(time_s, input.interpolation);
+          knots = KnotsUpTo(time_s, knots);
+          return BetweenKnots(time_s, input.interpolation, knots);
         } else {
           return ClosedForm(input, time_s);
         }
@@ -301,11 +307,27 @@ bool InputSignal::Jumps() const {
       specification_);
 }
 
-double InputSignal::BetweenKnots(double time_s, Interpolation interpolation) const {
-  if (knot_time_s_.empty()) return 0;
+// Returns the number of knots up to a time: `guess` or its neighbours, if it is one of them.
+size_t InputSignal::KnotsUpTo(double time_s, size_t guess) const {
+  const size_t count = knot_time_s_.size();
+  const auto reaches = [&](size_t knots) {
+    return knots == 0 || knot_time_s_[knots - 1] <= time_s;
+  };
+  const auto ends = [&](size_t knots) { return knots == count || time_s < knot_time_s_[knots]; };
+  if (guess <= count && reaches(guess)) {
+    if (ends(guess)) return guess;
+    if (ends(guess + 1)) return guess + 1;
+  } else if (guess <= count && reaches(guess - 1)) {
+    return guess - 1;
+  }
   const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
-  if (next == knot_time_s_.begin()) return knot_value_.front();
-  const size_t right = static_cast<size_t>(next - knot_time_s_.begin());
+  return static_cast<size_t>(next - knot_time_s_.begin());
+}
+
+// `right` is the number of knots up to the time.
+double InputSignal::BetweenKnots(double time_s, Interpolation interpolation, size_t right) const {
+  if (knot_time_s_.empty()) return 0;
+  if (right == 0) return knot_value_.front();
   const size_t left = right - 1;
   if (time_s == knot_time_s_[left] || right == knot_time_s_.size()) return knot_value_[left];
   if (interpolation == Interpolation::kHold) return knot_value_[left];

@@ -57,6 +57,9 @@ class InputSignal {
   // (step, held knot, end of a chirp) it is the value from the right; the value from the left is
   // Shape(std::nextafter(break, −∞)).
   double Shape(double time_s) const;
+  // The same, for a caller that asks for times close to each other. `knots` is the number of knots
+  // up to the time that it asked for before, which it only hands on; 0 at first.
+  double Shape(double time_s, size_t& knots) const;
   // Returns the first time strictly after time_s at which shape or its derivative jumps, or +∞ if
   // there is none. A smooth curve through knots has breaks only at its two ends.
   double NextBreak(double time_s) const;
@@ -72,7 +75,8 @@ class InputSignal {
   std::optional<Interpolation> interpolation() const;  // only for a signal with knots
   void SettleSlopes();
   double EndAfter(double time_s) const;
-  double BetweenKnots(double time_s, Interpolation interpolation) const;
+  size_t KnotsUpTo(double time_s, size_t guess) const;
+  double BetweenKnots(double time_s, Interpolation interpolation, size_t right) const;
 
   InputSpecification specification_;  // without a table's knots, which are moved out of it
   std::vector<double> knot_time_s_;

@@ -137,13 +137,4 @@ double MonotoneSlope(std::span<const double> time_s, std::span<const double> val
   return (left + right) / (left / chord[0] + right / chord[1]);
 }
 
-double Hermite(std::span<const double> time_s, std::span<const double> value, size_t k,
-               double left_slope, double right_slope, double at_s) {
-  const double h = time_s[k + 1] - time_s[k];
-  const double q = (at_s - time_s[k]) / h;
-  const double p = 1 - q;
-  return (1 + 2 * q) * p * p * value[k] + q * q * (3 - 2 * q) * value[k + 1] +
-         h * q * p * (p * left_slope - q * right_slope);
-}
-
 }  // namespace polyest::internal

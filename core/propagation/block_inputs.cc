@@ -41,16 +41,13 @@ BlockInputs::BlockInputs(const EnsembleSpecification& specification, const Input
   for (Eigen::Index i = 0; i < amplitudes_.cols(); ++i) {
     std::vector<Cursor> cursors;
     const bool differ = delays_s.size() > 0 && (delays_s.col(i) != delays_s(0, i)).any();
+    const bool stops = !differ || (*signals)[static_cast<size_t>(i)].Jumps();
     for (Eigen::Index row = 0; row < (differ ? amplitudes_.rows() : 1); ++row) {
       const double delay_s = delays_s.size() > 0 ? delays_s(row, i) : 0;
-      cursors.push_back({.delay_s = delay_s, .last_s = -delay_s});
+      cursors.push_back({.delay_s = delay_s, .stops = stops, .last_s = -delay_s});
     }
     cursors_.push_back(std::move(cursors));
   }
-}
-
-bool BlockInputs::Stops(size_t input) const {
-  return cursors_[input].size() == 1 || (*signals_)[input].Jumps();
 }
 
 double BlockInputs::BreakAfter(size_t input, double time_s) const {
@@ -58,14 +55,19 @@ double BlockInputs::BreakAfter(size_t input, double time_s) const {
   return every_knot_ ? signal.NextKnot(time_s) : signal.NextBreak(time_s);
 }
 
+void BlockInputs::FindNext(size_t input, Cursor& cursor) const {
+  cursor.next_s = BreakAfter(input, cursor.last_s);
+  cursor.before_next_s = std::nextafter(cursor.next_s, -kInfinity);
+}
+
 BlockInputs::Break BlockInputs::NextBreak() {
   Break next;
   for (size_t i = 0; i < cursors_.size(); ++i) {
-    if (!Stops(i)) continue;
     const InputSignal& signal = (*signals_)[i];
     for (Cursor& cursor : cursors_[i]) {
+      if (!cursor.stops) break;
       // The break is computed again each time, because knots may have been appended.
-      cursor.next_s = BreakAfter(i, cursor.last_s);
+      FindNext(i, cursor);
       const double break_s = cursor.next_s + cursor.delay_s;
       if (break_s > next.time_s || break_s == kInfinity) continue;
       next = {break_s, signal.Jumps() || (break_s == next.time_s && next.jumps)};
@@ -76,26 +78,23 @@ BlockInputs::Break BlockInputs::NextBreak() {
 
 void BlockInputs::Pass(double time_s) {
   for (size_t i = 0; i < cursors_.size(); ++i) {
-    if (!Stops(i)) continue;
     for (Cursor& cursor : cursors_[i]) {
-      while (cursor.next_s + cursor.delay_s <= time_s) {
+      while (cursor.stops && cursor.next_s + cursor.delay_s <= time_s) {
         cursor.last_s = cursor.next_s;
-        cursor.next_s = BreakAfter(i, cursor.last_s);
+        FindNext(i, cursor);
       }
     }
   }
   time_s_ = std::numeric_limits<double>::quiet_NaN();
 }
 
-double BlockInputs::BoundedTime(size_t input, const Cursor& cursor, double time_s) const {
+double BlockInputs::BoundedTime(const Cursor& cursor, double time_s) {
   const double at_s = time_s - cursor.delay_s;
-  if (!Stops(input)) return at_s;
-  const double before_next_s = std::nextafter(cursor.next_s, -kInfinity);
-  return std::max(cursor.last_s, std::min(at_s, before_next_s));
+  return cursor.stops ? std::max(cursor.last_s, std::min(at_s, cursor.before_next_s)) : at_s;
 }
 
 double BlockInputs::Shape(size_t input, const Cursor& cursor, double time_s) const {
-  return (*signals_)[input].Shape(BoundedTime(input, cursor, time_s));
+  return (*signals_)[input].Shape(BoundedTime(cursor, time_s), cursor.knots);
 }
 
 double BlockInputs::StepEnd(double time_s) const {
@@ -108,7 +107,7 @@ double BlockInputs::StepEnd(double time_s) const {
       double first_s = signal.NextKnot(at_s);
       // The rounding of t − delay may leave a knot that has been reached.
       while (first_s + cursor.delay_s <= time_s) first_s = signal.NextKnot(first_s);
-      if (first_s == kInfinity || (Stops(i) && first_s == signal.NextBreak(at_s))) continue;
+      if (first_s == kInfinity || (cursor.stops && first_s == signal.NextBreak(at_s))) continue;
       // A step is at most half as long as the interval that it starts in. It ends no later than the
       // knot before the next interval, or after half the length of that one: some evaluation falls
       // inside each interval, even if there is one a step.
@@ -133,7 +132,7 @@ std::vector<size_t> BlockInputs::Varying() const {
 
 void BlockInputs::GeneratorStateOf(size_t input, double time_s, std::span<double> state) const {
   const Cursor& cursor = cursors_[input].front();
-  GeneratorState((*signals_)[input], BoundedTime(input, cursor, time_s), state);
+  GeneratorState((*signals_)[input], BoundedTime(cursor, time_s), state);
 }
 
 const Eigen::ArrayXXd& BlockInputs::At(double time_s) {

@@ -66,17 +66,21 @@ class BlockInputs {
   void CopyRow(Eigen::Index from, Eigen::Index to);
 
  private:
-  // The last break passed and the next one, in the signal's own time t − delay.
+  // A place in a signal, in the signal's own time t − delay.
   struct Cursor {
     double delay_s = 0;
-    double last_s = 0;
-    double next_s = std::numeric_limits<double>::infinity();
+    bool stops = true;  // whether an integrator stops at the breaks
+    double last_s = 0;  // the last break passed
+    double next_s = std::numeric_limits<double>::infinity();         // the next one
+    double before_next_s = std::numeric_limits<double>::infinity();  // the last time before it
+    // Where the last evaluation was, as evaluations are close to each other.
+    mutable size_t knots = 0;
   };
 
-  bool Stops(size_t input) const;
+  void FindNext(size_t input, Cursor& cursor) const;
   double BreakAfter(size_t input, double time_s) const;
   // Returns the time in the signal's own time at which to evaluate it for `time_s`.
-  double BoundedTime(size_t input, const Cursor& cursor, double time_s) const;
+  static double BoundedTime(const Cursor& cursor, double time_s);
   double Shape(size_t input, const Cursor& cursor, double time_s) const;
 
   const InputSignals* signals_;
