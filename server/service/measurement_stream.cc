@@ -215,6 +215,10 @@ bool MeasurementFlow::AllTaken() const {
 
 void MeasurementFlow::StartLoading() {
   if (end_ || session_ == nullptr || stage_ != Stage::kNone) return;
+  if (session_->ReadyToTake()) {
+    stage_ = Stage::kReady;  // its acknowledgements need not wait for the numerics of others
+    return;
+  }
   stage_ = Stage::kLoading;
   const absl::Status accepted =
       session_->strand().Submit([flow = shared_from_this()] { flow->Load(); });

@@ -112,6 +112,16 @@ Session::InMemory Session::Present() const {
   return in_memory_;
 }
 
+bool Session::IsWhole() const {
+  const InMemory present = Present();
+  return present.loaded != nullptr && present.losses == ledger_.losses();
+}
+
+bool Session::ReadyToTake() const {
+  const SharedJournal* const shared = services_.journal.shared();
+  return !closed_ && IsWhole() && (shared == nullptr || shared->Owns(number()));
+}
+
 void Session::Weigh() {
   if (services_.tenant_memory == nullptr) return;
   const std::shared_ptr<LoadedSession> loaded = Present().loaded;
@@ -165,9 +175,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
 absl::Status Session::Own() {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr) return absl::OkStatus();
-  const InMemory present = Present();
-  const bool whole = present.loaded != nullptr && present.losses == ledger_.losses();
-  if (whole && shared->Owns(number())) return absl::OkStatus();
+  if (IsWhole() && shared->Owns(number())) return absl::OkStatus();
   // A batch that is just being taken goes to the journal before the claim, which settles it.
   { const std::lock_guard taking(taking_); }
   const absl::StatusOr<SessionPlace> place = shared->Claim(number());
@@ -379,7 +387,15 @@ void Session::Unobserve(const SessionObserver* observer) {
 }
 
 void Session::Unload() {
-  if (!IdleTime()) return Weigh();
+  InMemory dropped;
+  bool idle = false;
+  {
+    // At once, so that a writer who claims the session meanwhile does not see it in memory.
+    const std::lock_guard lock(mutex_);
+    idle = IdleTime().has_value();
+    if (idle) std::swap(dropped.loaded, in_memory_.loaded);
+  }
+  if (!idle) return Weigh();
   Drop();
   if (SharedJournal* const shared = services_.journal.shared()) shared->Release(number());
   Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});

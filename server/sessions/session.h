@@ -131,6 +131,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // Returns how often batches that were taken could not be kept.
   uint64_t losses() const { return ledger_.losses(); }
 
+  // Whether batches can be taken at once, because the session is in memory and this daemon's own.
+  // For a writer that has claimed the lease, without which it may be unloaded at any time.
+  bool ReadyToTake() const;
   // Takes the batch, all of it or nothing, and gives it to the journal. The acknowledgement
   // returned may be sent once WhenKept reports its batch as kept. Computes no numerics: ProcessUpTo
   // does that. UNAVAILABLE when the session is not loaded. After batches were lost, refuses with
@@ -202,6 +205,8 @@ class Session : public std::enable_shared_from_this<Session> {
   // Waits until the journal keeps what the estimator has.
   absl::Status AwaitKept(const LoadedSession& loaded);
   InMemory Present() const;
+  // Whether the session is in memory with all batches taken but those that were lost.
+  bool IsWhole() const;
   void Replace(InMemory in_memory);
   void Drop();
   absl::Status LoadHistory();

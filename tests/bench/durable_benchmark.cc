@@ -39,6 +39,7 @@ using Stub = v1::SessionService::Stub;
 
 constexpr int kRows = 100;
 constexpr int kBatchesASecond = 10;
+constexpr std::chrono::seconds kMostToConnect{10};
 constexpr double kStiffness = 40, kDamping = 0.4;
 
 constexpr char kFourChannels[] = R"json({
@@ -120,11 +121,14 @@ class BareService final : public v1::SessionService::Service {
   std::unique_ptr<CommitQueue<SqliteDatabase>> queue_;
 };
 
+// Returns a client with a connection of its own, which exists already.
 std::unique_ptr<Stub> Connect(int port) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return v1::SessionService::NewStub(grpc::CreateCustomChannel(
-      "127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials(), arguments));
+  const auto channel = grpc::CreateCustomChannel("127.0.0.1:" + std::to_string(port),
+                                                 grpc::InsecureChannelCredentials(), arguments);
+  POLYEST_CHECK(channel->WaitForConnected(std::chrono::system_clock::now() + kMostToConnect));
+  return v1::SessionService::NewStub(channel);
 }
 
 struct Streamed {
@@ -180,6 +184,8 @@ Outcome StreamAll(int port, int sessions, int batches, bool paced) {
       requests[static_cast<size_t>(session)].push_back(Batch(session, index));
     }
   }
+  std::vector<std::unique_ptr<Stub>> rigs;
+  for (int session = 0; session < sessions; ++session) rigs.push_back(Connect(port));
   Outcome outcome;
   std::vector<std::future<Streamed>> streams;
   const auto begin = Clock::now();
@@ -188,8 +194,8 @@ Outcome StreamAll(int port, int sessions, int batches, bool paced) {
     // The rigs do not all send at the same moment.
     if (paced) due = begin + std::chrono::milliseconds(1000 / kBatchesASecond) * session / sessions;
     streams.push_back(std::async(std::launch::async, [&, session, due] {
-      const auto stub = Connect(port);
-      return Stream(*stub, requests[static_cast<size_t>(session)], due);
+      const auto i = static_cast<size_t>(session);
+      return Stream(*rigs[i], requests[i], due);
     }));
   }
   for (auto& stream : streams) {

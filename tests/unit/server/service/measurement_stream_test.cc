@@ -123,23 +123,29 @@ TEST_F(MeasurementStreamTest, ReadsNoMoreWhileTooManyBytesWaitToBeComputed) {
   hello.set_session("sessions/a");
   peer.Give(hello);
   const auto session = sessions_->All().front();
-  std::latch blocked(1), go_on(1);
-  // The hello has loaded the session by the time that this task runs.
-  while (!session->strand()
-              .Submit([&] {
-                blocked.count_down();
-                go_on.wait();
-              })
-              .ok()) {
-    std::this_thread::yield();
-  }
-  blocked.wait();
+  std::latch go_on(1);
+  ASSERT_TRUE(session->strand().Submit([&] { go_on.wait(); }).ok());
   peer.Give(Batch(1));
   peer.Give(Batch(2));
   while (session->taken().sequence < 2) std::this_thread::yield();
   EXPECT_FALSE(peer.Asks());
   go_on.count_down();  // the queue of the executor was full, and the stream goes on all the same
   peer.Give(Batch(3));
+  stream->OnCancel();
+  EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
+  stream->OnDone();
+}
+
+TEST_F(MeasurementStreamTest, TakesBatchesOfASessionInMemoryWhileOthersCompute) {
+  std::latch go_on(1);
+  ASSERT_TRUE(executor_.Submit("others", [&] { go_on.wait(); }).ok());
+  ServiceContext context = Context();
+  auto* const stream = new MeasurementStream(context, call_);
+  Peer peer(*stream);
+  peer.Give(Batch(1));
+  const auto session = sessions_->All().front();
+  while (session->place().sequence < 1) std::this_thread::yield();
+  go_on.count_down();
   stream->OnCancel();
   EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
   stream->OnDone();

@@ -273,9 +273,11 @@ TEST_F(SessionTest, IsUnloadedWhenIdleAndComesBackOnUse) {
   ASSERT_TRUE(session_->ClaimWriter(writer, "").ok());
   session_->Unload();
   EXPECT_TRUE(session_->loaded());
+  EXPECT_TRUE(session_->ReadyToTake());
   session_->ReleaseWriter(writer.get());
   session_->Unload();
   EXPECT_FALSE(session_->loaded());
+  EXPECT_FALSE(session_->ReadyToTake());
   EXPECT_EQ(session_->Describe().last_sequence(), 1);
   EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
 }
@@ -314,6 +316,7 @@ TEST_F(SessionTest, ForgetsWhatAFullDiskCouldNotKeepAndGoesOnAfterIt) {
   EXPECT_EQ(second->value().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(third->value().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(Kept(3)->value().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_FALSE(session_->ReadyToTake());
   EXPECT_EQ(session_->Describe().last_sequence(), 1);
   EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
   journal_.Fail(absl::OkStatus());
