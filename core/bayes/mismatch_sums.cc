@@ -8,6 +8,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kRowsAtOnce = 8;  // of a column of G: as wide as the processor's vectors
+constexpr int kColumnsAtOnce = 4;        // of G: as many as have room in registers
 
 }  // namespace
 
@@ -39,24 +40,41 @@ void MismatchSums::Complete() const {
 
 // Adds c cᵀ/R to the lower triangle of G for each sample that waits, in their order.
 void MismatchSums::AddWaiting() const {
-  using Rows = Eigen::Array<double, kRowsAtOnce, 1>;
   const Eigen::Index terms = b_.size();
-  std::array<double, kTogether> factors;
-  for (Eigen::Index j = 0; j < terms; ++j) {
-    for (int k = 0; k < waiting_; ++k) factors[k] = weights_[k] * coefficients_(j, k);  // c_j/R
-    double* const column = &g_(0, j);
-    Eigen::Index i = j;
-    for (; i + kRowsAtOnce <= terms; i += kRowsAtOnce) {
-      Rows sum = Rows::Map(column + i);
-      for (int k = 0; k < waiting_; ++k) sum += factors[k] * Rows::Map(&coefficients_(i, k));
-      Rows::Map(column + i) = sum;
-    }
-    for (; i < terms; ++i) {
-      for (int k = 0; k < waiting_; ++k) column[i] += factors[k] * coefficients_(i, k);
-    }
-  }
+  Eigen::Index first = 0;
+  for (; first + kColumnsAtOnce <= terms; first += kColumnsAtOnce) AddTo<kColumnsAtOnce>(first);
+  for (; first < terms; ++first) AddTo<1>(first);
   waiting_ = 0;
   is_whole_ = false;
+}
+
+// Goes up from the last row, so that whole vectors of rows end with it. What they add above the
+// diagonal is overwritten when G is completed.
+template <int kColumns>
+void MismatchSums::AddTo(Eigen::Index first) const {
+  using Rows = Eigen::Array<double, kRowsAtOnce, 1>;
+  std::array<std::array<double, kColumns>, kTogether> factors;  // c_j/R
+  for (int k = 0; k < waiting_; ++k) {
+    for (int j = 0; j < kColumns; ++j) factors[k][j] = weights_[k] * coefficients_(first + j, k);
+  }
+  Eigen::Index row = b_.size();
+  while (row > first && row >= kRowsAtOnce) {
+    row -= kRowsAtOnce;
+    std::array<Rows, kColumns> sums;
+    for (int j = 0; j < kColumns; ++j) sums[j] = Rows::Map(&g_(row, first + j));
+    for (int k = 0; k < waiting_; ++k) {
+      const Rows values = Rows::Map(&coefficients_(row, k));
+      for (int j = 0; j < kColumns; ++j) sums[j] += factors[k][j] * values;
+    }
+    for (int j = 0; j < kColumns; ++j) Rows::Map(&g_(row, first + j)) = sums[j];
+  }
+  while (row > first) {
+    --row;
+    for (int j = 0; j < kColumns; ++j) {
+      for (int k = 0; k < waiting_; ++k)
+        g_(row, first + j) += factors[k][j] * coefficients_(row, k);
+    }
+  }
 }
 
 void MismatchSums::Add(const MismatchSums& other) {

@@ -67,6 +67,9 @@ class MismatchSums {
   static constexpr int kTogether = 8;  // so many samples are added to G in one pass
 
   void AddWaiting() const;
+  // Adds the samples that wait to kColumns columns of G from `first` on.
+  template <int kColumns>
+  void AddTo(Eigen::Index first) const;
 
   mutable Matrix g_;              // without the samples that wait
   mutable int waiting_ = 0;       // their number

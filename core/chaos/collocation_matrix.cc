@@ -15,6 +15,25 @@ namespace {
 
 constexpr Eigen::Index kColumnsAtOnce = 32;
 
+// Returns the matrix whose sweep upwards solves R x = b: with the inverse D_t of the square of the
+// tile t on the diagonal, x_t = D_t b_t − D_t R_t,>t x_>t. The squares are small, and so is what
+// their inverses lose.
+Matrix BackSubstitution(const Matrix& triangular) {
+  const Eigen::Index terms = triangular.rows();
+  Matrix sweep = Matrix::Zero(terms, terms);
+  for (Eigen::Index first = 0; first < terms; first += PackedMatrix::kTile) {
+    const Eigen::Index count = std::min<Eigen::Index>(PackedMatrix::kTile, terms - first);
+    const Eigen::Index right = terms - first - count;
+    const Matrix square = triangular.block(first, first, count, count);
+    const Matrix inverse =
+        square.triangularView<Eigen::Upper>().solve(Matrix::Identity(count, count));
+    sweep.block(first, first, count, count) = inverse;
+    sweep.block(first, first + count, count, right) =
+        -inverse * triangular.block(first, first + count, count, right);
+  }
+  return sweep;
+}
+
 }  // namespace
 
 absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
@@ -34,12 +53,11 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   Matrix matrix;
   basis.EvaluateMany(points, matrix);
   POLYEST_ASSIGN_OR_RETURN(ThinQr factors, DecomposeThinQr(matrix, stop));
-  result.triangular_ = std::move(factors.r);
   result.matrix_ = PackedMatrix(matrix);
   result.thin_q_ = PackedMatrix(factors.q.transpose());
   result.ReserveResiduals(kColumnsAtOnce);
   // R has the singular values of A.
-  const Conditioning conditioning = ConditioningOfTriangular(result.triangular_);
+  const Conditioning conditioning = ConditioningOfTriangular(factors.r);
   result.condition_ = conditioning.number;
   if (conditioning.rank < terms || !(result.condition_ <= max_condition)) {
     return absl::FailedPreconditionError(absl::StrFormat(
@@ -47,6 +65,7 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
         "number %.3g, at most %.3g allowed); use more points or a lower order",
         points.rows(), terms, basis.order(), conditioning.rank, result.condition_, max_condition));
   }
+  result.back_substitution_ = PackedMatrix(BackSubstitution(factors.r));
   return result;
 }
 
@@ -73,10 +92,7 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
 void CollocationMatrix::SolveSome(const ConstMatrixRef& values, MatrixRef coefficients,
                                   VectorRef residual_variance, MatrixRef residuals) const {
   thin_q_.Multiply(values, coefficients);
-  for (Eigen::Index j = 0; j < values.cols(); ++j) {
-    auto solution = coefficients.col(j);
-    triangular_.triangularView<Eigen::Upper>().solveInPlace(solution);
-  }
+  back_substitution_.SweepUpwards(coefficients);
   const int freedom = points() - terms();
   if (freedom == 0) {
     residual_variance.setZero();

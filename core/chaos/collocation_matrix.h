@@ -1,7 +1,7 @@
 #pragma once
 
 // The collocation matrix A_qs = φ_s(ξ_q) (8), factored once by Householder QR; the coefficients
-// c = A⁺ Y of (10) come from the factors and never from an inverse.
+// c = A⁺ Y of (10) come from the factors and never from A⁺ or R⁻¹.
 
 #include <absl/status/statusor.h>
 
@@ -43,9 +43,9 @@ class CollocationMatrix {
                  MatrixRef residuals) const;
 
   PackedMatrix matrix_;
-  PackedMatrix thin_q_;  // transposed, S × Q
-  Matrix triangular_;    // S × S, upper
-  Matrix residuals_;     // Q and more × the largest number of columns so far
+  PackedMatrix thin_q_;             // transposed, S × Q
+  PackedMatrix back_substitution_;  // S × S: swept upwards, it solves with R
+  Matrix residuals_;                // Q and more × the largest number of columns so far
   double condition_ = 0;
 };
 

@@ -43,6 +43,17 @@ void PackedMatrix::Subtract(const ConstMatrixRef& x, MatrixRef product) const {
   Run<true>(x, product);
 }
 
+void PackedMatrix::SweepUpwards(MatrixRef x) const {
+  POLYEST_CHECK(rows_ == cols_ && x.rows() == rows_);
+  for (Eigen::Index tile = (rows_ + kTile - 1) / kTile; tile-- > 0;) {
+    Eigen::Index column = 0;
+    for (; column + kTogether <= x.cols(); column += kTogether) {
+      RunSome<false, 1, kTogether>(tile, x, column, x, tile * kTile);
+    }
+    for (; column < x.cols(); ++column) RunSome<false, 1, 1>(tile, x, column, x, tile * kTile);
+  }
+}
+
 template <bool kSubtracts>
 void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
   POLYEST_CHECK(x.rows() == cols_ && product.rows() == rows_ && product.cols() == x.cols());
@@ -65,9 +76,11 @@ void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
   }
 }
 
+// Multiplies kTiles tiles from `tile` on and kColumns columns from `first` on, with the inner index
+// from `from` on. All of X is read before the product is written.
 template <bool kSubtracts, int kTiles, int kColumns>
 void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first,
-                           MatrixRef product) const {
+                           MatrixRef product, Eigen::Index from) const {
   std::array<std::array<TileColumn, kColumns>, kTiles> sums;
   std::array<const double*, kColumns> factors;
   const auto place = [&](int t, int i) {
@@ -81,7 +94,7 @@ void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::In
       if constexpr (kSubtracts) sums[t][i].head(place(t, i).size()) = place(t, i);
     }
   }
-  for (Eigen::Index k = 0; k < cols_; ++k) {
+  for (Eigen::Index k = from; k < cols_; ++k) {
     for (int t = 0; t < kTiles; ++t) {
       const TileColumn values = tiles_.col((tile + t) * cols_ + k);
       for (int i = 0; i < kColumns; ++i) {

@@ -16,6 +16,8 @@ namespace polyest::internal {
 
 class PackedMatrix {
  public:
+  static constexpr int kTile = 8;  // rows
+
   PackedMatrix() = default;
   explicit PackedMatrix(const ConstMatrixRef& a);  // copies A, m × k
 
@@ -26,16 +28,18 @@ class PackedMatrix {
   // Multiply writes A X into `product` (m × n), Subtract subtracts it from `product`; X is k × n.
   void Multiply(const ConstMatrixRef& x, MatrixRef product) const;
   void Subtract(const ConstMatrixRef& x, MatrixRef product) const;
+  // Replaces the rows of X (m × n) by those of A X, a tile after the other from the last on; for
+  // each, those below are replaced already. A is square, and 0 left of the tiles on its diagonal.
+  void SweepUpwards(MatrixRef x) const;
 
  private:
-  static constexpr int kTile = 8;  // rows
   using TileColumn = Eigen::Array<double, kTile, 1>;
 
   template <bool kSubtracts>
   void Run(const ConstMatrixRef& x, MatrixRef product) const;
   template <bool kSubtracts, int kTiles, int kColumns>
-  void RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first,
-               MatrixRef product) const;
+  void RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first, MatrixRef product,
+               Eigen::Index from = 0) const;
 
   Eigen::Index rows_ = 0, cols_ = 0;
   // The tiles in order; the last is filled up with zeros.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace polyest::internal {
@@ -26,6 +27,38 @@ TEST(PackedMatrix, MultipliesAsAMatrixDoes) {
         const double rounding = 2 * (inner + 1) * inner * std::numeric_limits<double>::epsilon();
         EXPECT_LE((product - a * x).cwiseAbs().maxCoeff(), rounding);
         EXPECT_LE((left - expected).cwiseAbs().maxCoeff(), rounding);
+      }
+    }
+  }
+}
+
+TEST(PackedMatrix, SweepsUpwards) {
+  for (const int size : kSizes) {
+    Matrix a = Matrix::Random(size, size) / size;
+    for (int tile = 1; tile * PackedMatrix::kTile < size; ++tile) {
+      const int first = tile * PackedMatrix::kTile;
+      a.block(first, 0, std::min(PackedMatrix::kTile, size - first), first).setZero();
+    }
+    for (const int columns : kSizes) {
+      const Matrix x = Matrix::Random(size, columns);
+      Matrix expected = x;
+      for (int end = size; end > 0;) {
+        const int first = (end - 1) / PackedMatrix::kTile * PackedMatrix::kTile;
+        expected.middleRows(first, end - first) =
+            (a.middleRows(first, end - first) * expected).eval();
+        end = first;
+      }
+      Matrix swept = x;
+      PackedMatrix(a).SweepUpwards(swept);
+      // Each tile sums `size` products of numbers up to 1 by factors up to 1/size, in an order of
+      // its own, and takes over what the tiles below have lost.
+      const int tiles = (size + PackedMatrix::kTile - 1) / PackedMatrix::kTile;
+      const double rounding = 2 * tiles * (size + 1) * std::numeric_limits<double>::epsilon();
+      EXPECT_LE((swept - expected).cwiseAbs().maxCoeff(), rounding);
+      for (int column = 0; column < columns; ++column) {
+        Matrix alone = x.col(column);
+        PackedMatrix(a).SweepUpwards(alone);
+        EXPECT_EQ(alone, swept.col(column));
       }
     }
   }
