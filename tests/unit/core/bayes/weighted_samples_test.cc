@@ -3,6 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
 namespace polyest::internal {
 namespace {
 
@@ -25,6 +30,35 @@ TEST(WeightedQuantiles, RunLinearlyBetweenDraws) {
   EXPECT_NEAR(quantile(0.8), 3, 1e-12);
   EXPECT_EQ(quantile(0), 1);
   EXPECT_EQ(quantile(0.99), 4);
+}
+
+// Among draws that crowd in one place, are equal or farther apart than a number can be, too.
+TEST(WeightedQuantiles, AreThoseOfDrawsInAscendingOrder) {
+  constexpr int kCount = 1000;
+  const Vector uniform = Vector::Random(kCount);
+  const Vector weights = Vector::LinSpaced(kCount, 1, 2) / (1.5 * kCount);
+  const Vector tailed = uniform.array() / (1.001 - uniform.array().square()).cube();
+  Vector apart = uniform;
+  apart[17] = -1.5e308;
+  apart[18] = 1.5e308;
+  const Vector rounded = (4 * uniform).array().round();
+  for (const Vector& draws : {uniform, tailed, rounded, apart}) {
+    std::vector<std::pair<double, double>> sorted(kCount);
+    for (size_t i = 0; i < kCount; ++i) {
+      sorted[i] = {draws[static_cast<Eigen::Index>(i)], weights[static_cast<Eigen::Index>(i)]};
+    }
+    std::sort(sorted.begin(), sorted.end());
+    const WeightedQuantiles quantile(draws, weights);
+    double below = 0;
+    for (size_t i = 0; i < kCount; ++i) {
+      const auto [draw, weight] = sorted[i];
+      // Next to a draw that is far away, rounding of the probability matters.
+      if (i > 1 && i < kCount - 2) {
+        EXPECT_NEAR(quantile(below + weight / 2), draw, 1e-9 * std::max(1.0, std::abs(draw)));
+      }
+      below += weight;
+    }
+  }
 }
 
 TEST(WeightedDensity, HoldsTheProbabilityOfItsBins) {
