@@ -13,7 +13,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr Eigen::Index kColumnsAtOnce = 32;
+constexpr Eigen::Index kColumnsAtOnce = 36;
 
 // Returns the matrix whose sweep upwards solves R x = b: with the inverse D_t of the square of the
 // tile t on the diagonal, x_t = D_t b_t − D_t R_t,>t x_>t. The squares are small, and so is what

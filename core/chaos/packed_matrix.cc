@@ -10,9 +10,10 @@ namespace {
 
 // So many columns, or tiles of one column, are multiplied together: as many as have room in
 // registers, and enough for their sums not to wait for each other.
-constexpr int kTogether = 4;
+constexpr int kColumnsTogether = 6;
+constexpr int kTilesTogether = 4;
 // So many columns pass a tile before the next one is read: as many as the second cache holds.
-constexpr Eigen::Index kPassing = 32;
+constexpr Eigen::Index kPassing = 6 * kColumnsTogether;
 
 }  // namespace
 
@@ -47,8 +48,8 @@ void PackedMatrix::SweepUpwards(MatrixRef x) const {
   POLYEST_CHECK(rows_ == cols_ && x.rows() == rows_);
   for (Eigen::Index tile = (rows_ + kTile - 1) / kTile; tile-- > 0;) {
     Eigen::Index column = 0;
-    for (; column + kTogether <= x.cols(); column += kTogether) {
-      RunSome<false, 1, kTogether>(tile, x, column, x, tile * kTile);
+    for (; column + kColumnsTogether <= x.cols(); column += kColumnsTogether) {
+      RunSome<false, 1, kColumnsTogether>(tile, x, column, x, tile * kTile);
     }
     for (; column < x.cols(); ++column) RunSome<false, 1, 1>(tile, x, column, x, tile * kTile);
   }
@@ -60,16 +61,16 @@ void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
   const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
   for (Eigen::Index begin = 0; begin < x.cols(); begin += kPassing) {
     const Eigen::Index end = std::min(begin + kPassing, x.cols());
-    const Eigen::Index whole = end - (end - begin) % kTogether;
+    const Eigen::Index whole = end - (end - begin) % kColumnsTogether;
     for (Eigen::Index tile = 0; tile < tiles; ++tile) {
-      for (Eigen::Index column = begin; column < whole; column += kTogether) {
-        RunSome<kSubtracts, 1, kTogether>(tile, x, column, product);
+      for (Eigen::Index column = begin; column < whole; column += kColumnsTogether) {
+        RunSome<kSubtracts, 1, kColumnsTogether>(tile, x, column, product);
       }
     }
     for (Eigen::Index column = whole; column < end; ++column) {
       Eigen::Index tile = 0;
-      for (; tile + kTogether <= tiles; tile += kTogether) {
-        RunSome<kSubtracts, kTogether, 1>(tile, x, column, product);
+      for (; tile + kTilesTogether <= tiles; tile += kTilesTogether) {
+        RunSome<kSubtracts, kTilesTogether, 1>(tile, x, column, product);
       }
       for (; tile < tiles; ++tile) RunSome<kSubtracts, 1, 1>(tile, x, column, product);
     }
