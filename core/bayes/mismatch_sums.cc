@@ -8,7 +8,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kRowsAtOnce = 8;  // of a column of G: as wide as the processor's vectors
-constexpr int kColumnsAtOnce = 4;        // of G: as many as have room in registers
+constexpr int kColumnsAtOnce = 6;        // of G: as many as have room in registers
 
 }  // namespace
 

@@ -16,27 +16,30 @@ constexpr double kLeftOut = 5e-4;  // probability left out of a density at each 
 
 using WeightedDraw = std::pair<double, double>;
 
-// Returns the draws in ascending order, each with its weight. As many stretches of equal length as
-// there are draws hold few each, whose order is quickly found.
+// Returns the draws in ascending order, each with its weight. Stretches of equal length, one for
+// four draws, hold few each, whose order is quickly found.
 std::vector<WeightedDraw> Sorted(const ConstVectorRef& draws, const ConstVectorRef& weights) {
   const double lowest = draws.minCoeff(), span = draws.maxCoeff() - lowest;
-  const double last = static_cast<double>(draws.size()) - 1;
+  const Eigen::Index last = draws.size() / 4;  // stretch
+  const double scale = static_cast<double>(last) / span;
+  const bool divided = span > 0 && span < kInfinity && scale < kInfinity;
   const auto stretch_of = [&](double draw) {
-    return span > 0 && span < kInfinity ? static_cast<size_t>(last * ((draw - lowest) / span)) : 0;
+    return divided ? std::min(last, static_cast<Eigen::Index>(scale * (draw - lowest))) : 0;
   };
-  // The number of draws before each stretch, at first one stretch later.
-  std::vector<size_t> before(static_cast<size_t>(draws.size()) + 1, 0);
-  for (const double draw : draws) ++before[stretch_of(draw) + 1];
-  std::partial_sum(before.begin(), before.end(), before.begin());
+  // The place of each stretch's first draw, then, while they are put there, of the next one.
+  std::vector<Eigen::Index> place(static_cast<size_t>(last) + 2, 0);
+  for (const double draw : draws) ++place[static_cast<size_t>(stretch_of(draw)) + 1];
+  std::partial_sum(place.begin(), place.end(), place.begin());
   std::vector<WeightedDraw> sorted(static_cast<size_t>(draws.size()));
-  std::vector<size_t> next = before;
   for (Eigen::Index i = 0; i < draws.size(); ++i) {
-    sorted[next[stretch_of(draws[i])]++] = {draws[i], weights[i]};
+    Eigen::Index& next = place[static_cast<size_t>(stretch_of(draws[i]))];
+    sorted[static_cast<size_t>(next++)] = {draws[i], weights[i]};
   }
-  for (size_t stretch = 0; stretch + 1 < before.size(); ++stretch) {
-    if (before[stretch + 1] - before[stretch] < 2) continue;
-    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(before[stretch]),
-              sorted.begin() + static_cast<std::ptrdiff_t>(before[stretch + 1]));
+  // Each place is now that of the stretch's end.
+  auto begin = sorted.begin();
+  for (const Eigen::Index end : place) {
+    std::sort(begin, sorted.begin() + end);
+    begin = sorted.begin() + end;
   }
   return sorted;
 }

@@ -99,9 +99,7 @@ void CollocationMatrix::SolveSome(const ConstMatrixRef& values, MatrixRef coeffi
     return;
   }
   // ‖Y − A c‖² / (Q − S)
-  auto differences = residuals.topRows(points());
-  differences = values;
-  matrix_.Subtract(coefficients, differences);
+  matrix_.Subtract(coefficients, values, residuals.topRows(points()));
   for (Eigen::Index j = 0; j < values.cols(); ++j) {
     residual_variance[j] = residuals.col(j).squaredNorm() / freedom;
   }

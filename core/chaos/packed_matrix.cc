@@ -15,6 +15,25 @@ constexpr int kTilesTogether = 4;
 // So many columns pass a tile before the next one is read: as many as the second cache holds.
 constexpr Eigen::Index kPassing = 6 * kColumnsTogether;
 
+// Copy a tile's column, of which there may be fewer rows.
+template <class TileColumn>
+void Load(const double* from, Eigen::Index rows, TileColumn& column) {
+  if (rows >= column.size()) {
+    column = TileColumn::Map(from);
+  } else {
+    std::copy_n(from, rows, column.data());
+  }
+}
+
+template <class TileColumn>
+void Store(const TileColumn& column, Eigen::Index rows, double* to) {
+  if (rows >= column.size()) {
+    TileColumn::Map(to) = column;
+  } else {
+    std::copy_n(column.data(), rows, to);
+  }
+}
+
 }  // namespace
 
 PackedMatrix::PackedMatrix(const ConstMatrixRef& a) : rows_(a.rows()), cols_(a.cols()) {
@@ -37,11 +56,13 @@ Matrix PackedMatrix::Unpacked() const {
 }
 
 void PackedMatrix::Multiply(const ConstMatrixRef& x, MatrixRef product) const {
-  Run<false>(x, product);
+  Run<false>(x, product, product);
 }
 
-void PackedMatrix::Subtract(const ConstMatrixRef& x, MatrixRef product) const {
-  Run<true>(x, product);
+void PackedMatrix::Subtract(const ConstMatrixRef& x, const ConstMatrixRef& y,
+                            MatrixRef difference) const {
+  POLYEST_CHECK(y.rows() == rows_ && y.cols() == x.cols());
+  Run<true>(x, y, difference);
 }
 
 void PackedMatrix::SweepUpwards(MatrixRef x) const {
@@ -49,14 +70,14 @@ void PackedMatrix::SweepUpwards(MatrixRef x) const {
   for (Eigen::Index tile = (rows_ + kTile - 1) / kTile; tile-- > 0;) {
     Eigen::Index column = 0;
     for (; column + kColumnsTogether <= x.cols(); column += kColumnsTogether) {
-      RunSome<false, 1, kColumnsTogether>(tile, x, column, x, tile * kTile);
+      RunSome<false, 1, kColumnsTogether>(tile, x, x, column, x, tile * kTile);
     }
-    for (; column < x.cols(); ++column) RunSome<false, 1, 1>(tile, x, column, x, tile * kTile);
+    for (; column < x.cols(); ++column) RunSome<false, 1, 1>(tile, x, x, column, x, tile * kTile);
   }
 }
 
 template <bool kSubtracts>
-void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
+void PackedMatrix::Run(const ConstMatrixRef& x, const ConstMatrixRef& y, MatrixRef product) const {
   POLYEST_CHECK(x.rows() == cols_ && product.rows() == rows_ && product.cols() == x.cols());
   const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
   for (Eigen::Index begin = 0; begin < x.cols(); begin += kPassing) {
@@ -64,15 +85,15 @@ void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
     const Eigen::Index whole = end - (end - begin) % kColumnsTogether;
     for (Eigen::Index tile = 0; tile < tiles; ++tile) {
       for (Eigen::Index column = begin; column < whole; column += kColumnsTogether) {
-        RunSome<kSubtracts, 1, kColumnsTogether>(tile, x, column, product);
+        RunSome<kSubtracts, 1, kColumnsTogether>(tile, x, y, column, product);
       }
     }
     for (Eigen::Index column = whole; column < end; ++column) {
       Eigen::Index tile = 0;
       for (; tile + kTilesTogether <= tiles; tile += kTilesTogether) {
-        RunSome<kSubtracts, kTilesTogether, 1>(tile, x, column, product);
+        RunSome<kSubtracts, kTilesTogether, 1>(tile, x, y, column, product);
       }
-      for (; tile < tiles; ++tile) RunSome<kSubtracts, 1, 1>(tile, x, column, product);
+      for (; tile < tiles; ++tile) RunSome<kSubtracts, 1, 1>(tile, x, y, column, product);
     }
   }
 }
@@ -80,19 +101,18 @@ void PackedMatrix::Run(const ConstMatrixRef& x, MatrixRef product) const {
 // Multiplies kTiles tiles from `tile` on and kColumns columns from `first` on, with the inner index
 // from `from` on. All of X is read before the product is written.
 template <bool kSubtracts, int kTiles, int kColumns>
-void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first,
-                           MatrixRef product, Eigen::Index from) const {
+void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, const ConstMatrixRef& y,
+                           Eigen::Index first, MatrixRef product, Eigen::Index from) const {
   std::array<std::array<TileColumn, kColumns>, kTiles> sums;
   std::array<const double*, kColumns> factors;
-  const auto place = [&](int t, int i) {
-    const Eigen::Index row = (tile + t) * kTile;
-    return product.col(first + i).segment(row, std::min<Eigen::Index>(kTile, rows_ - row));
-  };
+  // Of the last tile, rows may be missing.
+  const auto rows_of = [&](int t) { return rows_ - (tile + t) * kTile; };
+  const auto row_of = [&](int t) { return (tile + t) * kTile; };
   for (int i = 0; i < kColumns; ++i) {
     factors[i] = x.col(first + i).data();
     for (int t = 0; t < kTiles; ++t) {
       sums[t][i].setZero();
-      if constexpr (kSubtracts) sums[t][i].head(place(t, i).size()) = place(t, i);
+      if constexpr (kSubtracts) Load(&y.coeffRef(row_of(t), first + i), rows_of(t), sums[t][i]);
     }
   }
   for (Eigen::Index k = from; k < cols_; ++k) {
@@ -109,7 +129,7 @@ void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::In
   }
   for (int t = 0; t < kTiles; ++t) {
     for (int i = 0; i < kColumns; ++i) {
-      place(t, i) = sums[t][i].head(place(t, i).size()).matrix();
+      Store(sums[t][i], rows_of(t), &product.coeffRef(row_of(t), first + i));
     }
   }
 }

@@ -25,9 +25,10 @@ class PackedMatrix {
   Eigen::Index cols() const { return cols_; }  // k
   // Returns A.
   Matrix Unpacked() const;
-  // Multiply writes A X into `product` (m × n), Subtract subtracts it from `product`; X is k × n.
+  // Multiply writes A X (m × n) into `product`, Subtract writes Y − A X into `difference`; X is
+  // k × n. Y may be `difference`.
   void Multiply(const ConstMatrixRef& x, MatrixRef product) const;
-  void Subtract(const ConstMatrixRef& x, MatrixRef product) const;
+  void Subtract(const ConstMatrixRef& x, const ConstMatrixRef& y, MatrixRef difference) const;
   // Replaces the rows of X (m × n) by those of A X, a tile after the other from the last on; for
   // each, those below are replaced already. A is square, and 0 left of the tiles on its diagonal.
   void SweepUpwards(MatrixRef x) const;
@@ -36,10 +37,10 @@ class PackedMatrix {
   using TileColumn = Eigen::Array<double, kTile, 1>;
 
   template <bool kSubtracts>
-  void Run(const ConstMatrixRef& x, MatrixRef product) const;
+  void Run(const ConstMatrixRef& x, const ConstMatrixRef& y, MatrixRef product) const;
   template <bool kSubtracts, int kTiles, int kColumns>
-  void RunSome(Eigen::Index tile, const ConstMatrixRef& x, Eigen::Index first, MatrixRef product,
-               Eigen::Index from = 0) const;
+  void RunSome(Eigen::Index tile, const ConstMatrixRef& x, const ConstMatrixRef& y,
+               Eigen::Index first, MatrixRef product, Eigen::Index from = 0) const;
 
   Eigen::Index rows_ = 0, cols_ = 0;
   // The tiles in order; the last is filled up with zeros.

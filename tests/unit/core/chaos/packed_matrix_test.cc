@@ -22,7 +22,7 @@ TEST(PackedMatrix, MultipliesAsAMatrixDoes) {
         packed.Multiply(x, product);
         Matrix left = Matrix::Random(rows, columns);
         const Matrix expected = left - a * x;
-        packed.Subtract(x, left);
+        packed.Subtract(x, left, left);
         // Two sums of `inner` products of numbers up to 1, each in an order of its own.
         const double rounding = 2 * (inner + 1) * inner * std::numeric_limits<double>::epsilon();
         EXPECT_LE((product - a * x).cwiseAbs().maxCoeff(), rounding);
@@ -71,7 +71,7 @@ TEST(PackedMatrix, GivesAColumnTheSameBitsWhateverIsBesideIt) {
   packed.Multiply(x, together);
   const Matrix before = Matrix::Random(37, 70);
   Matrix left = before;
-  packed.Subtract(x, left);
+  packed.Subtract(x, left, left);
   for (int first = 0; first < 70; ++first) {
     for (const int count : {1, 2, 5}) {
       if (first + count > 70) continue;
@@ -79,7 +79,7 @@ TEST(PackedMatrix, GivesAColumnTheSameBitsWhateverIsBesideIt) {
       packed.Multiply(x.middleCols(first, count), some);
       EXPECT_EQ(some, together.middleCols(first, count)) << first << " " << count;
       some = before.middleCols(first, count);
-      packed.Subtract(x.middleCols(first, count), some);
+      packed.Subtract(x.middleCols(first, count), some, some);
       EXPECT_EQ(some, left.middleCols(first, count)) << first << " " << count;
     }
   }
