@@ -193,12 +193,13 @@ void TrajectoryBlock::ReadOutputs(double time_s, int sample, MatrixRef outputs) 
     FailRowsBeyond(selected_outputs_, time_s_, "an output");
     if (alive_points_ < alive_before && states_.cols() > 0) StartIntegrator(time_s);
   }
-  for (Eigen::Index point = 0; point < std::ssize(point_alive_); ++point) {
-    auto row = outputs.row(first_point_ + point).segment(sample * columns, columns);
-    if (point_alive_[point]) {
-      row = selected_outputs_.row(point).matrix();
-    } else {
-      row.setConstant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Index points = std::ssize(point_alive_);
+  auto present = outputs.block(first_point_, sample * columns, points, columns);
+  present = selected_outputs_.topRows(points).matrix();
+  if (alive_points_ == points) return;
+  for (Eigen::Index point = 0; point < points; ++point) {
+    if (!point_alive_[point]) {
+      present.row(point).setConstant(std::numeric_limits<double>::quiet_NaN());
     }
   }
 }
