@@ -1,5 +1,7 @@
 #include "core/fmu/worker_ensemble.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -21,6 +23,20 @@ InputSpecification Specification(const InputSignal& signal) {
   return specification;
 }
 
+// The largest number of workers of one ensemble where each point needs one.
+constexpr int kMostWorkers = 256;
+
+// Whether a process can hold one trajectory only.
+bool HoldsOneTrajectory(const FmuInterface& interface) {
+  return interface.once_per_process && !interface.can_save_state;
+}
+
+// Whether each trajectory is simulated on its own (PointwiseEnsemble).
+bool IsPointwise(const FmuInterface& interface) {
+  return interface.kind == FmuKind::kCoSimulation || interface.event_indicators > 0 ||
+         interface.needs_completed_step;
+}
+
 }  // namespace
 
 WorkerEnsemble::WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu,
@@ -33,18 +49,26 @@ WorkerEnsemble::WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu,
       knots_sent_(inputs->size(), 0) {}
 
 absl::Status WorkerEnsemble::StartWorkers() {
-  constexpr int kBlock = TrajectoryBlock::kPoints;
-  const int blocks = (points() + kBlock - 1) / kBlock;
-  const int count = std::max(1, std::min(specification_.threads, blocks));
+  const FmuInterface& interface = fmu_->description.interface;
+  const bool alone = HoldsOneTrajectory(interface);
+  if (alone && points() > kMostWorkers) {
+    return absl::FailedPreconditionError(absl::StrFormat(
+        "fmu %s: it can be instantiated only once per process and cannot save its state, so that "
+        "its %d trajectories need as many processes; there may be at most %d",
+        interface.name, points(), kMostWorkers));
+  }
+  const int block_size = alone || IsPointwise(interface) ? 1 : TrajectoryBlock::kPoints;
+  const int blocks = (points() + block_size - 1) / block_size;
+  const int count = alone ? blocks : std::max(1, std::min(specification_.threads, blocks));
   std::vector<Worker> workers(static_cast<size_t>(count));
   for (size_t w = 0; w < workers.size(); ++w) {
     std::vector<int> block_points;
     for (int block = static_cast<int>(w); block < blocks; block += count) {
-      block_points.push_back(std::min(kBlock, points() - block * kBlock));
-      for (int i = 0; i < block_points.back(); ++i) workers[w].rows.push_back(block * kBlock + i);
+      const int first = block * block_size;
+      block_points.push_back(std::min(block_size, points() - first));
+      for (int i = 0; i < block_points.back(); ++i) workers[w].rows.push_back(first + i);
     }
-    POLYEST_ASSIGN_OR_RETURN(workers[w].process,
-                             WorkerProcess::Start(fmu_->description.interface.name, limits_));
+    POLYEST_ASSIGN_OR_RETURN(workers[w].process, WorkerProcess::Start(interface.name, limits_));
     workers[w].process->Send(Encode(MakeStart(block_points, workers[w].rows)));
   }
   workers_ = std::move(workers);
@@ -88,19 +112,15 @@ absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef 
   if (points() == 0) return absl::OkStatus();
   if (workers_.empty()) POLYEST_RETURN_IF_ERROR(StartWorkers());
   const std::string message = Encode(RequestMessage(MakeAdvance(times_s)));
-  std::vector<WorkerProcess*> processes;
-  for (Worker& worker : workers_) {
-    worker.process->Send(message);
-    worker.process->AwaitAnswer();
-    processes.push_back(worker.process.get());
-  }
-  absl::Status status = Converse(processes, stop);
-  for (Worker& worker : workers_) {
-    if (status.ok()) status = TakeResult(worker, outputs);
-  }
-  if (!status.ok()) {
-    KillAll();
-    return status;
+  const auto together = static_cast<size_t>(std::max(1, specification_.threads));
+  for (std::span<Worker> rest = workers_; !rest.empty();) {
+    const size_t count = std::min(together, rest.size());
+    const absl::Status status = AdvanceTogether(rest.first(count), message, outputs, stop);
+    if (!status.ok()) {
+      KillAll();
+      return status;
+    }
+    rest = rest.subspan(count);
   }
   failures_.clear();
   for (const Worker& worker : workers_) {
@@ -108,6 +128,19 @@ absl::Status WorkerEnsemble::Advance(std::span<const double> times_s, MatrixRef 
   }
   std::sort(failures_.begin(), failures_.end(),
             [](const PointFailure& a, const PointFailure& b) { return a.point < b.point; });
+  return absl::OkStatus();
+}
+
+absl::Status WorkerEnsemble::AdvanceTogether(std::span<Worker> workers, const std::string& message,
+                                             MatrixRef outputs, const Stop& stop) {
+  std::vector<WorkerProcess*> processes;
+  for (Worker& worker : workers) {
+    worker.process->Send(message);
+    worker.process->AwaitAnswer();
+    processes.push_back(worker.process.get());
+  }
+  POLYEST_RETURN_IF_ERROR(Converse(processes, stop));
+  for (Worker& worker : workers) POLYEST_RETURN_IF_ERROR(TakeResult(worker, outputs));
   return absl::OkStatus();
 }
 

@@ -1,8 +1,12 @@
 #pragma once
 
-// An ensemble of an FMU's trajectories in worker processes. The points are split into blocks of
-// TrajectoryBlock::kPoints, and the blocks are distributed over the workers. A block's results do
-// not depend on the worker's other blocks, so they are the same for any number of workers.
+// An ensemble of an FMU's trajectories in worker processes. Points that are integrated together are
+// split into blocks of TrajectoryBlock::kPoints, others into blocks of one, and the blocks are
+// distributed over as many workers as there may be threads. A block's results do not depend on the
+// worker's other blocks, so they are the same for any number of workers.
+//
+// Where a process can hold one instance only, whose state cannot be saved, each point has a worker
+// of its own, and as many of them as there may be threads work at a time.
 
 #include <absl/status/status.h>
 
@@ -38,6 +42,9 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
   absl::Status StartWorkers();
   StartMessage MakeStart(const std::vector<int>& block_points, const std::vector<int>& rows) const;
   AdvanceMessage MakeAdvance(std::span<const double> times_s);
+  // Lets workers advance at the same time.
+  absl::Status AdvanceTogether(std::span<Worker> workers, const std::string& message,
+                               MatrixRef outputs, const Stop& stop);
   absl::Status TakeResult(Worker& worker, MatrixRef outputs);
   void KillAll();
 

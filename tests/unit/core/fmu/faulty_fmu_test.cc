@@ -214,11 +214,19 @@ TEST_F(FaultyFmu, ThatCanBeInstantiatedOnceServesManyPointsByItsState) {
   }
 }
 
-TEST_F(FaultyFmu, ThatCanBeInstantiatedOnceWithoutStateServesOnePoint) {
-  FmuEnsemble one("once_without_state_cs2", 1, {"x"});
-  EXPECT_TRUE(one.TryPropagate({0.5}).ok());
-  FmuEnsemble two("once_without_state_cs2", 2, {"x"});
-  EXPECT_THAT(two.TryPropagate({0.5}).status().message(), HasSubstr("only once per process"));
+TEST_F(FaultyFmu, ThatCanBeInstantiatedOnceWithoutStateHasAProcessForEachPoint) {
+  FmuEnsemble reference("oscillator_cs2", 5, {"x"});
+  for (int point = 0; point < 5; ++point) reference.Set("x0", point, 1 + point);
+  const Matrix expected = reference.Propagate({0.5, 1});
+  for (const int threads : {1, 2, 8}) {
+    FmuEnsemble ensemble("once_without_state_cs2", 5, {"x"});
+    for (int point = 0; point < 5; ++point) ensemble.Set("x0", point, 1 + point);
+    ensemble.specification.threads = threads;
+    EXPECT_EQ(ensemble.Propagate({0.5, 1}), expected) << threads;
+  }
+  FmuEnsemble many("once_without_state_cs2", 257, {"x"});
+  EXPECT_THAT(many.TryPropagate({0.5}).status().message(),
+              HasSubstr("257 trajectories need as many processes"));
 }
 
 TEST_F(FaultyFmu, NeedsTheProgramThatRunsIt) {

@@ -2,9 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <numbers>
+#include <string>
 
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
@@ -104,6 +108,28 @@ TEST(FmuEnsemble, DoesNotDependOnTheNumberOfWorkers) {
     const std::vector<double> times_s = TimesUntil(1, 0.1);
     EXPECT_EQ(one.Propagate(times_s), two.Propagate(times_s)) << name;
   }
+}
+
+// Returns the number of processes that this one has started and that have not ended.
+int Children() {
+  int children = 0;
+  for (const auto& process : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream file(process.path() / "status");
+    for (std::string line; std::getline(file, line);) {
+      if (line == "PPid:\t" + std::to_string(getpid())) ++children;
+    }
+  }
+  return children;
+}
+
+TEST(FmuEnsemble, SharesTrajectoriesOnTheirOwnAmongWorkers) {
+  FmuEnsemble ensemble("oscillator_cs2", 3, {"x"});
+  ensemble.specification.threads = 2;
+  const int before = Children();
+  EnsemblePropagator propagator(ensemble.specification, &ensemble.inputs);
+  Matrix outputs(3, 1);
+  ASSERT_TRUE(propagator.Advance(std::vector{0.1}, outputs, Stop()).ok());
+  EXPECT_EQ(Children(), before + 2);
 }
 
 TEST(FmuEnsemble, DoesNotDependOnHowTheTimesAreCut) {
