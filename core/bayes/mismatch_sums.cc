@@ -71,8 +71,8 @@ void MismatchSums::AddTo(Eigen::Index first) const {
   while (row > first) {
     --row;
     for (int j = 0; j < kColumns; ++j) {
-      for (int k = 0; k < waiting_; ++k)
-        g_(row, first + j) += factors[k][j] * coefficients_(row, k);
+      double& sum = g_(row, first + j);
+      for (int k = 0; k < waiting_; ++k) sum += factors[k][j] * coefficients_(row, k);
     }
   }
 }

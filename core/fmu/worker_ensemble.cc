@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 
 #include "core/common/check.h"
@@ -23,8 +24,8 @@ InputSpecification Specification(const InputSignal& signal) {
   return specification;
 }
 
-// The largest number of workers of one ensemble where each point needs one.
-constexpr int kMostWorkers = 256;
+// The number of workers in this process that hold one trajectory each.
+std::atomic<int> of_one_trajectory = 0;
 
 // Whether a process can hold one trajectory only.
 bool HoldsOneTrajectory(const FmuInterface& interface) {
@@ -48,15 +49,24 @@ WorkerEnsemble::WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu,
       limits_(limits),
       knots_sent_(inputs->size(), 0) {}
 
+WorkerEnsemble::~WorkerEnsemble() { of_one_trajectory -= reserved_; }
+
+absl::Status WorkerEnsemble::Reserve(int workers) {
+  const int before = of_one_trajectory.fetch_add(workers);
+  reserved_ = workers;
+  if (before + workers <= kMostOfOneTrajectory) return absl::OkStatus();
+  of_one_trajectory -= workers;
+  reserved_ = 0;
+  return absl::ResourceExhaustedError(absl::StrFormat(
+      "fmu %s: it can be instantiated only once per process and cannot save its state, so that its "
+      "%d trajectories need as many processes; there may be %d of that kind, and %d are in use",
+      fmu_->description.interface.name, workers, kMostOfOneTrajectory, before));
+}
+
 absl::Status WorkerEnsemble::StartWorkers() {
   const FmuInterface& interface = fmu_->description.interface;
   const bool alone = HoldsOneTrajectory(interface);
-  if (alone && points() > kMostWorkers) {
-    return absl::FailedPreconditionError(absl::StrFormat(
-        "fmu %s: it can be instantiated only once per process and cannot save its state, so that "
-        "its %d trajectories need as many processes; there may be at most %d",
-        interface.name, points(), kMostWorkers));
-  }
+  if (alone && reserved_ == 0) POLYEST_RETURN_IF_ERROR(Reserve(points()));
   const int block_size = alone || IsPointwise(interface) ? 1 : TrajectoryBlock::kPoints;
   const int blocks = (points() + block_size - 1) / block_size;
   const int count = alone ? blocks : std::max(1, std::min(specification_.threads, blocks));

@@ -6,7 +6,8 @@
 // worker's other blocks, so they are the same for any number of workers.
 //
 // Where a process can hold one instance only, whose state cannot be saved, each point has a worker
-// of its own, and as many of them as there may be threads work at a time.
+// of its own, and as many of them as there may be threads work at a time. All ensembles of this
+// process together have at most kMostOfOneTrajectory such workers.
 
 #include <absl/status/status.h>
 
@@ -22,10 +23,13 @@ namespace polyest::internal {
 
 class WorkerEnsemble final : public TrajectoryEnsemble {
  public:
+  static constexpr int kMostOfOneTrajectory = 256;
+
   // Makes the ensemble. The processes start with the first Advance, which also reports an error of
-  // starting them.
+  // starting them; RESOURCE_EXHAUSTED where there would be too many.
   WorkerEnsemble(std::shared_ptr<const UnpackedFmu> fmu, EnsembleSpecification specification,
                  const InputSignals* inputs, const WorkerLimits& limits);
+  ~WorkerEnsemble() override;
 
   int points() const override { return static_cast<int>(specification_.parameters.rows()); }
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
@@ -39,6 +43,8 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
     std::vector<PointFailure> failures;
   };
 
+  // Counts workers that hold one trajectory each, unless there would be too many.
+  absl::Status Reserve(int workers);
   absl::Status StartWorkers();
   StartMessage MakeStart(const std::vector<int>& block_points, const std::vector<int>& rows) const;
   AdvanceMessage MakeAdvance(std::span<const double> times_s);
@@ -52,6 +58,7 @@ class WorkerEnsemble final : public TrajectoryEnsemble {
   EnsembleSpecification specification_;
   const InputSignals* inputs_;
   WorkerLimits limits_;
+  int reserved_ = 0;  // workers
   std::vector<Worker> workers_;
   std::vector<size_t> knots_sent_;  // number per input
   std::vector<PointFailure> failures_;

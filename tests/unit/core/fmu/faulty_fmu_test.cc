@@ -13,6 +13,7 @@
 #include <fstream>
 
 #include "core/common/sanitizer.h"
+#include "core/fmu/worker_ensemble.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
 namespace polyest::internal {
@@ -224,9 +225,15 @@ TEST_F(FaultyFmu, ThatCanBeInstantiatedOnceWithoutStateHasAProcessForEachPoint) 
     ensemble.specification.threads = threads;
     EXPECT_EQ(ensemble.Propagate({0.5, 1}), expected) << threads;
   }
-  FmuEnsemble many("once_without_state_cs2", 257, {"x"});
-  EXPECT_THAT(many.TryPropagate({0.5}).status().message(),
-              HasSubstr("257 trajectories need as many processes"));
+  FmuEnsemble one("once_without_state_cs2", 1, {"x"});
+  EnsemblePropagator propagator(one.specification, &one.inputs);
+  Matrix output(1, 1);
+  ASSERT_TRUE(propagator.Advance(std::vector{0.1}, output, Stop()).ok());
+  FmuEnsemble many("once_without_state_cs2", WorkerEnsemble::kMostOfOneTrajectory, {"x"});
+  const absl::Status refused = many.TryPropagate({0.1}).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(refused.message(), AllOf(HasSubstr("256 trajectories need as many processes"),
+                                       HasSubstr("and 1 are in use")));
 }
 
 TEST_F(FaultyFmu, NeedsTheProgramThatRunsIt) {
