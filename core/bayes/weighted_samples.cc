@@ -20,19 +20,20 @@ using WeightedDraw = std::pair<double, double>;
 // four draws, hold few each, whose order is quickly found.
 std::vector<WeightedDraw> Sorted(const ConstVectorRef& draws, const ConstVectorRef& weights) {
   const double lowest = draws.minCoeff(), span = draws.maxCoeff() - lowest;
-  const Eigen::Index last = draws.size() / 4;  // stretch
-  const double scale = static_cast<double>(last) / span;
+  const double last = static_cast<double>(draws.size() / 4);  // stretch
+  const double scale = last / span;
   const bool divided = span > 0 && span < kInfinity && scale < kInfinity;
   const auto stretch_of = [&](double draw) {
-    return divided ? std::min(last, static_cast<Eigen::Index>(scale * (draw - lowest))) : 0;
+    return divided ? static_cast<size_t>(std::min(last, std::max(0.0, scale * (draw - lowest))))
+                   : 0;
   };
   // The place of each stretch's first draw, then, while they are put there, of the next one.
   std::vector<Eigen::Index> place(static_cast<size_t>(last) + 2, 0);
-  for (const double draw : draws) ++place[static_cast<size_t>(stretch_of(draw)) + 1];
+  for (const double draw : draws) ++place[stretch_of(draw) + 1];
   std::partial_sum(place.begin(), place.end(), place.begin());
   std::vector<WeightedDraw> sorted(static_cast<size_t>(draws.size()));
   for (Eigen::Index i = 0; i < draws.size(); ++i) {
-    Eigen::Index& next = place[static_cast<size_t>(stretch_of(draws[i]))];
+    Eigen::Index& next = place[stretch_of(draws[i])];
     sorted[static_cast<size_t>(next++)] = {draws[i], weights[i]};
   }
   // Each place is now that of the stretch's end.
