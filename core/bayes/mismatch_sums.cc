@@ -48,8 +48,8 @@ void MismatchSums::AddWaiting() const {
   is_whole_ = false;
 }
 
-// Goes up from the last row, so that whole vectors of rows end with it. What they add above the
-// diagonal is overwritten when G is completed.
+// Adds whole vectors of rows, from the last row upwards. What they add above the diagonal is
+// overwritten when G is completed.
 template <int kColumns>
 void MismatchSums::AddTo(Eigen::Index first) const {
   using Rows = Eigen::Array<double, kRowsAtOnce, 1>;

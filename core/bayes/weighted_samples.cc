@@ -16,8 +16,8 @@ constexpr double kLeftOut = 5e-4;  // probability left out of a density at each 
 
 using WeightedDraw = std::pair<double, double>;
 
-// Returns the draws in ascending order, each with its weight. Stretches of equal length, one for
-// four draws, hold few each, whose order is quickly found.
+// Returns the draws in ascending order, each with its weight. It deals them to stretches of equal
+// length first, a quarter as many as draws, because to sort the few draws of each takes less time.
 std::vector<WeightedDraw> Sorted(const ConstVectorRef& draws, const ConstVectorRef& weights) {
   const double lowest = draws.minCoeff(), span = draws.maxCoeff() - lowest;
   const double last = static_cast<double>(draws.size() / 4);  // stretch
@@ -27,7 +27,7 @@ std::vector<WeightedDraw> Sorted(const ConstVectorRef& draws, const ConstVectorR
     return divided ? static_cast<size_t>(std::min(last, std::max(0.0, scale * (draw - lowest))))
                    : 0;
   };
-  // The place of each stretch's first draw, then, while they are put there, of the next one.
+  // Where the first draw of each stretch goes and, while draws are put there, the next one.
   std::vector<Eigen::Index> place(static_cast<size_t>(last) + 2, 0);
   for (const double draw : draws) ++place[stretch_of(draw) + 1];
   std::partial_sum(place.begin(), place.end(), place.begin());
@@ -36,7 +36,7 @@ std::vector<WeightedDraw> Sorted(const ConstVectorRef& draws, const ConstVectorR
     Eigen::Index& next = place[stretch_of(draws[i])];
     sorted[static_cast<size_t>(next++)] = {draws[i], weights[i]};
   }
-  // Each place is now that of the stretch's end.
+  // Each place is now the end of its stretch.
   auto begin = sorted.begin();
   for (const Eigen::Index end : place) {
     std::sort(begin, sorted.begin() + end);

@@ -13,6 +13,7 @@
 namespace polyest::internal {
 namespace {
 
+// So many columns are one thread's work at a time: as many as pass a tile of a packed matrix.
 constexpr Eigen::Index kColumnsAtOnce = 36;
 
 // Returns the matrix whose sweep upwards solves R x = b: with the inverse D_t of the square of the

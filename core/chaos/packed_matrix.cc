@@ -15,7 +15,7 @@ constexpr int kTilesTogether = 4;
 // So many columns pass a tile before the next one is read: as many as the second cache holds.
 constexpr Eigen::Index kPassing = 6 * kColumnsTogether;
 
-// Copy a tile's column, of which there may be fewer rows.
+// Copy a column of a tile, of which the last one may have fewer rows.
 template <class TileColumn>
 void Load(const double* from, Eigen::Index rows, TileColumn& column) {
   if (rows >= column.size()) {

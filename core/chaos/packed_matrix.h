@@ -29,8 +29,9 @@ class PackedMatrix {
   // k × n. Y may be `difference`.
   void Multiply(const ConstMatrixRef& x, MatrixRef product) const;
   void Subtract(const ConstMatrixRef& x, const ConstMatrixRef& y, MatrixRef difference) const;
-  // Replaces the rows of X (m × n) by those of A X, a tile after the other from the last on; for
-  // each, those below are replaced already. A is square, and 0 left of the tiles on its diagonal.
+  // Replaces the rows of X (m × n) by those of A X, a tile of rows after the other from the last
+  // upwards: each is computed from X with the rows below it replaced already. A is square, and 0
+  // left of the tiles on its diagonal.
   void SweepUpwards(MatrixRef x) const;
 
  private:

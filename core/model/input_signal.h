@@ -57,8 +57,9 @@ class InputSignal {
   // (step, held knot, end of a chirp) it is the value from the right; the value from the left is
   // Shape(std::nextafter(break, −∞)).
   double Shape(double time_s) const;
-  // The same, for a caller that asks for times close to each other. `knots` is the number of knots
-  // up to the time that it asked for before, which it only hands on; 0 at first.
+  // As Shape(time_s), but finds the interval between knots without a search where the time is close
+  // to the caller's last one. The caller keeps `knots`, the number of knots up to that time,
+  // between its calls; it is 0 at first.
   double Shape(double time_s, size_t& knots) const;
   // Returns the first time strictly after time_s at which shape or its derivative jumps, or +∞ if
   // there is none. A smooth curve through knots has breaks only at its two ends.

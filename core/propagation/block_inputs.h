@@ -73,7 +73,7 @@ class BlockInputs {
     double last_s = 0;  // the last break passed
     double next_s = std::numeric_limits<double>::infinity();         // the next one
     double before_next_s = std::numeric_limits<double>::infinity();  // the last time before it
-    // Where the last evaluation was, as evaluations are close to each other.
+    // The number of knots up to the time of the last evaluation, which the next one is close to.
     mutable size_t knots = 0;
   };
 

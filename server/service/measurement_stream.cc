@@ -215,11 +215,9 @@ bool MeasurementFlow::AllTaken() const {
 
 void MeasurementFlow::StartLoading() {
   if (end_ || session_ == nullptr || stage_ != Stage::kNone) return;
-  if (session_->ReadyToTake()) {
-    stage_ = Stage::kReady;  // its acknowledgements need not wait for the numerics of others
-    return;
-  }
-  stage_ = Stage::kLoading;
+  // Acknowledgements of a session in memory do not wait for the numerics of others on the strand.
+  stage_ = session_->ReadyToTake() ? Stage::kReady : Stage::kLoading;
+  if (stage_ == Stage::kReady) return;
   const absl::Status accepted =
       session_->strand().Submit([flow = shared_from_this()] { flow->Load(); });
   if (accepted.ok()) return;
@@ -280,11 +278,10 @@ void MeasurementFlow::Take() {
     inbox_.pop_front();
     lock.unlock();
     std::optional<Uncomputed> uncomputed;
-    const auto answer = [&]() -> absl::Status {
+    const absl::Status answered = Guarded([&]() -> absl::Status {
       POLYEST_ASSIGN_OR_RETURN(uncomputed, Answer(request));
       return absl::OkStatus();
-    };
-    const absl::Status answered = Guarded(answer);
+    });
     lock.lock();
     const auto bytes = static_cast<int64_t>(request.ByteSizeLong());
     if (uncomputed) {

@@ -112,14 +112,11 @@ Session::InMemory Session::Present() const {
   return in_memory_;
 }
 
-bool Session::IsWhole() const {
-  const InMemory present = Present();
-  return present.loaded != nullptr && present.losses == ledger_.losses();
-}
-
 bool Session::ReadyToTake() const {
   const SharedJournal* const shared = services_.journal.shared();
-  return !closed_ && IsWhole() && (shared == nullptr || shared->Owns(number()));
+  const InMemory present = Present();
+  return !closed_ && present.loaded != nullptr && present.losses == ledger_.losses() &&
+         (shared == nullptr || shared->Owns(number()));
 }
 
 void Session::Weigh() {
@@ -175,7 +172,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
 absl::Status Session::Own() {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr) return absl::OkStatus();
-  if (IsWhole() && shared->Owns(number())) return absl::OkStatus();
+  if (ReadyToTake()) return absl::OkStatus();
   // A batch that is just being taken goes to the journal before the claim, which settles it.
   { const std::lock_guard taking(taking_); }
   const absl::StatusOr<SessionPlace> place = shared->Claim(number());
@@ -387,14 +384,12 @@ void Session::Unobserve(const SessionObserver* observer) {
 }
 
 void Session::Unload() {
-  InMemory dropped;
-  bool idle = false;
-  {
-    // At once, so that a writer who claims the session meanwhile does not see it in memory.
-    const std::lock_guard lock(mutex_);
-    idle = IdleTime().has_value();
-    if (idle) std::swap(dropped.loaded, in_memory_.loaded);
-  }
+  // A writer that claims the session does so before this lock, and it stays in memory, or sees that
+  // it is gone.
+  std::unique_lock lock(mutex_);
+  const bool idle = IdleTime().has_value();
+  const auto dropped = idle ? std::move(in_memory_.loaded) : nullptr;
+  lock.unlock();
   if (!idle) return Weigh();
   Drop();
   if (SharedJournal* const shared = services_.journal.shared()) shared->Release(number());

@@ -131,8 +131,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // Returns how often batches that were taken could not be kept.
   uint64_t losses() const { return ledger_.losses(); }
 
-  // Whether batches can be taken at once, because the session is in memory and this daemon's own.
-  // For a writer that has claimed the lease, without which it may be unloaded at any time.
+  // Whether batches can be taken without loading the session first: it is in memory, no batch has
+  // been lost since it was loaded, and this daemon owns it. Only a writer that has claimed the
+  // lease may rely on that; without one, the session may be unloaded at any time.
   bool ReadyToTake() const;
   // Takes the batch, all of it or nothing, and gives it to the journal. The acknowledgement
   // returned may be sent once WhenKept reports its batch as kept. Computes no numerics: ProcessUpTo
@@ -205,8 +206,6 @@ class Session : public std::enable_shared_from_this<Session> {
   // Waits until the journal keeps what the estimator has.
   absl::Status AwaitKept(const LoadedSession& loaded);
   InMemory Present() const;
-  // Whether the session is in memory with all batches taken but those that were lost.
-  bool IsWhole() const;
   void Replace(InMemory in_memory);
   void Drop();
   absl::Status LoadHistory();
