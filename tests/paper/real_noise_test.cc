@@ -8,7 +8,7 @@
 #include "tests/testing/records.h"
 #include "tests/testing/two_gliders.h"
 
-namespace polyest::internal {
+namespace polyest::internal::real_noise_test {
 namespace {
 
 using testing::EstimateInBatches;
@@ -91,4 +91,4 @@ TEST(PendulumRecordNoise, HasThePublishedValueWithinItsIntervalHoweverItArrives)
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::real_noise_test

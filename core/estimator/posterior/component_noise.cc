@@ -40,6 +40,9 @@ constexpr double kAimedIntegrationShift = 0.005;
 // signal's size to 10⁻⁶ of it takes 20 halvings.
 constexpr int kMaxRevisions = 24;
 
+// Maximum number of revisions of the misfit at the end of a window after the first. While the
+// cost's minimum lies beyond the region, each lets the region move on.
+constexpr int kMaxMisfitRevisions = 12;
 // Factor by which the misfit falls while the cost's minimum lies beyond the region.
 constexpr double kMisfitStep = 4;
 
@@ -53,14 +56,34 @@ double MixtureComponent::CoarseResidual() const {
 // Returns whether the region must first move on to the minimum of the cost with the noise as
 // stated. The misfit then falls step by step, which lets the posterior go there.
 bool MixtureComponent::ReviseMisfit(const Stop& stop) {
-  // A stop may come before the posterior has gone there; the same step is then taken again.
-  if (!revised_from_) revised_from_ = expansion_->noise().misfit;
-  const double before = *revised_from_;
+  // A stop may come before the minimum is found; the same step is then taken again.
+  if (!row_end_.revised_from) row_end_.revised_from = expansion_->noise().misfit;
+  const double before = *row_end_.revised_from;
   const MisfitFound found = FindMisfit(problem_, *expansion_, stop);
   const double revised =
       found.at_edge ? std::clamp(before / kMisfitStep, 1.0, found.ratio) : found.ratio;
   expansion_->set_misfit(std::max(revised, tempered_.misfit));
   return found.at_edge && expansion_->noise().misfit < before;
+}
+
+// Returns true when the expansion has moved or must be divided.
+absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
+  for (; row_end_.revisions <= kMaxMisfitRevisions && !must_divide(); ++row_end_.revisions) {
+    if (!row_end_.goes_on) {
+      const bool goes_on = ReviseMisfit(stop);
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      row_end_.goes_on = goes_on;
+    }
+    if (row_end_.revisions > 0 && !*row_end_.goes_on) break;
+    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
+    row_end_.moved = row_end_.moved || tightened;
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    row_end_.moved = row_end_.moved || settled;
+    row_end_.goes_on.reset();
+    row_end_.revised_from.reset();
+    if (!settled) break;
+  }
+  return std::exchange(row_end_, {}).moved;
 }
 
 // After the rows of a tempered beginning lets its misfit fall to 1.
@@ -104,23 +127,27 @@ absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& bloc
 // Returns whether the record was reweighed with another noise. Smaller noise requires a more
 // accurate expansion.
 absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
-  bool moved = false;
-  for (int i = 0; i < kMaxRevisions; ++i) {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    std::optional<LearnedNoise> revised =
-        ReviseNoise(problem_, *expansion_, summary_, particles_, stop);
-    if (!revised) {
-      postponed_.noise = 0;
-      break;
+  for (; row_end_.reweighed < kMaxRevisions; ++row_end_.reweighed) {
+    if (!row_end_.settles) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      std::optional<LearnedNoise> revised =
+          ReviseNoise(problem_, *expansion_, summary_, particles_, stop);
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      if (!revised) {
+        postponed_.noise = 0;
+        break;
+      }
+      POLYEST_ASSIGN_OR_RETURN(const bool reweighed, Reweigh(*std::move(revised), stop));
+      if (!reweighed) break;
+      row_end_.settles = true;
     }
-    POLYEST_ASSIGN_OR_RETURN(const bool reweighed, Reweigh(*std::move(revised), stop));
-    if (!reweighed) break;
-    moved = true;
-    if (!adaptive()) continue;
-    POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
-    POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+    if (adaptive()) {
+      POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
+      POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+    }
+    row_end_.settles = false;
   }
-  return moved;
+  return row_end_.reweighed > 0;
 }
 
 // Goes on from the state that the expansion keeps, if the allowance lets the rows since then be

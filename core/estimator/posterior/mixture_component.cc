@@ -38,10 +38,6 @@ constexpr double kAheadOfNeed = 0.004;
 // by this number.
 constexpr int64_t kLooksAhead = 10;
 
-// Maximum number of revisions of the misfit at the end of a window after the first. While the
-// cost's minimum lies beyond the region, each lets the region move on.
-constexpr int kMaxMisfitRevisions = 12;
-
 }  // namespace
 
 int64_t NextWindow(int64_t rows, int64_t from) {
@@ -220,33 +216,17 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
-  bool moved = false;
-  if (learns_noise_) {
-    POLYEST_ASSIGN_OR_RETURN(moved, LearnNoise(stop));
+  if (learns_noise_ && !row_end_.learned) {
+    POLYEST_ASSIGN_OR_RETURN(row_end_.learned, LearnNoise(stop));
   }
+  bool moved = row_end_.learned.value_or(false);
   if (adaptive()) {
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleWithMisfit(stop));
     moved = moved || settled;
   }
+  row_end_ = {};
   window_end_ = NextWindow(taken_, windows_from_);
   edges_row_ = NextLook();
-  return moved;
-}
-
-// Returns true when the expansion has moved or must be divided.
-absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
-  bool moved = false;
-  for (int i = 0; i <= kMaxMisfitRevisions && !must_divide(); ++i) {
-    const bool goes_on = ReviseMisfit(stop);
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    if (i > 0 && !goes_on) break;
-    POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
-    revised_from_.reset();
-    moved = moved || tightened || settled;
-    if (!settled) break;
-  }
-  revised_from_.reset();
   return moved;
 }
 
@@ -295,6 +275,12 @@ absl::StatusOr<bool> MixtureComponent::SettleAhead(const Stop& stop) {
 }
 
 absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleWhileInaccurate(stop));
+  row_end_.settlements = 0;
+  return moved;
+}
+
+absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
     return bisected_ && !expansion_->design().checks_are_draws
@@ -302,19 +288,19 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
                : AgreementWithModel(*expansion_, cost).shift;
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };
-  bool moved = false;
   // Each settlement may raise the order, so several may be needed.
-  for (int i = 0; i < (automatic_order() ? kMaxSettlementsAtRow : 1); ++i) {
+  for (; row_end_.settlements < (automatic_order() ? kMaxSettlementsAtRow : 1);
+       ++row_end_.settlements) {
     const bool follows = accurate();
     if (follows && !Leans()) {
       postponed_.expansion = 0;
-      return moved;
+      return row_end_.settlements > 0;
     }
     POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
     if (must_divide()) return true;
     if (!settled) break;
-    moved = true;
   }
+  const bool moved = row_end_.settlements > 0;
   if (accurate()) return moved;
   if (LookForPieces()) return true;
   const bool waits = moved && problem_.dimension() >= kDimensionToMoveFirst;

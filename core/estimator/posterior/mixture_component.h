@@ -130,6 +130,7 @@ class MixtureComponent {
   absl::Status WithdrawTempering(const Stop& stop);
   absl::StatusOr<bool> SettleWithMisfit(const Stop& stop);
   absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
+  absl::StatusOr<bool> SettleWhileInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   double ShiftOfControls() const;
@@ -147,6 +148,18 @@ class MixtureComponent {
     bool overlooked = false;  // whether there are particles at minima that were overlooked
   };
   absl::StatusOr<Settled> SettleOnce(SettleRequest request, const Stop& stop);
+  // How far what is due after the last row has come. A stop leaves it, so that nothing is done
+  // twice, which would change the estimate.
+  struct RowEnd {
+    int reweighed = 0;                   // times that the noise was revised
+    bool settles = false;                // whether the expansion has yet to follow the last time
+    std::optional<bool> learned;         // what LearnNoise has returned
+    int revisions = 0;                   // of the misfit
+    std::optional<double> revised_from;  // misfit before the present one
+    std::optional<bool> goes_on;         // what ReviseMisfit has returned
+    int settlements = 0;                 // that have moved the expansion because it was inaccurate
+    bool moved = false;                  // whether any of SettleWithMisfit has
+  };
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);
   int64_t NextLook() const;
@@ -182,12 +195,12 @@ class MixtureComponent {
   int64_t taken_ = 0;
   int64_t windows_from_ = 0;  // row from which the present windows are counted
   int64_t window_end_ = 2;
-  int64_t edges_row_ = 2;               // row at which to look at the region's edges next
-  int64_t ahead_row_ = 0;               // no move ahead of need before this row
-  int64_t patient_until_ = 0;           // rows before this one are taken regardless of residual
-  int64_t whole_until_ = 0;             // no search for pieces before this row
-  TemperedBeginning tempered_;          // what is left of it
-  std::optional<double> revised_from_;  // misfit from which it is being revised
+  int64_t edges_row_ = 2;       // row at which to look at the region's edges next
+  int64_t ahead_row_ = 0;       // no move ahead of need before this row
+  int64_t patient_until_ = 0;   // rows before this one are taken regardless of residual
+  int64_t whole_until_ = 0;     // no search for pieces before this row
+  TemperedBeginning tempered_;  // what is left of it
+  RowEnd row_end_;
   int64_t settled_row_ = -1;
   int settlements_at_row_ = 0;
   int64_t comparable_row_ = -1;

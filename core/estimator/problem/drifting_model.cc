@@ -40,24 +40,32 @@ class PresentMemory {
   // Returns θ(t) where the walk has departed by `departures` from the values `thetas`.
   const Eigen::ArrayXd& Values(const UncertainParameter& prior, const ConstColumn& thetas,
                                const ConstColumn& departures) {
-    const Germ germ(prior.germ);
     const bool same_thetas = HaveSameBits(thetas, thetas_);
     if (same_thetas && HaveSameBits(departures, departures_)) return values_;
-    if (!same_thetas) {
-      thetas_ = thetas;
-      scores_ =
-          thetas.unaryExpr([&](double theta) { return germ.NormalScore(prior.ToGerm(theta)); });
-    }
     departures_ = departures;
-    values_ = thetas;
-    for (Eigen::Index row = 0; row < values_.size(); ++row) {
-      if (departures_[row] == 0) continue;
-      values_[row] = prior.ToParameter(germ.OfNormalScore(scores_[row] + departures_[row]));
+    if (!same_thetas) thetas_ = thetas;
+    if (prior.germ.family == GermFamily::kNormal) {
+      values_ = thetas_ * (prior.scale * departures_).exp();
+    } else {
+      MapBack(prior, !same_thetas);
     }
     return values_;
   }
 
  private:
+  void MapBack(const UncertainParameter& prior, bool new_thetas) {
+    const Germ germ(prior.germ);
+    if (new_thetas) {
+      scores_ =
+          thetas_.unaryExpr([&](double theta) { return germ.NormalScore(prior.ToGerm(theta)); });
+    }
+    values_ = thetas_;
+    for (Eigen::Index row = 0; row < values_.size(); ++row) {
+      if (departures_[row] == 0) continue;
+      values_[row] = prior.ToParameter(germ.OfNormalScore(scores_[row] + departures_[row]));
+    }
+  }
+
   Eigen::ArrayXd thetas_, departures_, scores_, values_;
 };
 
@@ -141,8 +149,6 @@ const Eigen::ArrayXXd& DriftingModel::Present(const ConstBlock& states,
     const UncertainParameter& prior = walk.prior;
     if (prior.germ.family == GermFamily::kNormal && prior.map == ParameterMap::kAffine) {
       theta += prior.scale * departure;
-    } else if (prior.germ.family == GermFamily::kNormal) {
-      theta *= (prior.scale * departure).exp();
     } else {
       theta = MemoryOf(number_, theta.size(), walks_.size())[j].Values(prior, theta, departure);
     }

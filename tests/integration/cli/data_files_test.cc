@@ -11,7 +11,7 @@
 
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest::internal {
+namespace polyest::internal::data_files_test {
 namespace {
 
 using ::testing::AllOf;
@@ -171,4 +171,4 @@ TEST_F(DataFilesTest, AreWhatAProblemIsProposedFor) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::data_files_test

@@ -9,7 +9,7 @@
 #include "polyest/client.h"
 #include "tests/integration/cli/command_test.h"
 
-namespace polyest::internal {
+namespace polyest::internal::errors_test {
 namespace {
 
 using ::testing::AllOf;
@@ -285,4 +285,4 @@ TEST_F(ErrorsTest, BadUsage) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::errors_test

@@ -14,7 +14,7 @@
 #include "polyest/client.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest::internal {
+namespace polyest::internal::connection_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -133,4 +133,4 @@ TEST(Client, GivesUpEveryKindOfCallAtTheDeadline) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::connection_test

@@ -16,7 +16,7 @@
 #include "proto/wire/refusal/refusal.h"
 #include "tests/testing/test_folder.h"
 
-namespace polyest::internal {
+namespace polyest::internal::measurement_stream_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -395,4 +395,4 @@ TEST(StreamingClient, TellsThatADaemonIsUnreachable) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::measurement_stream_test

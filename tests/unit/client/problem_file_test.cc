@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace polyest::internal {
+namespace polyest::internal::problem_file_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -112,4 +112,4 @@ TEST(ReadProblemFile, NamesAFileThatCannotBeOpened) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::problem_file_test

@@ -11,7 +11,7 @@
 
 #include "tests/unit/client/table_backend.h"
 
-namespace polyest::internal {
+namespace polyest::internal::remedy_trial_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -146,4 +146,4 @@ TEST(RemedyTrialTest, AtMostEightAreTriedAndTheOthersNamed) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::remedy_trial_test

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace polyest::internal {
+namespace polyest::internal::stream_session_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -51,4 +51,4 @@ TEST(RemoveRowsUpTo, TakesEarlierRunsWhole) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::stream_session_test

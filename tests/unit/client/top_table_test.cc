@@ -11,7 +11,7 @@
 
 #include "client/cli/screen.h"
 
-namespace polyest::internal {
+namespace polyest::internal::top_table_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -153,4 +153,4 @@ TEST(TopTableTest, HasUnitsThatFitTheSize) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::top_table_test

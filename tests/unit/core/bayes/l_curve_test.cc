@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/bayes/frequency_example.h"
 
-namespace polyest::internal {
+namespace polyest::internal::l_curve_test {
 namespace {
 
 // Returns the minimum for α² of linear data z_i = s_i ξ_i with unit noise and unit normal priors:
@@ -98,4 +98,4 @@ TEST(LCurve, SurvivesDegenerateCosts) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::l_curve_test

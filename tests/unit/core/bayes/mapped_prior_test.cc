@@ -17,7 +17,7 @@
 #include "core/bayes/prior.h"
 #include "core/chaos/collocation_points.h"
 
-namespace polyest::internal {
+namespace polyest::internal::mapped_prior_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -325,4 +325,4 @@ TEST(Correlations, RefusalNamesPairAndRule) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::mapped_prior_test

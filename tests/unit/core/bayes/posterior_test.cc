@@ -10,7 +10,7 @@
 #include "tests/unit/core/bayes/many_parameters.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
 
-namespace polyest::internal {
+namespace polyest::internal::posterior_test {
 namespace {
 
 Prior OneUniform() { return Prior({UncertainParameter::Uniform("a", -1, 1).value()}); }
@@ -220,4 +220,4 @@ TEST(SamplePosterior, NeedsSomewhereToStart) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::posterior_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-namespace polyest::internal {
+namespace polyest::internal::relative_noise_test {
 namespace {
 
 constexpr double kRelative = 0.3, kOwnError = 0.01;
@@ -71,4 +71,4 @@ TEST(ScoredSample, LeadsToTheMaximumOfTheLikelihood) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::relative_noise_test

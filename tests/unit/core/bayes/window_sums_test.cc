@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace polyest::internal {
+namespace polyest::internal::window_sums_test {
 namespace {
 
 constexpr int kTerms = 3;
@@ -138,4 +138,4 @@ TEST(WindowSums, OfALearnedScaleAreDividedAlone) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::window_sums_test

@@ -24,14 +24,14 @@ void ExpectExact(const Samples& samples, const Prediction& prediction,
   for (size_t row = 60; row < prediction.rows.size(); ++row) {
     const size_t rows = used(row);
     const LocalLevel level = ExactFilter(samples, kRate, rows);
-    const double since = prediction.rows[row].time_s - static_cast<double>(rows) * kStepS;
+    const double since = prediction.rows[row].time_s - static_cast<double>(rows) * kLevelStepS;
     const double deviation = std::sqrt(level.variance + kRate * kRate * since);
     const auto k = static_cast<Eigen::Index>(row);
     EXPECT_NEAR(y.mean[k], level.mean, 1e-6 * deviation) << row;
     EXPECT_NEAR(y.std_dev[k], deviation, 1e-6 * deviation) << row;
     EXPECT_NEAR(y.quantiles(k, 2), level.mean + 1.959964 * deviation, 1e-5 * deviation) << row;
     if (row < samples.rows()) {
-      EXPECT_NEAR(y.sample_std_dev[k], std::hypot(deviation, kSigma), 1e-6 * deviation) << row;
+      EXPECT_NEAR(y.sample_std_dev[k], std::hypot(deviation, kLevelSigma), 1e-6 * deviation) << row;
     }
   }
 }
@@ -51,14 +51,14 @@ TEST(DriftPrediction, PredictsEachRowFromTheRowsBefore) {
   EXPECT_NEAR(each->outputs[0].score.coverage95, 0.95, 3 * 2.7 / 150);
 
   // Windows of ten rows: row 60 is the first of the seventh.
-  options.horizon_s = 10.5 * kStepS;
+  options.horizon_s = 10.5 * kLevelStepS;
   const auto windows = estimator->CurrentPrediction(options);
   ASSERT_TRUE(windows.ok()) << windows.status();
   ExpectExact(samples, *windows, [](size_t row) { return row / 10 * 10; });
 
   // Forecasts after the last row, from all.
   options.horizon_s = 0;
-  for (int i = 1; i <= 100; ++i) options.times.push_back({0, (150 + i) * kStepS});
+  for (int i = 1; i <= 100; ++i) options.times.push_back({0, (150 + i) * kLevelStepS});
   const auto forecasts = estimator->CurrentPrediction(options);
   ASSERT_TRUE(forecasts.ok()) << forecasts.status();
   ExpectExact(samples, *forecasts, [](size_t) { return size_t{150}; });
@@ -70,7 +70,7 @@ TEST(DriftPrediction, IsPredictedOverTime) {
   problem.fixed = {{"y.gain", 2}};
   Samples samples = Walk(60, 4);
   for (double& value : samples.columns[0].value) value *= 2;
-  problem.measured[0].noise.absolute = 2 * kSigma;
+  problem.measured[0].noise.absolute = 2 * kLevelSigma;
   const auto estimator = MakeEstimator(problem);
   ASSERT_TRUE(estimator->Append(samples).ok());
   ASSERT_TRUE(estimator->Process().ok());
@@ -119,17 +119,17 @@ TEST(DriftPrediction, IsSmoothedByLaterSamples) {
     EXPECT_NEAR(a.mean[k], mean, 1e-6 * deviation) << row;
     EXPECT_NEAR(a.std_dev[k], deviation, 1e-6 * deviation) << row;
     EXPECT_NEAR(y.mean[k], mean, 1e-6 * deviation) << row;
-    const double S = backward.variance + kSigma * kSigma;
+    const double S = backward.variance + kLevelSigma * kLevelSigma;
     backward.mean += backward.variance / S * (samples.columns[0].value[row] - backward.mean);
-    backward.variance *= kSigma * kSigma / S;
-    backward.variance += kRate * kRate * kStepS;
+    backward.variance *= kLevelSigma * kLevelSigma / S;
+    backward.variance += kRate * kRate * kLevelStepS;
   }
   // Of more rows than are asked for, and at other times.
   options.max_rows = 10;
   const auto thinned = estimator->CurrentPrediction(options);
   ASSERT_TRUE(thinned.ok()) << thinned.status();
   EXPECT_NEAR(thinned->outputs[1].mean[5], a.mean[75], 1e-9);
-  options.times = {{0, 75.5 * kStepS}, {0, (kRows + 10) * kStepS}};
+  options.times = {{0, 75.5 * kLevelStepS}, {0, (kRows + 10) * kLevelStepS}};
   const auto between = estimator->CurrentPrediction(options);
   ASSERT_TRUE(between.ok()) << between.status();
   EXPECT_NEAR(between->outputs[1].mean[0], (a.mean[74] + a.mean[75]) / 2, 1e-9);
@@ -154,18 +154,18 @@ TEST(DriftPrediction, TellsAnAbruptChangeFromAWalk) {
   Samples samples = Walk(kRows, 4);
   EXPECT_FALSE(change_of(samples).has_value());
 
-  for (size_t row = kChanged; row < kRows; ++row) samples.columns[0].value[row] -= 12 * kSigma;
+  for (size_t row = kChanged; row < kRows; ++row) samples.columns[0].value[row] -= 12 * kLevelSigma;
   double largest = 0;
   LocalLevel backward{0, 1e12, 0};
   for (size_t row = kRows; row-- > 60;) {
     const LocalLevel before = ExactFilter(samples, kRate, row);
-    const double predicted = before.variance + kRate * kRate * kStepS;
-    const double S = backward.variance + kSigma * kSigma;
+    const double predicted = before.variance + kRate * kRate * kLevelStepS;
+    const double S = backward.variance + kLevelSigma * kLevelSigma;
     backward.mean += backward.variance / S * (samples.columns[0].value[row] - backward.mean);
-    backward.variance *= kSigma * kSigma / S;
+    backward.variance *= kLevelSigma * kLevelSigma / S;
     const double score = (backward.mean - before.mean) / std::sqrt(predicted + backward.variance);
     if (std::abs(score) > std::abs(largest)) largest = score;
-    backward.variance += kRate * kRate * kStepS;
+    backward.variance += kRate * kRate * kLevelStepS;
   }
   const auto change = change_of(samples);
   ASSERT_TRUE(change.has_value());

@@ -95,7 +95,7 @@ TEST(Drift, IntervalsCoverTheLevel) {
     std::normal_distribution<double> normal;
     double truth = 6;
     for (int i = 0; i < 40; ++i) {
-      truth += kRate * std::sqrt(kStepS) * normal(random);
+      truth += kRate * std::sqrt(kLevelStepS) * normal(random);
       normal(random);
     }
     const FilteredQuantity a = EstimateOf(DriftingLevel(), samples).filtered[1];

@@ -13,7 +13,7 @@
 #include "polyest/catalogue.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
-namespace polyest::internal {
+namespace polyest::internal::filtered_outliers_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -216,4 +216,4 @@ TEST(FilteredOutliers, AreNotHandledByHubersWeights) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::filtered_outliers_test

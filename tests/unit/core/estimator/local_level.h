@@ -12,8 +12,8 @@
 
 namespace polyest::internal {
 
-inline constexpr double kStepS = 0.1;
-inline constexpr double kSigma = 0.2;
+inline constexpr double kLevelStepS = 0.1;
+inline constexpr double kLevelSigma = 0.2;
 inline constexpr double kRate = 0.3;
 inline constexpr double kPriorMean = 5, kPriorDeviation = 2;
 
@@ -31,7 +31,7 @@ inline Problem DriftingLevel() {
   problem.model = Level();
   problem.uncertain = {UncertainParameter::Normal("a", kPriorMean, kPriorDeviation).value()};
   problem.uncertain[0].drift = RandomWalk{.std_dev_per_sqrt_s = kRate};
-  problem.measured = {{"y", {.absolute = kSigma}}};
+  problem.measured = {{"y", {.absolute = kLevelSigma}}};
   return problem;
 }
 
@@ -48,9 +48,9 @@ inline Samples Walk(int rows, uint64_t seed) {
   samples.columns = {{"y", {}, {}}};
   double a = 6;
   for (int i = 1; i <= rows; ++i) {
-    a += kRate * std::sqrt(kStepS) * normal(random);
-    samples.time_s.push_back(i * kStepS);
-    samples.columns[0].value.push_back(a + kSigma * normal(random));
+    a += kRate * std::sqrt(kLevelStepS) * normal(random);
+    samples.time_s.push_back(i * kLevelStepS);
+    samples.columns[0].value.push_back(a + kLevelSigma * normal(random));
   }
   return samples;
 }
@@ -62,11 +62,11 @@ struct LocalLevel {
 
 // Takes the first `rows` rows.
 inline LocalLevel ExactFilter(const Samples& samples, double rate, size_t rows,
-                              double sigma = kSigma) {
+                              double sigma = kLevelSigma) {
   LocalLevel level;
   for (size_t i = 0; i < rows; ++i) {
     const double z = samples.columns[0].value[i];
-    level.variance += rate * rate * kStepS;
+    level.variance += rate * rate * kLevelStepS;
     const double S = level.variance + sigma * sigma, nu = z - level.mean;
     level.log_likelihood -= 0.5 * (nu * nu / S + std::log(S));
     level.mean += level.variance / S * nu;

@@ -14,7 +14,7 @@
 #include "polyest/experiment_design.h"
 #include "tests/unit/core/estimator/forced_oscillator.h"
 
-namespace polyest::internal {
+namespace polyest::internal::process_noise_test {
 namespace {
 
 using ::testing::AllOf;
@@ -269,4 +269,4 @@ TEST(ProcessNoise, IsRefusedByStudiesOfAPerfectModel) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::process_noise_test

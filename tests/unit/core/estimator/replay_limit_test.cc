@@ -14,7 +14,7 @@
 #include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/estimator/snapshot_session.h"
 
-namespace polyest::internal {
+namespace polyest::internal::replay_limit_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -188,4 +188,4 @@ TEST(ReplayLimit, MustLetAShortRecordBePropagatedAgain) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::replay_limit_test

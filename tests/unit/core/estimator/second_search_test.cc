@@ -12,7 +12,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::second_search_test {
 namespace {
 
 constexpr double kNoise = 0.1;
@@ -74,4 +74,4 @@ TEST(SecondSearch, KeepsWhatItCannotBetter) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::second_search_test

@@ -8,7 +8,7 @@
 #include "core/propagation/filter_bank.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest::internal {
+namespace polyest::internal::fmu_filter_test {
 namespace {
 
 using testing::HasSubstr;
@@ -186,4 +186,4 @@ TEST(FmuFilter, IsRefusedWhereStatesCannotBeSetOrEventsMayCome) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::fmu_filter_test

@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
-namespace polyest::internal {
+namespace polyest::internal::input_fmu_test {
 namespace {
 
 FmuEnsemble Oscillator(std::shared_ptr<const Model> model) {
@@ -107,4 +107,4 @@ INSTANTIATE_TEST_SUITE_P(Versions, CoSimulationInputs,
                          testing::Values("oscillator_cs2", "oscillator_cs3"));
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::input_fmu_test

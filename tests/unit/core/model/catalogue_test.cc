@@ -13,7 +13,7 @@
 
 #include "core/model/list_names.h"
 
-namespace polyest::internal {
+namespace polyest::internal::catalogue_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -211,4 +211,4 @@ TEST(ModelDescription, ListsNamesForMessages) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::catalogue_test

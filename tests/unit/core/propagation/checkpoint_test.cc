@@ -10,7 +10,7 @@
 #include "tests/unit/core/propagation/ensemble.h"
 #include "tests/unit/core/propagation/oscillator.h"
 
-namespace polyest::internal {
+namespace polyest::internal::checkpoint_test {
 namespace {
 
 constexpr int kInterval = 10;
@@ -213,4 +213,4 @@ TEST(Checkpoint, RefusesWhatCannotBeOfTheEnsemble) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::checkpoint_test

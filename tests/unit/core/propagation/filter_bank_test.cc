@@ -10,15 +10,15 @@
 #include <vector>
 
 #include "polyest/equation_model.h"
-#include "tests/unit/core/propagation/random_oscillators.h"
+#include "tests/unit/core/propagation/driven_oscillators.h"
 
-namespace polyest::internal {
+namespace polyest::internal::filter_bank_test {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-const std::vector<Oscillator> kMembers = {
+const std::vector<DrivenOscillator> kMembers = {
     {40, 0.3, 1, 0, 0.01}, {36, 0.2, 0.5, 1, 0.1}, {42, 0.5, 0, 0, 1e-4}, {39, 0.1, 1, -1, 0}};
 
 // The samples of one channel or two (x, v): the same for each test of a kind.
@@ -46,7 +46,7 @@ Record MakeRecord(int channels, int count, double step_s, double sigma) {
 
 Ensemble Oscillators(std::vector<const char*> outputs,
                      IntegrationMethod method = IntegrationMethod::kAuto) {
-  Ensemble ensemble = OscillatorEnsemble(kMembers, std::move(outputs));
+  Ensemble ensemble = DrivenOscillatorEnsemble(kMembers, std::move(outputs));
   ensemble.specification.integration.method = method;
   return ensemble;
 }
@@ -64,7 +64,7 @@ Filtered Filter(FilterBank& bank, const FilterSamples& samples) {
 
 // The exact Kalman filter of a member with the same discretization of its process noise, in dense
 // matrices: the oracle. Reports the whitened innovations and log(S/r), 0 without a sample.
-Filtered ExactFilter(const Oscillator& member, const Record& record) {
+Filtered ExactFilter(const DrivenOscillator& member, const Record& record) {
   Eigen::Matrix2d A, Q = Eigen::Matrix2d::Zero();
   A << 0, 1, -member.k, -member.c;
   Q(1, 1) = member.q;
@@ -257,4 +257,4 @@ TEST(FilterBank, NamesTheMembersThatFailAndKeepsTheOthers) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::filter_bank_test

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/propagation/filter_bank.h"
-#include "tests/unit/core/propagation/random_oscillators.h"
+#include "tests/unit/core/propagation/driven_oscillators.h"
 
-namespace polyest::internal {
+namespace polyest::internal::heavy_tail_test {
 namespace {
 
 constexpr double kSigma = 0.02;
@@ -117,7 +117,7 @@ std::vector<double> Values(int count) {
   return values;
 }
 
-States Exact(const Oscillator& oscillator, double step_s, const std::vector<double>& values) {
+States Exact(const DrivenOscillator& oscillator, double step_s, const std::vector<double>& values) {
   Eigen::Matrix2d A, q = Eigen::Matrix2d::Zero();
   A << 0, 1, -oscillator.k, -oscillator.c;
   q(1, 1) = oscillator.q;
@@ -139,7 +139,7 @@ States Exact(const Oscillator& oscillator, double step_s, const std::vector<doub
   return states;
 }
 
-const std::vector<Oscillator> kOscillators = {{40, 0.3, 1, 0, 0.01}, {36, 0.2, 0.9, 1, 0.1}};
+const std::vector<DrivenOscillator> kOscillators = {{40, 0.3, 1, 0, 0.01}, {36, 0.2, 0.9, 1, 0.1}};
 
 TEST(HeavyTail, MakesTheFiltersThoseOfTheIntegral) {
   constexpr int kRows = 25;
@@ -147,7 +147,7 @@ TEST(HeavyTail, MakesTheFiltersThoseOfTheIntegral) {
   const std::vector<double> values = Values(kRows);
   std::vector<double> times_s;
   for (int k = 0; k < kRows; ++k) times_s.push_back((k + 1) * kStepS);
-  Ensemble ensemble = OscillatorEnsemble(kOscillators, {"x"});
+  Ensemble ensemble = DrivenOscillatorEnsemble(kOscillators, {"x"});
   ensemble.specification.heavy_tailed = {true};
   FilterBank bank(ensemble.specification, &ensemble.inputs);
   const Matrix samples = Eigen::Map<const Matrix>(values.data(), 1, kRows);
@@ -173,7 +173,7 @@ TEST(HeavyTail, MakesTheFiltersThoseOfTheIntegral) {
 // What a sample tells of its own instant is the same for a filter and a smoother.
 TEST(HeavyTail, IsTakenBySmoothersAsByFilters) {
   for (const double wild : {0.0, 4.0, 20.0}) {
-    Ensemble ensemble = OscillatorEnsemble(kOscillators, {"x"});
+    Ensemble ensemble = DrivenOscillatorEnsemble(kOscillators, {"x"});
     ensemble.specification.heavy_tailed = {true};
     FilterBank smoother(ensemble.specification, &ensemble.inputs);
     FilterBank filter(ensemble.specification, &ensemble.inputs);
@@ -196,4 +196,4 @@ TEST(HeavyTail, IsTakenBySmoothersAsByFilters) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::heavy_tail_test

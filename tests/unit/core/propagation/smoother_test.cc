@@ -9,16 +9,16 @@
 #include <vector>
 
 #include "core/propagation/filter_bank.h"
-#include "tests/unit/core/propagation/random_oscillators.h"
+#include "tests/unit/core/propagation/driven_oscillators.h"
 
-namespace polyest::internal {
+namespace polyest::internal::smoother_test {
 namespace {
 
 constexpr double kStep = 0.05, kSigma = 0.02;
 constexpr int kRows = 60;
 
 // x is measured.
-const std::vector<Oscillator> kOscillators = {
+const std::vector<DrivenOscillator> kOscillators = {
     {40, 0.3, 1, 0, 0.01}, {36, 0.2, 0.5, 1, 0.1}, {42, 0.5, 0, 0, 1e-6}, {39, 0.1, 1, -1, 0}};
 
 struct Record {
@@ -45,7 +45,7 @@ struct Smoothed {
 // With x_k = Φ x_{k−1} + w_k the states deviate from their means by G w; given z = H x + e they are
 // normal with mean X Hᵀ (H X Hᵀ + R)⁻¹ (z − H x̄) beyond x̄ and covariance X − X Hᵀ (…)⁻¹ H X, X = G
 // Q Gᵀ.
-Smoothed Exact(const Oscillator& oscillator, const Record& record) {
+Smoothed Exact(const DrivenOscillator& oscillator, const Record& record) {
   Eigen::Matrix2d A, q = Eigen::Matrix2d::Zero();
   A << 0, 1, -oscillator.k, -oscillator.c;
   q(1, 1) = oscillator.q;
@@ -85,7 +85,7 @@ Smoothed Exact(const Oscillator& oscillator, const Record& record) {
 // Marks every `stride`-th row and compares there.
 void ExpectExact(int stride) {
   const Record record = MakeRecord();
-  Ensemble ensemble = OscillatorEnsemble(kOscillators, {"x", "v"});
+  Ensemble ensemble = DrivenOscillatorEnsemble(kOscillators, {"x", "v"});
   FilterBank bank(ensemble.specification, &ensemble.inputs);
   bank.StartBackward();
   Matrix innovations(bank.members(), 2), log_variances = innovations;
@@ -99,7 +99,8 @@ void ExpectExact(int stride) {
   }
   bank.FinishBackward();
   std::vector<Smoothed> exact;
-  for (const Oscillator& oscillator : kOscillators) exact.push_back(Exact(oscillator, record));
+  for (const DrivenOscillator& oscillator : kOscillators)
+    exact.push_back(Exact(oscillator, record));
   Matrix means(bank.members(), 2), deviations = means;
   for (int k = 0; k < kRows; k += stride) {
     const double time_s = record.times_s[static_cast<size_t>(k)];
@@ -124,7 +125,7 @@ TEST(Smoother, NeedsOnlyTheInstantsAskedFor) { ExpectExact(7); }
 
 TEST(Smoother, IsTheFilterAfterTheLastSample) {
   const Record record = MakeRecord();
-  Ensemble ensemble = OscillatorEnsemble(kOscillators, {"x", "v"});
+  Ensemble ensemble = DrivenOscillatorEnsemble(kOscillators, {"x", "v"});
   FilterBank smoother(ensemble.specification, &ensemble.inputs);
   FilterBank filter(ensemble.specification, &ensemble.inputs);
   smoother.StartBackward();
@@ -144,4 +145,4 @@ TEST(Smoother, IsTheFilterAfterTheLastSample) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::smoother_test

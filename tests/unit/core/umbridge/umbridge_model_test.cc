@@ -14,7 +14,7 @@
 #include "polyest/estimator.h"
 #include "tests/unit/core/umbridge/model_server.h"
 
-namespace polyest::internal {
+namespace polyest::internal::umbridge_model_test {
 namespace {
 
 using testing::ElementsAre;
@@ -229,4 +229,4 @@ TEST(UmBridgeModel, EndsAnEstimateIfNoServerIsLeft) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::umbridge_model_test

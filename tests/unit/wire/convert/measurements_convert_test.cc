@@ -7,7 +7,7 @@
 #include "polyest/catalogue.h"
 #include "proto/wire/convert/measurements.h"
 
-namespace polyest::internal {
+namespace polyest::internal::measurements_convert_test {
 namespace {
 
 // Returns three rows of x and v; v lacks the second.
@@ -125,4 +125,4 @@ TEST(ToSamples, ConvertsToTheUnitsOfTheModel) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::measurements_convert_test

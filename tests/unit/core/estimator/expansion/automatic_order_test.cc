@@ -9,7 +9,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::automatic_order_test {
 namespace {
 
 constexpr double kNoise = 0.4;
@@ -146,4 +146,4 @@ TEST_P(TwelveParameters, AreEstimatedAsByLeastSquares) {
 INSTANTIATE_TEST_SUITE_P(TotalDegreeAndHyperbolic, TwelveParameters, ::testing::Values(1.0, 0.75));
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::automatic_order_test

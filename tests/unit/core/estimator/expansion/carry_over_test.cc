@@ -19,7 +19,7 @@
 #include "tests/unit/core/estimator/stopping_store.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::carry_over_test {
 namespace {
 
 constexpr double kNoise = 0.01;
@@ -333,4 +333,4 @@ TEST(CarryOver, HoldsStreamedInputs) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::carry_over_test

@@ -14,7 +14,7 @@
 #include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::rescaled_test {
 namespace {
 
 constexpr int64_t kCheckpoint = 100, kRows = 650;
@@ -121,4 +121,4 @@ TEST_F(RescaledExpansion, IsRefusedWhereMoreThanScalesDiffers) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::rescaled_test

@@ -11,7 +11,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::elements_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -164,4 +164,4 @@ TEST(Elements, MoveToWhereANormalPriorHardlyReaches) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::elements_test

@@ -8,7 +8,7 @@
 
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest::internal {
+namespace polyest::internal::estimates_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -244,4 +244,4 @@ TEST(Estimates, OfAPreciseRecordDoNotShowTheIntegration) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::estimates_test

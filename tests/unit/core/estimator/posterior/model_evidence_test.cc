@@ -13,7 +13,7 @@
 #include "tests/unit/core/estimator/estimation.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::model_evidence_test {
 namespace {
 
 constexpr int kSamples = 40;
@@ -139,4 +139,4 @@ TEST(LogSumOfExponentials, NeedsAllValues) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::model_evidence_test

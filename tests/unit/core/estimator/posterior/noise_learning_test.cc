@@ -16,7 +16,7 @@
 #include "tests/unit/core/estimator/estimation.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::noise_learning_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -334,4 +334,4 @@ TEST(ProblemOfUnknownNoise, RefusesAWhiteShareThatIsNone) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::noise_learning_test

@@ -13,7 +13,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::time_constant_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -198,4 +198,4 @@ TEST(RelativeNoise, IsSaidToBeBiasedWhereItIsThatOfTheSample) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::time_constant_test

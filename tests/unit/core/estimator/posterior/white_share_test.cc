@@ -15,7 +15,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::white_share_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -322,4 +322,4 @@ TEST(SlowNoise, IsSaidToLastForALargePartOfTheRecord) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::white_share_test

@@ -10,7 +10,7 @@
 #include "core/estimator/posterior/constancy.h"
 #include "core/estimator/posterior/robust_covariance.h"
 
-namespace polyest::internal {
+namespace polyest::internal::window_statistics_test {
 namespace {
 
 constexpr int kWindows = 32;
@@ -157,4 +157,4 @@ TEST(Constancy, DoesNotTakeAPriorForAChange) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::window_statistics_test

@@ -14,7 +14,7 @@
 #include "core/estimator/posterior/robust_covariance.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::windows_of_runs_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -122,4 +122,4 @@ TEST(WindowsOfRuns, WidenWhatScattersFromRunToRun) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::windows_of_runs_test

@@ -9,7 +9,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::windows_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST(Windows, ThresholdsGrowSharpWithTheNumberOfSamples) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::windows_test

@@ -10,7 +10,7 @@
 #include "core/estimator/problem/resolved_problem.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest::internal {
+namespace polyest::internal::channel_estimates_test {
 namespace {
 
 constexpr double kNoise = 0.002;
@@ -112,4 +112,4 @@ TEST(ProblemOfChannels, ListsAllThatIsWrongAtOnce) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::channel_estimates_test

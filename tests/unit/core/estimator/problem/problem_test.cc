@@ -9,7 +9,7 @@
 #include "core/estimator/problem/truncation.h"
 #include "polyest/catalogue.h"
 
-namespace polyest::internal {
+namespace polyest::internal::problem_test {
 namespace {
 
 using ::testing::AllOf;
@@ -219,4 +219,4 @@ TEST(ResolvedProblem, RefusesValuesThatAreNotFinite) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::problem_test

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <vector>
 
-namespace polyest::internal {
+namespace polyest::internal::correlation_profile_test {
 namespace {
 
 constexpr int kUnknowns = 2;
@@ -174,4 +174,4 @@ TEST(CorrelationProfile, HasNoisesThatAreAlikeOverShortTimes) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::correlation_profile_test

@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-namespace polyest::internal {
+namespace polyest::internal::whitening_test {
 namespace {
 
 constexpr double kTimeConstant = 0.3;
@@ -116,4 +116,4 @@ TEST(Whitening, OnlyScalesWhiteNoise) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::whitening_test

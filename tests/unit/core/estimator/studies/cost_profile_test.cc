@@ -6,7 +6,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::cost_profile_test {
 namespace {
 
 UncertainParameter Normal(const char* name) {
@@ -129,4 +129,4 @@ TEST(ProfileOptions, NameFieldValueAndRule) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::cost_profile_test

@@ -13,7 +13,7 @@
 #include "polyest/catalogue.h"
 #include "polyest/estimator.h"
 
-namespace polyest::internal {
+namespace polyest::internal::experiment_design_test {
 namespace {
 
 using ::testing::AllOf;
@@ -318,4 +318,4 @@ TEST(EstimateAsPrior, StaysWithinTheBounds) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::experiment_design_test

@@ -10,7 +10,7 @@
 #include "core/bayes/predictive_density.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::prediction_test {
 namespace {
 
 constexpr double kNoise = 0.2;
@@ -343,4 +343,4 @@ TEST(Prediction, RefusesTimesWhereTheStreamedInputsAreNotKnown) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::prediction_test

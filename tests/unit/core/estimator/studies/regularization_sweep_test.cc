@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::regularization_sweep_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -206,4 +206,4 @@ TEST(EstimateWithARule, RefusesTheDiscrepancyOfANoiseOfUnknownSize) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::regularization_sweep_test

@@ -8,7 +8,7 @@
 #include "core/model/equations/equation_model.h"
 #include "polyest/catalogue.h"
 
-namespace polyest::internal {
+namespace polyest::internal::sensitivity_test {
 namespace {
 
 using ::testing::AllOf;
@@ -262,4 +262,4 @@ TEST(Sensitivity, DoesNotDependOnTheNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::sensitivity_test

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace polyest::internal {
+namespace polyest::internal::studies_test {
 namespace {
 
 using ::testing::AllOf;
@@ -394,4 +394,4 @@ TEST(CostGrid, EndsOnAStopRequest) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::studies_test

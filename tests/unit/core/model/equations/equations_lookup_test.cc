@@ -7,7 +7,7 @@
 #include "core/model/equations/lookup.h"
 #include "tests/unit/core/model/equations/equations.h"
 
-namespace polyest::internal {
+namespace polyest::internal::equations_lookup_test {
 namespace {
 
 using equations::Lookup;
@@ -159,4 +159,4 @@ TEST(Tables, AreCalledByTheirNamesAndDifferentiated) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::equations_lookup_test

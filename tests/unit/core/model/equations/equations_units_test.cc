@@ -5,7 +5,7 @@
 
 #include "tests/unit/core/model/equations/equations.h"
 
-namespace polyest::internal {
+namespace polyest::internal::equations_units_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -146,4 +146,4 @@ TEST(EquationUnits, OfOutputsFollowFromTheirExpressions) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::equations_units_test

@@ -10,18 +10,18 @@
 namespace polyest::internal {
 
 // One member's parameters: x″ = −k x − c v + w, w of spectral density q.
-struct Oscillator {
+struct DrivenOscillator {
   double k, c, x0, v0, q;
 };
 
 // Returns an ensemble with one point for each oscillator.
-inline Ensemble OscillatorEnsemble(const std::vector<Oscillator>& oscillators,
-                                   std::vector<const char*> outputs) {
+inline Ensemble DrivenOscillatorEnsemble(const std::vector<DrivenOscillator>& oscillators,
+                                         std::vector<const char*> outputs) {
   Ensemble ensemble("mass_spring_damper", static_cast<int>(oscillators.size()), std::move(outputs));
   ensemble.specification.integration.relative_tolerance = 1e-10;
   ensemble.specification.process_noise.setZero(ensemble.points(), 2);
   for (int i = 0; i < ensemble.points(); ++i) {
-    const Oscillator& oscillator = oscillators[static_cast<size_t>(i)];
+    const DrivenOscillator& oscillator = oscillators[static_cast<size_t>(i)];
     ensemble.Set("m", i, 1);
     ensemble.Set("k", i, oscillator.k);
     ensemble.Set("c", i, oscillator.c);
