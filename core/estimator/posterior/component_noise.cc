@@ -66,7 +66,7 @@ bool MixtureComponent::ReviseMisfit(const Stop& stop) {
   return found.at_edge && expansion_->noise().misfit < before;
 }
 
-// Returns true when the expansion has moved or must be divided.
+// Returns true when the expansion has moved. After a stop it goes on where it was left.
 absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
   for (; row_end_.revisions <= kMaxMisfitRevisions && !must_divide(); ++row_end_.revisions) {
     if (!row_end_.goes_on) {

@@ -224,7 +224,7 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleWithMisfit(stop));
     moved = moved || settled;
   }
-  row_end_ = {};
+  row_end_ = {};  // where nothing was settled
   window_end_ = NextWindow(taken_, windows_from_);
   edges_row_ = NextLook();
   return moved;

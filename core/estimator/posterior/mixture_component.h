@@ -148,17 +148,17 @@ class MixtureComponent {
     bool overlooked = false;  // whether there are particles at minima that were overlooked
   };
   absl::StatusOr<Settled> SettleOnce(SettleRequest request, const Stop& stop);
-  // How far what is due after the last row has come. A stop leaves it, so that nothing is done
-  // twice, which would change the estimate.
+  // The progress of what is due after the last row taken. It outlives a stop, so that the work goes
+  // on where it was left: a settlement made once more would change the estimate.
   struct RowEnd {
     int reweighed = 0;                   // times that the noise was revised
-    bool settles = false;                // whether the expansion has yet to follow the last time
+    bool settles = false;                // whether the expansion must still follow the last time
     std::optional<bool> learned;         // what LearnNoise has returned
     int revisions = 0;                   // of the misfit
     std::optional<double> revised_from;  // misfit before the present one
     std::optional<bool> goes_on;         // what ReviseMisfit has returned
-    int settlements = 0;                 // that have moved the expansion because it was inaccurate
-    bool moved = false;                  // whether any of SettleWithMisfit has
+    int settlements = 0;                 // of SettleIfInaccurate that have moved the expansion
+    bool moved = false;                  // whether SettleWithMisfit has moved the expansion
   };
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);

@@ -47,13 +47,14 @@ class PresentMemory {
     if (prior.germ.family == GermFamily::kNormal) {
       values_ = thetas_ * (prior.scale * departures_).exp();
     } else {
-      MapBack(prior, !same_thetas);
+      SetByScores(prior, !same_thetas);
     }
     return values_;
   }
 
  private:
-  void MapBack(const UncertainParameter& prior, bool new_thetas) {
+  // Sets the values by F of the prior. The score of each θ is computed once for a block.
+  void SetByScores(const UncertainParameter& prior, bool new_thetas) {
     const Germ germ(prior.germ);
     if (new_thetas) {
       scores_ =

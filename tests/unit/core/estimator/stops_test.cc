@@ -16,8 +16,8 @@ std::atomic<int64_t> times_asked = 0;
 
 }  // namespace
 
-// In this program the clock of deadlines counts how often it was asked, so that a deadline is the
-// number of a question. Only this program may have it, which has no other sources.
+// Replaces the clock of deadlines by one that counts how often it is asked, so that a deadline is
+// the number of a question. It applies to the whole program, which therefore has no other tests.
 namespace std::chrono {
 inline namespace _V2 {
 
