@@ -14,7 +14,8 @@
 #   threads      looks for races in the tests in which threads meet (90 minutes)
 #   calibration  asks of 1,768 campaigns, and of held-out halves of measured records, if they are there,
 #                whether the uncertainty is true (25 minutes)
-#   properties   compares estimates of 2,000 random small problems with exact posteriors
+#   properties   compares estimates of 2,000 random small problems with exact posteriors, and stops the
+#                numerics at many moments of 40
 #   adversary    asks for estimates of all problems made to mislead it, if their maker is there
 #   invariances  asks whether estimates depend on the assumed noise, the sampling rate or the half of a
 #                record, for measured records, if they are there, and the examples (10 minutes)
@@ -90,8 +91,9 @@ calibration() {
 
 properties() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
-  cmake --build --preset release --parallel "$(nproc)" --target properties
+  cmake --build --preset release --parallel "$(nproc)" --target properties stops
   build/release/bin/properties 2000
+  build/release/bin/stops 40
 }
 
 adversary() {

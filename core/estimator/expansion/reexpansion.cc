@@ -328,6 +328,24 @@ absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const Settle
   return Settler(present, request, stop).Run();
 }
 
+absl::StatusOr<Settlement> SettleFurther(const RegionalExpansion& present, Settlement begun,
+                                         SettleRequest request, const Stop& stop) {
+  request.guesses = std::move(begun.particles);
+  request.memory = std::move(begun.memory);
+  request.allowance = begun.allowance;
+  const RegionalExpansion& reached = begun.expansion ? *begun.expansion : present;
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, Settle(reached, request, stop));
+  settlement.reexpansions += begun.reexpansions;
+  settlement.propagated_rows += begun.propagated_rows;
+  if (!begun.expansion) return settlement;
+  if (settlement.expansion) {
+    settlement.propagated_rows += begun.expansion->propagated_rows();
+  } else {
+    settlement.expansion = std::move(begun.expansion);
+  }
+  return settlement;
+}
+
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
                                                           LearnedNoise noise,

@@ -64,6 +64,11 @@ struct Settlement {
 absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
                                   const Stop& stop);
 
+// Goes on with a settlement of `present` that has ended at overlooked minima; `request` says how
+// and with which seed. Returns what both have found together, or an error as Settle does.
+absl::StatusOr<Settlement> SettleFurther(const RegionalExpansion& present, Settlement begun,
+                                         SettleRequest request, const Stop& stop);
+
 // Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
 // problem.first_row() on. Returns FailedPrecondition when its collocation matrix cannot be factored
 // or too few trajectories are left.

@@ -57,10 +57,11 @@ bool MixtureComponent::MayLookForPieces() const {
   return true;
 }
 
-// Returns true when the particles and the cost on the present expansion are in pieces.
-bool MixtureComponent::DivideIntoPieces() {
-  const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  std::vector<Piece> pieces = FindPieces(cost, expansion_->design(), particles_);
+// Returns true when the particles and the cost on the expansion are in pieces.
+bool MixtureComponent::DivideIntoPieces(const RegionalExpansion& expansion,
+                                        const Matrix& particles) {
+  const Cost cost = expansion.MakeCost(problem_.problem().regularization);
+  std::vector<Piece> pieces = FindPieces(cost, expansion.design(), particles);
   if (pieces.size() > 1) pieces_ = std::move(pieces);
   return must_divide();
 }
@@ -70,7 +71,8 @@ bool MixtureComponent::DivideIntoPieces() {
 bool MixtureComponent::LookForPieces() {
   if (!MayLookForPieces()) return false;
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  return AgreementWithModel(*expansion_, cost).shift <= kMaxShiftInPieces && DivideIntoPieces();
+  return AgreementWithModel(*expansion_, cost).shift <= kMaxShiftInPieces &&
+         DivideIntoPieces(*expansion_, particles_);
 }
 
 bool MixtureComponent::MayBisect() const {

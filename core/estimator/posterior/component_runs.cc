@@ -117,14 +117,10 @@ std::optional<GermSummary> MixtureComponent::GaussianPosterior(const Stop& stop)
 // Returns particles of the present posterior, germ coordinates. Leaves the component as it is, so
 // that a stop has no effect on later results.
 absl::StatusOr<Matrix> MixtureComponent::ParticlesNow(const Stop& stop) const {
-  SettleRequest request;
+  SettleRequest request = RequestSettlement();
   request.may_raise_order = false;
-  request.problem = &problem_;
-  request.store = store_;
-  request.rows = taken_;
-  request.guesses = particles_;
-  request.seed = 1000 * (settlements_ + 1);
-  request.threads = threads_;
+  request.memory = {};  // the particles are drawn anew
+  request.allowance = ReplayAllowance();
   POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
                            polyest::internal::Settle(*expansion_, request, stop));
   if (settlement.particles.rows() <= problem_.dimension()) {

@@ -38,6 +38,9 @@ constexpr double kAheadOfNeed = 0.004;
 // by this number.
 constexpr int64_t kLooksAhead = 10;
 
+// A settlement takes at most so many seeds from the one that this returns on.
+uint64_t SeedOfSettlement(uint64_t settlements) { return 1000 * (settlements + 1); }
+
 }  // namespace
 
 int64_t NextWindow(int64_t rows, int64_t from) {
@@ -307,46 +310,56 @@ absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
   return (!waits && shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
-// Returns true when the expansion moved or must be divided. Where the sampler has overlooked
-// minima, the pieces around them are told apart on the expansion that shows them; only if that is
-// not possible does it move to where all of them are.
-absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order,
-                                              bool may_replay) {
+SettleRequest MixtureComponent::RequestSettlement() const {
   SettleRequest request;
-  request.may_replay = may_replay;
-  request.may_raise_order = may_raise_order && !bisected_;
-  request.ends_at_overlooked = MayLookForPieces();
-  POLYEST_ASSIGN_OR_RETURN(const Settled first, SettleOnce(request, stop));
-  if (!first.overlooked || !request.ends_at_overlooked) return first.moved;
-  if (DivideIntoPieces()) return true;
-  request.ends_at_overlooked = false;
-  POLYEST_ASSIGN_OR_RETURN(const Settled second, SettleOnce(request, stop));
-  return first.moved || second.moved;
-}
-
-absl::StatusOr<MixtureComponent::Settled> MixtureComponent::SettleOnce(SettleRequest request,
-                                                                       const Stop& stop) {
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;
   request.guesses = particles_;
   request.memory = memory_;
-  request.seed = 1000 * (settlements_ + 1);
+  request.seed = SeedOfSettlement(settlements_);
   request.threads = threads_;
   request.allowance = allowance_;
+  return request;
+}
+
+// Returns true when the expansion moved or must be divided. Where the sampler has overlooked
+// minima, the pieces around them are told apart on the expansion that shows them; only if that is
+// not possible does it move to where all of them are. A stop changes nothing, so that what is due
+// is found to be due again.
+absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order,
+                                              bool may_replay) {
+  SettleRequest request = RequestSettlement();
+  request.may_replay = may_replay;
+  request.may_raise_order = may_raise_order && !bisected_;
+  request.ends_at_overlooked = MayLookForPieces();
   POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
                            polyest::internal::Settle(*expansion_, request, stop));
+  if (!settlement.overlooked || !request.ends_at_overlooked) return Take(std::move(settlement));
+  const RegionalExpansion& shown = settlement.expansion ? *settlement.expansion : *expansion_;
+  if (!DivideIntoPieces(shown, settlement.particles)) {
+    request.ends_at_overlooked = false;
+    request.seed = SeedOfSettlement(settlements_ + 1);
+    POLYEST_ASSIGN_OR_RETURN(
+        settlement, SettleFurther(*expansion_, std::move(settlement), std::move(request), stop));
+    ++settlements_;
+  }
+  return Take(std::move(settlement)) || must_divide();
+}
+
+// Adopts what a settlement has found. Returns whether the expansion has moved.
+bool MixtureComponent::Take(Settlement settlement) {
   ++settlements_;
   particles_ = std::move(settlement.particles);
   memory_ = std::move(settlement.memory);
   abandoned_rows_ += settlement.propagated_rows;
   reexpansions_ += settlement.reexpansions;
-  const bool moved = settlement.expansion != nullptr;
   allowance_ = settlement.allowance;
+  const bool moved = settlement.expansion != nullptr;
   if (moved && !settlement.postponed) postponed_.expansion = 0;
   if (settlement.postponed && postponed_.expansion == 0) postponed_.expansion = taken_;
   if (moved) Adopt(std::move(settlement.expansion));
-  return Settled{moved, settlement.overlooked};
+  return moved;
 }
 
 absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
@@ -354,9 +367,11 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (!AgreementWithModel(*expansion_, cost).mean_difference) {
-    SettleRequest request;
+    SettleRequest request = RequestSettlement();
     request.may_raise_order = false;
-    POLYEST_RETURN_IF_ERROR(SettleOnce(std::move(request), stop).status());
+    POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
+                             polyest::internal::Settle(*expansion_, request, stop));
+    Take(std::move(settlement));
   }
   comparable_row_ = taken_;
   return absl::OkStatus();

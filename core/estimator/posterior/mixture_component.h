@@ -143,11 +143,8 @@ class MixtureComponent {
                                                                   const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
   absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order, bool may_replay = true);
-  struct Settled {
-    bool moved = false;
-    bool overlooked = false;  // whether there are particles at minima that were overlooked
-  };
-  absl::StatusOr<Settled> SettleOnce(SettleRequest request, const Stop& stop);
+  SettleRequest RequestSettlement() const;
+  bool Take(Settlement settlement);
   // The progress of what is due after the last row taken. It outlives a stop, so that the work goes
   // on where it was left: a settlement made once more would change the estimate.
   struct RowEnd {
@@ -167,7 +164,7 @@ class MixtureComponent {
   absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
   absl::StatusOr<bool> SettleAhead(const Stop& stop);
   bool MayLookForPieces() const;
-  bool DivideIntoPieces();
+  bool DivideIntoPieces(const RegionalExpansion& expansion, const Matrix& particles);
   bool LookForPieces();
   bool MayBisect() const;
   bool BisectElement();
