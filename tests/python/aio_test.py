@@ -145,6 +145,12 @@ def test_refusals_are_the_same_exceptions(client, problem, rows):
                 second = await other.session("refused-aio", options=few)
                 with pytest.raises(polyest.Aborted):
                     await second.append(rows(20, 30))
+            with pytest.raises(polyest.InvalidInput, match="no quantity 'X'"):
+                await other.session("units-aio", problem, units={"X": "mm"})
+            with pytest.raises(polyest.NotFound):
+                await other.session("units-aio")
+            with pytest.raises(polyest.InvalidInput, match="the column 'force' for the streamed"):
+                await other.estimate(problem.copy().stream("force"), rows(0, 10))
             with pytest.raises(polyest.NotFound):
                 await other.model("perpetual_motion")
             raise RuntimeError("the rig stopped")

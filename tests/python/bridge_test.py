@@ -333,6 +333,12 @@ def test_a_wrong_configuration_names_the_field(tmp_path, change, said):
         bridge.Bridge(bridge.read_configuration(tmp_path / "bridge.json"))
 
 
+def test_a_configuration_that_gives_a_field_twice_is_refused(tmp_path):
+    (tmp_path / "bridge.json").write_text('{"session": {"name": "a", "name": "b"}}')
+    with pytest.raises(polyest.InvalidInput, match=r"bridge\.json: session\.name: given twice$"):
+        bridge.read_configuration(tmp_path / "bridge.json")
+
+
 def test_an_input_without_a_channel_is_refused(tmp_path):
     one = Rig(tmp_path, "127.0.0.1:1")
     one.bus.shutdown()

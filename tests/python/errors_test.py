@@ -1,5 +1,6 @@
 """Every exception, with what it tells: by the daemon where it can be brought to it."""
 
+import asyncio
 import threading
 from concurrent import futures
 
@@ -36,6 +37,42 @@ def test_a_field_that_no_problem_has_is_refused_before_it_is_sent(client, record
     with pytest.raises(polyest.InvalidInput, match="uncertian") as raised:
         client.estimate({"model": {"builtin": "duffing"}, "uncertian": []}, record)
     assert raised.value.code == "INVALID_ARGUMENT"
+
+
+def test_data_that_lack_a_streamed_input_are_refused_before_they_are_sent(client, problem, rows):
+    driven = problem.copy().stream("force")
+    missing = "the column 'force' for the streamed input of that name is missing"
+    experiment = client.experiment(driven, {**rows(0, 10), "force": rows(0, 10)["x"]})
+    for call in (lambda: client.estimate(driven, rows(0, 10)),
+                 lambda: client.check(driven, rows(0, 10)),
+                 lambda: driven.check(rows(0, 10), client=client),
+                 lambda: experiment.predict(record=rows(10, 20))):
+        with pytest.raises(polyest.InvalidInput, match=missing):
+            call()
+    with client.session("without-input", driven) as session:
+        with pytest.raises(polyest.InvalidInput, match=missing):
+            session.append(rows(0, 10))
+        assert session.info().last_sequence == 0
+
+
+def test_units_of_unknown_names_are_refused_before_anything_is_sent(client, problem, record):
+    for call in (client.estimate, client.check, client.experiment):
+        with pytest.raises(polyest.InvalidInput, match="no quantity 'X'.*the nearest is 'x'"):
+            call(problem, record, units={"X": "mm"})
+    with pytest.raises(polyest.InvalidInput, match="no quantity 'X'"):
+        client.session("wrong-units", problem, units={"X": "mm"})
+    with pytest.raises(polyest.NotFound):
+        client.session("wrong-units")
+
+
+def test_a_number_in_place_of_a_file_is_not_opened(client, record, tmp_path):
+    # `open` would close what has the number, such as the client's own connection.
+    with open(tmp_path / "other", "w+") as other:
+        with pytest.raises(TypeError, match="a problem must be"):
+            client.estimate(other.fileno(), record)
+        with pytest.raises(TypeError):
+            client.import_session(other.fileno())
+        other.write("still open")
 
 
 def test_a_problem_file_that_cannot_be_read_is_named(client, record, tmp_path):
@@ -162,6 +199,28 @@ def test_a_role_that_does_not_allow_the_call(guarded, problem):
 def test_a_connection_that_cannot_be_safe(options, said):
     with pytest.raises(polyest.InvalidInput, match=said):
         polyest.connect("rig.example.org:50051", **options)
+
+
+@pytest.mark.parametrize("server", [
+    "foo", "", ":50051", "foo:", "foo:0", "127.0.0.1:99999", "foo:65536", "foo:-1", "foo:+5",
+    "foo: 5", "foo:5 ", "foo:５", "foo:grpc", 50051,
+])
+def test_an_address_is_that_of_a_host_with_a_port(server):
+    async def asynchronous():
+        polyest.aio.connect(server)
+
+    for call in (lambda: polyest.connect(server), lambda: asyncio.run(asynchronous())):
+        with pytest.raises(polyest.InvalidInput) as raised:
+            call()
+        assert raised.value.message == (f'server: "{server}" must be HOST:PORT, the port from 1 to '
+                                        "65535")
+        assert raised.value.field == "server"
+
+
+@pytest.mark.parametrize("server", ["rig:1", "[::1]:65535", "127.0.0.1:00050051"])
+def test_addresses_that_the_command_takes(server):
+    with polyest.connect(server) as client:
+        assert client.server == server
 
 
 class Answering(grpc.GenericRpcHandler):

@@ -117,7 +117,8 @@ def test_units_are_those_of_the_file_unless_others_are_given(tmp_path, client):
     with pytest.raises(polyest.InvalidInput, match="no channel 'y'; there are 'x'"):
         mdf.read(path, {"x": "defl"}, units={"y": "cm"})
     with pytest.raises(polyest.InvalidInput, match="kg"):
-        client.estimate(PROBLEM, mdf.read(path, {"x": "defl"}, units={"x": "kg"}))
+        client.estimate(PROBLEM, mdf.read(path, {"x": "defl", "force": "w"},
+                                          units={"x": "kg", "force": "N"}))
 
 
 def test_times_begin_where_they_are_asked_to(tmp_path):

@@ -6,12 +6,15 @@ import pytest
 
 import polyest
 from polyest._measurements import MeasurementConverter, split
+from polyest.io import Batch, Recording
 from polyest.problem import to_message
 
+MEASURED = polyest.Problem.builtin("quarter_car").measure("x", 0.1)
+DRIVEN = MEASURED.copy().stream("u")
 
-def converter(problem=None, units=None):
-    problem = problem or polyest.Problem.builtin("quarter_car").measure("x", 0.1).stream("u")
-    return MeasurementConverter(to_message(problem), units)
+
+def converter(problem=MEASURED, units=None, **options):
+    return MeasurementConverter(to_message(problem), units, **options)
 
 
 def values_of(measurements):
@@ -20,7 +23,8 @@ def values_of(measurements):
 
 def test_columns_of_the_problem_are_taken_and_others_are_named():
     with pytest.warns(UserWarning, match="are not used: note"):
-        found = converter().convert({"t": [0.0, 1.0], "u": [1, 2], "x": [3, 4], "note": [5, 6]})
+        found = converter(DRIVEN).convert({"t": [0.0, 1.0], "u": [1, 2], "x": [3, 4],
+                                           "note": [5, 6]})
     assert list(found.time_s) == [0.0, 1.0]
     assert values_of(found) == {"x": [3, 4], "u": [1, 2]}
 
@@ -58,6 +62,72 @@ def test_a_column_that_the_problem_names_must_exist():
     problem = polyest.Problem.builtin("quarter_car").measure("x", 0.1, column="Disp")
     with pytest.raises(polyest.InvalidInput, match="no column 'Disp'; the columns are 't', 'x'"):
         converter(problem).convert({"t": [0.0], "x": [1.0]})
+
+
+@pytest.mark.parametrize("data", [
+    {"t": [0.0], "x": [1.0]}, pd.DataFrame({"x": [1.0]}, index=pd.Index([0.0], name="t")),
+    Batch(np.array([0.0]), {"x": np.array([1.0])}),
+    Recording("r", {"x": ""}, lambda: iter([Batch(np.array([0.0]), {"x": np.array([1.0])})])),
+], ids=lambda data: type(data).__name__)
+def test_the_column_of_a_streamed_input_must_be_there(data):
+    with pytest.raises(polyest.InvalidInput, match="^measurements: the column 'u' for the streamed "
+                       "input of that name is missing; the columns are ('t', )?'x'$"):
+        converter(DRIVEN).convert(data)
+    with pytest.raises(polyest.InvalidInput, match="the column 'u' for the streamed input"):
+        list(converter(DRIVEN).convert_each(data))
+
+
+def test_a_missing_column_is_told_with_the_line_that_maps_the_nearest_one():
+    data = {"t": [0.0], "x": [1.0], "note": [2.0], "U [mm]": [3.0]}
+    with pytest.raises(polyest.InvalidInput, match=r"""'U \[mm\]'; map one in the problem: """
+                       r""""columns": {"u": {"from": "U \[mm\]"}}$"""):
+        converter(DRIVEN).convert(data)
+
+
+def test_an_input_may_have_no_sample_where_it_has_a_column():
+    found = converter(DRIVEN).convert({"t": [0.0], "x": [1.0], "u": [np.nan]})
+    assert list(found.channels[1].missing) == [0]
+
+
+def test_later_batches_may_lack_a_slow_input():
+    one = converter(DRIVEN)
+    assert len(list(one.convert_each({"t": [0.0], "x": [1.0], "u": [1.0]}))) == 1
+    found, = one.convert_each({"t": [1.0], "x": [2.0]})
+    assert values_of(found) == {"x": [2.0]}
+
+
+def test_channels_may_come_apart_where_rows_may_come_in_any_order():
+    one = converter(DRIVEN, apart=True)
+    assert values_of(one.convert({"t": [0.0], "x": [1.0]})) == {"x": [1.0]}
+    assert values_of(one.convert({"t": [0.0], "u": [1.0]})) == {"u": [1.0]}
+    with pytest.raises(polyest.InvalidInput, match=r"no column of the problem \(x, u\); .* 'y'"):
+        one.convert({"t": [0.0], "y": [1.0]})
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("X", "units: there is no quantity 'X' in the problem; there are 't', 'x', 'u'; "
+     "the nearest is 'x'"),
+    ("travel", "units: there is no quantity 'travel' in the problem; there are 't', 'x', 'u'$"),
+    ("run", "there is no quantity 'run'"),
+])
+def test_a_unit_of_an_unknown_name_is_refused_with_the_known_ones(name, said):
+    with pytest.raises(polyest.InvalidInput, match=said) as raised:
+        converter(DRIVEN, {name: "mm"})
+    assert raised.value.field == "units"
+
+
+def test_units_may_be_given_by_the_header_that_the_problem_names():
+    problem = MEASURED.copy().column("x", "Disp")
+    channel, = converter(problem, {"Disp": "mm"}).convert({"t": [0.0], "Disp": [1.0]}).channels
+    assert (channel.name, channel.unit) == ("x", "mm")
+
+
+def test_columns_of_the_condition_must_be_there():
+    problem = MEASURED.copy().use_when("abs(v) > 1e2*pi && t > 1")
+    data = {"t": [0.0], "x": [1.0]}
+    with pytest.raises(polyest.InvalidInput, match="column 'v', which useWhen names, is missing"):
+        converter(problem).convert(data)
+    assert values_of(converter(problem).convert({**data, "v": [2.0]})) == {"x": [1.0], "v": [2.0]}
 
 
 def test_columns_of_the_condition_are_sent():

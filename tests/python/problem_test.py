@@ -114,6 +114,39 @@ def test_a_check_looks_at_the_data(client, problem, record):
     assert problem.check(late, client=client).warnings
 
 
+@pytest.mark.parametrize(("text", "field"), [
+    ('{"fixed": {"m": 1}, "fixed": {"m": 2}}', "fixed"),
+    ('{"fixed": {"m": 1, "m": 2}}', "fixed.m"),
+    ('{"uncertain": [{}, {"uniform": {"lower": 1, "lower": 1, "upper": 2}}]}',
+     "uncertain[1].uniform.lower"),
+    ('{"fixed": {"m": 1, "m": 2}, "fixed": {}}', "fixed"),
+])
+def test_a_field_that_a_file_gives_twice_is_refused(tmp_path, text, field):
+    file = tmp_path / "twice.json"
+    file.write_text(text)
+    for read in (polyest.Problem.read, to_message):
+        with pytest.raises(polyest.InvalidInput) as raised:
+            read(file)
+        assert raised.value.message == f"{file}: {field}: given twice"
+        assert (raised.value.field, raised.value.rule) == (field, "given twice")
+
+
+def test_what_is_no_problem_is_refused_before_anything_is_opened(tmp_path):
+    # `open` would take the number for a descriptor: it would close what another part has opened.
+    with open(tmp_path / "other", "w+") as other:
+        number = other.fileno()
+        for call in (polyest.Problem.read, to_message):
+            with pytest.raises(TypeError, match="a problem must be a polyest.Problem, a dict, or "
+                               rf"the path .*; got {number} of the type int"):
+                call(number)
+        with pytest.raises(TypeError):
+            polyest.Problem().save(number)
+        other.write("still open")
+    for wrong in (None, True, b"problem.json", ["problem.json"]):
+        with pytest.raises(TypeError, match="a problem must be"):
+            to_message(wrong)
+
+
 def test_the_word_auto_is_the_default_order(problem):
     document = problem.as_dict()
     document["expansion"] = {"order": "AUTO"}

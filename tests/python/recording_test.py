@@ -82,6 +82,17 @@ def test_a_session_may_take_rows_out_of_order(client, problem, rows):
     assert asyncio.run(again()) == "window"
 
 
+def test_a_session_with_a_window_takes_each_channel_by_itself(client, problem, rows):
+    driven = problem.copy().stream("force")
+    part = rows(0, 100)
+    force = 0 * part["x"]
+    with client.session("apart", driven, reorder_window_s=10.0) as session:
+        session.append({"t": part["t"], "force": force})
+        session.append(part, end_of_run=True)
+        found = session.estimate().to_dict()["parameters"]
+    assert found == client.estimate(driven, {**part, "force": force}).to_dict()["parameters"]
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_merged_tracks_are_the_union_of_their_samples(seed):
     random = np.random.default_rng(seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional, Union
@@ -14,6 +15,7 @@ from polyest.errors import InvalidInput, PolyestError, Unavailable, of_rpc
 
 File = Union[str, "os.PathLike[str]"]
 
+_PORT = re.compile(r"0*[0-9]{1,5}")
 # The largest message taken from the daemon, bytes; gRPC's default of 4 MB is too little.
 _MAX_RESPONSE_BYTES = 64 << 20
 
@@ -30,6 +32,12 @@ class ConnectionOptions:
     key: Optional[File] = None
     server_name: Optional[str] = None
     timeout_s: Optional[float] = None
+
+    def __post_init__(self) -> None:
+        """Raises InvalidInput unless the server is HOST:PORT: gRPC would dial something else."""
+        host, _, port = str(self.server).rpartition(":")
+        if not host or not _PORT.fullmatch(port) or not 1 <= int(port[-5:]) <= 65535:
+            raise _invalid("server", f'"{self.server}" must be HOST:PORT, the port from 1 to 65535')
 
     @property
     def uses_tls(self) -> bool:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import re
 import warnings
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Optional
 
 import numpy as np
 
 from polyest._proto.v1 import measurements_pb2, problem_pb2
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse
+from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
 
 Measurements = measurements_pb2.Measurements
 
-# A header with its unit: "Disp [mm]", "Disp (mm)" or "Disp / mm".
-_HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)|/\s(?P<c>\S+))$")
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+# A header with its unit: "Disp [mm]", "Disp (mm)", "Disp / mm" or "Disp / (mm)".
+_HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)"
+                     r"|/\s\(?(?P<c>[^\s()]\S*?)\)?)$")
+# A name in a condition that is no function, as in "abs(v)", and no part of a number, as in "1e5".
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?!\w*\s*\()")
 
 
 def _split_header(header: str) -> tuple[str, str]:
@@ -29,6 +33,20 @@ def _split_header(header: str) -> tuple[str, str]:
     return match["name"], match["a"] or match["b"] or match["c"] or ""
 
 
+def _listed(names: Collection[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names) or "none"
+
+
+def _mapping(quantity: str, unused: Collection[str]) -> str:
+    """Returns the end of a message: what maps the unused column whose name is the nearest."""
+    if not unused:
+        return ""
+    headers = {_split_header(header)[0]: header for header in unused}
+    header = headers[next(iter((*nearest(quantity, headers, 1), *headers)))]
+    line = json.dumps({quantity: {"from": header}}, ensure_ascii=False)
+    return f'; map one in the problem: "columns": {line}'
+
+
 class MeasurementConverter:
     """Converts data to measurements of one problem.
 
@@ -37,19 +55,26 @@ class MeasurementConverter:
     """
 
     def __init__(self, problem: problem_pb2.Problem,
-                 units: Optional[Mapping[str, str]] = None) -> None:
-        """`units` names the unit of columns by quantity, as in {"x": "mm", "t": "ms"}."""
+                 units: Optional[Mapping[str, str]] = None, *, apart: bool = False) -> None:
+        """`units` names the unit of columns by quantity, as in {"x": "mm", "t": "ms"}.
+
+        apart: channels may come in batches of their own. Raises InvalidInput for a name in `units`
+        that the problem does not have.
+        """
         # The field's name is a word of Python.
         self._sources = {name: (getattr(column, "from"), column.unit)
                          for name, column in problem.columns.items()}
         self._units = dict(units or {})
         self._measured = [measured.output for measured in problem.measured]
         self._streamed = [signal.name for signal in problem.inputs if signal.HasField("streamed")]
-        known = {"t", *self._measured, *self._streamed}
+        known = {"t", "pi", *self._measured, *self._streamed}
         self._conditions = [name for name in dict.fromkeys(_NAME.findall(problem.use_when))
                             if name not in known]
+        self._apart = apart
         self._clock = Clock()
         self._noted: set[str] = set()
+        self._given: set[str] = set()  # the channels of all batches so far
+        self._check_units()
 
     @property
     def names(self) -> list[str]:
@@ -67,7 +92,9 @@ class MeasurementConverter:
             return data
         if isinstance(data, (Batch, Recording)):
             rows = data.all() if isinstance(data, Recording) else data
-            return rows.measurements(self._units, end_of_run=end_of_run)
+            message = rows.measurements(self._units, end_of_run=end_of_run)
+            self._check_channels(message, rows.values, ())
+            return message
         table = Table(data)
         used: list[str] = []
         message = Measurements(end_of_run=end_of_run)
@@ -75,7 +102,8 @@ class MeasurementConverter:
         self._add_run(table, message, used)
         for quantity in self.names:
             self._add_channel(table, quantity, message, used)
-        self._check_channels(table, message)
+        self._check_channels(message, table.columns,
+                             [name for name in table.columns if name not in used])
         self._note_unused(table, used)
         return message
 
@@ -99,7 +127,7 @@ class MeasurementConverter:
                 if column is not None:
                     break
         if column is None:
-            raise refuse("t", f"no column of the time; the columns are {self._listed(table)}")
+            raise refuse("t", f"no column of the time; the columns are {_listed(table.columns)}")
         used.append(header)
         return self._clock.seconds(header, column, unit)
 
@@ -121,7 +149,7 @@ class MeasurementConverter:
             if quantity in self._sources and self._sources[quantity][0]:
                 raise refuse(f"columns.{quantity}", f"there is no column "
                              f"'{self._sources[quantity][0]}'; the columns are "
-                             f"{self._listed(table)}")
+                             f"{_listed(table.columns)}")
             return
         header, unit, column = found
         values = floats(header, column)
@@ -145,11 +173,41 @@ class MeasurementConverter:
                 return header, unit or in_header, values
         return None
 
-    def _check_channels(self, table: Table, message: Measurements) -> None:
+    def _check_units(self) -> None:
+        headers = [header for quantity, (header, _) in self._sources.items()
+                   if header and quantity != "run"]
+        known = list(dict.fromkeys(("t", *self.names, *headers)))
+        for name in self._units:
+            if name not in known:
+                near = nearest(name, known, 1)
+                raise refuse("units", f"there is no quantity '{name}' in the problem; there are "
+                             f"{_listed(known)}"
+                             + (f"; the nearest is '{near[0]}'" if near else ""))
+
+    def _check_channels(self, message: Measurements, columns: Collection[str],
+                        unused: Collection[str]) -> None:
+        """Refuses rows that lack what the problem takes from them.
+
+        The daemon takes an input without samples as 0, and says so in its estimate only. Batches
+        after the first may lack one, since a slow sensor has no sample in each of them.
+        """
         present = {channel.name for channel in message.channels}
-        if self._measured and table.rows and not present.intersection(self._measured):
-            raise refuse("measurements", "no column of a measured output "
-                         f"({', '.join(self._measured)}); the columns are {self._listed(table)}")
+        self._given.update(present)
+        if not message.time_s:
+            return
+        wanted = self.names if self._apart else self._measured
+        if wanted and not present.intersection(wanted):
+            what = "the problem" if self._apart else "a measured output"
+            raise refuse("measurements", f"no column of {what} ({', '.join(wanted)}); the columns "
+                         f"are {_listed(columns)}")
+        if self._apart:
+            return
+        for name in (*self._streamed, *self._conditions):
+            if name not in self._given:
+                why = (" for the streamed input of that name" if name in self._streamed
+                       else ", which useWhen names,")
+                raise refuse("measurements", f"the column '{name}'{why} is missing; the columns "
+                             f"are {_listed(columns)}{_mapping(name, unused)}")
 
     def _note_unused(self, table: Table, used: list[str]) -> None:
         unused = [name for name in table.columns if name not in used and name not in self._noted]
@@ -157,10 +215,6 @@ class MeasurementConverter:
         if unused:
             warnings.warn(f"columns that the problem does not name are not used: "
                           f"{', '.join(unused)}", stacklevel=6)
-
-    @staticmethod
-    def _listed(table: Table) -> str:
-        return ", ".join(f"'{name}'" for name in table.columns) or "none"
 
 
 def split(measurements: Measurements, max_rows: int) -> Iterator[Measurements]:

@@ -45,7 +45,8 @@ class SessionFileWriter:
 
 def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.SessionRecord]:
     """Yields the records of a file. Raises InvalidInput if it is none or ends too early."""
-    with open(file, "rb") as source:
+    # A number is no path: `open` takes it for a descriptor and closes it in the end.
+    with open(os.fspath(file), "rb") as source:
         if source.readline(len(_FIRST_LINE)) != _FIRST_LINE:
             raise InvalidInput(f"{os.fspath(file)}: is not a session file written by an export")
         while True:

@@ -115,14 +115,15 @@ class Client:
                  units: Optional[Mapping[str, str]] = None) -> Estimate:
         """Returns the estimate of a problem's uncertain parameters from measurements.
 
-        problem: a `Problem`, a problem file's JSON object, or the path of a problem file.
+        problem: a `Problem`, a problem file's JSON object (a dict), or the path of a problem file.
         data: a pandas DataFrame, a dict of columns or a structured numpy array. It has the time `t`
-            in s (a column, or the index), the measured outputs and streamed inputs by name, and
+            in s (a column, or the index), the measured outputs and all streamed inputs by name, and
             may have `run`. NaN is a missing sample.
-        units: of columns, as in {"x": "mm", "t": "ms"}; by default those in the headers
-            ("x [mm]") or the problem's `columns`, else the model's.
+        units: of columns by the problem's names, as in {"x": "mm", "t": "ms"}; by default those in
+            the headers ("x [mm]") or the problem's `columns`, else the model's.
 
-        Raises InvalidInput, with the field and the rule, and any other `PolyestError`.
+        Raises InvalidInput, with the field and the rule, and any other `PolyestError`; TypeError
+        for what is no problem.
         """
         return self.experiment(problem, data, units=units).estimate()
 
@@ -168,6 +169,7 @@ class Client:
             created = self._get_session(name)
         else:
             message = to_message(problem)
+            MeasurementConverter(message, units)  # refuses wrong units before there is a session
             try:
                 created = self._transport.unary(
                     _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(

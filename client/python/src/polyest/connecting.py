@@ -25,9 +25,10 @@ def connect(server: str, *, token: Optional[str] = None, token_file: Optional[Fi
     ca: file with the CA that signed the daemon's certificate (PEM); asks for TLS.
     certificate, key: files with the client's own certificate and its key (PEM).
     server_name: the name in the daemon's certificate, if it is not the host's.
-    timeout_s: how long a call may take, s; None: without limit.
+    timeout_s: how long each call may take, s; None: without limit. Streams may take longer.
 
-    Raises InvalidInput if a file cannot be used or a token would go unencrypted over a network.
+    Raises InvalidInput if the server is not HOST:PORT with a port from 1 to 65535, a file cannot be
+    used, or a token would go unencrypted over a network.
     """
     return Client(ConnectionOptions(server, token, token_file, ca, certificate, key, server_name,
                                     timeout_s))
@@ -59,6 +60,7 @@ def local(daemon: Optional[File] = None, *, data_dir: Optional[File] = None, por
     data_dir: folder in which sessions are kept; by default they end with the daemon.
     port: at which it listens; by default a free one.
     arguments: further options of `polyestd`.
+    timeout_s: as in `polyest.connect`.
 
     Raises Unavailable if there is no such program or it does not start.
     """

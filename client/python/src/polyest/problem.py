@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 from google.protobuf import json_format
 
+from polyest import _strict_json
 from polyest._proto.v1 import problem_pb2
 from polyest.errors import InvalidInput
 from polyest.noise import Noise
@@ -213,7 +214,8 @@ class Problem:
 
     def save(self, path: Union[str, os.PathLike[str]]) -> None:
         """Writes the problem file, which the command `polyest` also reads."""
-        with open(path, "w", encoding="utf-8") as file:
+        # A number is no path: `open` takes it for a descriptor and closes it in the end.
+        with open(os.fspath(path), "w", encoding="utf-8") as file:
             file.write(self.as_json() + "\n")
 
     def copy(self) -> Problem:
@@ -241,11 +243,19 @@ _PLACE = re.compile(r'at "Problem\.([^"]+)"')
 
 
 def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
+    # `open` takes a number for a descriptor, perhaps a connection's, and closes it in the end.
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError("a problem must be a polyest.Problem, a dict, or the path of a problem "
+                        f"file (str or os.PathLike); got {path!r} of the type "
+                        f"{type(path).__name__}")
     try:
         with open(path, encoding="utf-8-sig") as file:
-            document = json.load(file)
+            document = _strict_json.loads(file.read())
     except OSError as error:
         raise InvalidInput(f"{os.fspath(path)}: cannot be opened: {error.strerror}") from error
+    except _strict_json.GivenTwice as error:
+        raise InvalidInput(f"{os.fspath(path)}: {error}", field=error.field,
+                           rule="given twice") from None
     except ValueError as error:
         raise InvalidInput(f"{os.fspath(path)}: {error}") from error
     if not isinstance(document, dict):

@@ -44,7 +44,8 @@ class Session(Studies):
         self._units = units or {}
         self._options = options
         self._on_estimate = on_estimate
-        self._converter = MeasurementConverter(created.problem, units)
+        self._converter = MeasurementConverter(created.problem, units,
+                                               apart=created.reorder_window_s > 0)
         self._stream: Optional[MeasurementStream] = None
 
     @property
@@ -66,7 +67,8 @@ class Session(Studies):
         """Adds rows, later than those before, and returns the number of the last batch.
 
         data: columns as in `Client.estimate`, or a `polyest.io.Recording`, which is read and sent
-            batch by batch. end_of_run: these are the last rows of their run.
+            batch by batch. Only the first data need the columns of all streamed inputs, and with a
+            `reorder_window_s` none do. end_of_run: these are the last rows of their run.
         wait: return when the daemon keeps the rows. Otherwise return as soon as they are on their
             way, and wait for room only; then `flush`, `estimate` or the end of the `with` block
             reports what goes wrong.

@@ -123,6 +123,7 @@ class Client:
             created = await self._get_session(name)
         else:
             message = to_message(problem)
+            MeasurementConverter(message, units)  # refuses wrong units before there is a session
             try:
                 created = await self._transport.unary(
                     _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(

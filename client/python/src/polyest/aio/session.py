@@ -38,7 +38,8 @@ class Session(Studies):
         self._units = units or {}
         self._options = options
         self._on_estimate = on_estimate
-        self._converter = MeasurementConverter(created.problem, units)
+        self._converter = MeasurementConverter(created.problem, units,
+                                               apart=created.reorder_window_s > 0)
         self._stream: Optional[MeasurementStream] = None
         # Tasks may share a session; its stream is one task's at a time.
         self._turn = asyncio.Lock()

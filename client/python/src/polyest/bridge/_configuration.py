@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pathlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Optional, Union
 
+from polyest import _strict_json
 from polyest._table import refuse
 from polyest.bridge._fields import Fields
 from polyest.errors import InvalidInput
@@ -139,7 +139,7 @@ def _parse(name: str) -> Any:
     try:
         text = pathlib.Path(name).read_text(encoding="utf-8")
         if name.endswith(".json"):
-            return json.loads(text)
+            return _strict_json.loads(text)
         return _toml().loads(text)
     except OSError as error:
         raise InvalidInput(f"{name}: cannot be opened: {error.strerror}") from error

@@ -87,7 +87,7 @@ def _unit(quantity: str, path: Path, schema: Any, channel: Any) -> str:
 
 def _open(file: File) -> IO[bytes]:
     try:
-        return open(file, "rb")
+        return open(os.fspath(file), "rb")
     except OSError as error:
         raise InvalidInput(f"{os.fspath(file)}: cannot be opened: {error.strerror}") from error
 
