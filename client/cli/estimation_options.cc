@@ -1,12 +1,23 @@
 // Adds the commands that estimate from measurements and those that study an estimate.
 
+#include <charconv>
 #include <memory>
+#include <string>
 
 #include "client/cli/command_registry.h"
 #include "client/cli/shared_options.h"
 
 namespace polyest::internal {
 namespace {
+
+// One point spans no axis, which a range from 0 would allow.
+std::string CheckGridPoints(const std::string& text) {
+  int points = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), points);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  if (whole && (points == 0 || (points >= 2 && points <= 1001))) return "";
+  return text + " must be 0 or 2 to 1001";
+}
 
 void AddEstimate(CommandRegistry& registry) {
   const auto arguments = std::make_shared<EstimateArguments>();
@@ -206,8 +217,9 @@ void AddCost(CommandRegistry& registry) {
       ->take_all();
   command
       .add_option("--grid", arguments->grid_points,
-                  "Points per axis (default: 201 for one parameter, 41 for two)")
-      ->check(CLI::Range(0, 1001));
+                  "Points per axis: 0 (default) or 2 to 1001; 0 stands for 201 with one parameter "
+                  "and for 41 with two")
+      ->check(CLI::Validator(CheckGridPoints, ""));
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"json", "csv"});
 }

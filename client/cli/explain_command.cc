@@ -40,6 +40,11 @@ std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
       return absl::StrFormat("%s is %s: %s, %.*f times narrower than your prior.", p.name(),
                              verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
     case v1::Identifiability::WEAK:
+      if (p.contraction() < kHelps) {
+        return absl::StrFormat(
+            "%s is %s: %s, %.*f times narrower than your prior, but a warning puts that in doubt.",
+            p.name(), verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
+      }
       return absl::StrFormat("%s is %s: %s; the data add little to your prior, %s%s.", p.name(),
                              verdict, value, FormatUncertain(p.prior_mean(), p.prior_std_dev()),
                              unit);

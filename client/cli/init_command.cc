@@ -1,7 +1,10 @@
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
@@ -9,6 +12,7 @@
 #include "client/cli/proposed_columns.h"
 #include "client/cli/starting_problem.h"
 #include "client/cli/text_table.h"
+#include "client/cpp/data/cells.h"
 #include "core/common/status.h"
 #include "polyest/catalogue.h"
 
@@ -37,17 +41,29 @@ absl::StatusOr<std::string> Text(const InitArguments& arguments, std::ostream& e
   return Write(model->description(), fmu ? "fmu" : "umbridge", arguments, err);
 }
 
+absl::Status NoModel(const RecordedColumns& recorded, const std::string& file) {
+  std::vector<std::string> headers;
+  for (const ColumnName& column : recorded.names) headers.push_back(QuoteCell(column.header));
+  return absl::InvalidArgumentError(absl::StrCat(
+      file, ": no model fits these columns: ",
+      headers.empty() ? "there is none besides the time" : absl::StrJoin(headers, ", "),
+      "; a column fits by the name of an output, or by a unit that only one output has"));
+}
+
 // Lists the models with outputs that the columns of the data file may be.
 absl::Status ListModels(const InitArguments& arguments, std::ostream& out) {
   POLYEST_ASSIGN_OR_RETURN(const RecordedColumns recorded,
                            ReadColumns(arguments.data_file, arguments.data_options));
   TextTable table({"model", "columns"});
+  bool any = false;
   for (const auto& model : BuiltinModels()) {
     const ProposedColumns proposed = ProposeColumns(model->description(), recorded);
     if (!CheckProposal(model->description(), recorded, proposed, arguments.data_file).ok())
       continue;
+    any = true;
     table.AddRow({model->description().name, Describe(recorded, proposed)});
   }
+  if (!any) return NoModel(recorded, arguments.data_file);
   table.Print(out);
   return absl::OkStatus();
 }

@@ -15,6 +15,7 @@
 #include "client/cpp/data/column_units.h"
 #include "client/cpp/data/header.h"
 #include "client/cpp/data/text_lines.h"
+#include "client/cpp/file_kind.h"
 #include "core/common/status.h"
 #include "core/model/unit_conversion.h"
 
@@ -84,6 +85,7 @@ void ProposeByUnit(const std::vector<Quantity>& quantities, const RecordedColumn
 
 absl::StatusOr<RecordedColumns> ReadColumns(const std::string& file,
                                             const DataFileOptions& options) {
+  POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(file));
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     return absl::InvalidArgumentError(

@@ -2,7 +2,6 @@
 #include <absl/time/clock.h>
 #include <absl/time/time.h>
 
-#include <fstream>
 #include <utility>
 
 #include "client/cli/backend.h"
@@ -10,6 +9,7 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/report_page.h"
+#include "client/plot/output_file.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
@@ -54,15 +54,8 @@ absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent
   return absl::OkStatus();
 }
 
-absl::Status Write(const std::string& file, const std::string& page) {
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << page;
-  stream.close();
-  if (stream) return absl::OkStatus();
-  return absl::UnknownError(absl::StrCat("--output: cannot write ", file));
-}
-
 absl::Status MakeReport(const ReportArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckOutputFile("--output", arguments.output_file));
   // Any of the requests has the subject.
   v1::ComputeEstimateRequest input;
   POLYEST_RETURN_IF_ERROR(FillInput(arguments, input));
@@ -76,7 +69,7 @@ absl::Status MakeReport(const ReportArguments& arguments) {
   const auto backend = MakeBackend(arguments.place);
   const absl::Status computed = Compute(input.subject(), *backend, content);
   if (!computed.ok()) return InInput(computed, arguments);
-  return Write(arguments.output_file, ReportPage(content));
+  return WriteOutputFile("--output", arguments.output_file, ReportPage(content));
 }
 
 }  // namespace

@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <cstring>
 
+#include "client/cpp/file_kind.h"
+#include "core/common/status.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -45,6 +48,7 @@ absl::Status SessionFileWriter::Finish() {
 
 absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     const std::string& file) {
+  POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(file));
   std::unique_ptr<SessionFileReader> reader(new SessionFileReader(file));
   if (!reader->in_) {
     return absl::InvalidArgumentError(

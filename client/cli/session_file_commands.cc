@@ -33,7 +33,10 @@ absl::StatusOr<int64_t> Export(const ExportArguments& arguments) {
 absl::StatusOr<v1::Session> Import(const ImportArguments& arguments) {
   POLYEST_ASSIGN_OR_RETURN(const auto reader, SessionFileReader::Open(arguments.file));
   Client client(arguments.place.server, ToClientOptions(arguments.place));
-  return client.ImportSession(arguments.session, [&] { return reader->Read(); });
+  auto session = client.ImportSession(arguments.session, [&] { return reader->Read(); });
+  if (!absl::IsAlreadyExists(session.status())) return session;
+  return absl::AlreadyExistsError(
+      absl::StrCat(session.status().message(), "; --session NAME imports it under another name"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -22,6 +23,7 @@
 #include "client/cli/progress_line.h"
 #include "client/cli/stream_progress.h"
 #include "client/cli/stream_session.h"
+#include "client/cpp/file_kind.h"
 #include "core/common/status.h"
 #include "polyest/client.h"
 #include "polyest/data_file.h"
@@ -86,6 +88,7 @@ class StreamCommand {
     ProgressLine line([this] { return progress_.Describe(); });
     line_ = &line;
     if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
+    POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(arguments_.data_file));
     const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {
       return absl::InvalidArgumentError(
@@ -107,20 +110,24 @@ class StreamCommand {
     std::istream in(&input);
     DataFileOptions options = arguments_.data_options;
     options.any_order = arguments_.reorder_window_s > 0;
+    // A session that is resumed may already have the runs before. The daemon checks them.
+    options.any_first_run = !arguments_.session.empty();
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem_, arguments_.place, options));
     auto reader = DataReader::Open(in, name, columns);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());
-    // The first batch is read before the session is created, so that an invalid file creates none.
-    auto first = reader->Read(arguments_.batch_rows);
+    // The first batch is read before the session is created, so that a file without any valid row
+    // creates none.
+    v1::Measurements first;
+    const absl::Status read = reader->Read(arguments_.batch_rows, first);
     if (interrupted()) return std::nullopt;
-    POLYEST_RETURN_IF_ERROR(first.status());
+    if (first.time_s().empty()) POLYEST_RETURN_IF_ERROR(read);
     line_->Interject([&] { TellOfDataFile(reader->Found()); });
     auto session = WaitForSession();
     if (!session.ok() && interrupted()) return std::nullopt;
     if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);
-    auto last = Send(*session, *reader, *std::move(first));
+    auto last = Send(*session, *reader, std::move(first), read);
     if (!last.ok()) return InFile(last.status(), arguments_.problem_file, name);
     return last;
   }
@@ -142,7 +149,9 @@ class StreamCommand {
     return session;
   }
 
-  LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch) {
+  // Sends `batch`, with which reading has ended with the status `read`, and all rows after it.
+  LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch,
+                    absl::Status read) {
     MeasurementStreamOptions options;
     options.wait = [this](std::chrono::milliseconds delay) {
       interrupt_.WaitUntil(std::chrono::steady_clock::now() + delay);
@@ -154,24 +163,23 @@ class StreamCommand {
       line_->Interject([&] { err_ << "streaming to " << session.name << std::endl; });
     }
     Pace pace(arguments_.rate, interrupt_);
-    int64_t skipped = 0;
-    bool any_sent = false;
+    int64_t skipped = 0, sent = 0;
     while (batch.time_s_size() > 0) {
       progress_.AddRows(batch.time_s_size());
       if (session.resumed_after) skipped += RemoveRowsUpTo(*session.resumed_after, batch);
-      if (batch.time_s_size() > 0) {
-        if (!any_sent) TellOfResumption(session, skipped);
+      if (const int rows = batch.time_s_size(); rows > 0) {
+        if (sent == 0) TellOfResumption(session, skipped);
         pace.Wait(batch);
         POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
-        any_sent = true;
+        sent += rows;
       }
-      if (interrupted()) break;
-      auto next = reader.Read(arguments_.batch_rows);
+      if (interrupted() || !read.ok()) break;
+      read = reader.Read(arguments_.batch_rows, batch);
       if (interrupted()) break;  // the rows read may end within a row
-      POLYEST_ASSIGN_OR_RETURN(batch, std::move(next));
     }
-    if (!any_sent) TellOfResumption(session, skipped);
-    if (EndsRun() && any_sent && !interrupted()) {
+    if (sent == 0) TellOfResumption(session, skipped);
+    if (!read.ok() && !interrupted()) return EndAtBadLine(session, stream, read, sent);
+    if (EndsRun() && sent > 0 && !interrupted()) {
       v1::Measurements end;
       end.set_end_of_run(true);
       POLYEST_RETURN_IF_ERROR(stream.Send(std::move(end)));
@@ -179,12 +187,36 @@ class StreamCommand {
     return stream.Finish();
   }
 
-  // Reports that a session is resumed, once the number of rows is known that it has already.
+  // Waits until the session has the rows before a line that was refused with `read`, and returns
+  // that error with their number. The run goes on: the line may be corrected.
+  absl::Status EndAtBadLine(const StreamSession& session, MeasurementStream& stream,
+                            const absl::Status& read, int64_t sent) {
+    const absl::Status kept = stream.Finish().status();
+    if (!kept.ok()) {
+      Tell(read.message());
+      return kept;
+    }
+    if (sent == 0) return read;
+    return absl::Status(
+        read.code(),
+        absl::StrCat(read.message(), "; ", session.name, " has kept ",
+                     sent == 1 ? "the row" : absl::StrCat("the ", sent, " rows"), " sent before"));
+  }
+
+  // Reports that a session is resumed, once the number of rows is known that it does not take.
   void TellOfResumption(const StreamSession& session, int64_t skipped) {
     if (!session.resumed_after) return;
+    const RowPlace& last = *session.resumed_after;
+    if (skipped == 0) {
+      Tell(absl::StrFormat("resumed %s after t = %g s of run %d", session.name, last.time_s,
+                           last.run));
+      return;
+    }
     Tell(absl::StrFormat(
-        "resumed %s after t = %g s of run %d; %d rows were already there and have been skipped",
-        session.name, session.resumed_after->time_s, session.resumed_after->run, skipped));
+        "resumed %s; %s not later than t = %g s of run %d, up to which the session has its data, "
+        "and %s skipped; rows of another record need a column run with the next number, %d",
+        session.name, skipped == 1 ? "1 row is" : absl::StrCat(skipped, " rows are"), last.time_s,
+        last.run, skipped == 1 ? "was" : "were", last.run + 1));
   }
 
   // Returns whether the stream must end the run, because the last rows of a streamed input would
@@ -212,7 +244,7 @@ class StreamCommand {
     };
   }
 
-  void Tell(const std::string& sentence) {
+  void Tell(absl::string_view sentence) {
     line_->Interject([&] { err_ << "polyest: " << sentence << std::endl; });
   }
 

@@ -12,6 +12,7 @@
 #include "client/cli/exit_status.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_line.h"
+#include "core/common/status.h"
 #include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
@@ -35,6 +36,16 @@ class CancelOnInterrupt {
   std::jthread thread_;
 };
 
+// Refuses a session whose first sample has not arrived: nobody knows when there is an estimate.
+absl::Status CheckHasSamples(Client& client, const std::string& session) {
+  v1::GetSessionRequest get;
+  get.set_name(session);
+  POLYEST_ASSIGN_OR_RETURN(const v1::Session found, client.GetSession(get));
+  if (found.sample_count() > 0) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat(session, " has no estimate yet: no sample has arrived"));
+}
+
 }  // namespace
 
 int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream& err) {
@@ -42,6 +53,10 @@ int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream&
   Client client(arguments.place.server, ToClientOptions(arguments.place));
   v1::WatchSessionRequest request;
   request.set_session(absl::StrCat("sessions/", arguments.session));
+  if (arguments.once) {
+    const absl::Status checked = CheckHasSamples(client, request.session());
+    if (!checked.ok()) return Report(checked, arguments.place.server, err);
+  }
   std::optional<v1::Estimate> last;
   grpc::ClientContext call;
   absl::Status status;

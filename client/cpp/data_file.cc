@@ -18,6 +18,7 @@
 #include "client/cpp/data/header.h"
 #include "client/cpp/data/row_parser.h"
 #include "client/cpp/data/text_lines.h"
+#include "client/cpp/file_kind.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/model/equations/parser.h"
@@ -70,7 +71,7 @@ class DataReader::Reader {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused);
+  absl::Status Read(int64_t max_rows, v1::Measurements& batch, RefusedLine refused);
 
   std::string Found() const {
     if (!rows_) return "";
@@ -145,8 +146,9 @@ void DataReader::Reader::AddRow(v1::Measurements& batch) {
   if (has_run_) batch.add_run(rows_->clock().run());
 }
 
-absl::StatusOr<v1::Measurements> DataReader::Reader::Read(int64_t max_rows, RefusedLine refused) {
-  v1::Measurements batch;
+absl::Status DataReader::Reader::Read(int64_t max_rows, v1::Measurements& batch,
+                                      RefusedLine refused) {
+  batch.Clear();
   absl::string_view line;
   while (batch.time_s_size() < max_rows) {
     POLYEST_ASSIGN_OR_RETURN(bool found, NextLine(line));
@@ -165,7 +167,7 @@ absl::StatusOr<v1::Measurements> DataReader::Reader::Read(int64_t max_rows, Refu
     return absl::InvalidArgumentError(
         absl::StrCat(lines_.name(), ": has no rows below its header"));
   }
-  return batch;
+  return absl::OkStatus();
 }
 
 DataReader::DataReader(std::unique_ptr<Reader> reader) : reader_(std::move(reader)) {}
@@ -181,14 +183,22 @@ absl::StatusOr<DataReader> DataReader::Open(std::istream& in, std::string name,
 }
 
 absl::StatusOr<v1::Measurements> DataReader::Read(int64_t max_rows, RefusedLine refused) {
+  v1::Measurements batch;
+  POLYEST_RETURN_IF_ERROR(Read(max_rows, batch, refused));
+  return batch;
+}
+
+absl::Status DataReader::Read(int64_t max_rows, v1::Measurements& batch, RefusedLine refused) {
   POLYEST_CHECK(max_rows > 0);
-  return reader_->Read(std::min<int64_t>(max_rows, std::numeric_limits<int32_t>::max()), refused);
+  return reader_->Read(std::min<int64_t>(max_rows, std::numeric_limits<int32_t>::max()), batch,
+                       refused);
 }
 
 std::string DataReader::Found() const { return reader_->Found(); }
 
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
                                               RefusedLine refused, std::string* found) {
+  POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(path));
   std::ifstream in(path, std::ios::binary);
   if (!in) {
     return absl::InvalidArgumentError(

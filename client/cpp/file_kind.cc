@@ -1,8 +1,10 @@
 #include "client/cpp/file_kind.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
+#include <filesystem>
 #include <fstream>
 
 namespace polyest::internal {
@@ -29,6 +31,12 @@ FileKind KindOfFile(const std::string& path) {
   in.read(text.data(), kMaxBeginning);
   text.resize(static_cast<size_t>(in.gcount()));
   return KindOfText(text);
+}
+
+absl::Status CheckIsNoFolder(const std::string& path) {
+  std::error_code unknown;
+  if (!std::filesystem::is_directory(path, unknown)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(path, ": is a folder, not a file"));
 }
 
 }  // namespace polyest::internal

@@ -3,6 +3,7 @@
 // Tells problem files from data files by their beginning, so that a message can say that one was
 // given for the other.
 
+#include <absl/status/status.h>
 #include <absl/strings/string_view.h>
 
 #include <string>
@@ -18,5 +19,9 @@ FileKind KindOfText(absl::string_view text);
 
 // Returns the kind of a file by its first 4 KiB; kUnknown if it cannot be read.
 FileKind KindOfFile(const std::string& path);
+
+// Refuses a folder with INVALID_ARGUMENT: opening one succeeds, and reading it fails without a
+// reason.
+absl::Status CheckIsNoFolder(const std::string& path);
 
 }  // namespace polyest::internal

@@ -4,6 +4,7 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/strip.h>
 #include <google/protobuf/util/json_util.h>
 
 #include <array>
@@ -15,6 +16,7 @@
 #include "client/cpp/file_kind.h"
 #include "core/common/status.h"
 #include "proto/wire/json/json_error.h"
+#include "proto/wire/json/json_structure.h"
 #include "proto/wire/json/unknown_fields.h"
 #include "proto/wire/transport/automatic_order.h"
 
@@ -26,8 +28,7 @@ namespace {
 
 constexpr size_t kMaxFileBytes = size_t{16} << 20;
 
-absl::Status ParseError(absl::string_view json, absl::string_view name, absl::string_view message) {
-  const JsonError error = DescribeJsonError(json, message);
+absl::Status InFile(absl::string_view name, const JsonError& error) {
   if (error.line == 0) return absl::InvalidArgumentError(absl::StrCat(name, ": ", error.what));
   return absl::InvalidArgumentError(absl::StrCat(name, ":", error.line, ": ", error.what));
 }
@@ -51,10 +52,13 @@ absl::Status UnknownFieldsError(absl::string_view name, const std::vector<Unknow
 }  // namespace
 
 absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_view name) {
+  // Some editors write the mark of UTF-8, which protobuf's parser does not know.
+  absl::ConsumePrefix(&json, "\xEF\xBB\xBF");
   if (absl::StripAsciiWhitespace(json).empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": is empty; it must hold one JSON object, the problem"));
   }
+  if (const auto error = CheckJsonStructure(json)) return InFile(name, *error);
   v1::Problem problem;
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
@@ -67,10 +71,11 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
   }
   const auto unknown = FindUnknownFields(json, *v1::Problem::descriptor());
   if (!unknown.empty()) return UnknownFieldsError(name, unknown);
-  return ParseError(json, name, {status.message().data(), status.message().size()});
+  return InFile(name, DescribeJsonError(json, {status.message().data(), status.message().size()}));
 }
 
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path) {
+  POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(path));
   std::ifstream in(path, std::ios::binary);
   if (!in) {
     return absl::InvalidArgumentError(

@@ -10,8 +10,8 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "client/plot/output_file.h"
 #include "core/common/status.h"
 
 extern char** environ;
@@ -21,14 +21,6 @@ namespace {
 
 constexpr char kConverter[] = "rsvg-convert";
 constexpr char kZoom[] = "2";  // pixels of the PNG for each of the SVG: sharp on paper, too
-
-absl::Status WriteText(const std::string& file, const std::string& text) {
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << text;
-  stream.close();
-  if (stream) return absl::OkStatus();
-  return absl::UnknownError(absl::StrCat("--plot: cannot write ", file));
-}
 
 // Runs rsvg-convert, without a shell.
 absl::Status Convert(std::string svg, std::string png) {
@@ -59,7 +51,7 @@ absl::Status WritePng(const std::string& text, const std::string& file) {
     return absl::UnknownError(absl::StrCat("--plot: cannot write ", svg, ": ", strerror(errno)));
   }
   close(descriptor);
-  absl::Status written = WriteText(svg, text);
+  absl::Status written = WriteOutputFile("--plot", svg, text);
   if (written.ok()) written = Convert(svg, file);
   unlink(svg.c_str());
   return written;
@@ -68,18 +60,19 @@ absl::Status WritePng(const std::string& text, const std::string& file) {
 }  // namespace
 
 absl::Status CheckPlotFile(const std::string& file) {
-  if (file.empty() || absl::EndsWithIgnoreCase(file, ".svg") ||
-      absl::EndsWithIgnoreCase(file, ".png")) {
-    return absl::OkStatus();
+  if (file.empty()) return absl::OkStatus();
+  if (!absl::EndsWithIgnoreCase(file, ".svg") && !absl::EndsWithIgnoreCase(file, ".png")) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--plot: \"", file, "\" must end in .svg or .png"));
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("--plot: \"", file, "\" must end in .svg or .png"));
+  return CheckOutputFile("--plot", file);
 }
 
 absl::Status WritePlot(const Plot& plot, const std::string& file) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(file));
   const std::string text = RenderSvg(plot);
-  return absl::EndsWithIgnoreCase(file, ".png") ? WritePng(text, file) : WriteText(file, text);
+  return absl::EndsWithIgnoreCase(file, ".png") ? WritePng(text, file)
+                                                : WriteOutputFile("--plot", file, text);
 }
 
 }  // namespace polyest::internal

@@ -13,8 +13,9 @@ namespace polyest::internal {
 // FAILED_PRECONDITION if there is no such program, UNKNOWN if the file cannot be written.
 absl::Status WritePlot(const Plot& plot, const std::string& file);
 
-// Returns OK, or the error of WritePlot for a name of that ending, so that it can be known before
-// anything is computed. An empty name is OK: no plot is asked for.
+// Returns OK, or the error of WritePlot for a name of that ending or for a file that cannot be
+// written, so that it can be known before anything is computed. An empty name is OK: no plot is
+// asked for.
 absl::Status CheckPlotFile(const std::string& file);
 
 }  // namespace polyest::internal

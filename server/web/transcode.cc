@@ -12,6 +12,7 @@
 #include "core/common/check.h"
 #include "proto/wire/json/json_error.h"
 #include "proto/wire/json/json_format.h"
+#include "proto/wire/json/json_structure.h"
 #include "proto/wire/json/unknown_fields.h"
 #include "proto/wire/transport/automatic_order.h"
 
@@ -38,6 +39,11 @@ rpc::Status Invalid(const std::string& message) {
   return status;
 }
 
+rpc::Status InBody(const JsonError& error) {
+  if (error.line == 0) return Invalid(error.what);
+  return Invalid(absl::StrCat("line ", error.line, " of the body: ", error.what));
+}
+
 rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
   rpc::BadRequest details;
   std::string message;
@@ -61,6 +67,7 @@ rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
 rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descriptor& type,
                          std::string& bytes) {
   if (absl::StripAsciiWhitespace(json).empty()) return {};
+  if (const auto error = CheckJsonStructure(json)) return InBody(*error);
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
   const auto read = google::protobuf::util::JsonToBinaryString(
@@ -70,9 +77,7 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
   std::vector<UnknownField> unknown;
   if (json.size() <= kMaxSearched) unknown = FindUnknownFields(json, type);
   if (!unknown.empty()) return UnknownFields(unknown);
-  const JsonError error = DescribeJsonError(json, {read.message().data(), read.message().size()});
-  if (error.line == 0) return Invalid(error.what);
-  return Invalid(absl::StrCat("line ", error.line, " of the body: ", error.what));
+  return InBody(DescribeJsonError(json, {read.message().data(), read.message().size()}));
 }
 
 std::string ToJsonText(const std::string& bytes, const google::protobuf::Descriptor& type) {

@@ -195,10 +195,23 @@ class Mapping {
     const std::string& option = known_.options.time_column;
     const std::string wanted = option.empty() ? Source("t") : option;
     const std::string first = columns_.front().name.header;
+    if (columns_.size() == 1 && known_.options.delimiter != 0) {
+      return Error(absl::StrCat("the file has one column with the delimiter ",
+                                QuoteCell(std::string(1, known_.options.delimiter)),
+                                " that --delimiter names: ", QuoteCell(first),
+                                "; without the option, the delimiter is found out"));
+    }
     if (columns_.size() == 1 && first.find(' ') != first.npos) {
       return Error(absl::StrCat("the first line must name the columns, but ", QuoteCell(first),
                                 " is one cell: cells are separated by commas, semicolons, tabs or "
                                 "|, not by blanks"));
+    }
+    for (const DataColumn& column : columns_) {
+      const bool named = column.name.header == wanted || column.name.name == wanted;
+      if (wanted.empty() || !named || column.quantity.empty()) continue;
+      return Error(absl::StrCat("the column ", QuoteCell(wanted),
+                                " cannot be the time, since it is ", column.quantity,
+                                " of the problem; the file's columns are ", Headers(columns_)));
     }
     return Error(absl::StrCat(
         wanted.empty() ? "no column is the time t"

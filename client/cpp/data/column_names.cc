@@ -22,13 +22,16 @@ constexpr absl::string_view kTimeNames[] = {
 
 constexpr absl::string_view kTimeEndings[] = {"_s", "_ms", "_us", "_ns", "_min"};
 
-// Parts "name open unit close".
+// Parts "name open unit close", and "name / open unit close" as ISO 80000 writes a unit that is a
+// fraction itself: "v / (m/s)".
 bool PartBrackets(absl::string_view header, char open, char close, ColumnName& column) {
   if (header.empty() || header.back() != close) return false;
   const size_t begin = header.rfind(open);
   if (begin == absl::string_view::npos) return false;
   column.unit = std::string(StripCell(header.substr(begin + 1, header.size() - begin - 2)));
-  column.name = std::string(StripCell(header.substr(0, begin)));
+  absl::string_view name = StripCell(header.substr(0, begin));
+  if (absl::ConsumeSuffix(&name, "/")) name = StripCell(name);
+  column.name = std::string(name);
   return !column.name.empty();
 }
 

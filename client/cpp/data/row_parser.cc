@@ -40,6 +40,7 @@ RowParser::RowParser(std::vector<DataColumn> columns, char delimiter,
       time_column_(TimeColumnOf(columns_)),
       delimiter_(delimiter),
       lines_(lines),
+      any_first_run_(options.any_first_run),
       decimal_known_(options.decimal != 0),
       clock_(options, time_column_) {
   if (decimal_known_) style_ = {options.decimal, true};
@@ -234,7 +235,7 @@ absl::Status RowParser::ParseRun(const DataColumn& column, absl::string_view cel
   if (error != std::errc() || end != text.data() + text.size() || run < 0) {
     return CellError(column, absl::StrCat(QuoteCell(text), " must be a whole number ≥ 0"));
   }
-  if (clock_.rows() == 0 && run != 0) {
+  if (clock_.rows() == 0 && run != 0 && !any_first_run_) {
     return CellError(column, absl::StrCat("the first row's run is ", run, ", it must be 0"));
   }
   if (run < clock_.run()) {

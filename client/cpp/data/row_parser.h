@@ -68,6 +68,7 @@ class RowParser {
   const DataColumn& time_column_;
   const char delimiter_;
   const TextLines& lines_;
+  const bool any_first_run_;
   NumberStyle style_;
   bool decimal_known_;
   std::string with_points_;    // the line with decimal points in place of commas

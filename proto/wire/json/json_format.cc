@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/common/check.h"
+#include "proto/wire/json/json_structure.h"
 
 namespace polyest::internal {
 namespace {
@@ -135,6 +136,9 @@ std::string ToJson(const google::protobuf::Message& message, bool several_lines)
 }
 
 absl::Status FromJson(const std::string& json, google::protobuf::Message& message) {
+  if (const auto error = CheckJsonStructure(json)) {
+    return absl::InvalidArgumentError(absl::StrCat("line ", error->line, ": ", error->what));
+  }
   const JsonType type(message);
   std::string bytes;
   const auto read =

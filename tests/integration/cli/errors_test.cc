@@ -121,6 +121,38 @@ TEST_F(ErrorsTest, FilesThatAreNotThere) {
               HasSubstr("/nowhere/p.json: cannot be opened"));
 }
 
+// The problem is not there either: the file to write is tried first.
+TEST_F(ErrorsTest, FilesThatCannotBeWrittenBeforeAnythingIsRead) {
+  for (const char* const command : {"estimate", "fit", "posterior", "profile", "regularization"}) {
+    EXPECT_EQ(OneLine(Run({command, "p.json", "d.csv", "--plot", "/nowhere/plot.svg"}), 1),
+              "polyest: --plot: cannot write /nowhere/plot.svg: No such file or directory\n")
+        << command;
+  }
+  EXPECT_EQ(OneLine(Run({"report", "p.json", "d.csv", "-o", "/nowhere/r.html"}), 1),
+            "polyest: --output: cannot write /nowhere/r.html: No such file or directory\n");
+  EXPECT_EQ(OneLine(Run({"report", "p.json", "d.csv", "-o", folder_}), 1),
+            "polyest: --output: cannot write " + folder_.string() + ": Is a directory\n");
+  const std::string problem = File("p.json", kProblem);
+  EXPECT_EQ(OneLine(Run({"report", problem, File("d.csv", kData), "-o", "/dev/full"}), 1),
+            "polyest: --output: cannot write /dev/full: No space left on device\n");
+}
+
+TEST_F(ErrorsTest, FoldersInPlaceOfFiles) {
+  const std::string problem = File("p.json", kProblem);
+  const std::string data = File("d.csv", kData);
+  const std::string folder = folder_;
+  const std::string refusal = "polyest: " + folder + ": is a folder, not a file\n";
+  EXPECT_EQ(OneLine(Run({"estimate", problem, folder}), 2), refusal);
+  EXPECT_EQ(OneLine(Run({"estimate", folder, data}), 2), refusal);
+  EXPECT_EQ(OneLine(Run({"stream", problem, folder, "--server", "a:1"}), 2), refusal);
+  EXPECT_EQ(OneLine(Run({"init", "--from", folder}), 2), refusal);
+}
+
+TEST_F(ErrorsTest, ColumnsThatFitNoModel) {
+  EXPECT_THAT(OneLine(Run({"init", "--from", File("d.csv", "t,foo,bar [kg]\n0,1,2\n")}), 2),
+              HasSubstr("d.csv: no model fits these columns: \"foo\", \"bar [kg]\"; "));
+}
+
 TEST_F(ErrorsTest, TheDaemonSaysTheSame) {
   DaemonProcess daemon;
   const std::string problem = File("p.json", Changed("\"lower\": 31.584", "\"lower\": 50"));
@@ -234,7 +266,9 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
   EXPECT_THAT(OneLine(Run({"sensitivity", Example("damper_rig.json"), "--until", "1"}), 2),
               HasSubstr("correlations: m and k1"));
   const std::string streamed = Example("quarter_car.json");
-  EXPECT_THAT(OneLine(Run({"design", streamed, "--until", "1"}), 2), HasSubstr("road is streamed"));
+  EXPECT_THAT(OneLine(Run({"design", streamed, "--until", "1"}), 2),
+              HasSubstr("inputs: road is streamed, but this study needs inputs that are known in "
+                        "advance; replace its \"streamed\" by a \"table\""));
   const std::string other = File("other.json", R"({"inputs": [{"name": "wind"}]})");
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "1", "--candidate", other}), 2),
               HasSubstr("polyest: " + other + ": inputs[0]"));
@@ -281,7 +315,9 @@ TEST_F(ErrorsTest, BadUsage) {
   OneLine(Run({"propagate", problem, "--until", "1"}), 2);
   OneLine(Run({"propagate", problem, "--until", "1", "--step", "0"}), 2);
   OneLine(Run({"propagate", problem, "--until", "nan", "--step", "1"}), 2);
-  EXPECT_THAT(OneLine(Run({"cost", problem, data, "--grid", "1"}), 2), HasSubstr("1"));
+  EXPECT_THAT(OneLine(Run({"cost", problem, data, "--grid", "1"}), 2),
+              HasSubstr("--grid: 1 must be 0 or 2 to 1001"));
+  EXPECT_THAT(Run({"cost", "--help"}).out, HasSubstr("0 (default) or 2 to 1001"));
 }
 
 }  // namespace

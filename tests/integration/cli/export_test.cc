@@ -73,7 +73,11 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
            Case{{"import", File("csv", "t,x\n0,1\n")},
                 2,
                 "is not a session file written by polyest export"},
-           Case{{"import", file}, 2, "there is a session \"sessions/monday\" already"},
+           Case{{"import", file},
+                2,
+                "there is a session \"sessions/monday\" already; --session NAME imports it under "
+                "another name"},
+           Case{{"import", "/"}, 2, "/: is a folder, not a file"},
            Case{{"import", file, "--session", "A"}, 2, "must be 1 to 63 of a-z"},
            Case{{"import", File("cut", whole.substr(0, whole.size() - 9)), "--session", "b"},
                 2,

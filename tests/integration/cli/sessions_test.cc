@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "polyest/client.h"
+#include "polyest/problem_file.h"
 #include "polyest/v1/session_service.pb.h"
 #include "tests/integration/cli/command_test.h"
 
@@ -72,6 +74,20 @@ TEST_F(SessionsTest, AreWatchedForTheirPresentEstimate) {
             Lines(stream.out).back() + "\n");
   const Finished table = Ask({"watch", "rig", "--once"});
   EXPECT_THAT(table.out, StartsWith("60 samples up to t = "));
+}
+
+TEST_F(SessionsTest, HaveNoPresentEstimateBeforeTheFirstSample) {
+  Client client(daemon_.address());
+  const auto problem = ReadProblemFile(Example("oscillator.json"));
+  ASSERT_TRUE(problem.ok()) << problem.status();
+  v1::CreateSessionRequest create;
+  *create.mutable_session()->mutable_problem() = *problem;
+  create.set_session_id("rig");
+  ASSERT_TRUE(client.CreateSession(create).ok());
+  const Finished watch = Ask({"watch", "rig", "--once"});
+  EXPECT_EQ(watch.exit_status, 2);
+  EXPECT_EQ(watch.out, "");
+  EXPECT_EQ(watch.err, "polyest: sessions/rig has no estimate yet: no sample has arrived\n");
 }
 
 TEST_F(SessionsTest, EndTheirWatchWhenTheyAreDeleted) {

@@ -108,7 +108,11 @@ TEST_F(StreamTest, ResumesASessionWhereItEnded) {
   const Finished second =
       Run(Command(File("d.csv", DemoRows(100)), {"--format", "jsonl", "--session", "rig-1"}));
   ASSERT_EQ(second.exit_status, 0) << second.err;
-  EXPECT_THAT(second.err, HasSubstr("resumed sessions/rig-1 after t = 2.25 s of run 0; 45 rows"));
+  EXPECT_EQ(
+      second.err,
+      "polyest: resumed sessions/rig-1; 45 rows are not later than t = 2.25 s of run 0, up to "
+      "which the session has its data, and were skipped; rows of another record need a column "
+      "run with the next number, 1\n");
   ExpectSame(LastEstimate(second.out), EstimateOf(100));
 }
 
@@ -126,16 +130,30 @@ TEST_F(StreamTest, SaysThatItResumesASessionBeforeTheDataEnd) {
   process.CloseInput();
   process.ReadAll();
   EXPECT_EQ(process.Wait(), 0) << process.Errors();
-  EXPECT_EQ(process.Errors(),
-            "polyest: resumed sessions/rig-1 after t = 2.25 s of run 0; 45 rows were already there "
-            "and have been skipped\n");
+  EXPECT_EQ(
+      process.Errors(),
+      "polyest: resumed sessions/rig-1; 45 rows are not later than t = 2.25 s of run 0, up to "
+      "which the session has its data, and were skipped; rows of another record need a column "
+      "run with the next number, 1\n");
 }
 
-TEST_F(StreamTest, SaysThatAllRowsWereThereAlready) {
+TEST_F(StreamTest, SaysThatNoRowIsLaterThanThoseOfTheSession) {
   const std::string data = File("d.csv", DemoRows(45));
   ASSERT_EQ(Run(Command(data, {"--session", "rig-1"})).exit_status, 0);
   EXPECT_THAT(Run(Command(data, {"--session", "rig-1"})).err,
-              HasSubstr("; 45 rows were already there"));
+              HasSubstr("; 45 rows are not later than t = 2.25 s of run 0, up to which"));
+}
+
+TEST_F(StreamTest, TakesAnotherRecordAsTheNextRun) {
+  ASSERT_EQ(Run(Command(File("d.csv", DemoRows(45)), {"--session", "rig-1"})).exit_status, 0);
+  const std::string second = File("second.csv", "t,run,x\n0,1,1\n0.05,1,0.9\n");
+  const Finished run = Run(Command(second, {"--session", "rig-1", "--format", "jsonl"}));
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_EQ(run.err, "polyest: resumed sessions/rig-1 after t = 2.25 s of run 0\n");
+  EXPECT_EQ(LastEstimate(run.out).samples(), 47);
+  const Finished fresh = Run(Command(second, {"--session", "rig-2"}));
+  EXPECT_EQ(fresh.exit_status, 2);
+  EXPECT_THAT(fresh.err, HasSubstr("runs start at 0 and never decrease"));
 }
 
 // Exchanges each row with its neighbour, which is 0.05 s from it.
@@ -193,10 +211,32 @@ TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
   EXPECT_EQ(process.Wait(), 0) << process.Errors();
 }
 
-TEST_F(StreamTest, StopsAtABadRowAndSaysWhich) {
-  const Finished run = Run(Command("-", {}), DemoRows(35) + "1,2,3\n");
+TEST_F(StreamTest, KeepsTheRowsBeforeABadOneAndSaysWhichItIs) {
+  const Finished run = Run(Command("-", {"--session", "rig-1", "--format", "jsonl"}),
+                           DemoRows(35) + "1,2,3\n" + "1.8,0\n");
   EXPECT_EQ(run.exit_status, 2);
   EXPECT_THAT(run.err, HasSubstr("standard input:37: the row has 3 cells, the header has 2"));
+  EXPECT_THAT(run.err, HasSubstr("; sessions/rig-1 has kept the 35 rows sent before\n"));
+  EXPECT_EQ(LastEstimate(run.out).samples(), 35);
+  // The corrected record goes on there.
+  const Finished second =
+      Run(Command("-", {"--session", "rig-1", "--format", "jsonl"}), DemoRows(60));
+  ASSERT_EQ(second.exit_status, 0) << second.err;
+  EXPECT_THAT(second.err, HasSubstr("; 35 rows are not later than"));
+  ExpectSame(LastEstimate(second.out), EstimateOf(60));
+}
+
+TEST_F(StreamTest, KeepsTheRowsBeforeABadOneInItsFirstBatchToo) {
+  const Finished run = Run(Command("-", {"--session", "rig-1"}), DemoRows(1) + "0.05,many\n");
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("standard input:3: column x: \"many\" must be a number; "
+                                 "sessions/rig-1 has kept the row sent before"));
+}
+
+TEST_F(StreamTest, CreatesNoSessionForDataWithoutAnyValidRow) {
+  const Finished run = Run(Command("-", {"--session", "rig-1"}), "t,x\n0,many\n");
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(Run({"list", "--server", daemon_.address()}).out, testing::Not(HasSubstr("rig-1")));
 }
 
 TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {

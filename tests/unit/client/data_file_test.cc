@@ -105,6 +105,27 @@ TEST(DataReader, ChecksTimesFromOneBatchToTheNext) {
             "data.csv:4: column t: 1 must be later than 1 of the row before");
 }
 
+TEST(DataReader, KeepsTheRowsBeforeARefusedLine) {
+  std::istringstream in("t,x\n0,1\n1,2\n2,many\n3,4\n");
+  auto reader = DataReader::Open(in, "data.csv", kMeasuredOnly);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  v1::Measurements batch;
+  EXPECT_EQ(reader->Read(10, batch).message(), "data.csv:4: column x: \"many\" must be a number");
+  EXPECT_THAT(batch.time_s(), ElementsAre(0, 1));
+  EXPECT_THAT(batch.channels(0).values(), ElementsAre(1, 2));
+}
+
+TEST(DataReader, MayBeginWithALaterRun) {
+  DataColumns columns = kMeasuredOnly;
+  columns.options.any_first_run = true;
+  std::istringstream in("t,run,x\n0,2,1\n1,2,2\n");
+  auto reader = DataReader::Open(in, "data.csv", columns);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  const auto batch = reader->Read(10);
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  EXPECT_THAT(batch->run(), ElementsAre(2, 2));
+}
+
 TEST(DataReader, RefusesTextAndSaysWhere) {
   EXPECT_EQ(ErrorOf("t,x\n0,1\n1,abc\n"), "data.csv:3: column x: \"abc\" must be a number");
   EXPECT_EQ(ErrorOf("t,x\n0,1.5m\n"), "data.csv:2: column x: \"1.5m\" must be a number");

@@ -34,6 +34,18 @@ const ReadCase kColumnCases[] = {
      "'F (kN)' → F, kN → N; 1 row from 0 s"},
     {"UnitBehindSlash", "t / s,x / mm\n0,12\n", "t=0 x=0.012",
      "'t / s' is t; 'x / mm' → x, mm → m; 1 row from 0 s"},
+    {"FractionInParenthesesBehindSlash", "t / (s),v / (m/s),w / (U/min)\n0,12,60\n",
+     "t=0 v=12 w=6.28319",
+     "'t / (s)' is t; 'v / (m/s)' → v; 'w / (U/min)' → w, U/min → rad/s; 1 row from 0 s",
+     [](DataColumns& c) {
+       c.measured = {"v", "w"};
+       c.units = {{"v", "m/s"}, {"w", "rad/s"}};
+     }},
+    {"FractionInBracketsBehindSlash", "t,x / [1/min]\n0,60\n", "t=0 x=6.28319",
+     "'x / [1/min]' → x, 1/min → rad/s; 1 row from 0 s",
+     [](DataColumns& c) { c.units["x"] = "rad/s"; }},
+    {"NestedParenthesesBehindSlash", "t,x / (J/(kg K))\n0,3\n", "t=0 x=3",
+     "'x / (J/(kg K))' → x; 1 row from 0 s", [](DataColumns& c) { c.units["x"] = "J/(kg K)"; }},
     {"SameUnit", "t,x [m]\n0,12\n", "t=0 x=12", "'x [m]' → x; 1 row from 0 s"},
     {"UnitsRow", "t;x;F\ns;mm;kN\n0;12;1\n", "t=0 x=0.012 F=1000",
      "semicolons; units in line 2; 'x', mm → m; 'F', kN → N; 1 row from 0 s"},

@@ -102,13 +102,30 @@ TEST(ParseProblem, RefusesWhatIsNoObject) {
 }
 
 TEST(ParseProblem, RefusesDeepNestingWithoutFallingOver) {
-  EXPECT_THAT(ErrorOf(std::string(100'000, '[')), StartsWith("problem.json"));
+  const std::string deep(100'000, '[');
+  EXPECT_EQ(ErrorOf(deep), "problem.json:1: brackets are nested more than 100 deep");
+  EXPECT_EQ(ErrorOf("{\"fixed\":\n{\"kt\":" + deep),
+            "problem.json:2: brackets are nested more than 100 deep");
+}
+
+TEST(ParseProblem, RefusesAFieldThatIsGivenTwice) {
+  EXPECT_EQ(ErrorOf("{\"fixed\": {\"m\": 1},\n \"fixed\": {\"c\": 2}}"),
+            "problem.json:2: fixed: given twice");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "uniform": {"lower": 500, "lower": 600}}]})"),
+            "problem.json:1: uncertain[0].uniform.lower: given twice");
+}
+
+TEST(ParseProblem, LeavesOutTheMarkOfUtf8) {
+  EXPECT_TRUE(ParseProblem("\xEF\xBB\xBF{\"fixed\": {\"m\": 1}}", "problem.json").ok());
+  EXPECT_EQ(ErrorOf("\xEF\xBB\xBF\n{\"fixed\" 1}"),
+            "problem.json:2: Expected : between key:value pair.");
+  EXPECT_THAT(ErrorOf("\xEF\xBB\xBF"), HasSubstr("is empty"));
 }
 
 TEST(ReadProblemFile, NamesAFileThatCannotBeOpened) {
   EXPECT_EQ(ReadProblemFile("/nowhere/p.json").status().message(),
             "/nowhere/p.json: cannot be opened: No such file or directory");
-  EXPECT_EQ(ReadProblemFile("/").status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ReadProblemFile("/").status().message(), "/: is a folder, not a file");
 }
 
 }  // namespace

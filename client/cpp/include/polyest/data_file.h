@@ -8,7 +8,8 @@
 //   delimiter     , ; tab or |, by the header
 //   header        the first line that names the time and a quantity; lines above it are left out.
 //                 The last line of comments may be the header
-//   units         in the header, "Disp [mm]", "Disp (mm)" or "Disp / mm", or in a row below it
+//   units         in the header, "Disp [mm]", "Disp (mm)", "Disp / mm" or "v / (m/s)", or in a
+//                 row below it
 //   columns       a quantity's column has its name, or its name before a unit, or is named by
 //                 `DataColumns::sources`; the time is t, time, Zeit, timestamp, … Other columns are
 //                 left out. `run` (0, 1, 2 …) begins a new run at each change
@@ -55,6 +56,7 @@ struct DataFileOptions {
   DateOrder date_order = DateOrder::kAutomatic;  // the order in all dates
   std::string time_column;                       // header of the time; empty: found out
   bool any_order = false;                        // whether a run's rows may be in any order of time
+  bool any_first_run = false;  // whether the first row's run may be another than 0
 };
 
 // Where a quantity is in a file, as in Problem.columns. Empty fields are found out.
@@ -111,6 +113,10 @@ class DataReader {
   // time that does not increase within its run, a run that decreases, a row with too few or too
   // many cells, and data without any row.
   absl::StatusOr<v1::Measurements> Read(int64_t max_rows, RefusedLine refused = StopAtRefusedLine);
+
+  // As above, into `batch`, which has the rows before the refused line also after an error.
+  absl::Status Read(int64_t max_rows, v1::Measurements& batch,
+                    RefusedLine refused = StopAtRefusedLine);
 
   // Returns what has been found out so far, in one line: "data.csv: semicolons, decimal comma;
   // 'Disp [mm]' → x, mm → m; 600 rows from 0 s". Empty for a file that has commas, decimal points

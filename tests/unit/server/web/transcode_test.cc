@@ -74,9 +74,20 @@ TEST(Transcode, RefusesValuesOfTheWrongTypeAndTextThatIsNoObject) {
                            "{\"name\": \"\xff\"}", R"({"name": "a", "name": )", "{}{}"}) {
     EXPECT_EQ(Read<v1::GetSessionRequest>(json).code(), grpc::StatusCode::INVALID_ARGUMENT) << json;
   }
+}
+
+TEST(Transcode, RefusesDeepNestingAtOnce) {
   const std::string deep(100'000, '[');
-  EXPECT_EQ(Read<v1::GetSessionRequest>("{\"name\": " + deep).code(),
-            grpc::StatusCode::INVALID_ARGUMENT);
+  const rpc::Status status =
+      Read<v1::CreateSessionRequest>(R"({"session": {"problem": {"fixed": {"kt": )" + deep);
+  EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.message(), "line 1 of the body: brackets are nested more than 100 deep");
+}
+
+TEST(Transcode, RefusesAFieldThatIsGivenTwice) {
+  const rpc::Status status = Read<v1::GetSessionRequest>("{\"name\": \"a\",\n\"name\": \"b\"}");
+  EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.message(), "line 2 of the body: name: given twice");
 }
 
 TEST(Transcode, WritesWhatTheCommandWrites) {

@@ -331,8 +331,8 @@ TEST(ToProblem, TakesDrift) {
   EXPECT_EQ(ToProblem(given)->prior().Names().back(), name + ".drift");
   walk.set_upper(0.1);
   EXPECT_EQ(ToProblem(given).status().message(),
-            "uncertain[0].drift.randomWalk.lower: 0.1 must be above 0 and below upper 0.1, which "
-            "must be finite");
+            "uncertain[0].drift.randomWalk.lower: 0.1 must be above 0 and below upper 0.1; both "
+            "must lie between 1e-50 and 1e+50, and upper be at most 1e+20 times lower");
   given.mutable_uncertain(0)->mutable_drift()->Clear();
   EXPECT_THAT(std::string(ToProblem(given).status().message()),
               StartsWith("uncertain[0].drift: needs a kind"));
