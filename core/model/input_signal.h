@@ -15,8 +15,8 @@ namespace polyest::internal {
 
 class InputSignal {
  public:
-  // Makes the signal. Returns InvalidArgument that names the field as in a problem file, the value
-  // and the rule: "sinusoid: frequencyHz 0 must be finite and above 0".
+  // Makes the signal. Returns InvalidArgument that names the field, the value and the rule:
+  // "sinusoid: frequency_hz 0 must be finite and above 0".
   static absl::StatusOr<InputSignal> Make(InputSpecification specification);
 
   // Returns the amplitude of the specification.

@@ -19,11 +19,12 @@ struct Spelling {
 
 // Spellings in files of measurements that are not units of their own.
 constexpr Spelling kSpellings[] = {
-    {"-", "1"},       {"sec", "s"},      {"secs", "s"},        {"second", "s"},
-    {"seconds", "s"}, {"Sekunden", "s"}, {"msec", "ms"},       {"milliseconds", "ms"},
-    {"usec", "us"},   {"degree", "deg"}, {"degrees", "deg"},   {"Grad", "deg"},
-    {"U/min", "rpm"}, {"kph", "km/h"},   {"deg/sec", "deg/s"}, {"Grad/s", "deg/s"},
-    {"Nm", "N m"},    {"kNm", "kN m"},   {"Nmm", "N mm"},      {"Ns/m", "N s/m"},
+    {"-", "1"},       {"sec", "s"},       {"secs", "s"},        {"second", "s"},
+    {"seconds", "s"}, {"Sekunden", "s"},  {"msec", "ms"},       {"milliseconds", "ms"},
+    {"usec", "us"},   {"degree", "deg"},  {"degrees", "deg"},   {"Grad", "deg"},
+    {"U/min", "rpm"}, {"kph", "km/h"},    {"deg/sec", "deg/s"}, {"Grad/s", "deg/s"},
+    {"s-1", "1/s"},   {"min-1", "1/min"}, {"s⁻¹", "1/s"},       {"min⁻¹", "1/min"},
+    {"Nm", "N m"},    {"kNm", "kN m"},    {"Nmm", "N mm"},      {"Ns/m", "N s/m"},
 };
 
 // Spellings of accelerations in standard gravity, which are masses otherwise.
@@ -56,6 +57,19 @@ bool HasAny(std::string_view text, std::initializer_list<std::string_view> symbo
 bool CountsCycles(std::string_view unit) { return HasAny(unit, {"Hz"}); }
 bool CountsAngles(std::string_view unit) { return HasAny(unit, {"rad", "deg", "°", "rpm"}); }
 
+// Whether a unit is a number per time, 1/s or 1/min, which does not say what it counts.
+bool IsBareRate(std::string_view text, const Unit& unit) {
+  return SameDimension(unit, *ParseUnit("1/s")) && !CountsCycles(text) && !CountsAngles(text);
+}
+
+bool IsAngularVelocity(std::string_view text, const Unit& unit) {
+  return SameDimension(unit, *ParseUnit("1/s")) && CountsAngles(text);
+}
+
+bool IsPerMinute(std::string_view text, const Unit& unit) {
+  return IsBareRate(text, unit) && SameUnit(unit, *ParseUnit("1/min"));
+}
+
 UnitConversion ByScale(double scale) {
   constexpr double kRounding = 1e-12;
   const double inverse = 1 / scale;
@@ -78,7 +92,7 @@ absl::StatusOr<UnitConversion> ConvertUnit(std::string_view recorded, std::strin
   const std::string_view model_text = UnitOf(model);
   POLYEST_ASSIGN_OR_RETURN(const Unit to, ParseUnit(model_text));
   const std::string_view text = UnitOf(WithGravity(recorded, to));
-  POLYEST_ASSIGN_OR_RETURN(const Unit from, ParseUnit(text));
+  POLYEST_ASSIGN_OR_RETURN(Unit from, ParseUnit(text));
   const auto differ = [&](std::string_view why) {
     return absl::InvalidArgumentError(absl::StrFormat("values in %s cannot be converted to %s: %s",
                                                       equations::Quoted(recorded),
@@ -87,6 +101,11 @@ absl::StatusOr<UnitConversion> ConvertUnit(std::string_view recorded, std::strin
   if (!SameDimension(from, to)) return differ("their dimensions differ");
   if ((CountsCycles(text) && CountsAngles(model_text)) ||
       (CountsAngles(text) && CountsCycles(model_text))) {
+    return differ("one counts cycles, the other angles");
+  }
+  // Test rigs write speeds of rotation in 1/min, which are turns; none writes radians per minute.
+  if (IsAngularVelocity(model_text, to) && IsPerMinute(text, from)) from = *ParseUnit("rpm");
+  if (IsPerMinute(model_text, to) && IsAngularVelocity(text, from)) {
     return differ("one counts cycles, the other angles");
   }
   return ByScale(from.scale / to.scale);

@@ -3,8 +3,8 @@
 // Converts recorded values into a model's unit.
 //
 // A recorded unit is written as in core/model/units.h, or as files of measurements write it: "-"
-// for a plain number, "sec", "Grad", "U/min"; "g" is standard gravity where the model has an
-// acceleration.
+// for a plain number, "sec", "Grad", "U/min", "min-1"; "g" is standard gravity where the model has
+// an acceleration, and "1/min" is rpm where the model has an angular velocity.
 
 #include <absl/status/statusor.h>
 

@@ -75,5 +75,32 @@ TEST(UnitConversion, RefusesCyclesForAngles) {
   EXPECT_DOUBLE_EQ(Converted(2, "kHz", "Hz"), 2000);
 }
 
+TEST(UnitConversion, ReadsTurnsPerMinuteWhereTheModelHasAnAngularVelocity) {
+  for (const char* const turns : {"1/min", "min-1", "min^-1", "min⁻¹", "1 / min", "U/min", "rpm"}) {
+    EXPECT_TRUE(CheckRecordedUnit(turns).ok()) << turns;
+    EXPECT_DOUBLE_EQ(Converted(60, turns, "rad/s"), 2 * std::numbers::pi) << turns;
+    EXPECT_DOUBLE_EQ(Converted(1, turns, "deg/s"), 6) << turns;
+    EXPECT_DOUBLE_EQ(Converted(1, turns, "rpm"), 1) << turns;
+  }
+}
+
+TEST(UnitConversion, ReadsRatesWhereTheModelHasARate) {
+  for (const char* const rate : {"1/min", "min-1", "min^-1"}) {
+    EXPECT_DOUBLE_EQ(Converted(60, rate, "1/s"), 1) << rate;
+    EXPECT_DOUBLE_EQ(Converted(60, rate, "Hz"), 1) << rate;
+    EXPECT_DOUBLE_EQ(Converted(3, rate, "1/min"), 3) << rate;
+  }
+  EXPECT_DOUBLE_EQ(Converted(2, "s-1", "1/s"), 2);
+  EXPECT_DOUBLE_EQ(Converted(2, "rad/s", "1/s"), 2);
+}
+
+// The SI leaves the radian out.
+TEST(UnitConversion, ReadsRatesPerSecondAsAngularVelocities) {
+  EXPECT_DOUBLE_EQ(Converted(2, "1/s", "rad/s"), 2);
+  EXPECT_DOUBLE_EQ(Converted(2, "1/s^2", "rad/s^2"), 2);
+  EXPECT_DOUBLE_EQ(Converted(2, "N m s", "N m s/rad"), 2);
+  EXPECT_THAT(Refusal("rpm", "1/min"), HasSubstr("one counts cycles, the other angles"));
+}
+
 }  // namespace
 }  // namespace polyest::internal
