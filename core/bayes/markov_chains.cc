@@ -47,8 +47,8 @@ class ChainRunner {
       if (effective >= options_.effective_size || done >= options_.max_sweeps) break;
       // The number of sweeps rises in proportion to the missing effective size, and a little more.
       const double more = 1.1 * done * (options_.effective_size / effective - 1);
-      sweeps = done + static_cast<int>(std::clamp(more, static_cast<double>(kFirstSweeps),
-                                                  static_cast<double>(options_.max_sweeps - done)));
+      const double left = options_.max_sweeps - done;
+      sweeps = done + static_cast<int>(std::min(left, std::max<double>(more, kFirstSweeps)));
     }
     result_.etas = etas_.topRows(times_ * chains_);
     result_.costs = costs_.head(times_ * chains_);

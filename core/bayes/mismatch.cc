@@ -30,10 +30,15 @@ double LagCorrelation(double a, double d) {
 
 Likelihood Evaluate(double n, double chi_squared, double differences, bool scale_unknown,
                     bool correlation_unknown) {
-  const double a = std::max(chi_squared, n * kMinMeanSquare);
-  const double d = differences;
   Likelihood l;
   if (n <= 0) return l;
+  if (!scale_unknown && !correlation_unknown) {
+    l.value = 0.5 * chi_squared;  // below 0 where it stands for χ² + Σ log(S_k/R_k)
+    l.by_a = 0.5;
+    return l;
+  }
+  const double a = std::max(chi_squared, n * kMinMeanSquare);
+  const double d = differences;
   if (scale_unknown) {
     // ½ N (1 + log(A/N))
     l.value = 0.5 * n * (1 + std::log(a / n));
@@ -117,7 +122,9 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
     }
     known_.Add(channel.samples);
     if (channel.log_variance.size() > 0) {
-      known_.AddLinear(channel.log_variance, channel.log_variance_at_reference);
+      if (log_variance_.size() == 0) log_variance_.setZero(known_.terms());
+      log_variance_ += channel.log_variance;
+      log_variance_at_reference_ += channel.log_variance_at_reference;
     }
   }
   known_.Complete();
@@ -125,6 +132,7 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
 
 double Mismatch::Evaluate(const ConstVectorRef& d) const {
   double value = known_.ChiSquared(d) / 2;
+  if (log_variance_.size() > 0) value += log_variance_.dot(d) + log_variance_at_reference_;
   for (const ChannelSums& channel : other_) {
     const double differences = channel.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
     value += polyest::internal::Evaluate(channel, channel.samples.ChiSquared(d), differences).value;
@@ -136,6 +144,10 @@ double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradien
   // The gradient of a χ² is 2 (G d − b).
   double value = known_.ChiSquaredWithGradient(d, gradient) / 2;
   gradient /= 2;
+  if (log_variance_.size() > 0) {
+    value += log_variance_.dot(d) + log_variance_at_reference_;
+    gradient += log_variance_;
+  }
   Vector by_samples(d.size()), by_differences(d.size());
   for (const ChannelSums& channel : other_) {
     const double a = channel.samples.ChiSquaredWithGradient(d, by_samples);
@@ -195,6 +207,10 @@ void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
   if (known_.count() > 0) {
     factors.known.front().ChiSquaredMany(differences, product, values);
     values /= 2;
+  }
+  if (log_variance_.size() > 0) {
+    values.noalias() += differences * log_variance_;
+    values.array() += log_variance_at_reference_;
   }
   thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
   a.resize(values.size());

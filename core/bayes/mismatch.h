@@ -30,7 +30,8 @@
 namespace polyest::internal {
 
 // Returns −log of the likelihood of one channel as above; +∞ if χ² is +∞. `degrees` is N or the
-// degrees of freedom in its place; `differences` is Σ (u_k − u_{k−1})².
+// degrees of freedom in its place; `differences` is Σ (u_k − u_{k−1})². For a channel with known
+// noise `chi_squared` may include Σ log(S_k/R_k), with which it may be below 0.
 double NegativeLogLikelihood(double degrees, double chi_squared, double differences,
                              bool scale_unknown, bool correlation_unknown);
 
@@ -82,7 +83,10 @@ class Mismatch {
   struct Factors;
   const Factors& FactorsOnce() const;
 
-  MismatchSums known_;                // of all channels with known noise
+  MismatchSums known_;  // of all channels with known noise
+  // Their ½ Σ log(S_k/R_k) = lᵀd + lᵀφ_0, which may be below 0: l (S; empty if it is 0), and lᵀφ_0.
+  Vector log_variance_;
+  double log_variance_at_reference_ = 0;
   std::vector<ChannelSums> other_;    // the rest
   int64_t count_ = 0;                 // of samples, over all channels
   std::shared_ptr<Factors> factors_;  // of all sums, for many points; shared by copies

@@ -86,13 +86,6 @@ void MismatchSums::Add(const MismatchSums& other) {
   count_ += other.count_;
 }
 
-void MismatchSums::AddLinear(const ConstVectorRef& coefficients, double at_reference) {
-  POLYEST_CHECK(coefficients.size() == b_.size());
-  // ½ (… − 2 bᵀd + w) + lᵀd + lᵀφ_0
-  b_ -= coefficients;
-  w_ += 2 * at_reference;
-}
-
 MismatchSums MismatchSums::Substituted(const ConstMatrixRef& t, const ConstVectorRef& shift,
                                        double variance) const {
   POLYEST_CHECK(t.cols() == b_.size() && shift.size() == b_.size() && variance > 0);

@@ -39,8 +39,6 @@ class MismatchSums {
   // operations. The first call allocates memory for the samples that wait, later ones none.
   void Add(const ConstVectorRef& coefficients, double error, double variance);
   void Add(const MismatchSums& other);
-  // Adds lᵀφ = lᵀd + lᵀφ_0 to J_mismatch: `coefficients` = l (S), `at_reference` = lᵀφ_0.
-  void AddLinear(const ConstVectorRef& coefficients, double at_reference);
   // Returns the sums by other terms φ′ with φ ≈ Tᵀφ′, about a reference φ′_0: with d = Tᵀd′ + δ,
   //   G′ = T G Tᵀ,   b′ = T (b − G δ),   w′ = w − 2 bᵀδ + δᵀG δ,
   // all divided by `variance`, a factor of the noise's variance. `t` is S′ × S, `shift` = δ (S).

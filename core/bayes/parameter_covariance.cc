@@ -1,5 +1,6 @@
 #include "core/bayes/parameter_covariance.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/chaos/gauss_rule.h"
@@ -9,6 +10,9 @@ namespace {
 
 constexpr int kTerms = 40;  // (3.03²)^40/40! of the widest lognormal is 10⁻⁹
 constexpr int kNodes = 64;
+// The widest spread of a logarithm, far beyond that of any lognormal prior. A log-uniform one of a
+// hundred powers of ten may have more, and e to the square of it would not be a number.
+constexpr double kWidestLogarithm = 6;
 
 // The polynomials h_1 … h_kTerms at the nodes, √(k+1) h_{k+1} = u h_k − √k h_{k−1}, times the
 // weights: kTerms × kNodes.
@@ -45,9 +49,10 @@ Vector Coefficients(const Prior& prior, int i, double z, double s) {
     coefficients[0] = spread;
     return coefficients;
   }
-  double coefficient = parameter.ToParameter(z) * std::exp(0.5 * spread * spread);
+  const double bounded = std::min(spread, kWidestLogarithm);
+  double coefficient = parameter.ToParameter(z) * std::exp(0.5 * bounded * bounded);
   for (int k = 1; k <= kTerms; ++k) {
-    coefficient *= spread / std::sqrt(k);
+    coefficient *= bounded / std::sqrt(k);
     coefficients[k - 1] = coefficient;
   }
   return coefficients;

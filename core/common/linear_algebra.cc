@@ -7,7 +7,8 @@ namespace polyest::internal {
 CholeskyFactor::CholeskyFactor(const Matrix& matrix) {
   const Eigen::LLT<Matrix> factor(matrix);
   packed_ = factor.matrixLLT();
-  positive_definite_ = factor.info() == Eigen::Success;
+  // What is no number passes Eigen's test.
+  positive_definite_ = factor.info() == Eigen::Success && packed_.diagonal().allFinite();
 }
 
 Matrix CholeskyFactor::Lower() const { return packed_.triangularView<Eigen::Lower>(); }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/common/check.h"
@@ -11,6 +12,7 @@
 #include "core/common/status.h"
 #include "core/propagation/ensemble_blocks.h"
 #include "core/propagation/linear_system.h"
+#include "core/propagation/output_limit.h"
 #include "core/propagation/trajectory_block.h"
 
 namespace polyest {
@@ -131,6 +133,7 @@ EnsemblePropagator::EnsemblePropagator(EnsembleSpecification specification,
   const bool streamed = std::ranges::any_of(*inputs, &InputSignal::streamed);
   const double ahead_s = streamed ? specification.inputs_ahead_s : kInfinity;
   ensemble_ = StartEnsemble(std::move(specification), inputs);
+  UpdateFailures();
   if (delays_s.size() == 0) return;
   auto delayed = std::make_unique<DelayedOutputs>(std::move(ensemble_), std::move(delays_s),
                                                   tolerance, ahead_s);
@@ -148,12 +151,46 @@ absl::Status EnsemblePropagator::Advance(std::span<const double> times_s, Matrix
     if (output_gains_.size() > 0) y *= output_gains_.col(column % m).array();
     if (output_offsets_.size() > 0) y += output_offsets_.col(column % m).array();
   }
+  if (output_gains_.size() > 0 || output_offsets_.size() > 0) FailBeyondLimit(times_s, outputs);
+  UpdateFailures();
   if (delayed_ == nullptr) return absl::OkStatus();
   delay_errors_ = delayed_->errors();
   for (Eigen::Index column = 0; output_gains_.size() > 0 && column < outputs.cols(); ++column) {
     delay_errors_[column] *= output_gains_.col(column % m).cwiseAbs().maxCoeff();
   }
   return absl::OkStatus();
+}
+
+// The ensemble has seen to the limit before the gains and offsets; they may exceed it, too.
+void EnsemblePropagator::FailBeyondLimit(std::span<const double> times_s, MatrixRef outputs) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (const PointFailure& failure : beyond_) outputs.row(failure.point).setConstant(kNaN);
+  const Eigen::Index m = times_s.empty() ? 1 : outputs.cols() / std::ssize(times_s);
+  for (Eigen::Index column = 0; column < outputs.cols(); ++column) {
+    for (Eigen::Index point = 0; point < outputs.rows(); ++point) {
+      const double y = outputs(point, column);
+      if (std::isnan(y) || std::abs(y) <= kMaxOutput) continue;
+      PointFailure& failure = beyond_.emplace_back();
+      failure.point = static_cast<int>(point);
+      failure.time_s = times_s[static_cast<size_t>(column / m)];
+      failure.reason = "an output, with its gain and offset, exceeds 1e100 in magnitude";
+      outputs.row(point).tail(outputs.cols() - column / m * m).setConstant(kNaN);
+    }
+  }
+}
+
+void EnsemblePropagator::UpdateFailures() {
+  const std::vector<PointFailure>& others = ensemble_->failures();
+  if (failures_.size() == others.size() + beyond_.size()) return;
+  failures_ = others;
+  failures_.insert(failures_.end(), beyond_.begin(), beyond_.end());
+}
+
+bool EnsemblePropagator::Restore(const EnsembleState& state) {
+  const bool restored = ensemble_->Restore(state);
+  beyond_.clear();
+  failures_ = ensemble_->failures();
+  return restored;
 }
 
 }  // namespace polyest::internal

@@ -33,20 +33,25 @@ class EnsemblePropagator final : public TrajectoryEnsemble {
   int points() const override { return ensemble_->points(); }
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,
                        const Stop& stop) override;
-  const std::vector<PointFailure>& failures() const override { return ensemble_->failures(); }
+  const std::vector<PointFailure>& failures() const override { return failures_; }
   std::optional<EnsembleState> State() const override { return ensemble_->State(); }
-  bool Restore(const EnsembleState& state) override { return ensemble_->Restore(state); }
+  bool Restore(const EnsembleState& state) override;
 
   // Returns, for outputs with delays, the largest error of any point, by column of the last
   // Advance, that is due to their interpolation (delayed_outputs.h); empty without delays.
   const Vector& delay_errors() const { return delay_errors_; }
 
  private:
+  void FailBeyondLimit(std::span<const double> times_s, MatrixRef outputs);
+  void UpdateFailures();
+
   Matrix output_gains_;    // Q × m, or empty
   Matrix output_offsets_;  // Q × m, or empty
   std::unique_ptr<TrajectoryEnsemble> ensemble_;
   DelayedOutputs* delayed_ = nullptr;  // `ensemble_`, if outputs have delays
   Vector delay_errors_;
+  std::vector<PointFailure> beyond_;    // points whose gain or offset takes an output too far
+  std::vector<PointFailure> failures_;  // those of the ensemble, then these
 };
 
 }  // namespace polyest::internal

@@ -7,6 +7,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/propagation/block_rows.h"
+#include "core/propagation/output_limit.h"
 
 namespace polyest::internal {
 namespace {
@@ -204,6 +205,16 @@ void FilterBlock::SelectOutput(int channel) {
   }
   if (specification_.output_offsets.size() > 0) {
     outputs_ += specification_.output_offsets.col(channel).array();
+  }
+  for (Eigen::Index i = 0; i < outputs_.size(); ++i) {
+    if (std::abs(outputs_[i]) <= kMaxOutput) continue;
+    const int member = static_cast<int>(i) % member_count();
+    if (alive_[static_cast<size_t>(member)]) {
+      block_.LeaveOut(PointsOf(member),
+                      "an output, with its gain and offset, exceeds 1e100 in magnitude");
+      NoteFailures();
+    }
+    outputs_[i] = 0;  // so that the filter of a member that has failed remains finite
   }
 }
 

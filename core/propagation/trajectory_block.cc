@@ -155,13 +155,13 @@ absl::Status TrajectoryBlock::AdvanceStates(double time_s, const Stop& stop) {
 
 absl::Status TrajectoryBlock::Reach(double time_s, double stop_time_s, const Stop& stop) {
   const int max_steps = specification_->integration.max_steps;
-  const int steps_at_once = std::min(kStepsAtOnce, max_steps);
   int steps = 0;
   while (integrator_) {
+    const int steps_at_once = std::min(kStepsAtOnce, max_steps - steps);
     const IntegratorOutcome outcome =
         integrator_->AdvanceTo(time_s, stop_time_s, steps_at_once, states_);
     steps += steps_at_once;
-    const bool may_go_on = outcome.too_many_steps && steps + steps_at_once <= max_steps;
+    const bool may_go_on = outcome.too_many_steps && steps < max_steps;
     const bool change = MayChangeMethod() && (outcome.ok || outcome.too_many_steps) &&
                         (integrator_->LooksStiff() || !(outcome.ok || may_go_on));
     if (!change && outcome.ok) break;

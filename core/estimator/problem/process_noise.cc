@@ -50,8 +50,14 @@ Size SizeOf(const RandomWalk& walk) {
   return {"std_dev_per_sqrt_s", walk.std_dev_per_sqrt_s, walk.unknown, walk.lower, walk.upper};
 }
 
+// Over more powers of ten no expansion follows the model.
+constexpr double kLeastBound = 1e-50, kGreatestBound = 1e50, kGreatestRatio = 1e20;
+constexpr double kLeastRatio = 1 + 1e-6;
+
 bool AreBounds(const Size& size) {
-  return size.lower > 0 && size.lower < size.upper && std::isfinite(size.upper);
+  const double ratio = size.upper / size.lower;
+  return size.lower >= kLeastBound && size.upper <= kGreatestBound && ratio >= kLeastRatio &&
+         ratio <= kGreatestRatio;
 }
 
 absl::Status CheckSize(const FieldPath& path, const Size& size) {
@@ -73,9 +79,11 @@ absl::Status CheckSize(const FieldPath& path, const Size& size) {
                                         size.value));
   }
   if (AreBounds(size)) return absl::OkStatus();
-  return InvalidField(field("lower"), absl::StrFormat("%g must be above 0 and below upper %g, "
-                                                      "which must be finite",
-                                                      size.lower, size.upper));
+  return InvalidField(
+      field("lower"),
+      absl::StrFormat("%g must be above 0 and below upper %g; both must lie between %g and %g, and "
+                      "upper be at most %g times lower",
+                      size.lower, size.upper, kLeastBound, kGreatestBound, kGreatestRatio));
 }
 
 std::vector<absl::Status> CheckEach(const Problem& problem) {

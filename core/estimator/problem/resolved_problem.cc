@@ -26,6 +26,8 @@
 namespace polyest::internal {
 namespace {
 
+constexpr double kGreatestFixed = 1e100;  // as of the numbers of a prior
+
 absl::Status UnknownName(const FieldPath& field, std::string_view name, std::string_view kind,
                          const ModelDescription& model, std::string_view known) {
   return InvalidField(field, absl::StrFormat("model %s has no %s \"%s\"; it has %s", model.name,
@@ -262,7 +264,9 @@ void ResolvedProblem::Resolver::ResolveFixed() {
     const FieldPath field{"fixed", FieldStep::Key(name)};
     const auto index = Find(field, name);
     if (!index) continue;
-    if (!std::isfinite(value)) Refuse(field, "%g must be finite", value);
+    if (!(std::abs(value) <= kGreatestFixed)) {
+      Refuse(field, "%g must be finite and at most %g in magnitude", value, kGreatestFixed);
+    }
     ResolveDelay(field, settable_[*index], value, value);
     resolved_.base_[*index] = value;
   }

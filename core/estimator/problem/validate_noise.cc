@@ -11,6 +11,10 @@
 namespace polyest::internal {
 namespace {
 
+// The limits between which the squares of outputs, in units of the noise, are finite numbers
+// (propagation/output_limit.h).
+constexpr double kLeastNoise = 1e-50, kGreatestNoise = 1e50;
+
 absl::Status ValidateCorrelation(int index, const NoiseModel& noise) {
   const auto field = [index](const char* name) {
     return FieldPath{"measured", index, "noise", "correlation", name};
@@ -46,6 +50,10 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
       return InvalidField({"measured", index, "noise", field},
                           absl::StrFormat("%g must be a finite number ≥ 0", value));
     }
+    if (value == 0 || (value >= kLeastNoise && value <= kGreatestNoise)) continue;
+    return InvalidField({"measured", index, "noise", field},
+                        absl::StrFormat("%g must be 0 or lie between %g and %g", value, kLeastNoise,
+                                        kGreatestNoise));
   }
   POLYEST_RETURN_IF_ERROR(ValidateCorrelation(index, noise));
   if (noise.full_scale > 0 && noise.relative_to_max == 0) {

@@ -219,8 +219,7 @@ absl::Status SampleChecks::CheckColumns(const Samples& samples) const {
     return Refusal("time_s", "the measurements have no rows");
   }
   if (!samples.run.empty() && samples.run.size() != samples.rows()) {
-    return InvalidField(
-        "run", absl::StrFormat("%d values for %d rows", samples.run.size(), samples.rows()));
+    return Refusal("run", "run: %d values for %d rows", samples.run.size(), samples.rows());
   }
   std::set<std::string> seen;
   for (const SampleColumn& column : samples.columns) {

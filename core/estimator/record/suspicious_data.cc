@@ -4,7 +4,12 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/estimator/problem/settable_quantities.h"
 
 namespace polyest::internal {
 namespace {
@@ -140,6 +145,7 @@ class Warnings {
   void AddNoise(const MeasuredOutput& measured, const ColumnFacts& column) {
     if (measured.noise.unknown || column.samples < 3 || column.smallest == column.largest) return;
     const std::string& name = measured.output;
+    if (IsNoiseSet(name)) return;
     const double chi_squared = column.square_sum / (column.min_noise * column.min_noise);
     if (ProbabilityOfLess(chi_squared, static_cast<double>(column.samples - 1)) < kUnlikely) {
       Add("%s: its noise of %g is larger than the spread of its samples, %g; check its size and "
@@ -159,6 +165,14 @@ class Warnings {
           name, column.min_noise);
     }
     AddRunningMaximum(measured, column);
+  }
+
+  // Whether the noise of an output is a fixed or an uncertain parameter and not what is stated.
+  bool IsNoiseSet(const std::string& output) const {
+    const std::string name = NoiseName(output);
+    const std::vector<std::string> uncertain = problem_.prior().Names();
+    return problem_.problem().fixed.contains(name) ||
+           std::ranges::find(uncertain, name) != uncertain.end();
   }
 
   // Noise relative to the largest value so far is small during rest, and rises with the signal.

@@ -18,9 +18,11 @@ namespace polyest {
 
 // A value of the cost; plain numbers without unit.
 struct CostValue {
-  double mismatch = 0;  // J_mismatch ≥ 0
-  double prior = 0;     // J_prior, not yet weighted; +∞ outside the prior's support
-  double total = 0;     // mismatch + α² prior
+  // J_mismatch; ≥ 0 with noise of known size, of any sign where its size is a parameter or is
+  // marginalized, since a logarithm of it is then part of the likelihood.
+  double mismatch = 0;
+  double prior = 0;  // J_prior, not yet weighted; +∞ outside the prior's support
+  double total = 0;  // mismatch + α² prior
 };
 
 // How well the data determine a parameter or a direction.

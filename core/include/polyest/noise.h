@@ -37,6 +37,7 @@ enum class OutlierHandling {
 // soon as there is one, unless the noise is correlated. If the size of the noise is unknown, a
 // factor of σ is estimated; without numbers σ is then 1.
 struct NoiseModel {
+  // None of the parts may be above 10⁵⁰, or below 10⁻⁵⁰ unless it is 0.
   double absolute = 0;         // ≥ 0, in the output's unit
   double relative = 0;         // ≥ 0, of |z|
   double relative_to_max = 0;  // ≥ 0, of max |z| or of the full scale

@@ -51,7 +51,8 @@ struct ProcessNoise {
   // Whether q is estimated, as the uncertain parameter "processNoise.<state>" with a constant prior
   // density of log q between the bounds.
   bool unknown = false;
-  double lower = 0, upper = 0;  // bounds of an unknown q, 0 < lower < upper; else 0
+  // Bounds of an unknown q, 10⁻⁵⁰ ≤ lower < upper ≤ 10⁵⁰ and upper ≤ 10²⁰ lower; else 0.
+  double lower = 0, upper = 0;
 };
 
 // What the samples are compared with.
@@ -73,7 +74,7 @@ enum class RegularizationMode {
 struct Problem {
   std::shared_ptr<const Model> model;  // not null
   // Settable quantities whose values are known. A quantity that is neither fixed nor uncertain nor
-  // derived has the model's default.
+  // derived has the model's default. At most 10¹⁰⁰ in magnitude.
   std::map<std::string, double> fixed;
   std::vector<UncertainParameter> uncertain;  // what is estimated; at least one
   std::vector<Correlation> correlations;      // of pairs of them; a pair not listed has none

@@ -51,7 +51,8 @@ struct RandomWalk {
   // Whether it is estimated, as the uncertain parameter "<name>.drift" with a constant prior
   // density of its logarithm between the bounds.
   bool unknown = false;
-  double lower = 0, upper = 0;  // bounds of an unknown one, 0 < lower < upper; else 0
+  // Bounds of an unknown one, 10⁻⁵⁰ ≤ lower < upper ≤ 10⁵⁰ and upper ≤ 10²⁰ lower; else 0.
+  double lower = 0, upper = 0;
 
   friend bool operator==(const RandomWalk&, const RandomWalk&) = default;
 };

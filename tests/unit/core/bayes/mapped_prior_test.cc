@@ -220,6 +220,18 @@ TEST(MappedPrior, QuadratureOfOtherFamiliesKeepsTheirStandardDeviation) {
             1e-3);
 }
 
+// Of a hundred powers of ten the exponential of half the variance would not be a number.
+TEST(MappedPrior, CovarianceOfAWideLogarithmIsFinite) {
+  const Prior prior =
+      Prior::Make({Normal("a", 3, 2), UncertainParameter::LogUniform("b", 1e-100, 1e100).value()},
+                  {})
+          .value();
+  const Matrix root = prior.GermStandardDeviation().asDiagonal();
+  for (const double z : {-1.0, 0.0, 1.0}) {
+    EXPECT_TRUE(ParameterCovariance(prior, Vector{{0, z}}, root).allFinite()) << z;
+  }
+}
+
 TEST(MappedPrior, NarrowGaussiansAreMappedByTheDeltaMethod) {
   const Prior prior = Chain();
   const Vector xi = Vector::Constant(prior.dimension(), 0.3);

@@ -157,6 +157,28 @@ INSTANTIATE_TEST_SUITE_P(EveryNoise, MismatchOf,
                          ::testing::Values(std::pair(false, false), std::pair(true, false),
                                            std::pair(false, true), std::pair(true, true)));
 
+// The logarithms of the variances are no square: with a filter whose innovations are smaller than
+// the stated noise they make the cost negative.
+TEST(Mismatch, AddsLogarithmsOfVariancesThatMakeItNegative) {
+  ChannelSums channel = RandomChannel(false, false);
+  const Mismatch without(std::vector<ChannelSums>{channel});
+  channel.log_variance = Eigen::Vector4d(3, -1, 0.5, 2);
+  channel.log_variance_at_reference = -1000;
+  const Mismatch with(std::vector<ChannelSums>{channel});
+  const Vector d = Eigen::Vector4d(0.2, -0.1, 0.15, 0.05);
+  const double added = channel.log_variance.dot(d) - 1000;
+  Vector gradient(kTerms), plain(kTerms), values(1);
+  Matrix product;
+  EXPECT_LT(with.Evaluate(d), -900);
+  EXPECT_DOUBLE_EQ(with.Evaluate(d), without.Evaluate(d) + added);
+  EXPECT_DOUBLE_EQ(with.EvaluateWithGradient(d, gradient), with.Evaluate(d));
+  without.EvaluateWithGradient(d, plain);
+  EXPECT_TRUE(gradient.isApprox(plain + channel.log_variance, 1e-14));
+  with.EvaluateMany(d.transpose(), product, values);
+  EXPECT_NEAR(values[0], with.Evaluate(d), 1e-12 * 1000);
+  EXPECT_EQ(NegativeLogLikelihood(60, -40, 0, false, false), -20);
+}
+
 TEST(ChannelSums, HasTheLag1CorrelationOfItsResiduals) {
   const Residuals red(0.8);
   ChannelSums channel(1);

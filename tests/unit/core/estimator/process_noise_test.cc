@@ -70,6 +70,38 @@ TEST(ProcessNoise, FollowsStreamedInputsAndLeavesOutMissingSamples) {
   EXPECT_NEAR(std::log(estimate.parameters[2].map), exact.at[2], 0.15 * exact.std_dev[2]);
 }
 
+// Where the noise is a parameter, what is stated is a unit and no more. Ten times too much makes
+// the logarithms of variances outweigh all squares.
+TEST(ProcessNoise, DoesNotDependOnTheStatedNoiseWhereItIsAParameter) {
+  const Samples samples = Measure(300, kTrueQ, 11);
+  const auto estimate_of = [&](double stated) {
+    Problem problem = ForcedOscillator();
+    problem.process_noise = {{.state = "v", .spectral_density = kTrueQ}};
+    problem.uncertain.push_back(UncertainParameter::Uniform("x.noise", 0.001, 0.02).value());
+    problem.measured[0].noise.absolute = stated;
+    return EstimateOf(problem, samples);
+  };
+  const Estimate right = estimate_of(kSigma), large = estimate_of(10 * kSigma);
+  EXPECT_LT(large.cost.mismatch, 0);
+  for (size_t i = 0; i < 3; ++i) {
+    const ParameterEstimate &a = right.parameters[i], &b = large.parameters[i];
+    EXPECT_NEAR(b.map, a.map, 0.05 * a.std_dev) << a.name;
+    EXPECT_NEAR(b.std_dev, a.std_dev, 0.05 * a.std_dev) << a.name;
+    EXPECT_NEAR(b.mean, a.mean, 0.15 * a.std_dev) << a.name;
+  }
+}
+
+TEST(ProcessNoise, RefusesBoundsThatNoPriorHas) {
+  for (const auto& [lower, upper] :
+       {std::pair{1e-120, 1.0}, {1.0, 1e120}, {1e-30, 1.0}, {1.0, 1.0 + 1e-12}}) {
+    Problem problem = ForcedOscillator();
+    problem.process_noise = {{.state = "v", .unknown = true, .lower = lower, .upper = upper}};
+    EXPECT_THAT(std::string(Estimator::Make(problem).status().message()),
+                HasSubstr("process_noise[0].lower: "))
+        << lower;
+  }
+}
+
 // The same record of two runs: the likelihood is the product of two, and standard deviations are
 // those of twice as many samples.
 TEST(ProcessNoise, BeginsAgainWithEachRun) {

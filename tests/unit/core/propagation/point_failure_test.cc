@@ -200,5 +200,34 @@ TEST(PointFailures, NameTheStepsThatRanOut) {
   EXPECT_LT(ensemble.failures[0].time_s, 1);
 }
 
+// Of 5 kHz one second takes far more than 5,000 steps, and a hundredth fewer than 999.
+TEST(PointFailures, HaveAllStepsThatAreAllowed) {
+  const auto reached_s = [](int max_steps) {
+    Ensemble ensemble("mass_spring_damper", 1, {"x"});
+    ensemble.Set("v0", 1.0);
+    ensemble.Set("k", 1e8);
+    ensemble.specification.integration.method = IntegrationMethod::kExplicit;
+    ensemble.specification.integration.max_steps = max_steps;
+    ensemble.Propagate({0, 1});
+    return ensemble.failures.at(0).time_s;
+  };
+  EXPECT_GT(reached_s(999), 1.5 * reached_s(500));
+}
+
+// The limit counts for what is measured.
+TEST(PointFailures, IncludeOutputsThatTheirGainTakesBeyondTheLimit) {
+  Ensemble ensemble("mass_spring_damper", 3, {"x"});
+  ensemble.Set("x0", 1.0);
+  ensemble.specification.output_gains = Matrix::Ones(3, 1);
+  ensemble.specification.output_gains(1, 0) = 1e160;
+  const Matrix y = ensemble.Propagate({0, 1, 2});
+  ASSERT_EQ(ensemble.failures.size(), 1u);
+  EXPECT_EQ(ensemble.failures[0].point, 1);
+  EXPECT_EQ(ensemble.failures[0].time_s, 0);
+  EXPECT_THAT(ensemble.failures[0].reason, ::testing::HasSubstr("with its gain and offset"));
+  EXPECT_TRUE(y.row(1).array().isNaN().all());
+  EXPECT_TRUE(y.row(0).allFinite() && y.row(2).allFinite());
+}
+
 }  // namespace
 }  // namespace polyest::internal

@@ -208,8 +208,21 @@ TEST(ResolvedProblem, RefusesANoiseThatIsNegativeOrNotFinite) {
             "fraction of it");
 }
 
+// Squares of outputs in units of the noise would not be finite.
+TEST(ResolvedProblem, RefusesANoiseOfNoMagnitude) {
+  for (const double bad : {1e-60, 1e60}) {
+    EXPECT_THAT(Refusal([&](Problem& p) { p.measured[0].noise.absolute = bad; }),
+                AllOf(StartsWith("measured[0].noise.absolute: "),
+                      HasSubstr("must be 0 or lie between 1e-50 and 1e+50")));
+  }
+}
+
 TEST(ResolvedProblem, RefusesValuesThatAreNotFinite) {
-  EXPECT_EQ(Refusal([](Problem& p) { p.fixed["c"] = kInfinity; }), "fixed.c: inf must be finite");
+  for (const double bad : {kInfinity, -1e101}) {
+    EXPECT_THAT(Refusal([&](Problem& p) { p.fixed["c"] = bad; }),
+                AllOf(StartsWith("fixed.c: "),
+                      HasSubstr("must be finite and at most 1e+100 in magnitude")));
+  }
   for (const double bad : {-1.0, kNan, kInfinity}) {
     EXPECT_THAT(Refusal([&](Problem& p) { p.regularization = bad; }),
                 AllOf(StartsWith("regularization: "), HasSubstr("must be a finite number ≥ 0")));
