@@ -1,10 +1,27 @@
 #include "core/bayes/element.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/common/check.h"
 
 namespace polyest::internal {
+namespace {
+
+// A density that is cut off has at least so much of its mass within so many of its standard
+// deviations from the cut; a normal one that ends 1.7 standard deviations from its peak has.
+constexpr double kShareAtCut = 0.03, kNearCut = 0.25;
+
+bool PressOn(const Element::Bound& bound, const ConstMatrixRef& particles) {
+  if (particles.rows() == 0) return false;
+  const Vector distance = bound.offset - (particles * bound.normal).array();
+  const double mean = distance.mean();
+  const double deviation = std::sqrt((distance.array() - mean).square().mean());
+  const auto near = static_cast<double>((distance.array() < kNearCut * deviation).count());
+  return near >= kShareAtCut * static_cast<double>(distance.size());
+}
+
+}  // namespace
 
 bool Element::Contains(const ConstVectorRef& xi) const {
   return std::ranges::all_of(
@@ -16,6 +33,19 @@ std::pair<Element, Element> Element::Divide(const Vector& normal, double offset)
   parts.first.bounds_.push_back({normal, offset});
   parts.second.bounds_.push_back({-normal, -offset});
   return parts;
+}
+
+Element Element::Freed(const std::vector<const Element*>& others,
+                       const ConstMatrixRef& particles) const {
+  Element freed;
+  for (const Bound& bound : bounds_) {
+    const bool has_neighbour = std::ranges::any_of(others, [&](const Element* other) {
+      return std::ranges::any_of(other->bounds_,
+                                 [&](const Bound& one) { return one.IsOpposite(bound); });
+    });
+    if (has_neighbour || !PressOn(bound, particles)) freed.bounds_.push_back(bound);
+  }
+  return freed;
 }
 
 Element Element::WithDimension(Eigen::Index dimension) const {

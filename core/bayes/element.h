@@ -21,6 +21,12 @@ class Element {
     Vector normal;
     double offset = 0;
 
+    // Whether the other half-space is what this one leaves of the space.
+    bool IsOpposite(const Bound& other) const {
+      return normal.size() == other.normal.size() && offset == -other.offset &&
+             normal == -other.normal;
+    }
+
     // Writes to or reads from a cereal archive. The size of what is read is not checked.
     template <class Archive>
     void serialize(Archive& archive) {
@@ -37,6 +43,10 @@ class Element {
   bool Contains(const ConstVectorRef& xi) const;
   // Returns the parts with normalᵀξ ≤ offset and with normalᵀξ ≥ offset.
   std::pair<Element, Element> Divide(const Vector& normal, double offset) const;
+  // Returns the element without the bounds beyond which none of the others lies and on which the
+  // particles (a row each) press. It then has the place of those that are gone, and still only
+  // hyperplanes in common with the others.
+  Element Freed(const std::vector<const Element*>& others, const ConstMatrixRef& particles) const;
   // Returns the same part of a space with more dimensions, unbounded in the new ones.
   Element WithDimension(Eigen::Index dimension) const;
 

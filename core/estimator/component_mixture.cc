@@ -142,6 +142,7 @@ absl::Status ComponentMixture::Weigh(const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles,
                            KeepHeaviest(components_, 1, static_cast<size_t>(most), stop));
   POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
+  FreeBounds(particles);
   for (const auto& component : components_) {
     component->set_room(std::max(1, most / static_cast<int>(components_.size())));
   }
@@ -165,6 +166,22 @@ absl::Status ComponentMixture::Unite(const std::vector<Matrix>& particles, const
   components_.clear();
   components_.push_back(std::move(united));
   return absl::OkStatus();
+}
+
+// Frees elements from bounds on which their posterior presses and beyond which all others have been
+// dropped: while the expansions were not accurate yet, the other side looked too light. `particles`
+// are those of each component. What cannot be integrated stays beyond its bound.
+void ComponentMixture::FreeBounds(const std::vector<Matrix>& particles) {
+  if (elements_left_out_ > 0 || particles.size() != components_.size()) return;
+  std::vector<Element> freed;
+  for (size_t k = 0; k < components_.size(); ++k) {
+    std::vector<const Element*> others;
+    for (const auto& other : components_) {
+      if (other != components_[k]) others.push_back(&other->element());
+    }
+    freed.push_back(components_[k]->element().Freed(others, particles[k]));
+  }
+  for (size_t k = 0; k < freed.size(); ++k) components_[k]->set_element(std::move(freed[k]));
 }
 
 // Keeps the `most` heaviest components and returns the particles of each. `weight` is the weight of

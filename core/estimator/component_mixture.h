@@ -62,6 +62,7 @@ class ComponentMixture {
   absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
                                                    size_t most, const Stop& stop);
   absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
+  void FreeBounds(const std::vector<Matrix>& particles);
   void LeaveOut(size_t component);
   void Retire(const MixtureComponent& component);
   static std::vector<AssessmentRequest> Requests(const Components& components);

@@ -27,7 +27,8 @@ absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
   const auto column = static_cast<size_t>(problem.streamed_inputs().front());
   return InvalidField(
       "inputs",
-      absl::StrFormat("%s is streamed, but here are no data to carry it; give it as a table",
+      absl::StrFormat("%s is streamed, but this study needs inputs that are known in advance; "
+                      "replace its \"streamed\" by a \"table\"",
                       problem.problem().model->description().inputs[column].name));
 }
 

@@ -201,12 +201,11 @@ absl::Status RegionalExpansion::DropFailed(int row, const Stop& stop) {
   std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
   const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
   if (static_cast<int>(kept_.size()) < needed) {
-    const FailedTrajectory& last = failures_.back();
     return absl::FailedPreconditionError(absl::StrFormat(
         "only %d of %d trajectories could be integrated to t = %g s and the expansion needs %d; "
         "the last to fail: %s",
         kept_.size(), points(), block_.rows[static_cast<size_t>(row)].time_s, needed,
-        DescribeFailure(last, problem_.prior())));
+        failures_.empty() ? "not known" : DescribeFailure(failures_.back(), problem_.prior())));
   }
   const Matrix left = design_.points(kept_, Eigen::all);
   POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left, stop));

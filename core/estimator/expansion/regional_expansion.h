@@ -150,6 +150,8 @@ class RegionalExpansion {
   void AddCountsTo(EndedRuns& ended) const;
 
   const ExpansionDesign& design() const { return design_; }
+  // The new element must contain the present one; the region stays as it is.
+  void set_element(Element element) { design_.element = std::move(element); }
   const LearnedNoise& noise() const { return noise_; }
   void set_misfit(double misfit) { noise_.misfit = misfit; }
   // Whether its trajectories are stepped without error of integration (linear_system.h).

@@ -70,6 +70,14 @@ struct Postponed {
   int64_t tolerance = 0;  // a tighter tolerance of the integrators
 
   bool any() const { return expansion > 0 || noise > 0 || tolerance > 0; }
+  // Takes over what `other` has put off, each since the earlier row.
+  void Include(const Postponed& other) {
+    for (int64_t Postponed::*row :
+         {&Postponed::expansion, &Postponed::noise, &Postponed::tolerance}) {
+      if (other.*row > 0)
+        this->*row = this->*row > 0 ? std::min(this->*row, other.*row) : other.*row;
+    }
+  }
 };
 
 }  // namespace polyest::internal

@@ -31,8 +31,6 @@ namespace {
 constexpr int kDrawsForEdges = 2'000;
 // Fraction of the posterior at an edge of the region from which on its being cut there matters.
 constexpr double kOverEdge = 0.03;
-// Ratio of the draws' and the curvature's standard deviations from which on they contradict.
-constexpr double kContradiction = 2;
 
 class Assessment {
  public:
@@ -205,8 +203,9 @@ class Assessment {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
-      if ((findings_.power < 1 || findings_.shift > kInaccurateShift) &&
-          parameter.posterior_std_dev > parameter.prior_std_dev) {
+      const bool unknown = parameter.verdict == Verdict::kNotIdentified ||
+                           parameter.posterior_std_dev > parameter.prior_std_dev;
+      if (unknown && (findings_.power < 1 || findings_.shift > kInaccurateShift)) {
         DescribeByPrior(i, parameter);
       }
       estimate_.parameters.push_back(std::move(parameter));
@@ -247,7 +246,7 @@ class Assessment {
   }
 
   // Sets what is known of parameter i to what its prior says: an expansion that is not accurate
-  // must not make it less.
+  // must not make it less, nor its draws tell what its curvature does not.
   void DescribeByPrior(int i, ParameterEstimate& parameter) const {
     const UncertainParameter& prior = prior_.parameters()[static_cast<size_t>(i)];
     const Germ germ(prior.germ);

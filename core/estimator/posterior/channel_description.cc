@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -80,6 +81,10 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
     channel.output = request.problem->problem().measured[static_cast<size_t>(c)].output;
     if (!request.record->channels().empty()) {
       DescribeChannel(request, cost, d, posterior, fitted, c, channel);
+    }
+    const std::map<std::string, double>& fixed = request.problem->problem().fixed;
+    if (const auto noise = fixed.find(NoiseName(channel.output)); noise != fixed.end()) {
+      channel.noise_std_dev = noise->second;
     }
     if (const auto i = UncertainNoise(cost.prior(), channel.output)) {
       channel.noise_std_dev = cost.prior().ToParameters(cost.region().ToGerm(eta))[*i];

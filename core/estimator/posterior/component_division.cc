@@ -133,6 +133,13 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const 
   return united;
 }
 
+void MixtureComponent::set_element(Element element) {
+  if (element.bounds().size() == this->element().bounds().size()) return;
+  bisected_ = bisected_ && !element.bounds().empty();
+  expansion_->set_element(std::move(element));
+  edges_row_ = taken_;  // some of the region's edges are not the element's any more
+}
+
 // Returns the design over the piece's region. Its check points are particles of the piece, or cover
 // the region if the particles' density is unknown.
 ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,

@@ -15,10 +15,6 @@ constexpr double kWallOfPiece = 8;  // difference in cost: e^−8 ≈ 3·10⁻�
 // bound itself rounding decides whether a point belongs to the element.
 constexpr double kOffWall = 1e-9;
 
-bool AreOpposite(const Element::Bound& a, const Element::Bound& b) {
-  return a.offset == -b.offset && a.normal == -b.normal;
-}
-
 // Returns the least cost of the element at its bound, +∞ if the expansion's box does not reach it.
 double LeastAt(const Element::Bound& bound, const ElementCost& element) {
   const Region& region = element.design->region;
@@ -35,7 +31,7 @@ bool AreConnected(const ElementCost& a, const ElementCost& b) {
   const double peak = std::max(a.minimum.value + a.height, b.minimum.value + b.height);
   for (const Element::Bound& bound : a.design->element.bounds()) {
     for (const Element::Bound& other : b.design->element.bounds()) {
-      if (!AreOpposite(bound, other)) continue;
+      if (!bound.IsOpposite(other)) continue;
       // Both sides must reach the bound, each at its own place if the expansions differ a little.
       return LeastAt(bound, a) < peak + kWallOfPiece && LeastAt(other, b) < peak + kWallOfPiece;
     }

@@ -17,6 +17,8 @@ namespace polyest::internal {
 // An expansion is called inaccurate when a posterior mean may be wrong by this many of its standard
 // deviations.
 inline constexpr double kInaccurateShift = 0.25;
+// Ratio of the draws' and the curvature's standard deviations from which on they contradict.
+inline constexpr double kContradiction = 2;
 
 struct Findings {
   // Whether more of the shift is due to the integration than to the expansion.
@@ -34,7 +36,7 @@ struct Findings {
   bool CarriesError() const;
   // Whether parameter i must not be called identified.
   bool IsDoubtful(int i) const {
-    return postponed.any() || windows.doubtful[static_cast<size_t>(i)];
+    return postponed.any() || power < 1 || windows.doubtful[static_cast<size_t>(i)];
   }
   // Whether the standard deviation of parameter i is the draws', which the curvature contradicts.
   bool GoesByDraws(int i) const {

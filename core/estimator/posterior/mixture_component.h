@@ -83,6 +83,9 @@ class MixtureComponent {
   // Prepares for weighing: settles again, at most once at a row, if the posterior has become so
   // narrow that the check points no longer determine the height of its cost (mixture_share.h).
   absl::Status MakeComparable(const Stop& stop);
+  // The element that the component stands for; a new one must contain the present one.
+  const Element& element() const { return expansion_->design().element; }
+  void set_element(Element element);
   const ResolvedProblem& problem() const { return problem_; }
   // Returns the posterior probability of the component at the last weighing.
   double weight() const { return weight_; }

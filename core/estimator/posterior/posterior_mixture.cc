@@ -84,6 +84,27 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, Estimate
   }
 }
 
+// The curvature at the minimum is that of one component. Where it contradicts the draws of several
+// that are one piece of the posterior, the draws count, if nothing speaks against them.
+void GoByDraws(Findings& findings, Estimate& estimate) {
+  if (findings.power < 1 || findings.shift > kInaccurateShift || findings.windows.contradicted ||
+      estimate.regularization != 1) {
+    return;
+  }
+  findings.drawn_to_curvature = Vector::Zero(std::ssize(estimate.parameters));
+  for (Eigen::Index i = 0; i < findings.drawn_to_curvature.size(); ++i) {
+    ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const double drawn = std::min(parameter.posterior_std_dev, parameter.prior_std_dev);
+    const double ratio = drawn / parameter.std_dev;
+    if (ratio < kContradiction && ratio > 1 / kContradiction) continue;
+    findings.drawn_to_curvature[i] = ratio;
+    parameter.std_dev = drawn;
+    parameter.contraction = drawn / parameter.prior_std_dev;
+    estimate.covariance.row(i) *= ratio;
+    estimate.covariance.col(i) *= ratio;
+  }
+}
+
 // Returns the places of each piece's components, heaviest piece first.
 std::vector<Places> PiecesOf(const std::vector<AssessmentRequest>& requests,
                              const std::vector<Assessed>& components,
@@ -149,8 +170,16 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
     whole.findings.shift = std::max(whole.findings.shift, findings.shift);
     whole.findings.integration_shift =
         std::max(whole.findings.integration_shift, findings.integration_shift);
+    whole.findings.population_shift =
+        std::max(whole.findings.population_shift, findings.population_shift);
+    whole.findings.carried_shift = std::max(whole.findings.carried_shift, findings.carried_shift);
     whole.findings.power = std::min(whole.findings.power, findings.power);
     whole.findings.leans = whole.findings.leans || findings.leans;
+    whole.findings.postponed.Include(findings.postponed);
+    if (!findings.converged && whole.findings.converged) {
+      whole.findings.converged = false;
+      whole.findings.minimizer_reason = findings.minimizer_reason;
+    }
   }
   if (pieces.size() > 1) {
     for (const Places& places : pieces) {
@@ -163,6 +192,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   whole.log_evidence = LogSumOfExponentials(evidences);
   whole.posterior = Mix(components, weights, all);
   DescribeWhole(problem.prior(), whole.posterior, whole.estimate);
+  if (pieces.size() == 1) GoByDraws(whole.findings, whole.estimate);
   whole.filtered = MixFiltered(components);
   whole.estimate.filtered = DescribeFiltered(problem, whole.filtered, whole.posterior.weights);
   return whole;

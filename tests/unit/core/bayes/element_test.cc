@@ -28,6 +28,21 @@ TEST(Element, IsDividedIntoPartsThatCoverItAndMeetAtTheHyperplane) {
   EXPECT_GT(on_the_hyperplane, 0);
 }
 
+// The particles of the quadrant on the upper left press on the hyperplane to its right.
+TEST(Element, TakesThePlaceOfThoseThatAreGoneWhereItsParticlesPress) {
+  const auto [below, above] = Element().Divide(Vector{{0, 1}}, 0);
+  const auto [left, right] = above.Divide(Vector{{1, 0}}, 0);
+  Matrix particles(101, 2);
+  particles.col(0) = Vector::LinSpaced(101, -1, 0);
+  particles.col(1) = Vector::LinSpaced(101, 5, 6);
+  const Vector to_the_right{{1, 1}}, underneath{{-1, -1}};
+  EXPECT_EQ(left.Freed({&below, &right}, particles).bounds().size(), 2u);
+  EXPECT_TRUE(left.Freed({&below}, particles).Contains(to_the_right));
+  EXPECT_FALSE(left.Freed({&below}, particles).Contains(underneath));
+  EXPECT_FALSE(left.Freed({&right}, particles).Contains(underneath));
+  EXPECT_TRUE(left.Freed({}, particles).Contains(to_the_right));
+}
+
 TEST(Element, IsNotBoundedInNewDimensions) {
   const Element half = Element().Divide(Vector{{1.0}}, 0.5).first.WithDimension(2);
   EXPECT_TRUE(half.Contains(Vector{{0.4, 1e9}}));
