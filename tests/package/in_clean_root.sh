@@ -104,7 +104,7 @@ step_stream() { # BEFORE AFTER
   answer=$(head -n $(($2 + 1)) "$data" | "${as_polyest[@]}" polyest stream "$problem" - --server "$server" \
     --session rig --batch 20 --format jsonl 2>&1) || fail "polyest stream: $answer"
   expect "the estimate" "$answer" "\"samples\":\"$2\""
-  [[ "$1" == 0 ]] || expect "the session" "$answer" "$1 rows were already there"
+  [[ "$1" == 0 ]] || expect "the session" "$answer" "$1 rows are not later than t = "
   head -n $(($2 + 1)) "$data" >/tmp/rows.csv
   [[ "$(tail -n 1 <<<"$answer" | parameters)" == \
     "$(polyest estimate "$problem" /tmp/rows.csv --format json | parameters)" ]] ||
