@@ -8,11 +8,10 @@
 //   cov(θ_i, θ_j) = Σ_{k≥1} r_ij^k c_ik c_jk,
 // which is positive semidefinite wherever the sum ends. Affine: c_i1 = scale s_i alone, the linear
 // rule.
-// Lognormal and log-uniform: c_ik = e^{location + scale ẑ_i + v/2} v^{k/2}/√k!, v = (scale s_i)²,
-// at most 36, so that it is finite; what is larger than the prior's variance says no more than
-// that. A correlated
-// parameter of another family: Gauss's rule of 64 points; its standard deviation is then right to
-// 10⁻³ for s_i ≤ 1.
+// Lognormal and log-uniform: c_ik = e^{location + scale ẑ_i + v/2} v^{k/2}/√k!, v = (scale s_i)².
+// v is at most 36, so that the variance is finite; it is far larger than the prior's then. A
+// correlated parameter of another family: Gauss's rule of 64 points; its standard deviation is then
+// right to 10⁻³ for s_i ≤ 1.
 // As s → 0 this is the delta method, t′ C t′; at ẑ = 0, C = P it is the prior's own covariance.
 
 #include "core/bayes/prior.h"

@@ -57,17 +57,13 @@ bool HasAny(std::string_view text, std::initializer_list<std::string_view> symbo
 bool CountsCycles(std::string_view unit) { return HasAny(unit, {"Hz"}); }
 bool CountsAngles(std::string_view unit) { return HasAny(unit, {"rad", "deg", "°", "rpm"}); }
 
-// Whether a unit is a number per time, 1/s or 1/min, which does not say what it counts.
-bool IsBareRate(std::string_view text, const Unit& unit) {
-  return SameDimension(unit, *ParseUnit("1/s")) && !CountsCycles(text) && !CountsAngles(text);
-}
-
 bool IsAngularVelocity(std::string_view text, const Unit& unit) {
   return SameDimension(unit, *ParseUnit("1/s")) && CountsAngles(text);
 }
 
+// Whether a unit is 1/min, which does not say what it counts.
 bool IsPerMinute(std::string_view text, const Unit& unit) {
-  return IsBareRate(text, unit) && SameUnit(unit, *ParseUnit("1/min"));
+  return SameUnit(unit, *ParseUnit("1/min")) && !CountsCycles(text) && !CountsAngles(text);
 }
 
 UnitConversion ByScale(double scale) {

@@ -7,35 +7,15 @@
 // Prints each problem whose estimate changes, with its seed. Exits with 1 if there is one, or if
 // there were fewer than 20 stops a problem.
 
-#include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
-#include "core/common/check.h"
 #include "polyest/estimator.h"
 #include "tests/properties/problems.h"
-
-namespace {
-
-std::atomic<int64_t> times_asked = 0;
-
-}  // namespace
-
-// Replaces the clock of deadlines by one that counts how often it is asked, so that a deadline is
-// the number of a question.
-namespace std::chrono {
-inline namespace _V2 {
-
-steady_clock::time_point steady_clock::now() noexcept {
-  return time_point(duration(++times_asked));
-}
-
-}  // namespace _V2
-}  // namespace std::chrono
+#include "tests/testing/count_deadlines.h"
 
 namespace polyest::internal::properties {
 namespace {
@@ -44,10 +24,6 @@ constexpr int kRounds = 4;                // of each problem, stopped at other m
 constexpr double kFirstPatience = 0.025;  // of the questions of an undisturbed record
 constexpr double kMorePatience = 1.05;    // after each stop, so that every record gets through
 constexpr int64_t kFewestStops = 20;
-
-Stop StopAt(int64_t question) {
-  return Stop(std::stop_token(), Stop::Clock::time_point(Stop::Clock::duration(question)));
-}
 
 // What an estimate says, as text in which every bit shows.
 std::string TextOf(const Estimate& estimate) {

@@ -74,8 +74,8 @@ struct Postponed {
   void Include(const Postponed& other) {
     for (int64_t Postponed::*row :
          {&Postponed::expansion, &Postponed::noise, &Postponed::tolerance}) {
-      if (other.*row > 0)
-        this->*row = this->*row > 0 ? std::min(this->*row, other.*row) : other.*row;
+      if (other.*row == 0) continue;
+      this->*row = this->*row == 0 ? other.*row : std::min(this->*row, other.*row);
     }
   }
 };

@@ -1,41 +1,19 @@
 // Stops the numerics at any of the moments at which they ask whether to end. What follows must be
-// what would have followed without the stop, to the last bit.
+// what would have followed without the stop, to the last bit. The program has no other tests, since
+// its clock of deadlines counts questions.
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 
+#include "tests/testing/count_deadlines.h"
 #include "tests/unit/core/estimator/estimation.h"
-
-namespace {
-
-std::atomic<int64_t> times_asked = 0;
-
-}  // namespace
-
-// Replaces the clock of deadlines by one that counts how often it is asked, so that a deadline is
-// the number of a question. It applies to the whole program, which therefore has no other tests.
-namespace std::chrono {
-inline namespace _V2 {
-
-steady_clock::time_point steady_clock::now() noexcept {
-  return time_point(duration(++times_asked));
-}
-
-}  // namespace _V2
-}  // namespace std::chrono
 
 namespace polyest::internal {
 namespace {
 
 constexpr int kRows = 40, kRowsABatch = 4;
-
-Stop StopAt(int64_t question) {
-  return Stop(std::stop_token(), Stop::Clock::time_point(Stop::Clock::duration(question)));
-}
 
 // A free oscillation with a ripple that no model explains, so that the misfit is revised while the
 // region moves.
