@@ -46,6 +46,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "replay postponed";
     case v1::Diagnostic::WINDOWS_DISAGREE:
       return "windows disagree";
+    case v1::Diagnostic::PRIOR_DATA_CONFLICT:
+      return "prior and data in conflict";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }

@@ -8,8 +8,9 @@
 namespace polyest::internal {
 namespace {
 
-// A density that is cut off has at least so much of its mass within so many of its standard
-// deviations from the cut; a normal one that ends 1.7 standard deviations from its peak has.
+// A posterior presses on a bound if at least this share of its particles lies within this many of
+// their standard deviations from it. A normal density that is cut off up to about 1.5 standard
+// deviations from its peak does.
 constexpr double kShareAtCut = 0.03, kNearCut = 0.25;
 
 bool PressOn(const Element::Bound& bound, const ConstMatrixRef& particles) {

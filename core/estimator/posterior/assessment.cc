@@ -22,6 +22,7 @@
 #include "core/estimator/posterior/noise_marginal.h"
 #include "core/estimator/posterior/other_minima.h"
 #include "core/estimator/posterior/population_shift.h"
+#include "core/estimator/posterior/prior_conflict.h"
 #include "core/estimator/posterior/regularization_choice.h"
 #include "core/estimator/posterior/trade_off.h"
 
@@ -63,6 +64,7 @@ class Assessment {
     Correct(cost);
     filtered_ = DrawFiltered(problem_, *request_.expansion, posterior_);
     findings_.population_shift = PopulationShift(problem_, posterior_);
+    findings_.conflict = FindPriorConflict(problem_, posterior_, regularization_);
     findings_.shift =
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
     fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);

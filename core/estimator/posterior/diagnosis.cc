@@ -18,6 +18,8 @@ constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
 // As kAtBound, for a correlated parameter: its score has no bound, and only approaches the
 // parameter's.
 constexpr double kNearBound = 1e-4;
+// Conflict of data and prior, in standard deviations, from which on chance hardly explains it.
+constexpr double kConflict = 4;
 // Maximum ratio of the posterior's and the curvature's standard deviations, in either direction.
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
@@ -100,6 +102,33 @@ void AddBounds(const Findings& findings, const Estimate& estimate,
     }
     diagnostics.push_back({DiagnosticCode::kAtPriorBound, std::move(message)});
   }
+}
+
+// Reports that data and prior contradict each other. A parameter on its bound is reported as such.
+void AddPriorConflict(const Findings& findings, const Estimate& estimate,
+                      std::vector<Diagnostic>& diagnostics) {
+  bool any = false;
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const double conflict = findings.conflict.of_parameters[i];
+    if (!(conflict > kConflict) || BoundReached(findings, i) != 0 ||
+        estimate.parameters[static_cast<size_t>(i)].verdict == Verdict::kNotIdentified) {
+      continue;
+    }
+    any = true;
+    diagnostics.push_back(
+        {DiagnosticCode::kPriorDataConflict,
+         absl::StrFormat("what the data say of %s and what its prior says are %.3g standard "
+                         "deviations of both together apart; check its unit, its prior, and what "
+                         "is wrong in the model that %s may make up for",
+                         findings.NameOf(i), conflict, findings.NameOf(i))});
+  }
+  if (any || !(findings.conflict.of_all > kConflict)) return;
+  diagnostics.push_back(
+      {DiagnosticCode::kPriorDataConflict,
+       absl::StrFormat("the parameters are together as improbable by their priors as a normal "
+                       "variable beyond %.3g standard deviations, though none is on its own; check "
+                       "the priors and their correlations",
+                       findings.conflict.of_all)});
 }
 
 // Reports a posterior that differs from the curvature's Gaussian. Parameters that the data do not
@@ -322,6 +351,7 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddEdge(findings, diagnostics);
   DiagnoseResiduals(findings, estimate, diagnostics);
   AddBounds(findings, estimate, diagnostics);
+  AddPriorConflict(findings, estimate, diagnostics);
   AddNonGaussian(findings, estimate, diagnostics);
   AddComponents(findings, estimate, diagnostics);
   AddMinima(findings, diagnostics);

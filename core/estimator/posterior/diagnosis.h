@@ -8,6 +8,7 @@
 #include "core/bayes/minimizer.h"
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/replay_allowance.h"
+#include "core/estimator/posterior/prior_conflict.h"
 #include "core/estimator/posterior/window_assessment.h"
 #include "core/estimator/record/record_summary.h"
 #include "polyest/estimate.h"
@@ -61,6 +62,7 @@ struct Findings {
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion
   WindowAssessment windows;  // what the windows of the record say
+  PriorConflict conflict;    // how far what the data say is from the prior
   // By parameter, where the draws' standard deviation replaces the curvature's: draws' ÷
   // curvature's, else 0; may be empty.
   Vector drawn_to_curvature;

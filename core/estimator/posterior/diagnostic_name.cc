@@ -36,6 +36,8 @@ const char* NameOf(DiagnosticCode code) {
       return "REPLAY_POSTPONED";
     case DiagnosticCode::kWindowsDisagree:
       return "WINDOWS_DISAGREE";
+    case DiagnosticCode::kPriorDataConflict:
+      return "PRIOR_DATA_CONFLICT";
   }
   return "";
 }

@@ -38,7 +38,7 @@ constexpr double kAheadOfNeed = 0.004;
 // by this number.
 constexpr int64_t kLooksAhead = 10;
 
-// A settlement takes at most so many seeds from the one that this returns on.
+// Returns the first of the thousand seeds that a settlement may use.
 uint64_t SeedOfSettlement(uint64_t settlements) { return 1000 * (settlements + 1); }
 
 }  // namespace

@@ -191,6 +191,8 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   for (const Assessed& component : components) evidences.push_back(component.log_evidence);
   whole.log_evidence = LogSumOfExponentials(evidences);
   whole.posterior = Mix(components, weights, all);
+  whole.findings.conflict =
+      FindPriorConflict(problem, whole.posterior, whole.estimate.regularization);
   DescribeWhole(problem.prior(), whole.posterior, whole.estimate);
   if (pieces.size() == 1) GoByDraws(whole.findings, whole.estimate);
   whole.filtered = MixFiltered(components);

@@ -8,15 +8,10 @@ namespace polyest::internal {
 namespace {
 
 constexpr size_t kMinDistinct = 4;          // for a resolution: fewer are multiples by chance
-constexpr double kRounding = 1e-9;          // of a mean interval
 constexpr double kMultiple = 1e-3;          // how far from a multiple of the step a value may be
 constexpr double kIntegrationError = 1e-5;  // relative error of a prediction that means nothing
 
 }  // namespace
-
-int IntervalFacts::OctaveOf(double interval_s) {
-  return std::clamp(std::ilogb(interval_s) + kOctaves / 2, 0, kOctaves - 1);
-}
 
 void IntervalFacts::Add(const SampleRow& row) {
   if (rows_ == 0 || row.run != run_) {
@@ -27,47 +22,22 @@ void IntervalFacts::Add(const SampleRow& row) {
       longest_s_ = interval_s;
       longest_after_s_ = time_s_;
     }
-    count_[OctaveOf(interval_s)] += 1;
-    sum_s_[OctaveOf(interval_s)] += interval_s;
+    intervals_s_.Add(interval_s);
   }
   ++rows_;
   run_ = row.run;
   time_s_ = row.time_s;
 }
 
-double IntervalFacts::usual_s() const {
-  const double half = 0.5 * count_.sum();
-  double before = 0;
-  for (Eigen::Index k = 0; k < count_.size(); ++k) {
-    before += count_[k];
-    if (count_[k] > 0 && before >= half) return sum_s_[k] / count_[k];
-  }
-  return 0;
-}
-
 int64_t IntervalFacts::gaps() const {
   const double gap_s = kGapSteps * usual_s();
   if (!(longest_s_ > gap_s)) return 0;
-  double gaps = 0;
-  for (Eigen::Index k = 0; k < count_.size(); ++k) {
-    if (count_[k] > 0 && sum_s_[k] > gap_s * count_[k]) gaps += count_[k];
-  }
-  return std::max<int64_t>(1, std::llround(gaps));
+  return std::max<int64_t>(1, intervals_s_.CountAbove(gap_s));
 }
 
 bool IntervalFacts::IsConsistent() const {
-  if (count_.size() != kOctaves || sum_s_.size() != kOctaves) return false;
-  for (int k = 0; k < kOctaves; ++k) {
-    if (!(count_[k] >= 0) || count_[k] != std::floor(count_[k])) return false;
-    // An empty octave has no sum, and another one's mean lies in it up to rounding.
-    const double mean_s = sum_s_[k] / count_[k];
-    if (count_[k] == 0
-            ? sum_s_[k] != 0
-            : OctaveOf(mean_s * (1 + kRounding)) != k && OctaveOf(mean_s * (1 - kRounding)) != k) {
-      return false;
-    }
-  }
-  return count_.sum() <= static_cast<double>(rows_) && longest_s_ >= 0 && latest_first_s_ >= 0;
+  return intervals_s_.IsConsistent() && intervals_s_.count() <= rows_ && longest_s_ >= 0 &&
+         latest_first_s_ >= 0;
 }
 
 double DistanceOf(const PriorPrediction& prediction) {
@@ -110,7 +80,8 @@ bool ColumnFacts::IsConsistent() const {
   return samples >= 0 && distinct.size() <= kMaxDistinct && std::ranges::is_sorted(distinct) &&
          in_range && distinct.empty() == (samples == 0) && smallest <= largest && min_noise >= 0 &&
          min_noise <= max_noise && square_sum >= 0 && std::isfinite(mean) && far >= 0 &&
-         far <= predicted && predicted <= samples && error_sum >= 0 && deviation_sum >= 0;
+         far <= predicted && predicted <= samples && error_sum >= 0 && deviation_sum >= 0 &&
+         faults.IsConsistent();
 }
 
 double ColumnFacts::Spread() const {
@@ -155,6 +126,7 @@ bool DataFacts::IsFor(size_t columns, size_t inputs) const {
 
 void DataFacts::EndRun() {
   for (InputFacts& input : inputs_) input.EndRun(time_s_);
+  for (ColumnFacts& column : columns_) column.faults.EndRun();
   ended_run_ = run_;
 }
 
@@ -172,7 +144,11 @@ void DataFacts::Add(const RowBlock& block, int row, int channels) {
     const double value = block.values[k * width + i];
     if (std::isnan(value)) continue;
     columns_[i].Add(value, i < m ? block.noise[k * m + i] : 0);
-    if (i >= m) inputs_[i - m].Add(block.rows[k]);
+    if (i < m) {
+      columns_[i].faults.Add(value);
+    } else {
+      inputs_[i - m].Add(block.rows[k]);
+    }
   }
   if (block.run_ended && row + 1 == block.count()) EndRun();
 }

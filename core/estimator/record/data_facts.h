@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/common/types.h"
+#include "core/estimator/record/octave_sums.h"
+#include "core/estimator/record/signal_faults.h"
 #include "polyest/samples.h"
 
 namespace polyest::internal {
@@ -19,9 +20,8 @@ class IntervalFacts {
 
   void Add(const SampleRow& row);
 
-  // Returns the usual interval: the mean of those in the octave [2^k, 2^(k+1)) s that holds the
-  // median; 0 if no run has two rows.
-  double usual_s() const;
+  // Returns the usual interval (OctaveSums::Usual); 0 if no run has two rows.
+  double usual_s() const { return intervals_s_.Usual(); }
   // Returns how many intervals lie in octaves whose mean is at least a gap, and at least 1 if the
   // longest interval is a gap.
   int64_t gaps() const;
@@ -36,20 +36,15 @@ class IntervalFacts {
 
   template <class Archive>
   void serialize(Archive& archive) {
-    archive(rows_, run_, time_s_, longest_s_, longest_after_s_, latest_first_s_, count_, sum_s_);
+    archive(rows_, run_, time_s_, longest_s_, longest_after_s_, latest_first_s_, intervals_s_);
   }
 
  private:
-  // Octaves from 2⁻⁶⁴ s, which is 5·10⁻²⁰ s, to 2⁶⁴ s; the first and the last also take what is
-  // beyond.
-  static constexpr int kOctaves = 128;
-  static int OctaveOf(double interval_s);
-
   int64_t rows_ = 0;
   int run_ = 0;
   double time_s_ = 0;
   double longest_s_ = 0, longest_after_s_ = 0, latest_first_s_ = 0;
-  Vector count_ = Vector::Zero(kOctaves), sum_s_ = Vector::Zero(kOctaves);
+  OctaveSums intervals_s_;
 };
 
 // What the prior predicts for one sample.
@@ -70,6 +65,7 @@ struct ColumnFacts {
   double mean = 0, square_sum = 0;          // Σ (z − mean)²
   double min_noise = 0, max_noise = 0;      // of measured samples
   std::vector<double> distinct;             // the first different values, in increasing order
+  SignalFaults faults;                      // of a measured output
   int64_t predicted = 0, far = 0;           // samples with a prediction, and those far from it
   PriorPrediction first;                    // of the first sample
   double error_sum = 0, deviation_sum = 0;  // Σ (z − mean)², Σ (variance + noise²)
@@ -86,7 +82,7 @@ struct ColumnFacts {
   template <class Archive>
   void serialize(Archive& archive) {
     archive(samples, smallest, largest, mean, square_sum, min_noise, max_noise, distinct);
-    archive(predicted, far, first.value, first.mean, first.variance, first.noise, error_sum,
+    archive(faults, predicted, far, first.value, first.mean, first.variance, first.noise, error_sum,
             deviation_sum);
   }
 };

@@ -22,6 +22,8 @@ constexpr double kUnlikely = 5e-3;
 // its square.
 constexpr double kRiseOfNoise = 10;
 constexpr int64_t kMinConstant = 3;  // samples of one value before it is said never to change
+constexpr int64_t kMinDropouts = 4;  // to one value before they are mentioned
+constexpr int64_t kMinPlateaus = 4;  // at either end of a range before they are mentioned
 
 // Returns an upper bound of the probability that χ² with `degrees` degrees of freedom is at most
 // `chi_squared` (Chernoff): (r e^{1−r})^{degrees/2} with r = χ²/degrees < 1; else 1.
@@ -64,6 +66,7 @@ class Warnings {
       AddConstant(NameOf(i), columns_[i], i < channels);
       if (i >= channels) continue;
       samples += columns_[i].samples;
+      AddFaults(problem_.problem().measured[i], columns_[i].faults);
       AddNoise(problem_.problem().measured[i], columns_[i]);
       AddPrediction(problem_.problem().measured[i], columns_[i]);
     }
@@ -139,6 +142,22 @@ class Warnings {
     if (column.samples >= kMinConstant && column.smallest == column.largest) {
       Add("%s never changes: it is %g in every row; is the sensor connected?", name,
           column.smallest);
+    }
+  }
+
+  // Where gross errors are expected, dropouts are taken care of.
+  void AddFaults(const MeasuredOutput& measured, const SignalFaults& faults) {
+    const RecurringValue dropouts = faults.Dropouts();
+    if (measured.noise.outliers == OutlierHandling::kNone && dropouts.count >= kMinDropouts) {
+      Add("%s: it jumps to %g and back at least %d times, as when a signal drops out; leave these "
+          "cells empty, or give its noise outliers",
+          measured.output, dropouts.value, dropouts.count);
+    }
+    for (const RecurringValue& end : {faults.UpperPlateaus(), faults.LowerPlateaus()}) {
+      if (end.count < kMinPlateaus) continue;
+      Add("%s: it stops at %g %d times, for three samples or more each, as at the end of a "
+          "measuring range; leave these cells empty, or measure with a larger range",
+          measured.output, end.value, end.count);
     }
   }
 

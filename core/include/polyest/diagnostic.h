@@ -24,6 +24,7 @@ enum class DiagnosticCode {
   kInconsistentOverTime,         // a parameter differs between parts of the record
   kReplayPostponed,              // max_replay_row_count has put off what the estimate needs
   kWindowsDisagree,              // windows of the record scatter by more than the noise explains
+  kPriorDataConflict,            // what the data say is improbable by the prior
 };
 
 // Returns the code's name in messages and files, such as "NOT_IDENTIFIED": that of the value of

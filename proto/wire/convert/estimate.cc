@@ -53,6 +53,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::REPLAY_POSTPONED;
     case DiagnosticCode::kWindowsDisagree:
       return v1::Diagnostic::WINDOWS_DISAGREE;
+    case DiagnosticCode::kPriorDataConflict:
+      return v1::Diagnostic::PRIOR_DATA_CONFLICT;
   }
   POLYEST_CHECK(false);
 }

@@ -86,6 +86,12 @@ const EXPLANATIONS: Record<string, Explanation> = {
     remedy: 'If values beyond the bound are possible, widen the prior. If not, the parameter makes up for something else that is wrong.',
     severity: 'serious',
   },
+  PRIOR_DATA_CONFLICT: {
+    title: 'Measurements contradict the prior',
+    meaning: 'What the measurements say of a parameter, or of all together, is very improbable by what was said of it before. The estimate is a compromise between the two, one of which is wrong.',
+    remedy: 'Check the unit and the prior. If both are right, the parameter makes up for something else that is wrong in the model.',
+    severity: 'serious',
+  },
   MULTIPLE_MINIMA: {
     title: 'Several sets of values fit',
     meaning: 'Several separate sets of values fit the data. The estimate shown is that of the most probable one.',

@@ -185,7 +185,8 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kSuspiciousData, v1::Diagnostic::SUSPICIOUS_DATA},
       {DiagnosticCode::kInconsistentOverTime, v1::Diagnostic::INCONSISTENT_OVER_TIME},
       {DiagnosticCode::kReplayPostponed, v1::Diagnostic::REPLAY_POSTPONED},
-      {DiagnosticCode::kWindowsDisagree, v1::Diagnostic::WINDOWS_DISAGREE}};
+      {DiagnosticCode::kWindowsDisagree, v1::Diagnostic::WINDOWS_DISAGREE},
+      {DiagnosticCode::kPriorDataConflict, v1::Diagnostic::PRIOR_DATA_CONFLICT}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};
