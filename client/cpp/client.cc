@@ -162,6 +162,11 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> Client::ComputeCostProfiles(
   return Call(studies_.get(), &v1::StudyService::Stub::ComputeCostProfiles, request);
 }
 
+absl::StatusOr<v1::ComputeLogDensityResponse> Client::ComputeLogDensity(
+    const v1::ComputeLogDensityRequest& request) {
+  return Call(studies_.get(), &v1::StudyService::Stub::ComputeLogDensity, request);
+}
+
 absl::StatusOr<v1::ComputeRegularizationSweepResponse> Client::ComputeRegularizationSweep(
     const v1::ComputeRegularizationSweepRequest& request) {
   return Call(studies_.get(), &v1::StudyService::Stub::ComputeRegularizationSweep, request);
@@ -234,10 +239,9 @@ absl::StatusOr<v1::DrainNodeResponse> Client::DrainNode(const v1::DrainNodeReque
   return Call(nodes_.get(), &v1::NodeService::Stub::DrainNode, request);
 }
 
-absl::Status Client::WatchSession(
-    const v1::WatchSessionRequest& request,
-    const std::function<bool(const v1::WatchSessionResponse&)>& estimate,
-    grpc::ClientContext* call) {
+absl::Status Client::WatchSession(const v1::WatchSessionRequest& request,
+                                  const std::function<bool(const v1::WatchSessionResponse&)>& take,
+                                  grpc::ClientContext* call) {
   POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext own;
   grpc::ClientContext& context = call != nullptr ? *call : own;
@@ -245,7 +249,7 @@ absl::Status Client::WatchSession(
   const auto reader = sessions_->WatchSession(&context, request);
   v1::WatchSessionResponse response;
   while (reader->Read(&response)) {
-    if (estimate(response)) continue;
+    if (take(response)) continue;
     context.TryCancel();
     reader->Finish();
     return absl::OkStatus();

@@ -57,7 +57,8 @@ class Cost {
   // narrow a Gaussian; subtracting `spent` degrees of freedom (parameters fitted, plus 2) gives the
   // curvature of a Gaussian with the variance of the t.
   Matrix MismatchHessian(const ConstVectorRef& eta, double spent = 0) const;
-  // Returns the same with J_P, which knows of the runs' parameters what the prior does not.
+  // Returns the Hessian of β J_mismatch + J_P likewise; J_P holds what the record says of the
+  // parameters of its runs and the prior does not.
   Matrix InformationHessian(const ConstVectorRef& eta, double spent = 0) const;
   Matrix Hessian(const ConstVectorRef& eta, double spent = 0) const;  // of the total
   // Writes the total at W points (W × n) into `totals` (resized) by matrix products.

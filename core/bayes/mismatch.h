@@ -40,8 +40,8 @@ struct ChannelSums {
   explicit ChannelSums(int terms = 0) : samples(terms), differences(terms) {}
 
   MismatchSums samples;  // of u_k
-  // Of u_k − u_{k−1}, and of u_k where a run begins and where it has ended. With the run that has
-  // not, Σ (…)² = 2 Σ u_k² − 2 Σ u_k u_{k−1} − u² of the last sample.
+  // The sums of u_k − u_{k−1}, and of u_k where a run begins and where it has ended. With the run
+  // that has not, Σ (…)² = 2 Σ u_k² − 2 Σ u_k u_{k−1} − u² of the last sample.
   MismatchSums differences;
   // The coefficients l (S) of ½ Σ log(S_k/R_k) = lᵀφ, and its value at the reference; empty and 0
   // if the variances are those of the noise.

@@ -78,8 +78,8 @@ double MixtureValue(double mean, const ScoreMixture& shape, const RunScore& popu
   return -greatest - std::log((terms - greatest).exp().sum());
 }
 
-// Of F = −log Σ w_k e^{−f_k} with the shares ρ_k ∝ w_k e^{−f_k}: ∇F = Σ ρ_k ∇f_k and
-// ∇²F = Σ ρ_k (∇²f_k − ∇f_k ∇f_kᵀ) + ∇F ∇Fᵀ.
+// Returns the derivatives of F = −log Σ w_k e^{−f_k} with the shares ρ_k ∝ w_k e^{−f_k}: ∇F = Σ ρ_k
+// ∇f_k and ∇²F = Σ ρ_k (∇²f_k − ∇f_k ∇f_kᵀ) + ∇F ∇Fᵀ.
 RunTerm MixtureTerm(double mean, const ScoreMixture& shape, const RunScore& population) {
   const Components c = CentresOf(mean, shape);
   Components shares = LogTerms(mean, shape, population);

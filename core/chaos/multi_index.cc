@@ -75,6 +75,7 @@ int64_t TermCount(int dimension, const Truncation& truncation, int64_t most) {
   if (truncation.exponent == 1) {
     return std::min(TotalDegreeTermCount(dimension, truncation.order), most + 1);
   }
+  if (truncation.order >= most) return most + 1;  // one variable alone has order + 1 terms
   int64_t count = 0;
   HyperbolicSet(dimension, truncation).Visit([&](const Eigen::ArrayXi&) {
     return ++count <= most;

@@ -105,7 +105,7 @@ void PackedMatrix::RunSome(Eigen::Index tile, const ConstMatrixRef& x, const Con
                            Eigen::Index first, MatrixRef product, Eigen::Index from) const {
   std::array<std::array<TileColumn, kColumns>, kTiles> sums;
   std::array<const double*, kColumns> factors;
-  // Of the last tile, rows may be missing.
+  // The last tile may lack rows.
   const auto rows_of = [&](int t) { return rows_ - (tile + t) * kTile; };
   const auto row_of = [&](int t) { return (tile + t) * kTile; };
   for (int i = 0; i < kColumns; ++i) {

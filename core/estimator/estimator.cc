@@ -16,7 +16,6 @@
 #include "core/estimator/problem_fingerprint.h"
 #include "core/estimator/record/checkpoints.h"
 #include "core/estimator/record/known_inputs_store.h"
-#include "core/estimator/record/memory_store.h"
 #include "core/estimator/record/sample_checks.h"
 #include "core/estimator/second_search.h"
 #include "core/estimator/snapshot.h"
@@ -33,13 +32,6 @@ using namespace internal;
 namespace {
 
 constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
-
-std::shared_ptr<SampleStore> StoreFor(const ResolvedProblem& problem,
-                                      std::shared_ptr<SampleStore> store) {
-  if (!store) store = std::make_shared<MemoryStore>();
-  if (problem.lead_s() == 0) return store;
-  return std::make_shared<KnownInputsStore>(problem, std::move(store));
-}
 
 }  // namespace
 
@@ -90,6 +82,7 @@ class Estimator::Implementation {
 
  private:
   absl::StatusOr<int64_t> SettledRows() const;
+  const ResolvedProblem& estimated_problem() const;
   absl::StatusOr<Prediction> PredictOther(PredictionSubject subject,
                                           const PredictionOptions& options, const Stop& stop) const;
   absl::StatusOr<DensityBasis> MakeDensityBasis(const Stop& stop) const;
@@ -127,6 +120,18 @@ absl::StatusOr<int64_t> Estimator::Implementation::SettledRows() const {
   if (last.run_ended) return last.rows;
   return polyest::internal::SettledRows(problem_, last.knots, last.rows - last.rows_in_run,
                                         last.rows, *store_);
+}
+
+// Returns the problem of estimates: that of the components with the fewest parameters. A run of
+// which no row has been processed yet has no parameters in it, nor has one in which a stop kept
+// some components from beginning.
+const ResolvedProblem& Estimator::Implementation::estimated_problem() const {
+  size_t least = 0;
+  for (size_t i = 1; i < mixture_->size(); ++i) {
+    const auto dimension = [&](size_t k) { return mixture_->component(k).problem().dimension(); };
+    if (dimension(i) < dimension(least)) least = i;
+  }
+  return mixture_->component(least).problem();
 }
 
 absl::Status Estimator::Implementation::Process(const Stop& stop) {
@@ -182,15 +187,16 @@ absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& 
 
 absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
     const PosteriorOptions& options, const Stop& stop) const {
-  POLYEST_RETURN_IF_ERROR(Validate(options, problem_.prior()));
+  const Prior& prior = estimated_problem().prior();
+  POLYEST_RETURN_IF_ERROR(Validate(options, prior));
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
                            mixture_->Assess(EffortOf(options), stop));
-  return DescribePosterior(assessed.whole, problem_.prior(), options);
+  return DescribePosterior(assessed.whole, prior, options);
 }
 
 absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
     const ProfileOptions& options, const Stop& stop) const {
-  POLYEST_RETURN_IF_ERROR(Validate(options, problem_.prior()));
+  POLYEST_RETURN_IF_ERROR(Validate(options, estimated_problem().prior()));
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
                            mixture_->Assess(PosteriorEffort(), stop));
   const auto profile = [&](const Assessed& one, size_t component) {
@@ -245,24 +251,23 @@ absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegulariza
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
                            mixture_->Assess(PosteriorEffort(), stop));
   const RegionalExpansion& expansion = mixture_->component(assessed.order.front()).expansion();
-  return SweepRegularization(problem_, expansion, assessed.whole, options, stop);
+  return SweepRegularization(estimated_problem(), expansion, assessed.whole, options, stop);
 }
 
 absl::StatusOr<Prediction> Estimator::Implementation::CurrentPrediction(
     const PredictionOptions& options, const Stop& stop) const {
-  POLYEST_RETURN_IF_ERROR(Validate(options, problem_, rows_processed()));
+  const ResolvedProblem& own = estimated_problem();
+  POLYEST_RETURN_IF_ERROR(Validate(options, own, rows_processed()));
   POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
                            mixture_->Assess(PosteriorEffort(), stop));
   const AssessmentRequest heaviest =
       mixture_->component(assessed.order.front()).RequestAssessment();
   PredictionSubject subject;
-  const ResolvedProblem& own = mixture_->component(assessed.order.front()).problem();
-  // Only the component's problem knows the parameters of runs that have been eliminated.
-  subject.problem = own.ended_runs() != nullptr ? &own : &problem_;
+  subject.problem = &own;
   subject.store = store_.get();
   subject.rows = rows_processed();
-  subject.thetas = EquallyWeightedThetas(assessed.whole.posterior, problem_.prior(), options.draws);
-  subject.noise = NoiseOf(assessed.whole, *heaviest.record, heaviest.expansion->noise(), problem_);
+  subject.thetas = EquallyWeightedThetas(assessed.whole.posterior, own.prior(), options.draws);
+  subject.noise = NoiseOf(assessed.whole, *heaviest.record, heaviest.expansion->noise(), own);
   absl::StatusOr<Prediction> prediction = options.record
                                               ? PredictOther(std::move(subject), options, stop)
                                               : Predict(subject, options, threads_, stop);
@@ -292,7 +297,7 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
   const std::shared_ptr<SampleStore> store = StoreFor(other, nullptr);
   POLYEST_RETURN_IF_ERROR(store->Append(*checked));
   POLYEST_RETURN_IF_ERROR(Validate(options, other, store->rows()));
-  subject.thetas = ThetasOfOtherRuns(problem_, subject.thetas, other);
+  subject.thetas = ThetasOfOtherRuns(*subject.problem, subject.thetas, other);
   subject.problem = &other;
   subject.store = store.get();
   subject.rows = store->rows();

@@ -64,11 +64,11 @@ using RequestMessage = std::variant<AdvanceMessage, EvaluateMessage>;
 
 struct ResultMessage {
   std::string error;  // an error that ended the whole simulation, or empty
-  // Of AdvanceMessage: rows as in StartMessage, columns as in TrajectoryEnsemble::Advance. Of
+  // After AdvanceMessage: rows as in StartMessage, columns as in TrajectoryEnsemble::Advance. After
   // EvaluateMessage: the values, rows as there.
   Matrix outputs;
-  // Of AdvanceMessage: all so far; of EvaluateMessage: of rows without values. `point` is a row of
-  // StartMessage.
+  // After AdvanceMessage: all so far; after EvaluateMessage: those of rows without values. `point`
+  // is a row of StartMessage.
   std::vector<PointFailure> failures;
 };
 

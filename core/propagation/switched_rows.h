@@ -143,7 +143,7 @@ class SwitchedRows final : public RowSystem {
   Eigen::ArrayXXd output_modes_;
   RowVariants variants_;
 
-  // Of the row that was analysed last.
+  // What was found about the row that was analysed last.
   std::vector<AtSurface> surfaces_;
   const Eigen::ArrayXXd* slopes_ = nullptr;
   Eigen::ArrayXXd changes_;   // surfaces × states: Δ_j

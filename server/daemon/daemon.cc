@@ -39,8 +39,8 @@ constexpr int kKeepaliveTimeoutMs = 20'000;
 constexpr int64_t kBufferMb = 1'024;
 // Largest number of streams of one connection.
 constexpr int kMaxConcurrentStreams = 1'000;
-// Largest number of tasks of an executor that wait or run, and of those in one lane: a tenant,
-// which has two, takes half of the room at most.
+// Largest number of tasks of an executor that wait or run, and of those in one lane. A tenant has
+// two lanes for its calls, and so takes half of that executor at most, and one lane of the intake.
 constexpr int kWaitingTasks = 20'000;
 constexpr int kWaitingTasksOfLane = kWaitingTasks / 4;
 // Number of the executor's lanes that may be busy with long tasks before another lane has to wait.

@@ -69,6 +69,14 @@ sockaddr_storage Reachable(sockaddr_storage address) {
   return address;
 }
 
+// Returns an address and its port as text, which no two connections to a socket share.
+std::string TextOf(const sockaddr_storage& address) {
+  char host[NI_MAXHOST] = "", port[NI_MAXSERV] = "";
+  getnameinfo(reinterpret_cast<const sockaddr*>(&address), sizeof(address), host, sizeof(host),
+              port, sizeof(port), NI_NUMERICHOST | NI_NUMERICSERV);
+  return absl::StrCat(host, " ", port);
+}
+
 socklen_t SizeOf(const sockaddr_storage& address) {
   return address.ss_family == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
 }
@@ -206,7 +214,7 @@ void Listener::Accept(int socket) {
     }
     return;
   }
-  if (TakeOwn(connection, PortOf(address))) return;
+  if (TakeOwn(connection, TextOf(address))) return;
   const std::string peer = PeerKey(address);
   // The lowest free number is given to a new descriptor: this one says how many are in use.
   if (connection >= options_.descriptors - ReserveOf(options_.descriptors) / 2) {
@@ -224,11 +232,11 @@ void Listener::Accept(int socket) {
 }
 
 // Takes a connection if it is one that Dial has made.
-bool Listener::TakeOwn(int connection, int port) {
+bool Listener::TakeOwn(int connection, const std::string& from) {
   const std::lock_guard lock(own_mutex_);
-  const auto own = own_.find(port);
+  const auto own = own_.find(from);
   if (own == own_.end()) return false;
-  own_accepted_.insert(port);
+  own_accepted_.insert(from);
   own_changed_.notify_all();
   if (own->second) {
     Pass(connection);
@@ -267,28 +275,29 @@ bool Listener::DialOne(int listening, std::chrono::steady_clock::time_point dead
   if (getsockname(listening, reinterpret_cast<sockaddr*>(&address), &size) != 0) return false;
   address = Reachable(address);
   const Socket client(::socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  // The port that it comes from is chosen first, so that the connection is known when it arrives.
-  sockaddr_storage from{};
-  from.ss_family = address.ss_family;
+  // Where it comes from is chosen first, so that the connection is known when it arrives: the same
+  // address, which is this machine's, and any port.
+  sockaddr_storage from = address;
+  SetPort(reinterpret_cast<sockaddr*>(&from), 0);
   size = sizeof(from);
   if (client.number < 0 ||
       bind(client.number, reinterpret_cast<sockaddr*>(&from), SizeOf(from)) != 0 ||
       getsockname(client.number, reinterpret_cast<sockaddr*>(&from), &size) != 0) {
     return false;
   }
-  const int port = PortOf(from);
+  const std::string place = TextOf(from);
   {
     const std::lock_guard lock(own_mutex_);
-    own_[port] = http2;
+    own_[place] = http2;
   }
   const int connected =
       connect(client.number, reinterpret_cast<sockaddr*>(&address), SizeOf(address));
   const bool begun = connected == 0 || errno == EINPROGRESS;
   std::unique_lock lock(own_mutex_);
   const bool accepted = begun && own_changed_.wait_until(
-                                     lock, deadline, [&] { return own_accepted_.contains(port); });
-  own_.erase(port);
-  own_accepted_.erase(port);
+                                     lock, deadline, [&] { return own_accepted_.contains(place); });
+  own_.erase(place);
+  own_accepted_.erase(place);
   lock.unlock();
   return accepted && (!http2 || AnswersHealthCall(client.number, deadline));
 }

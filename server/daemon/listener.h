@@ -88,7 +88,7 @@ class Listener {
   void Bind(const sockaddr* address, socklen_t size, int& port);
   void Run(std::stop_token stop);
   void Accept(int socket);
-  bool TakeOwn(int connection, int port);
+  bool TakeOwn(int connection, const std::string& from);
   // Hands a connection to gRPC.
   void Pass(int connection);
   void Refuse(int connection, const std::string& peer, const char* why);
@@ -101,11 +101,11 @@ class Listener {
   std::atomic<int64_t> refused_ = 0;
   LogLimit warnings_{5, 0.2};
 
-  // Own connections that are awaited, by the port that they come from, with whether gRPC is to have
-  // them; and those that have come.
+  // Own connections that are awaited, by the address and port that they come from, with whether
+  // gRPC is to have them; and those that have come.
   std::mutex own_mutex_;
-  std::map<int, bool> own_;
-  std::set<int> own_accepted_;
+  std::map<std::string, bool> own_;
+  std::set<std::string> own_accepted_;
   std::condition_variable own_changed_;
 
   std::unique_ptr<Socket> wake_;  // an eventfd, which ends the wait for connections

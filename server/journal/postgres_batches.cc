@@ -28,7 +28,7 @@ constexpr char kInsertBatchIfWhole[] =
 void PostgresBatches::Add(const PostgresBatch& batch) {
   const auto [session, is_new] =
       sessions_.try_emplace(batch.entry->session, Session{.owner = batch.owner});
-  // Of two owners only the later one can be the present one.
+  // If there are two owners, only the later one can be the present one.
   if (!is_new && batch.owner.epoch > session->second.owner.epoch) {
     session->second.owner = batch.owner;
   }

@@ -107,7 +107,7 @@ absl::Status MeasurementFlow::Join(absl::StatusOr<std::shared_ptr<Session>> sess
 // Looks for the session where a thread may wait for that.
 void MeasurementFlow::Find(const std::string& tenant, const std::string& session,
                            const std::string& writer) {
-  auto found = context_.sessions.Find(tenant, session);
+  auto found = Guarded([&] { return context_.sessions.Find(tenant, session); });
   std::lock_guard lock(mutex_);
   stage_ = Stage::kNone;
   if (!end_) {

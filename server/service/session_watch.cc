@@ -104,7 +104,7 @@ absl::Status WatchFlow::Attach(const v1::WatchSessionRequest& request) {
 
 // Looks for the session where a thread may wait for that.
 void WatchFlow::Find(const std::string& tenant, const v1::WatchSessionRequest& request) {
-  auto found = context_.sessions.Find(tenant, request.session());
+  auto found = Guarded([&] { return context_.sessions.Find(tenant, request.session()); });
   std::lock_guard lock(mutex_);
   absl::Status accepted = found.status();
   if (accepted.ok()) {

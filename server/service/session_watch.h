@@ -56,11 +56,12 @@ class WatchFlow final : public SessionObserver,
 
   // Computes a prediction; runs on the strand.
   void Predict();
-  // Makes the watch an observer of the session; runs on the strand.
+  // Looks for the session; runs where a thread may wait for that.
   void Find(const std::string& tenant, const v1::WatchSessionRequest& request);
   // Passes the watch on to the owner of its session, if `refusal` names one that may be asked.
   // Called with the mutex held.
   bool PassOn(const absl::Status& refusal, const v1::WatchSessionRequest& request);
+  // Makes the watch an observer of the session; runs on the strand.
   void Register();
 
   ServiceContext& context_;

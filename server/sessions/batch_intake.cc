@@ -86,12 +86,15 @@ absl::Status BatchIntake::CheckRuns(int runs, const ProblemLimits& limits) {
   return absl::OkStatus();
 }
 
-std::optional<TakenBatch> BatchIntake::Next(int64_t sequence) {
+const TakenBatch* BatchIntake::Oldest(int64_t sequence) const {
   const std::lock_guard lock(mutex_);
-  if (waiting_.empty() || waiting_.front().place.sequence > sequence) return std::nullopt;
-  TakenBatch next = std::move(waiting_.front());
+  if (waiting_.empty() || waiting_.front().place.sequence > sequence) return nullptr;
+  return &waiting_.front();
+}
+
+void BatchIntake::RemoveOldest() {
+  const std::lock_guard lock(mutex_);
   waiting_.pop_front();
-  return next;
 }
 
 // Returns the next batch, in which these samples arrive, without its samples.

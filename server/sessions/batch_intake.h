@@ -56,9 +56,11 @@ class BatchIntake {
   absl::Status Take(const v1::Measurements& batch, const ProblemLimits& limits = {},
                     const Record& record = {});
 
-  // Removes and returns the oldest batch that has not been handed on yet. Returns nothing when
-  // there is none or its number is above `sequence`.
-  std::optional<TakenBatch> Next(int64_t sequence);
+  // Returns the oldest batch that has not been handed on yet; null when there is none or its number
+  // is above `sequence`. It stays as it is until it is removed.
+  const TakenBatch* Oldest(int64_t sequence) const;
+  // Removes the oldest batch, which must be there: it has been handed on.
+  void RemoveOldest();
 
  private:
   absl::Status CheckRuns(int runs, const ProblemLimits& limits);

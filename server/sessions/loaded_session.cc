@@ -132,7 +132,8 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
     if (batch.sequence > computed_.sequence) return enough;
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements));
-    POLYEST_RETURN_IF_ERROR(Give(*intake.Next(batch.sequence), anew));
+    POLYEST_RETURN_IF_ERROR(Give(*intake.Oldest(batch.sequence), anew));
+    intake.RemoveOldest();
     anew.store->Release(batch.sequence);
     return absl::OkStatus();
   };
@@ -145,6 +146,7 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
   if (!snapshot.state.empty()) anew.estimator->Restore(snapshot, stop).IgnoreError();
   POLYEST_RETURN_IF_ERROR(stop.Check());
   computed_ = std::move(anew);
+  half_given_ = false;
   latest_ = nullptr;
   return absl::OkStatus();
 }
@@ -160,13 +162,13 @@ int64_t LoadedSession::memory_bytes() const {
 }
 
 absl::Status LoadedSession::Store(int64_t sequence) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence, Stop()));
   Release(sequence);
   return absl::OkStatus();
 }
 
 absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence, stop));
   return computed_.estimator->Process(stop);
 }
 
@@ -188,13 +190,21 @@ absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop&
 }
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max()));
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max(), Stop()));
   return work(*computed_.estimator, computed_.sequence);
 }
 
-absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
-  while (const std::optional<TakenBatch> batch = intake_.Next(sequence)) {
+// A lack of memory may throw while a batch is given. How much of it the estimator has then is not
+// known, so the estimator is made anew before the same batch is given again.
+absl::Status LoadedSession::GiveUpTo(int64_t sequence, const Stop& stop) {
+  if (half_given_) {
+    POLYEST_RETURN_IF_ERROR(BeginAnew(computed_.cuts, Snapshot().second, stop));
+  }
+  while (const TakenBatch* const batch = intake_.Oldest(sequence)) {
+    half_given_ = true;
     POLYEST_RETURN_IF_ERROR(Give(*batch, computed_));
+    half_given_ = false;
+    intake_.RemoveOldest();
   }
   return absl::OkStatus();
 }

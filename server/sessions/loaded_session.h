@@ -121,7 +121,7 @@ class LoadedSession {
   absl::Status BeginAnew(RunCuts cuts, const EstimatorSnapshot& snapshot, const Stop& stop);
   // Takes the journal's snapshot and the cuts before it; nothing if it has none that is readable.
   std::pair<RunCuts, EstimatorSnapshot> Snapshot() const;
-  absl::Status GiveUpTo(int64_t sequence);
+  absl::Status GiveUpTo(int64_t sequence, const Stop& stop);
   static absl::Status Give(const TakenBatch& batch, Computed& computed);
   absl::StatusOr<Estimate> PriorEstimate(const absl::Status& reason, const Stop& stop) const;
 
@@ -134,6 +134,7 @@ class LoadedSession {
   int64_t number_ = 0;                       // of the session in the journal
   std::function<void(EstimatorSnapshot)> save_;
   int64_t failed_rows_ = -1;  // rows processed when EndFailedRun was called last
+  bool half_given_ = false;   // whether the estimator may have a part of the intake's oldest batch
   SharedEstimate latest_;
 };
 

@@ -50,6 +50,8 @@ bool RunCuts::LeavesOut(int run, double time_s) const {
 
 Samples RunCuts::Keep(Samples samples) const {
   if (cuts_.empty()) return samples;
+  // Before its first row a record has no run that could end.
+  if (everything_) samples.end_of_run = false;
   std::vector<bool> kept(samples.rows());
   for (size_t row = 0; row < samples.rows(); ++row) {
     kept[row] = !LeavesOut(samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]);

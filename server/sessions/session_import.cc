@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-// Of estimates of a thousand a second, those of 30,000 years.
+// Estimates at a thousand a second for 30,000 years.
 constexpr int64_t kMaxOrdinal = int64_t{1} << 50;
 constexpr size_t kMaxPastEstimateBytes = size_t{1} << 16;
 

@@ -84,10 +84,13 @@ absl::Status TenantMemory::MakeRoom(const std::string& tenant, int64_t more) {
   std::sort(idle.begin(), idle.end(), std::greater<>());
   for (const auto& [time, bytes, session] : idle) {
     if (excess <= 0) break;
-    // A busy daemon refuses the task.
-    if (!session->strand().Submit([session = session] { session->Unload(); }).ok()) continue;
-    NoteLeaving(session->number());
-    excess -= bytes;
+    // Noted first, because the session may have left, and come back, before Submit returns.
+    NoteLeaving(session->number(), true);
+    if (session->strand().Submit([session = session] { session->Unload(); }).ok()) {
+      excess -= bytes;
+    } else {  // the daemon is busy
+      NoteLeaving(session->number(), false);
+    }
   }
   return excess <= 0 ? absl::OkStatus() : NoRoom(excess + limit - more, more, max_mb_);
 }
@@ -106,10 +109,10 @@ std::vector<std::pair<int64_t, std::shared_ptr<Session>>> TenantMemory::Candidat
 }
 
 // The session may have left already.
-void TenantMemory::NoteLeaving(int64_t session) {
+void TenantMemory::NoteLeaving(int64_t session, bool leaving) {
   const std::lock_guard lock(mutex_);
   const auto share = sessions_.find(session);
-  if (share != sessions_.end()) share->second.leaving = true;
+  if (share != sessions_.end()) share->second.leaving = leaving;
 }
 
 int64_t TenantMemory::OfTenant(const std::string& tenant) const {

@@ -51,7 +51,7 @@ class TenantMemory {
   // Returns the sessions that may leave; subtracts what those that are leaving hold from `excess`.
   std::vector<std::pair<int64_t, std::shared_ptr<Session>>> Candidates(const std::string& tenant,
                                                                        int64_t& excess);
-  void NoteLeaving(int64_t session);
+  void NoteLeaving(int64_t session, bool leaving);
 
   const int64_t max_mb_;
   mutable std::mutex mutex_;

@@ -58,10 +58,13 @@ AuditLog::~AuditLog() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
+std::string AuditLog::LineOf(const std::string& event, const LogFields& fields) const {
+  return absl::StrCat("{\"time\":\"", google::protobuf::util::TimeUtil::ToString(wall_clock_()),
+                      "\",\"event\":", JsonString(event), FieldsAsJson(fields), "}\n");
+}
+
 void AuditLog::Add(const std::string& event, const LogFields& fields) {
-  std::string line =
-      absl::StrCat("{\"time\":\"", google::protobuf::util::TimeUtil::ToString(wall_clock_()),
-                   "\",\"event\":", JsonString(event), FieldsAsJson(fields), "}\n");
+  std::string line = LineOf(event, fields);
   const std::lock_guard lock(mutex_);
   if (lines_.size() >= kMaxLines) {
     ++lost_;
@@ -85,8 +88,7 @@ void AuditLog::Run(std::stop_token stop) {
     if (written) {
       lines_.erase(lines_.begin(), lines_.begin() + static_cast<std::ptrdiff_t>(count));
       if (lost_ == 0) continue;
-      lines_.push_back(
-          absl::StrCat("{\"event\":\"lines lost\",\"count\":\"", std::exchange(lost_, 0), "\"}\n"));
+      lines_.push_back(LineOf("lines lost", {{"count", absl::StrCat(std::exchange(lost_, 0))}}));
     } else {
       if (stop.stop_requested()) return;
       added_.wait_for(lock, stop, kRetry, [] { return false; });

@@ -48,6 +48,7 @@ class AuditLog {
  private:
   AuditLog(std::string file, int descriptor, WallClock wall_clock);
 
+  std::string LineOf(const std::string& event, const LogFields& fields) const;
   // The following run on the writing thread.
   void Run(std::stop_token stop);
   bool Write(const std::string& text);

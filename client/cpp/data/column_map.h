@@ -34,7 +34,7 @@ struct DataColumn {
   std::string unit = {};
   std::string model_unit = {};
   UnitConversion conversion = {};
-  // Of the time: why its unit cannot be used; empty if it can. Dates need no unit.
+  // For the time: why its unit cannot be used; empty if it can. Dates need no unit.
   std::string unit_refusal = {};
 
   bool is_channel() const { return role == kMeasured || role == kStreamed; }

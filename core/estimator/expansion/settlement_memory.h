@@ -3,15 +3,16 @@
 // What earlier settlements (reexpansion.h) have found, so that nothing is tried again that failed
 // before and must fail again.
 //
-// Of the posterior a settlement leaves particles and their costs. As long as these particles,
+// A settlement leaves particles of the posterior and their costs. As long as these particles,
 // reweighted to the present cost, keep nine tenths of their number as effective size, the posterior
 // has hardly moved, and what they say of the region is what new ones would say. Where they neither
 // lean on an edge nor would fit into a region of half the volume, no new ones are drawn. That holds
 // in up to three dimensions, where elements find the pieces of a posterior that particles overlook.
 //
-// Of a higher order that did not follow the model its error is kept, and the region. Over a region
-// that contains this one the error is no smaller. The order is not tried again before the region
-// has left it, the noise has grown to where the error would be accepted, or the record has doubled.
+// If a higher order did not follow the model, its error and the region of that trial are kept. Over
+// a region that contains this one the error is no smaller. The order is not tried again before the
+// region has left it, the noise has grown to where the error would be accepted, or the record has
+// doubled.
 
 #include <cstdint>
 

@@ -28,7 +28,7 @@ struct WindowChange {
 
 struct Inconsistency {
   int parameter = 0;
-  // Of the windows in which the parameter can be determined, the two that differ most, in order.
+  // The two windows that differ most, in order, among those that determine the parameter.
   WindowChange first, second;
   double separation = 0;  // their difference in standard deviations
 };

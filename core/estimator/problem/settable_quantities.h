@@ -50,7 +50,7 @@ class SettableQuantities {
     // Column of the model's parameters, inputs, outputs or states; of a rate, that of its state in
     // the drifting model.
     int column;
-    // Of a rate: the one by which the normal score gains 1/√s. Of a noise: as stated.
+    // For a rate: the one by which the normal score gains 1/√s. For a noise: as stated.
     double unit_value = 1;
 
     bool of_input() const {

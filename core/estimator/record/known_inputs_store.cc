@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/record/memory_store.h"
 
 namespace polyest::internal {
 
@@ -48,6 +49,13 @@ absl::Status KnownInputsStore::Read(int64_t first, int64_t count, RowBlock& bloc
     std::fill_n(block.noise.begin() + static_cast<std::ptrdiff_t>(k * channels_), channels_, 0);
   }
   return absl::OkStatus();
+}
+
+std::shared_ptr<SampleStore> StoreFor(const ResolvedProblem& problem,
+                                      std::shared_ptr<SampleStore> store) {
+  if (!store) store = std::make_shared<MemoryStore>();
+  if (problem.lead_s() == 0) return store;
+  return std::make_shared<KnownInputsStore>(problem, std::move(store));
 }
 
 }  // namespace polyest::internal

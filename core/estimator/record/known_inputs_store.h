@@ -35,4 +35,9 @@ class KnownInputsStore final : public SampleStore {
   std::vector<double> known_to_s_;       // by streamed input, in the last run
 };
 
+// Returns the store in which an estimator of the problem keeps its rows: `store`, or one in memory
+// if that is null, as a KnownInputsStore if need be.
+std::shared_ptr<SampleStore> StoreFor(const ResolvedProblem& problem,
+                                      std::shared_ptr<SampleStore> store);
+
 }  // namespace polyest::internal

@@ -17,7 +17,8 @@ std::vector<int> AskedAndMeasured(const ResolvedProblem& problem, std::vector<in
 // Samples that filters have not taken yet.
 class PendingSamples {
  public:
-  // Of `channels` outputs, behind `before` others of the filters that are not measured.
+  // Holds samples of `channels` outputs, behind `before` others of the filters that are not
+  // measured.
   PendingSamples(Eigen::Index before, Eigen::Index channels)
       : before_(before), channels_(channels) {}
 

@@ -29,6 +29,10 @@ RecordTrajectories::RecordTrajectories(const ResolvedProblem& problem, const Sam
 
 absl::Status RecordTrajectories::CheckTimes(std::span<const SampleRow> times) const {
   for (size_t i = 0; i < times.size(); ++i) {
+    if (times[i].run < 0) {
+      return InvalidField(FieldPath{"times", i, "run"},
+                          absl::StrFormat("%d must be at least 0", times[i].run));
+    }
     if (!std::isfinite(times[i].time_s) || times[i].time_s < 0) {
       return InvalidField(FieldPath{"times", i, "time_s"},
                           absl::StrFormat("%g must be a finite time ≥ 0", times[i].time_s));

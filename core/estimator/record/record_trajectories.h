@@ -37,8 +37,7 @@ struct TrajectoryInstant {
 struct FilterUse {
   double horizon_s = 0;  // as that of RunFilters
   // Whether outputs are told from all samples of their run, also those after them (RunSmoothers).
-  // Of the rows only those are visited then for which `visits` returns true, and each run's at its
-  // end.
+  // Only the rows for which `visits` returns true are visited then, and each run's at its end.
   bool smooth = false;
   std::function<bool(int64_t row)> visits;
 };

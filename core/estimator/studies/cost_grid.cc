@@ -5,11 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
 
 #include "core/bayes/mismatch.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/record/known_inputs_store.h"
+#include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/sample_checks.h"
 #include "core/estimator/record/whitening.h"
 
@@ -18,7 +22,7 @@ namespace {
 
 // Numbers of grid points and of sample times processed at once; they bound the memory.
 constexpr Eigen::Index kPointsAtATime = 1024;
-constexpr size_t kTimesAtATime = 64;
+constexpr int64_t kTimesAtATime = 64;
 // Half the range of an axis without a bound, in standard deviations from the mean.
 constexpr double kDeviations = 4;
 
@@ -56,13 +60,12 @@ absl::StatusOr<Eigen::Index> ChoosePoints(const CostGridOptions& options, size_t
   if (options.points == 0) return axes == 1 ? 201 : 41;
   if (options.points < 2) {
     return InvalidField(
-        "grid_points",
-        absl::StrFormat("%d must be at least 2, or 0 for the default", options.points));
+        "points", absl::StrFormat("%d must be at least 2, or 0 for the default", options.points));
   }
   const auto points = static_cast<int64_t>(options.points);
   const int64_t all = axes == 1 ? points : points * points;
   if (all > kMaxGridPoints) {
-    return FieldError(absl::StatusCode::kResourceExhausted, "grid_points",
+    return FieldError(absl::StatusCode::kResourceExhausted, "points",
                       absl::StrFormat("%d an axis make %d runs of the model; the limit is %d",
                                       points, all, kMaxGridPoints));
   }
@@ -115,13 +118,14 @@ Vector AxisScores(const Germ& germ, Eigen::Index points) {
   return axis;
 }
 
-// Computes J_mismatch of every row of `thetas` from runs of the model over the whole record.
-// Outliers are not handled, since there is no estimate to judge them by.
+// Computes J_mismatch of every row of `thetas` from runs of the model over the whole record, as the
+// estimator reads it. Outliers are not handled, since there is no estimate to judge them by.
 class ModelMismatch {
  public:
-  ModelMismatch(const ResolvedProblem& problem, const CheckedSamples& record, int threads)
+  // `store` has the whole record.
+  ModelMismatch(const ResolvedProblem& problem, const SampleStore& store, int threads)
       : problem_(problem),
-        record_(record),
+        store_(store),
         threads_(threads),
         channels_(static_cast<size_t>(problem.channels())),
         width_(channels_ + problem.streamed_inputs().size()) {}
@@ -130,12 +134,18 @@ class ModelMismatch {
     const auto m = static_cast<Eigen::Index>(channels_);
     Sums sums{Matrix::Zero(thetas.rows(), m), Matrix::Zero(thetas.rows(), m),
               Matrix::Zero(thetas.rows(), m), Vector::Zero(m)};
-    for (size_t first = 0; first < record_.rows.size();) {
-      size_t end = first + 1;
-      while (end < record_.rows.size() && record_.rows[end].run == record_.rows[first].run) ++end;
-      POLYEST_RETURN_IF_ERROR(AddRun(thetas, first, end, sums, stop));
-      first = end;
+    std::optional<Run> run;
+    RowBlock block;
+    for (int64_t first = 0; first < store_.rows(); first += block.count()) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      POLYEST_RETURN_IF_ERROR(ReadOfOneRun(first, block));
+      if (const int number = block.rows.front().run; !run || run->number != number) {
+        if (run) EndRun(run->ensemble, sums);
+        run.emplace(*this, thetas, number, first);
+      }
+      POLYEST_RETURN_IF_ERROR(AddRows(block, *run, sums, stop));
     }
+    if (run) EndRun(run->ensemble, sums);
     return Total(sums);
   }
 
@@ -147,43 +157,55 @@ class ModelMismatch {
     Vector samples;
   };
 
-  // Adds the rows [first, end) of one run. The model starts anew, with the run's own inputs.
-  absl::Status AddRun(const Matrix& thetas, size_t first, size_t end, Sums& sums,
-                      const Stop& stop) const {
-    sums.differences.array() += sums.previous.array().square();  // ends the run before
-    sums.previous.setZero();
-    InputSignals inputs = problem_.MakeInputs();
-    std::vector<double> times;
-    for (size_t k = first; k < end; ++k) {
-      times.push_back(record_.rows[k].time_s);
-      for (size_t i = 0; i < problem_.streamed_inputs().size(); ++i) {
-        inputs[static_cast<size_t>(problem_.streamed_inputs()[i])].Append(
-            times.back(), record_.values[k * width_ + channels_ + i]);
-      }
-    }
-    for (const int input : problem_.streamed_inputs()) inputs[static_cast<size_t>(input)].Finish();
-    EnsemblePropagator ensemble(
-        problem_.MakeEnsemble(thetas, problem_.outputs(), threads_, record_.rows[first].run),
-        &inputs);
+  // A run, in which the model starts anew, with the run's own inputs.
+  struct Run {
+    Run(const ModelMismatch& of, const Matrix& thetas, int run, int64_t first_row)
+        : number(run),
+          inputs(of.problem_, &of.store_, run, first_row),
+          ensemble(of.problem_.MakeEnsemble(thetas, of.problem_.outputs(), of.threads_, run),
+                   &inputs.signals()),
+          whitening(of.NoiseAsStated(), thetas.rows()) {}
+
+    int number;
+    RunInputs inputs;
+    EnsemblePropagator ensemble;
+    Whitening whitening;
+  };
+
+  std::vector<ChannelNoise> NoiseAsStated() const {
     std::vector<ChannelNoise> noise = NoiseToBeginWith(problem_.problem()).channels;
     for (ChannelNoise& channel : noise) channel.scale = 1;
-    Whitening whitening(noise, thetas.rows());
-    RowBlock block = record_;
-    Matrix outputs;
-    for (size_t k = 0; k < times.size(); k += kTimesAtATime) {
-      POLYEST_RETURN_IF_ERROR(stop.Check());
-      const size_t count = std::min(kTimesAtATime, times.size() - k);
-      outputs.resize(thetas.rows(), static_cast<Eigen::Index>(count * channels_));
-      POLYEST_RETURN_IF_ERROR(ensemble.Advance(std::span(times).subspan(k, count), outputs, stop));
-      whitening.Apply(static_cast<int>(first + k), static_cast<int>(count), block, outputs);
-      for (size_t row = 0; row < count; ++row) {
-        AddRow(block, first + k + row, outputs, row * channels_, sums);
-      }
+    return noise;
+  }
+
+  // Reads the next rows, as far as they are of the same run.
+  absl::Status ReadOfOneRun(int64_t first, RowBlock& block) const {
+    POLYEST_RETURN_IF_ERROR(
+        store_.Read(first, std::min(kTimesAtATime, store_.rows() - first), block));
+    const int run = block.rows.front().run;
+    const auto same = std::ranges::count(block.rows, run, &SampleRow::run);
+    return same == block.count() ? absl::OkStatus() : store_.Read(first, same, block);
+  }
+
+  absl::Status AddRows(RowBlock& block, Run& run, Sums& sums, const Stop& stop) const {
+    POLYEST_RETURN_IF_ERROR(run.inputs.ReadUpTo(block.rows.back().time_s));
+    std::vector<double> times;
+    for (const SampleRow& row : block.rows) times.push_back(row.time_s);
+    Matrix outputs(sums.previous.rows(), static_cast<Eigen::Index>(times.size() * channels_));
+    POLYEST_RETURN_IF_ERROR(run.ensemble.Advance(times, outputs, stop));
+    run.whitening.Apply(0, block.count(), block, outputs);
+    for (size_t row = 0; row < times.size(); ++row) {
+      AddRow(block, row, outputs, row * channels_, sums);
     }
+    return absl::OkStatus();
+  }
+
+  static void EndRun(const EnsemblePropagator& ensemble, Sums& sums) {
+    sums.differences.array() += sums.previous.array().square();
+    sums.previous.setZero();
     for (const PointFailure& failure : ensemble.failures()) {
       sums.chi_squared.row(failure.point).setConstant(kInfinity);
     }
-    return absl::OkStatus();
   }
 
   void AddRow(const RowBlock& block, size_t row, const Matrix& outputs, size_t first_column,
@@ -220,7 +242,7 @@ class ModelMismatch {
   }
 
   const ResolvedProblem& problem_;
-  const CheckedSamples& record_;
+  const SampleStore& store_;
   int threads_;
   size_t channels_;
   size_t width_;  // number of values in a row: channels, then streamed inputs
@@ -268,7 +290,7 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
   if (options.threads < 1) {
     return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
   }
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples record, SampleChecks(problem).Check(samples));
+  POLYEST_ASSIGN_OR_RETURN(CheckedSamples record, SampleChecks(problem).Check(samples));
   if (record.after.run >= problem.max_joint_runs()) {
     return InvalidField(
         "measurements",
@@ -292,6 +314,7 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
     const auto parameter = static_cast<size_t>(axes[a]);
     const Vector axis = AxisScores(prior.germs()[parameter], points);
     grid.parameters.push_back(prior.parameters()[parameter].name);
+    grid.units.push_back(problem.units()[parameter]);
     grid.axes.push_back(axis.unaryExpr([&](double z) { return prior.OfScore(axes[a], z); }));
     for (Eigen::Index i = 0; i < scores.rows(); ++i) {
       scores(i, axes[a]) = axis[a == 0 ? i % points : i / points];
@@ -299,7 +322,10 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
   }
   grid.mismatch.resize(points, second);
   grid.prior.resize(points, second);
-  const ModelMismatch model(problem, record, options.threads);
+  record.run_ended = true;  // nothing follows
+  const std::shared_ptr<SampleStore> store = StoreFor(problem, nullptr);
+  POLYEST_RETURN_IF_ERROR(store->Append(record));
+  const ModelMismatch model(problem, *store, options.threads);
   POLYEST_RETURN_IF_ERROR(FillGrid(problem, model, scores, grid, stop));
   return grid;
 }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <limits>
 
 #include "core/common/check.h"
 #include "core/common/field_error.h"
@@ -18,10 +17,8 @@ constexpr double kShortened = 1e-7;
 
 absl::StatusOr<UncertainParameter> PriorAfter(const UncertainParameter& before,
                                               const ParameterEstimate& after, double std_dev) {
-  const bool lognormal = before.map == ParameterMap::kExponential;
-  const double lower = lognormal ? 0 : before.ToParameter(Germ(before.germ).Lower());
-  const double upper = lognormal ? std::numeric_limits<double>::infinity()
-                                 : before.ToParameter(Germ(before.germ).Upper());
+  const double lower = before.ToParameter(Germ(before.germ).Lower());
+  const double upper = before.ToParameter(Germ(before.germ).Upper());
   if (after.mean - kFarBound * std_dev >= lower && after.mean + kFarBound * std_dev <= upper) {
     return UncertainParameter::Normal(before.name, after.mean, std_dev);
   }

@@ -17,6 +17,7 @@
 #include "core/estimator/expansion/prior_expansion.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_builder.h"
+#include "polyest/posterior.h"
 
 namespace polyest::internal {
 namespace {
@@ -41,6 +42,29 @@ absl::Status ValidateForecast(const PredictionOptions& options, const ResolvedPr
                       absl::StrFormat("%g needs inputs that are known in advance, and one is "
                                       "streamed",
                                       forecast_s));
+}
+
+// Returns the number of times of which the prediction tells, for a record of so many rows.
+int64_t CountTimes(const PredictionOptions& options, int64_t rows) {
+  if (options.forecast_s > 0) return options.max_rows;
+  return options.times.empty() ? std::min(rows, options.max_rows) : std::ssize(options.times);
+}
+
+// Refuses a prediction of too many outputs, counted at all times.
+absl::Status LimitNumbers(const PredictionOptions& options, int64_t outputs) {
+  const int64_t numbers = outputs * NumbersPerTime(options);
+  if (numbers > kMaxPredictedValues) {
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("the prediction would have %d numbers, the limit is %d; ask for fewer "
+                        "rows, outputs or probabilities",
+                        numbers, kMaxPredictedValues));
+  }
+  const int64_t smoothed = options.smoothed ? outputs * options.draws : 0;
+  if (smoothed <= kMaxSmoothedValues) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrFormat("smoothing would keep %d values, one for each draw, output and time, the "
+                      "limit is %d; ask for fewer rows, outputs or draws",
+                      smoothed, kMaxSmoothedValues));
 }
 
 // Returns the times after the record's last row to predict at.
@@ -70,6 +94,11 @@ absl::StatusOr<std::vector<SampleRow>> ForecastTimes(const PredictionSubject& su
 absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& problem,
                       int64_t rows) {
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
+  if (options.probabilities.size() > kMaxProbabilities) {
+    return InvalidField("probabilities",
+                        absl::StrFormat("%d are given; the limit is %d",
+                                        options.probabilities.size(), kMaxProbabilities));
+  }
   for (size_t i = 0; i < options.probabilities.size(); ++i) {
     if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;
     return InvalidField(FieldPath{"probabilities", i},
@@ -98,14 +127,7 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
   POLYEST_RETURN_IF_ERROR(CheckRange("first_scored_row", options.first_scored_row, 0,
                                      std::numeric_limits<int64_t>::max()));
   POLYEST_RETURN_IF_ERROR(CheckRange("times", std::ssize(options.times), 0, kMaxPredictionRows));
-  const int64_t times =
-      options.times.empty() ? std::min(rows, options.max_rows) : std::ssize(options.times);
-  const int64_t numbers = times * std::ssize(columns) * NumbersPerTime(options);
-  if (numbers <= kMaxPredictedValues) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrFormat("the prediction would have %d numbers, the limit is %d; ask for fewer rows, "
-                      "outputs or probabilities",
-                      numbers, kMaxPredictedValues));
+  return LimitNumbers(options, CountTimes(options, rows) * std::ssize(columns));
 }
 
 namespace {
@@ -214,9 +236,8 @@ absl::StatusOr<Prediction> PredictSmoothed(const PredictionSubject& subject,
                                            const Stop& stop) {
   PredictionBuilder builder(subject, options, columns);
   const Eigen::Index draws = subject.thetas.rows();
-  const int64_t most =
-      options.times.empty() ? std::min(subject.rows, options.max_rows) : std::ssize(options.times);
-  const Eigen::Index batch = DrawsOfBatch(*subject.problem, std::max<int64_t>(1, most));
+  const Eigen::Index batch =
+      DrawsOfBatch(*subject.problem, std::max<int64_t>(1, CountTimes(options, subject.rows)));
   const FilterUse use{
       .horizon_s = 0, .smooth = true, .visits = [&](int64_t row) { return builder.Returns(row); }};
   std::vector<SmoothedInstant> instants;

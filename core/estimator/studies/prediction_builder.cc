@@ -57,9 +57,9 @@ class JumpSearch {
   std::optional<AbruptChange> Take() {
     if (times_ == 0) return std::nullopt;
     // One of so many normal scores is beyond the limit, on either side, with this probability at
-    // most (Bonferroni).
+    // most (Bonferroni, two-sided).
     constexpr double kChance = 0.01;
-    found_.limit = Germ::Uniform().NormalScore(1 - kChance / static_cast<double>(times_));
+    found_.limit = Germ::Normal().Quantile(1 - kChance / static_cast<double>(2 * times_));
     if (std::abs(found_.score) > found_.limit) return found_;
     return std::nullopt;
   }

@@ -36,6 +36,7 @@ struct CostGridOptions {
 // The cost on a grid.
 struct CostGrid {
   std::vector<std::string> parameters;  // one or two names
+  std::vector<std::string> units;       // of each; "1" for a plain number, empty if none is given
   std::vector<Vector> axes;             // values of each, over the prior's support or mean ± 4 σ
   Matrix mismatch;            // first axis × second axis (or × 1); +∞ where the model fails
   Matrix prior;               // +∞ at a bound where the density is 0

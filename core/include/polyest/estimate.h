@@ -52,8 +52,8 @@ struct Direction {
 struct TradeOff {
   int first = 0, second = 0;  // indices of the uncertain parameters
   std::string combination;    // as text, "k/m"
-  // Of the combination: posterior standard deviation ÷ |mean|; of a product or quotient, the
-  // standard deviation of its logarithm.
+  // Relative uncertainty of the combination: its posterior standard deviation ÷ |mean|, or that of
+  // the logarithm of a product or quotient.
   double relative_std_dev = 0;
   // Posterior standard deviation ÷ |mean| of each parameter alone.
   double first_alone = 0, second_alone = 0;

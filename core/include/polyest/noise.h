@@ -32,10 +32,10 @@ enum class OutlierHandling {
 // the maximum over the output's samples up to and including this one in time order, so that how
 // samples are cut into batches does not matter. A known full scale takes the place of the last
 // term's maximum. Samples of 0 before any other, to which neither `absolute` nor a full scale gives
-// a σ above 0, are not used. Of the sample, the part proportional to |z| favours samples that
-// happen to be small: an adaptive expansion takes it of the model's prediction in place of z as
-// soon as there is one, unless the noise is correlated. If the size of the noise is unknown, a
-// factor of σ is estimated; without numbers σ is then 1.
+// a σ above 0, are not used. If the part proportional to |z| is taken of the sample, samples that
+// happen to be small count too much: an adaptive expansion takes it of the model's prediction in
+// place of z as soon as there is one, unless the noise is correlated. If the size of the noise is
+// unknown, a factor of σ is estimated; without numbers σ is then 1.
 struct NoiseModel {
   // None of the parts may be above 10⁵⁰, or below 10⁻⁵⁰ unless it is 0.
   double absolute = 0;         // ≥ 0, in the output's unit

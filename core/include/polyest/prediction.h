@@ -33,6 +33,8 @@ inline constexpr int64_t kMaxPredictionRows = 1'000'000;  // max_rows, and the n
 inline constexpr int kMaxPredictionLags = 10'000;         // PredictionOptions::lags
 // The most numbers in an answer: rows × outputs × numbers for each; past it RESOURCE_EXHAUSTED.
 inline constexpr int64_t kMaxPredictedValues = 10'000'000;
+// The most values that smoothing keeps: draws × outputs × times; past it RESOURCE_EXHAUSTED.
+inline constexpr int64_t kMaxSmoothedValues = 10'000'000;
 
 // What to compute.
 struct PredictionOptions {
@@ -49,14 +51,14 @@ struct PredictionOptions {
   // later, instead of the record's rows; ≥ 0. Not with `times`, nor where an input is streamed,
   // since nobody knows it yet.
   double forecast_s = 0;
-  // Of filters: the record is divided into windows of this length in s (each to the last row within
-  // it of the row that it begins after), and no sample is used within its own window, so that rows
-  // are forecasts up to this time ahead; ≥ 0, 0 for output errors. 0: each row is predicted from
-  // all rows before it.
+  // How far ahead filters predict, s, ≥ 0; 0 for output errors. The record is divided into windows:
+  // one begins after the last row of the one before, and ends with the last row within `horizon_s`
+  // of that. No sample is used within its own window. 0: each row is predicted from all rows before
+  // it.
   double horizon_s = 0;
-  // Of filters: whether the outputs at each time are told from all samples of its run. The samples
-  // there are among them, so nothing is said of new samples, and nothing is scored. Not with
-  // `horizon_s`, nor for output errors, whose predictions are of all samples anyway.
+  // Whether filters tell the outputs at each time from all samples of its run (smoothing). The
+  // samples at that time are among them, so nothing is said of new samples, and nothing is scored.
+  // Not with `horizon_s`, nor for output errors, whose predictions are of all samples anyway.
   bool smoothed = false;
   int lags = 50;  // of the residuals' autocorrelation, ≥ 0
   // The first row of the record that is scored, ≥ 0; those before it serve the filters.

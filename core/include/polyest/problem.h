@@ -85,8 +85,9 @@ struct Problem {
   std::vector<MeasuredOutput> measured;     // at least one for an estimator; studies may have none
   std::vector<ProcessNoise> process_noise;  // what drives the states beside the inputs
   // Default: kPredictionError if there is process noise or a parameter drifts, else kOutputError.
-  // With kPredictionError the model must have from 1 to 32 states, must be a StateSpaceModel whose
-  // equations do not switch, and outputs have no delays; noise of the samples is known, white and
+  // With kPredictionError the model must have from 1 to 32 states, drifting parameters among them,
+  // that can be set (a StateSpaceModel, or an FMU for Model Exchange without events), and equations
+  // that do not switch; outputs have no delays; noise of the samples is known, white and
   // not relative, and its outliers are not kHuber; there are no populations; regularization_mode is
   // kFixed.
   std::optional<LikelihoodForm> likelihood;

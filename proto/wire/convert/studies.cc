@@ -33,13 +33,6 @@ void ToProto(const OutputSensitivity& output, v1::ComputeSensitivityResponse::Ou
   Append(output.noise, *proto.mutable_noise_std_dev());
 }
 
-const std::string& UnitOf(const std::string& parameter, const ResolvedProblem& problem) {
-  const auto& parameters = problem.prior().parameters();
-  size_t index = 0;
-  while (parameters.at(index).name != parameter) ++index;
-  return problem.units()[index];
-}
-
 }  // namespace
 
 PropagationOptions ToPropagationOptions(const v1::ComputePropagationRequest& request) {
@@ -78,12 +71,12 @@ CostGridOptions ToCostGridOptions(const v1::ComputeCostGridRequest& request) {
   return options;
 }
 
-v1::ComputeCostGridResponse ToProto(const CostGrid& grid, const ResolvedProblem& problem) {
+v1::ComputeCostGridResponse ToProto(const CostGrid& grid) {
   v1::ComputeCostGridResponse response;
   for (size_t i = 0; i < grid.parameters.size(); ++i) {
     v1::ComputeCostGridResponse::Axis& axis = *response.add_axes();
     axis.set_parameter(grid.parameters[i]);
-    axis.set_unit(UnitOf(grid.parameters[i], problem));
+    axis.set_unit(grid.units[i]);
     Append(grid.axes[i], *axis.mutable_value());
   }
   Append(grid.mismatch, *response.mutable_mismatch());

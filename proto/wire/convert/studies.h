@@ -17,7 +17,7 @@ v1::ComputePropagationResponse ToProto(const Propagation& propagation,
 
 CostGridOptions ToCostGridOptions(const v1::ComputeCostGridRequest& request);
 // Converts a cost grid. The units of its axes are taken from `problem`.
-v1::ComputeCostGridResponse ToProto(const CostGrid& grid, const ResolvedProblem& problem);
+v1::ComputeCostGridResponse ToProto(const CostGrid& grid);
 
 // Returns the options of a request. `step_s` is a hundredth of `until_s` by default.
 SensitivityOptions ToSensitivityOptions(const v1::ComputeSensitivityRequest& request);

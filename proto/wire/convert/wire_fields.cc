@@ -16,13 +16,9 @@ using Names = std::map<std::string, std::string>;
 // Fields whose JSON name is not the core's name in camel case. They are fields of a request itself,
 // where the names of counts end in "Count", and fields of measurements. Structures inside of a
 // request, such as `expansion.points`, have the core's names.
-const Names kNamesOfRequests{{"density_bins", "densityBinCount"},
-                             {"draws", "drawCount"},
-                             {"grid_points", "pointCount"},
-                             {"joint_bins", "jointBinCount"},
-                             {"lags", "lagCount"},
-                             {"max_rows", "maxRowCount"},
-                             {"points", "pointCount"},
+const Names kNamesOfRequests{{"density_bins", "densityBinCount"}, {"draws", "drawCount"},
+                             {"joint_bins", "jointBinCount"},     {"lags", "lagCount"},
+                             {"max_rows", "maxRowCount"},         {"points", "pointCount"},
                              {"samples", "sampleCount"}};
 const Names kNamesOfMeasurements{{"columns", "channels"}, {"value", "values"}};
 const Names kNoOtherNames;

@@ -152,7 +152,7 @@ absl::StatusOr<v1::ComputeCostGridResponse> ComputeCostGrid(
   }
   POLYEST_ASSIGN_OR_RETURN(CostGrid grid,
                            WireFields(EvaluateCostGrid(problem, samples, options, stop)));
-  return ToProto(grid, problem);
+  return ToProto(grid);
 }
 
 absl::StatusOr<v1::ComputeSensitivityResponse> ComputeSensitivity(

@@ -66,6 +66,10 @@ class Client {
   // Computes the cost over each parameter, minimized over all the others.
   absl::StatusOr<v1::ComputeCostProfilesResponse> ComputeCostProfiles(
       const v1::ComputeCostProfilesRequest& request);
+  // Computes the log density of the posterior at given values, with gradient and Hessian if asked
+  // for.
+  absl::StatusOr<v1::ComputeLogDensityResponse> ComputeLogDensity(
+      const v1::ComputeLogDensityRequest& request);
   // Computes the minima of the cost for several regularization weights.
   absl::StatusOr<v1::ComputeRegularizationSweepResponse> ComputeRegularizationSweep(
       const v1::ComputeRegularizationSweepRequest& request);
@@ -103,11 +107,12 @@ class Client {
   absl::StatusOr<v1::ListNodesResponse> ListNodes(const v1::ListNodesRequest& request);
   // Asks one of them to hand its sessions over to the others.
   absl::StatusOr<v1::DrainNodeResponse> DrainNode(const v1::DrainNodeRequest& request);
-  // Calls `estimate` with the session's present estimate and then with new ones, until it returns
-  // false (the answer is then OK) or the daemon ends the watch. `call`, if given, is a new context
-  // for this call: another thread may cancel it, which ends the watch with CANCELLED.
+  // Calls `take` with the session's present estimate, then with new ones and, if the request asks
+  // for them, predictions, until it returns false (the answer is then OK) or the daemon ends the
+  // watch. `call`, if given, is a new context for this call: another thread may cancel it, which
+  // ends the watch with CANCELLED.
   absl::Status WatchSession(const v1::WatchSessionRequest& request,
-                            const std::function<bool(const v1::WatchSessionResponse&)>& estimate,
+                            const std::function<bool(const v1::WatchSessionResponse&)>& take,
                             grpc::ClientContext* call = nullptr);
   // Calls `take` with each record of a session. If `take` fails, the export ends with its status.
   absl::Status ExportSession(const v1::ExportSessionRequest& request,

@@ -24,7 +24,7 @@ struct ClientTls {
 
 // Options of a client.
 struct ClientOptions {
-  // How long a unary call may take; none: without limit.
+  // How long a call may take, a stream such as a watch included; none: without limit.
   std::optional<std::chrono::milliseconds> deadline{};
   // Time without traffic after which the connection is probed, ≥ 10 s: the daemon closes
   // connections that are probed more often.

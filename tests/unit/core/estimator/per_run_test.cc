@@ -113,6 +113,37 @@ TEST(PerRun, HowARecordIsCutIntoBatchesDoesNotMatter) {
   ExpectSame(estimator->CurrentEstimate().value(), whole);
 }
 
+// The rows of a new run may be appended long before they are processed.
+TEST(PerRun, AnswersAreOfTheRunsThatHaveBeenProcessed) {
+  Samples first = ThreeLines(), second = first;
+  const auto cut = [](Samples& samples, size_t from, size_t to) {
+    const auto part = [&](auto& values) {
+      values = std::decay_t<decltype(values)>(values.begin() + from, values.begin() + to);
+    };
+    part(samples.time_s);
+    part(samples.run);
+    part(samples.columns[0].value);
+  };
+  cut(first, 0, 9);
+  cut(second, 9, 12);
+  const auto estimator = MakeEstimator(LineProblem());
+  ASSERT_TRUE(estimator->Append(first).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  const Posterior posterior = estimator->CurrentPosterior({}).value();
+  const Prediction prediction = estimator->CurrentPrediction({}).value();
+  const CostProfiles profiles = estimator->CurrentProfiles({}).value();
+  const RegularizationSweep sweep = estimator->CurrentRegularizationSweep({}).value();
+  ASSERT_TRUE(estimator->Append(second).ok());
+  const Posterior after = estimator->CurrentPosterior({}).value();
+  ASSERT_EQ(after.marginals.size(), 2u);
+  EXPECT_EQ(after.marginals[0].quantiles, posterior.marginals[0].quantiles);
+  EXPECT_EQ(estimator->CurrentPrediction({})->outputs[0].mean, prediction.outputs[0].mean);
+  EXPECT_EQ(estimator->CurrentProfiles({})->profiles.size(), profiles.profiles.size());
+  EXPECT_EQ(estimator->CurrentRegularizationSweep({})->points.size(), sweep.points.size());
+  ASSERT_TRUE(estimator->Process().ok());
+  EXPECT_EQ(estimator->CurrentPosterior({})->marginals.size(), 3u);
+}
+
 TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   Problem problem = LineProblem();
   problem.expansion.adaptive = false;  // runs that have ended cannot be eliminated
@@ -231,6 +262,7 @@ TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {
   const auto grid =
       EvaluateCostGrid(ResolvedProblem::Make(LineProblem()).value(), samples, options, {});
   ASSERT_TRUE(grid.ok()) << grid.status();
+  EXPECT_THAT(grid->units, ElementsAre(""));
   const double step = grid->axes[0][6] - grid->axes[0][5];
   const double information = 1.0 / 9 + 5 / (kNoise * kNoise);  // Run 2 has five samples.
   EXPECT_NEAR(grid->total(4, 0) - 2 * grid->total(5, 0) + grid->total(6, 0),

@@ -85,7 +85,7 @@ TEST(UnitConversion, ReadsTurnsPerMinuteWhereTheModelHasAnAngularVelocity) {
 }
 
 TEST(UnitConversion, ReadsRatesWhereTheModelHasARate) {
-  for (const char* const rate : {"1/min", "min-1", "min^-1"}) {
+  for (const char* const rate : {"1/min", "min-1", "min^-1", "U/min"}) {
     EXPECT_DOUBLE_EQ(Converted(60, rate, "1/s"), 1) << rate;
     EXPECT_DOUBLE_EQ(Converted(60, rate, "Hz"), 1) << rate;
     EXPECT_DOUBLE_EQ(Converted(3, rate, "1/min"), 3) << rate;

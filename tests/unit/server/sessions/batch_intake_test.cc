@@ -49,9 +49,13 @@ TEST_F(BatchIntakeTest, TakesOnlyWhatCanBeRecorded) {
   // The intake did not take the batch, so that it can come again.
   ASSERT_TRUE(intake_.Take(Row(0.2), {}, record).ok());
   EXPECT_EQ(recorded.sequence, 2);
-  EXPECT_EQ(intake_.Next(2)->place.sequence, 1);
-  EXPECT_EQ(intake_.Next(2)->place.sequence, 2);
-  EXPECT_FALSE(intake_.Next(2));
+  EXPECT_EQ(intake_.Oldest(0), nullptr);
+  EXPECT_EQ(intake_.Oldest(2)->place.sequence, 1);
+  EXPECT_EQ(intake_.Oldest(2)->place.sequence, 1);  // it stays
+  intake_.RemoveOldest();
+  EXPECT_EQ(intake_.Oldest(2)->place.sequence, 2);
+  intake_.RemoveOldest();
+  EXPECT_EQ(intake_.Oldest(2), nullptr);
 }
 
 }  // namespace

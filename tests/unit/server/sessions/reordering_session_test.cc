@@ -248,7 +248,8 @@ TEST_F(ReorderingSessionTest, ReadsRowsOfTheJournalInTheOrderInWhichTheyWereRele
     JournalEntry entry{session->number(), DeterministicBytes(batch), "", {}};
     entry.digest = Digest(entry.measurements);
     ASSERT_TRUE(intake.Take(batch).ok());
-    const TakenBatch taken = *intake.Next(std::numeric_limits<int64_t>::max());
+    const TakenBatch taken = *intake.Oldest(std::numeric_limits<int64_t>::max());
+    intake.RemoveOldest();
     entry.place = taken.place;
     journal_.Append(std::move(entry), [](const absl::Status& kept) { ASSERT_TRUE(kept.ok()); });
     store.SetHeldFrom(taken.held_from);

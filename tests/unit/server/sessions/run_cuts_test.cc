@@ -112,6 +112,19 @@ TEST_F(FailingModelTest, EndsTheRunAndSaysSoInTheEstimate) {
   EXPECT_EQ(CurrentEstimate().samples(), before.samples() + 1);
 }
 
+// Whoever streams inputs ends the record without rows.
+TEST_F(FailingModelTest, TakesTheEndOfARunOfWhichNoRowCanBeUsed) {
+  Add(Rows(0, {40}));
+  EXPECT_THAT(Failures(CurrentEstimate()), ElementsAre(HasSubstr("not even the first one")));
+  v1::Measurements end;
+  end.set_end_of_run(true);
+  Add(end);
+  EXPECT_THAT(Failures(CurrentEstimate()), ElementsAre(HasSubstr("not even the first one")));
+  Restart();
+  ASSERT_TRUE(session_->Load({}).ok());
+  EXPECT_THAT(Failures(CurrentEstimate()), ElementsAre(HasSubstr("not even the first one")));
+}
+
 TEST_F(FailingModelTest, GoesOnWithTheNextRunAsIfTheRowsHadNotCome) {
   Add(Rows(0, kGood));
   Add(Rows(0, {40}));

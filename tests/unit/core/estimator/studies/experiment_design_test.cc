@@ -317,5 +317,14 @@ TEST(EstimateAsPrior, StaysWithinTheBounds) {
   EXPECT_EQ(sharp.prior().parameters()[1].germ.family, GermFamily::kNormal);
 }
 
+TEST(EstimateAsPrior, KeepsTheBoundsOfALogUniformPrior) {
+  Problem problem = Line();
+  problem.uncertain = {Normal("x_0", 0, 2), UncertainParameter::LogUniform("a", 1, 3).value()};
+  const ResolvedProblem before = Resolve(problem);
+  const ResolvedProblem after = WithEstimateAsPrior(before, LineEstimate(before, {0.1})).value();
+  EXPECT_NEAR(after.prior().OfScore(1, -30), 1, 1e-12);
+  EXPECT_NEAR(after.prior().OfScore(1, 30), 3, 1e-12);
+}
+
 }  // namespace
 }  // namespace polyest::internal::experiment_design_test

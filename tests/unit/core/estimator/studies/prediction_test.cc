@@ -291,6 +291,18 @@ TEST(Prediction, RefusesWhatItCannotPredict) {
                  o.times = {{1, 0.5}};
                }),
                "times[0].run: the record has no run 1");
+  EXPECT_PRED2(contains, refusal([](auto& o) {
+                 o.times = {{-1, 0.5}};
+               }),
+               "times[0].run: -1 must be at least 0");
+  EXPECT_PRED2(contains, refusal([](auto& o) { o.probabilities.assign(1'001, 0.5); }),
+               "probabilities: 1001 are given; the limit is 1000");
+  // A forecast has as many times as it may have rows, however short the record.
+  EXPECT_PRED2(contains, refusal([](auto& o) {
+                 o.forecast_s = 1;
+                 o.max_rows = 1'000'000;
+               }),
+               "would have 12000000 numbers");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.times = {{0, 2}, {0, 1}}; }), "times[1]: run 0");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.times = {{0, -1}}; }), "times[0].time_s: -1");
   EXPECT_PRED2(contains, refusal([](auto& o) { o.forecast_s = -1; }), "forecast_s: -1 must be");

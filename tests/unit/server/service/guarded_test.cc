@@ -1,0 +1,27 @@
+// Tests that exceptions of a request end the request alone.
+
+#include "server/service/guarded.h"
+
+#include <absl/status/statusor.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace polyest::internal {
+namespace {
+
+TEST(Guarded, ReturnsWhatTheWorkReturns) {
+  EXPECT_TRUE(Guarded([] { return absl::OkStatus(); }).ok());
+  EXPECT_TRUE(absl::IsAborted(Guarded([] { return absl::AbortedError("why"); })));
+  EXPECT_EQ(Guarded([]() -> absl::StatusOr<int> { return 3; }).value(), 3);
+}
+
+TEST(Guarded, TurnsExceptionsIntoStatuses) {
+  const auto lacks_memory = []() -> absl::Status { throw std::bad_alloc(); };
+  EXPECT_TRUE(absl::IsResourceExhausted(Guarded(lacks_memory)));
+  const auto is_wrong = []() -> absl::StatusOr<int> { throw std::out_of_range("vector::at"); };
+  EXPECT_TRUE(absl::IsInternal(Guarded(is_wrong).status()));
+}
+
+}  // namespace
+}  // namespace polyest::internal
