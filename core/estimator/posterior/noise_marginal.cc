@@ -141,6 +141,8 @@ Vector NoiseProbabilities(const CorrelationProfile& profile, const TimeConstantG
 
 NoiseMarginal::NoiseMarginal(const ResolvedProblem& problem, const RegionalExpansion& expansion)
     : expansion_(expansion) {
+  // A profile has nothing of runs that have been eliminated, and the likelihood has.
+  if (problem.ended_runs() != nullptr) return;
   const Matrix unit = Inverse(expansion.design().region.axes()) *
                       problem.prior().GermStandardDeviation().asDiagonal();
   for (int c = 0; c < problem.channels(); ++c) {
