@@ -188,23 +188,24 @@ void MeasurementStream::Take(const v1::StreamMeasurementsResponse& response) {
   }
 }
 
-// Forgets the batches up to `sequence`, the session's last, before a new connection is made. Fails
-// if the session has batches of another client or has lost acknowledged ones. The caller holds the
-// lock.
-absl::Status MeasurementStream::ForgetAcknowledged(int64_t sequence) {
-  const int64_t first = last_sequence_ - static_cast<int64_t>(pending_.size()) + 1;
+// Checks that a session whose last batch is number `sequence` can be this stream's own, before a
+// new connection sends again what has no acknowledgement. The daemon then tells whether the batches
+// of these numbers are the stream's. The caller holds the lock.
+absl::Status MeasurementStream::CheckIsOwn(int64_t sequence) const {
+  const int64_t acknowledged = last_sequence_ - static_cast<int64_t>(pending_.size());
   if (sequence > last_sequence_) {
-    return absl::AbortedError(absl::StrCat(session_, " has batch ", sequence,
-                                           ", the last one sent is ", last_sequence_,
-                                           ": another client writes to it"));
+    return AnotherWrites(
+        absl::StrCat("it has batch ", sequence, ", the last one sent is ", last_sequence_));
   }
-  if (sequence < first - 1) {
+  if (sequence < acknowledged) {
     return absl::DataLossError(absl::StrCat(session_, " has batches up to ", sequence,
-                                            ", but acknowledged them up to ", first - 1));
+                                            ", but acknowledged them up to ", acknowledged));
   }
-  while (!pending_.empty() && pending_.front()->sequence() <= sequence) pending_.pop_front();
-  written_ = 0;
   return absl::OkStatus();
+}
+
+absl::Status MeasurementStream::AnotherWrites(absl::string_view how) const {
+  return absl::AbortedError(absl::StrCat("another client writes to ", session_, ": ", how));
 }
 
 absl::Status MeasurementStream::Connect() {
@@ -215,7 +216,8 @@ absl::Status MeasurementStream::Connect() {
   if (!connection_) {
     last_sequence_ = session.last_sequence();
   } else {
-    POLYEST_RETURN_IF_ERROR(ForgetAcknowledged(session.last_sequence()));
+    POLYEST_RETURN_IF_ERROR(CheckIsOwn(session.last_sequence()));
+    written_ = 0;
   }
   connection_ = std::make_unique<Connection>(*this);
   connection_->Start();
@@ -233,8 +235,6 @@ absl::Status MeasurementStream::Open() {
 // Returns whether another attempt to connect may help after `status`. The caller holds the lock.
 bool MeasurementStream::MayRecover(const absl::Status& status) const {
   if (IsBreak(status)) return attempts_ < options_.max_attempts;
-  // After a break the daemon may still hold the old connection as the session's writer.
-  if (absl::IsAborted(status)) return attempts_ > 0 && attempts_ < options_.max_attempts;
   // The token was replaced; the daemon may accept the new one a moment later.
   if (absl::IsUnauthenticated(status)) {
     return attempts_ < options_.max_attempts && connection_ && connection_->Outdated();
@@ -286,6 +286,7 @@ absl::Status MeasurementStream::Recover(Lock& lock) {
   if (lost.ok())
     return absl::InternalError("the daemon closed the stream before all batches were sent");
   const absl::Status status = ConnectAgain(lock, lost);
+  if (absl::IsAlreadyExists(status)) return AnotherWrites(status.message());
   if (absl::IsNotFound(status)) {
     return absl::DataLossError(absl::StrCat(
         "the daemon has lost ", session_, " and the batches it had acknowledged, up to number ",

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <numeric>
 
 #include "polyest/rpc/error_details.pb.h"
@@ -60,14 +61,22 @@ class FakeDaemon : public v1::SessionService::Service {
     int taken = 0;
     while (stream->Read(&request)) {
       if (request.sequence() == 0) continue;  // It only says how often estimates are wanted.
-      if (request.sequence() != last_sequence + 1) {
-        return {grpc::StatusCode::INVALID_ARGUMENT, "not the next batch"};
+      const double time = request.measurements().time_s(0);
+      if (request.sequence() > last_sequence + 1) {
+        return {grpc::StatusCode::FAILED_PRECONDITION, "a gap"};
+      }
+      if (request.sequence() <= last_sequence) {
+        if (TimeOf(request.sequence()) != time) {
+          return {grpc::StatusCode::ALREADY_EXISTS, "taken with other measurements"};
+        }
+        continue;
       }
       last_sequence = request.sequence();
-      times.push_back(request.measurements().time_s(0));
+      times.push_back(time);
       ++taken;
       // The batch is taken, but its acknowledgement gets lost with the connection.
       if (connections <= breaks && taken == 3) {
+        if (on_break) on_break();
         return {grpc::StatusCode::UNAVAILABLE, "the cable was pulled"};
       }
       if (taken % acknowledge_every == 0) Acknowledge(*stream);
@@ -80,6 +89,7 @@ class FakeDaemon : public v1::SessionService::Service {
   }
 
   int breaks = 0;  // the number of connections that break after three batches
+  std::function<void()> on_break;
   int acknowledge_every = 1;
   std::atomic<bool> lost = false;
   std::atomic<int> absences = 0;        // how often GetSession does not reach the daemon
@@ -98,6 +108,11 @@ class FakeDaemon : public v1::SessionService::Service {
                                   ? ""
                                   : std::string(found->second.data(), found->second.size());
     return authorization.empty() || given == authorization;
+  }
+
+  // Returns the time of a batch that the session has, of which only the last are in `times`.
+  double TimeOf(int64_t sequence) const {
+    return times[times.size() - 1 - static_cast<size_t>(last_sequence - sequence)];
   }
 
   void Acknowledge(Stream& stream) {
@@ -223,6 +238,45 @@ TEST_F(MeasurementStreamTest, DoesNotFightAnotherWriter) {
   MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
   ASSERT_TRUE(stream.Open().ok());
   EXPECT_EQ(stream.Finish().status(), absl::AbortedError("the session has a writer"));
+  EXPECT_EQ(daemon_.connections, 1);
+}
+
+TEST_F(MeasurementStreamTest, DoesNotFightAnotherWriterAfterABreak) {
+  daemon_.breaks = 1;
+  daemon_.refusals = 2;
+  daemon_.on_break = [this] {
+    daemon_.refusal = grpc::Status(grpc::StatusCode::ABORTED, "the session has a writer");
+  };
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  absl::Status status = SendBatches(stream, 10);
+  if (status.ok()) status = stream.Finish().status();
+  EXPECT_EQ(status, absl::AbortedError("the session has a writer"));
+  EXPECT_EQ(daemon_.connections, 2);
+}
+
+TEST_F(MeasurementStreamTest, DoesNotTakeBatchesOfAnotherClientForItsOwn) {
+  daemon_.breaks = 1;
+  // The third batch gets lost with the connection; another client's takes its number.
+  daemon_.on_break = [this] { daemon_.times.back() = -1; };
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  absl::Status status = SendBatches(stream, 10);
+  if (status.ok()) status = stream.Finish().status();
+  EXPECT_EQ(status, absl::AbortedError("another client writes to sessions/a: taken with other "
+                                       "measurements"));
+  EXPECT_THAT(daemon_.times, ElementsAre(1, 2, -1));
+}
+
+TEST_F(MeasurementStreamTest, EndsAtOnceWhenAnotherClientHasGoneOn) {
+  daemon_.breaks = 1;
+  daemon_.on_break = [this] { daemon_.last_sequence = 100; };
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  absl::Status status = SendBatches(stream, 10);
+  if (status.ok()) status = stream.Finish().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kAborted);
+  EXPECT_THAT(status.message(), HasSubstr("another client writes to sessions/a"));
   EXPECT_EQ(daemon_.connections, 1);
 }
 

@@ -4,13 +4,14 @@
 // break.
 //
 // The stream keeps a batch until the daemon has acknowledged it. If the connection breaks, the next
-// Send or Finish connects again, asks for the last batch that the session has, and sends the
-// batches after it. So no batch is lost or counted twice. It does the same if the daemon has no
-// room now but says that it may have later (its disk is full, or it is busy), and if the token was
-// replaced. Open also tries again while the daemon cannot be reached.
+// Send or Finish connects again and sends all batches that have no acknowledgement. The daemon
+// recognizes those that had arrived, so no batch is lost or counted twice. The stream does the same
+// if the daemon has no room now but says that it may have later (its disk is full, or it is busy),
+// and if the token was replaced. Open also tries again while the daemon cannot be reached.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -70,7 +71,8 @@ class MeasurementStream {
   // last one on. NOT_FOUND: no such session. UNAVAILABLE: no connection after all attempts.
   absl::Status Open();
   // Sends one batch; waits while too many are not acknowledged. DATA_LOSS: the daemon has lost the
-  // session or acknowledged batches of it. UNAVAILABLE: no connection after all attempts.
+  // session or acknowledged batches of it. ABORTED: another client writes to the session.
+  // UNAVAILABLE: no connection after all attempts.
   absl::Status Send(v1::Measurements batch);
   // Ends the stream: waits for all acknowledgements and returns the last estimate, or none if the
   // session has no samples. Fails as Send.
@@ -86,7 +88,8 @@ class MeasurementStream {
   bool MayRecover(const absl::Status& status) const;
   std::string CountAttempt(const absl::Status& status);
   void TellOfRoom(Lock& lock);
-  absl::Status ForgetAcknowledged(int64_t sequence);
+  absl::Status CheckIsOwn(int64_t sequence) const;
+  absl::Status AnotherWrites(absl::string_view how) const;
   void Write();
   void Take(const v1::StreamMeasurementsResponse& response);
   bool Wait(std::chrono::milliseconds delay) const;
