@@ -7,6 +7,7 @@
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/model_comparison.h"
@@ -111,9 +112,10 @@ void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {
 void PrintCsv(const std::vector<Contestant>& all, std::ostream& out) {
   out << "problem,logEvidence,logScore,heldOut,coverage95,warnings\n";
   for (const Contestant& one : all) {
-    out << one.file << ',' << (one.log_evidence ? FormatExact(*one.log_evidence) : "") << ','
-        << FormatExact(one.log_score) << ',' << one.held_out << ','
-        << (one.held_out > 0 ? FormatExact(Coverage(one)) : "") << ",\"" << Warnings(one) << "\"\n";
+    out << CsvField(one.file) << ',' << (one.log_evidence ? FormatExact(*one.log_evidence) : "")
+        << ',' << FormatExact(one.log_score) << ',' << one.held_out << ','
+        << (one.held_out > 0 ? FormatExact(Coverage(one)) : "") << ',' << CsvField(Warnings(one))
+        << '\n';
   }
 }
 

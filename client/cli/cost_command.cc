@@ -1,6 +1,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "core/common/status.h"
@@ -21,7 +22,7 @@ absl::StatusOr<v1::ComputeCostGridResponse> EvaluateCost(const CostArguments& ar
 
 // Prints one row per point of the grid: its coordinates and the three costs.
 void PrintCsv(const v1::ComputeCostGridResponse& cost, std::ostream& out) {
-  for (const auto& axis : cost.axes()) out << axis.parameter() << ',';
+  for (const auto& axis : cost.axes()) out << CsvField(axis.parameter()) << ',';
   out << "mismatch,prior,total\n";
   const int inner = cost.axes_size() == 2 ? cost.axes(1).value_size() : 1;
   for (int i = 0; i < cost.total_size(); ++i) {

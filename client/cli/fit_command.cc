@@ -1,6 +1,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/string_view.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/fit_plot.h"
 #include "client/cli/number_format.h"
@@ -121,18 +123,17 @@ void PrintTable(const v1::PredictResponse& prediction, std::ostream& out) {
 void PrintHeader(const v1::PredictResponse& prediction, std::ostream& out) {
   out << "run,t";
   for (const Output& output : prediction.outputs()) {
-    const std::string& name = output.output();
-    out << ',' << name << "_mean," << name << "_stdDev";
-    for (const double p : prediction.probabilities()) {
-      out << ',' << name << "_q" << FormatExact(p);
-    }
+    const auto column = [&](absl::string_view what) {
+      out << ',' << CsvField(absl::StrCat(output.output(), "_", what));
+    };
+    column("mean");
+    column("stdDev");
+    for (const double p : prediction.probabilities()) column("q" + FormatExact(p));
     if (!output.sample_std_dev().empty()) {
-      out << ',' << name << "_sampleStdDev";
-      for (const double p : prediction.probabilities()) {
-        out << ',' << name << "_sample_q" << FormatExact(p);
-      }
+      column("sampleStdDev");
+      for (const double p : prediction.probabilities()) column("sample_q" + FormatExact(p));
     }
-    out << ',' << name << "_measured," << name << "_residual," << name << "_standardizedResidual";
+    for (const char* const what : {"measured", "residual", "standardizedResidual"}) column(what);
   }
   out << '\n';
 }

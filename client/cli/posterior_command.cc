@@ -10,6 +10,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
@@ -99,7 +100,7 @@ void PrintTable(const v1::ComputePosteriorResponse& posterior, std::ostream& out
 void PrintSamples(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
   const int columns = posterior.parameters_size();
   for (int j = 0; j < columns; ++j) {
-    out << posterior.parameters(j).name() << (j + 1 < columns ? ',' : '\n');
+    out << CsvField(posterior.parameters(j).name()) << (j + 1 < columns ? ',' : '\n');
   }
   for (int i = 0; i < posterior.samples_size(); ++i) {
     out << FormatExact(posterior.samples(i)) << ((i + 1) % columns != 0 ? ',' : '\n');
@@ -111,7 +112,7 @@ void PrintJoints(const v1::ComputePosteriorResponse& posterior, std::ostream& ou
   for (const auto& joint : posterior.joints()) {
     const int inner = joint.second_value_size();
     for (int i = 0; i < joint.density_size(); ++i) {
-      out << joint.first() << ',' << joint.second() << ','
+      out << CsvField(joint.first()) << ',' << CsvField(joint.second()) << ','
           << FormatExact(joint.first_value(i / inner)) << ','
           << FormatExact(joint.second_value(i % inner)) << ',' << FormatExact(joint.density(i))
           << '\n';
@@ -126,7 +127,7 @@ void PrintParameters(const v1::ComputePosteriorResponse& posterior, std::ostream
   }
   out << ",effectiveSampleSize,rHat\n";
   for (const auto& parameter : posterior.parameters()) {
-    out << parameter.name() << ',' << FormatExact(parameter.mean()) << ','
+    out << CsvField(parameter.name()) << ',' << FormatExact(parameter.mean()) << ','
         << FormatExact(parameter.std_dev());
     for (const double quantile : parameter.quantiles()) out << ',' << FormatExact(quantile);
     out << ',' << FormatExact(parameter.effective_sample_size()) << ','

@@ -7,6 +7,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
@@ -76,12 +77,12 @@ void PrintTables(const v1::ComputeCostProfilesResponse& response, std::ostream& 
 // minimum.
 void PrintCsv(const v1::ComputeCostProfilesResponse& response, std::ostream& out) {
   out << "parameter,value,total,mismatch,prior";
-  for (const std::string& name : response.parameters()) out << ',' << name;
+  for (const std::string& name : response.parameters()) out << ',' << CsvField(name);
   out << '\n';
   const int columns = response.parameters_size();
   for (const auto& profile : response.profiles()) {
     for (int k = 0; k < profile.value_size(); ++k) {
-      out << profile.parameter() << ',' << FormatExact(profile.value(k)) << ','
+      out << CsvField(profile.parameter()) << ',' << FormatExact(profile.value(k)) << ','
           << FormatExact(profile.total(k)) << ',' << FormatExact(profile.mismatch(k)) << ','
           << FormatExact(profile.prior(k));
       for (int j = 0; j < columns; ++j) {

@@ -1,11 +1,13 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
 
 #include <utility>
 
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
@@ -61,11 +63,15 @@ void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream
 void PrintCsv(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
   out << 't';
   for (const auto& output : propagation.outputs()) {
-    out << ',' << output.name() << ".mean," << output.name() << ".stdDev";
+    const auto column = [&](absl::string_view what) {
+      out << ',' << CsvField(absl::StrCat(output.name(), ".", what));
+    };
+    column("mean");
+    column("stdDev");
     for (const double probability : propagation.probabilities()) {
-      out << ',' << output.name() << ".q" << FormatExact(probability);
+      column("q" + FormatExact(probability));
     }
-    out << ',' << output.name() << ".residual";
+    column("residual");
   }
   out << '\n';
   const int quantiles = propagation.probabilities_size();

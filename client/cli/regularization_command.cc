@@ -5,6 +5,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
@@ -79,7 +80,9 @@ void PrintTable(const Sweep& sweep, std::ostream& out) {
 // their standard deviations.
 void PrintCsv(const Sweep& sweep, std::ostream& out) {
   out << "regularization,mismatch,prior,effectiveParameters,logEvidence";
-  for (const std::string& name : sweep.parameters()) out << ',' << name << ',' << name << "_stdDev";
+  for (const std::string& name : sweep.parameters()) {
+    out << ',' << CsvField(name) << ',' << CsvField(name + "_stdDev");
+  }
   out << '\n';
   for (const Sweep::Point& point : sweep.points()) {
     out << FormatExact(point.regularization()) << ',' << FormatExact(point.cost().mismatch()) << ','

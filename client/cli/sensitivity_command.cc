@@ -1,5 +1,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
 
 #include <algorithm>
 #include <utility>
@@ -7,6 +8,7 @@
 #include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/number_format.h"
@@ -94,12 +96,13 @@ void PrintTables(const Analysis& analysis, std::ostream& out) {
 void PrintCsv(const Analysis& analysis, std::ostream& out) {
   out << 't';
   for (const auto& output : analysis.outputs()) {
-    for (const char* const what : {"mean", "stdDev", "residual", "noise"}) {
-      out << ',' << output.name() << '.' << what;
-    }
+    const auto column = [&](absl::string_view what) {
+      out << ',' << CsvField(absl::StrCat(output.name(), ".", what));
+    };
+    for (const char* const what : {"mean", "stdDev", "residual", "noise"}) column(what);
     for (const std::string& parameter : analysis.parameters()) {
-      out << ',' << output.name() << ".first." << parameter << ',' << output.name() << ".total."
-          << parameter;
+      column("first." + parameter);
+      column("total." + parameter);
     }
   }
   out << '\n';

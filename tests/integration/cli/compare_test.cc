@@ -94,6 +94,13 @@ TEST_F(CompareTest, ComparesNoEvidenceWhereDifferentNoisesAreUnknown) {
   EXPECT_THAT(mixed.out, HasSubstr("Evidence is compared only where"));
 }
 
+TEST_F(CompareTest, QuotesFileNamesThatHoldACommaInCsv) {
+  const std::string odd = ProblemFile("a,b.json", {.damping = "c*sign(v)"});
+  const Finished compared = Run({"compare", linear_, odd, data_, "--format", "csv"});
+  EXPECT_EQ(compared.exit_status, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr('"' + odd + "\","));
+}
+
 TEST_F(CompareTest, RefusesWhatCannotBeCompared) {
   const auto refusal = [this](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"compare", linear_});

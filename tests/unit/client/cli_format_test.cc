@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
@@ -61,6 +62,14 @@ v1::Estimate ExampleEstimate() {
   estimate.set_samples(200);
   estimate.set_sequence(7);
   return estimate;
+}
+
+TEST(CsvField, IsQuotedWhereItWouldBeReadAsSeveral) {
+  EXPECT_EQ(CsvField("k.mean"), "k.mean");
+  EXPECT_EQ(CsvField("K[1,1]"), "\"K[1,1]\"");
+  EXPECT_EQ(CsvField("the \"new\" k"), "\"the \"\"new\"\" k\"");
+  EXPECT_EQ(CsvField("two\nlines"), "\"two\nlines\"");
+  EXPECT_EQ(CsvField(""), "");
 }
 
 TEST(FormatValue, KeepsTwoDigitsOfTheUncertainty) {
