@@ -55,6 +55,7 @@ absl::Status Score(const v1::Experiment& whole, const HoldOut& hold_out, Backend
   *seen.mutable_problem() = whole.problem();
   *seen.mutable_measurements() = FirstRows(whole.measurements(), first);
   *request.mutable_record() = whole.measurements();
+  request.set_same_runs(true);
   request.set_first_scored_row(first);
   if (UsesFilters(whole.problem())) request.set_horizon_s(hold_out.horizon_s);
   POLYEST_ASSIGN_OR_RETURN(const v1::PredictResponse prediction, backend.Predict(request));

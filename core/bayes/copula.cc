@@ -18,10 +18,10 @@ constexpr double kMinEigenvalue = 1e-8;
 
 absl::StatusOr<Eigen::Index> Find(const std::vector<UncertainParameter>& parameters,
                                   const std::string& field, const std::string& name) {
+  const auto found = std::ranges::find(parameters, name, &UncertainParameter::name);
+  if (found != parameters.end()) return found - parameters.begin();
   std::vector<std::string> names;
   for (const UncertainParameter& parameter : parameters) names.push_back(parameter.name);
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return found - names.begin();
   return InvalidField(field, absl::StrFormat("unknown parameter \"%s\"; uncertain are %s", name,
                                              absl::StrJoin(names, ", ")));
 }
@@ -69,7 +69,7 @@ absl::StatusOr<Matrix> CorrelationMatrix(const std::vector<UncertainParameter>& 
     }
     matrix(i, j) = matrix(j, i) = pair.coefficient;
   }
-  POLYEST_RETURN_IF_ERROR(CheckPositiveDefinite(matrix, correlations));
+  if (!correlations.empty()) POLYEST_RETURN_IF_ERROR(CheckPositiveDefinite(matrix, correlations));
   return matrix;
 }
 

@@ -252,7 +252,7 @@ double Germ::Quantile(double probability) const {
 }
 
 double Germ::OfNormalScore(double score) const {
-  if (family_ == GermFamily::kNormal) return score;
+  if (family_ == GermFamily::kNormal || std::isnan(score)) return score;
   const double tail = 0.5 * std::erfc(std::min(std::abs(score), kMaxScore) / std::numbers::sqrt2);
   return score <= 0 ? LowerQuantile(tail) : UpperQuantile(tail);
 }

@@ -36,12 +36,10 @@ class HyperbolicSet {
   template <typename Visitor>
   bool VisitFrom(Eigen::Index k, double left, const Visitor& visit) {
     if (k == index_.size()) return visit(index_);
-    auto degree = static_cast<int>(std::ssize(powers_)) - 1;
-    for (; degree >= 0; --degree) {
-      const double power = powers_[static_cast<size_t>(degree)];
-      if (power > left + kRounding) continue;
+    const auto beyond = std::ranges::upper_bound(powers_, left + kRounding) - powers_.begin();
+    for (auto degree = static_cast<int>(beyond) - 1; degree >= 0; --degree) {
       index_[k] = degree;
-      if (!VisitFrom(k + 1, left - power, visit)) return false;
+      if (!VisitFrom(k + 1, left - powers_[static_cast<size_t>(degree)], visit)) return false;
     }
     return true;
   }

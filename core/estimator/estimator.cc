@@ -297,7 +297,7 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
   const std::shared_ptr<SampleStore> store = StoreFor(other, nullptr);
   POLYEST_RETURN_IF_ERROR(store->Append(*checked));
   POLYEST_RETURN_IF_ERROR(Validate(options, other, store->rows()));
-  subject.thetas = ThetasOfOtherRuns(*subject.problem, subject.thetas, other);
+  subject.thetas = ThetasOfOtherRuns(*subject.problem, subject.thetas, other, options.same_runs);
   subject.problem = &other;
   subject.store = store.get();
   subject.rows = store->rows();

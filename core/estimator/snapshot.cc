@@ -145,8 +145,8 @@ void save(Archive& archive, const EndedRuns& ended) {
           ended.factor, ended.region.centre(), ended.region.axes(), ended.basis->truncation().order,
           ended.basis->truncation().exponent, ended.sums, spent, ended.discount, ended.own_error,
           ended.log_noise, ended.log_variance, ended.outliers, ended.largest, ended.remainder,
-          ended.noise_scale, ended.noise_time_constant_s, ended.shapes, ended.left_out,
-          ended.unresolved, ended.windows);
+          ended.noise_scale, ended.noise_time_constant_s, ended.noise_white_share, ended.shapes,
+          ended.left_out, ended.unresolved, ended.windows);
 }
 
 template <class Archive>
@@ -159,7 +159,7 @@ void load(Archive& archive, EndedRuns& ended) {
           ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
           ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
           ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s,
-          ended.shapes, ended.left_out, ended.unresolved, ended.windows);
+          ended.noise_white_share, ended.shapes, ended.left_out, ended.unresolved, ended.windows);
   const Eigen::Index n = centre.size();
   if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
       !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||

@@ -81,6 +81,8 @@ class Decoder {
   bool complete() const { return ok_ && position_ == bytes_.size(); }
 
  private:
+  static constexpr uint64_t kMaxRows = uint64_t{1} << 32;  // of a matrix without columns
+
   size_t left() const { return bytes_.size() - position_; }
 
   // Returns the next `size` bytes, or nullptr if fewer are left.
@@ -112,11 +114,12 @@ class Decoder {
     if (const char* bytes = Next(size)) text.assign(bytes, size);
   }
   void Get(Matrix& matrix) {
-    const uint64_t rows = Count(1);
-    uint64_t columns = 0;
+    uint64_t rows = 0, columns = 0;
+    Get(rows);
     Get(columns);
-    ok_ = ok_ && (rows == 0 || columns <= left() / sizeof(double) / rows);
-    if (!ok_ || rows == 0) return matrix.resize(0, 0);
+    // A matrix without columns, such as the inputs of a model that has none, still has rows.
+    ok_ = ok_ && (columns == 0 ? rows <= kMaxRows : rows <= left() / sizeof(double) / columns);
+    if (!ok_) return matrix.resize(0, 0);
     const size_t size = static_cast<size_t>(rows * columns) * sizeof(double);
     if (const char* bytes = Next(size)) {
       matrix.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));

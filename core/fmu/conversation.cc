@@ -15,7 +15,7 @@ constexpr int kLookMs = 20;
 }  // namespace
 
 Matrix RowsOf(const Matrix& matrix, const std::vector<int>& rows) {
-  return matrix.size() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
+  return matrix.rows() == 0 ? Matrix() : Matrix(matrix(rows, Eigen::all));
 }
 
 StartMessage StartOf(const UnpackedFmu& fmu, const EnsembleSpecification& specification,

@@ -7,6 +7,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/propagation/block_rows.h"
+#include "core/propagation/noise_parts.h"
 #include "core/propagation/output_limit.h"
 
 namespace polyest::internal {
@@ -65,6 +66,7 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       spread_(members),
       whitened_(members),
       alive_(static_cast<size_t>(members), true) {
+  part_ends_s_.reserve(kMostEvenParts);
   gaussians_.mean() = points_.topRows(members);
   for (int i = 0; i < members; ++i) {
     if ((spectral_densities_.row(i) >= 0).all() && spectral_densities_.row(i).isFinite().all()) {
@@ -76,6 +78,8 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
   }
   NoteFailures();
 }
+
+bool FilterBlock::AnyAlive() const { return std::ranges::find(alive_, true) != alive_.end(); }
 
 std::vector<int> FilterBlock::PointsOf(int member) const {
   std::vector<int> points;
@@ -110,11 +114,15 @@ absl::Status FilterBlock::Advance(const FilterSamples& samples, MatrixRef innova
 absl::Status FilterBlock::Predict(double time_s, const Stop& stop) {
   const double start_s = time_s_, interval_s = time_s - start_s;
   if (!(interval_s > 0)) return absl::OkStatus();
+  if (!AnyAlive()) {
+    // What is left of the states is no place to evaluate the model at.
+    time_s_ = time_s;
+    return absl::OkStatus();
+  }
   if (!noisy_) return MoveTo(time_s, stop);
-  const int parts = Parts(interval_s);
-  for (int part = 0; part < parts; ++part) {
+  DivideForNoise(start_s, time_s, FastestRate(interval_s), part_ends_s_);
+  for (const double to_s : part_ends_s_) {
     const double from_s = time_s_;
-    const double to_s = part + 1 == parts ? time_s : start_s + interval_s * (part + 1) / parts;
     const double step_s = to_s - from_s;
     Diffuse(step_s / 6);
     POLYEST_RETURN_IF_ERROR(MoveTo(from_s + step_s / 2, stop));
@@ -140,12 +148,6 @@ absl::Status FilterBlock::MoveTo(double time_s, const Stop& stop) {
   if (backward_) backward_->AddMotion(*states, gaussians_.factor());
   time_s_ = time_s;
   return absl::OkStatus();
-}
-
-int FilterBlock::Parts(double interval_s) {
-  const double parts = std::ceil(interval_s * FastestRate(interval_s));
-  return std::isfinite(parts) ? static_cast<int>(std::clamp(parts, 1.0, double{kMaxParts}))
-                              : kMaxParts;
 }
 
 // Writes ∂f/∂x at the mean of the first member, by differences.
@@ -226,10 +228,11 @@ absl::Status FilterBlock::PredictOutputs(double time_s, MatrixRef means, MatrixR
 }
 
 void FilterBlock::WriteOutputs(MatrixRef means, MatrixRef deviations) {
-  ReadOutputs();
+  const bool any = AnyAlive();
+  if (any) ReadOutputs();
   const int members = member_count();
   const auto points = outputs_.size() / members;
-  for (int c = 0; c < static_cast<int>(means.cols()); ++c) {
+  for (int c = 0; any && c < static_cast<int>(means.cols()); ++c) {
     SelectOutput(c);
     const auto at_points = outputs_.reshaped(members, points);
     const Eigen::ArrayXd mean = at_points.rowwise().mean();
@@ -284,7 +287,7 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
   auto log_variance = log_variances.col(sample * samples.values.rows() + channel);
   innovation.segment(first_member_, members).setZero();
   log_variance.segment(first_member_, members).setZero();
-  if (sigma > 0) {
+  if (sigma > 0 && AnyAlive()) {
     ReadOutputs();
     SelectOutput(channel);
     noise_variance_.setConstant(sigma * sigma);
@@ -350,7 +353,8 @@ EnsembleState::OfBlock FilterBlock::State() const {
   all.leftCols(n) = state.states;
   all.middleCols(n, n).topRows(members) = gaussians_.mean();
   all.rightCols(gaussians_.factor().cols()).topRows(members) = gaussians_.factor();
-  state.states = std::move(all);
+  // What a member that has failed leaves behind need not be finite, and means nothing.
+  state.states = all.isFinite().select(all, 0);
   return state;
 }
 

@@ -18,8 +18,8 @@
 //
 // q Δt/6 before the interval, 4 q Δt/6 at its middle and q Δt/6 after it. Its relative error is
 // about (Δt λ)⁴/180 in a mode with the rate λ, so that an interval is divided until Δt λ ≤ 1 for
-// the fastest mode of the model at the filters' states, but into at most kMaxParts. Channels are
-// taken one by one; one without a sample is left out.
+// the fastest mode of the model at the filters' states (noise_parts.h). Channels are taken one by
+// one; one without a sample is left out.
 //
 // A member fails as a whole when a trajectory of one of its points cannot be integrated.
 
@@ -49,8 +49,6 @@ struct FilterSamples {
 
 class FilterBlock {
  public:
-  static constexpr int kMaxParts = 16;
-
   // Returns how many members of a model with so many states share a block.
   static int Members(Eigen::Index states);
 
@@ -105,10 +103,10 @@ class FilterBlock {
   absl::Status Predict(double time_s, const Stop& stop);
   absl::Status MoveTo(double time_s, const Stop& stop);
   void Diffuse(double duration_s);
-  int Parts(double interval_s);
   double FastestRate(double interval_s);
   void Differentiate(double interval_s);
   std::vector<int> PointsOf(int member) const;
+  bool AnyAlive() const;
   void ReadOutputs();
   void WriteOutputs(MatrixRef means, MatrixRef deviations);
   void SelectOutput(int channel);
@@ -131,6 +129,7 @@ class FilterBlock {
   TrajectoryBlock block_;
   GaussianStates gaussians_;
   double time_s_ = 0;
+  std::vector<double> part_ends_s_;               // of the interval to the next sample
   Eigen::ArrayXXd points_;                        // rows of the block × n
   Eigen::ArrayXXd moved_, moved_rates_;           // row j < n: moved in state j; below: not moved
   Eigen::ArrayXd steps_;                          // n

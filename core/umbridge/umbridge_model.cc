@@ -12,6 +12,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/propagation/output_limit.h"
 #include "core/umbridge/evaluation_requests.h"
 
 namespace polyest::internal {
@@ -23,8 +24,9 @@ constexpr std::uintmax_t kLongestFile = 4 << 20;
 // differences of numbers with finitely many digits.
 constexpr double kSameTime = 1e-9;
 
-// Returns the reason if these are not one vector of `count` values for each output.
-std::string WrongShape(const Vectors& outputs, size_t vectors, size_t count) {
+// Returns the reason if these are not one vector of `count` values for each output, or a value is
+// beyond the limit of outputs.
+std::string FailureOf(const Vectors& outputs, size_t vectors, size_t count) {
   if (outputs.size() != vectors) {
     return absl::StrFormat("it has %d output vectors where its description has %d outputs",
                            outputs.size(), vectors);
@@ -34,7 +36,19 @@ std::string WrongShape(const Vectors& outputs, size_t vectors, size_t count) {
     return absl::StrFormat("its output vector %d has %d values for %d times", i, outputs[i].size(),
                            count);
   }
+  for (const std::vector<double>& output : outputs) {
+    const char* const failure =
+        FailureOfOutputs(Eigen::Map<const Eigen::ArrayXd>(output.data(), std::ssize(output)));
+    if (failure != nullptr) return failure;
+  }
   return "";
+}
+
+// Returns the specification without the model. It outlives a computation while a late answer is
+// awaited, and the model's pool of connections must not end with one of its own threads.
+std::shared_ptr<const EnsembleSpecification> WithoutModel(EnsembleSpecification specification) {
+  specification.model = nullptr;
+  return std::make_shared<const EnsembleSpecification>(std::move(specification));
 }
 
 class UmBridgeEnsemble final : public TrajectoryEnsemble {
@@ -44,7 +58,7 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
                    const InputSignals* inputs)
       : description_(std::move(description)),
         pool_(std::move(pool)),
-        specification_(std::make_shared<const EnsembleSpecification>(std::move(specification))),
+        specification_(WithoutModel(std::move(specification))),
         inputs_(inputs),
         failed_(static_cast<size_t>(points()), false) {}
 
@@ -96,7 +110,7 @@ absl::StatusOr<std::vector<Evaluation>> UmBridgeEnsemble::EvaluateAll(
   for (size_t i = 0; i < points.size(); ++i) {
     Evaluation& result = results[points[i]] = std::move((*evaluated)[i]);
     if (result.failure.empty()) {
-      result.failure = WrongShape(result.outputs, description_->model.outputs.size(), count);
+      result.failure = FailureOf(result.outputs, description_->model.outputs.size(), count);
     }
     if (result.failure.empty()) continue;
     failed_[points[i]] = true;

@@ -149,6 +149,8 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Restored(const RegionalExpans
   }
   ExpansionState state = *present.kept_state();
   state.noise = present.noise();
+  state.design.element =
+      present.design().element.bounds();  // it may have been freed from bounds since
   POLYEST_ASSIGN_OR_RETURN(
       auto restored, RegionalExpansion::FromState(problem, std::move(state), store, threads, stop));
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, *restored));

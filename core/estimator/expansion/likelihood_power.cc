@@ -66,6 +66,7 @@ double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
   }
   if (cost.dimension() > kMaxDimension) return cost.power();
   const Points points = PointsOf(expansion, cost);
+  if (points.least.size() == 0) return cost.power();
   const auto count = static_cast<double>(points.least.size());
   // The fit has used up S of the Q points' differences.
   const double left = count - expansion.design().basis->size();

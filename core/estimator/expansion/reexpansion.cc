@@ -128,6 +128,10 @@ class Settler {
     auto next = NextTruncation(options(), request_.problem->dimension(), present());
     for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
       POLYEST_ASSIGN_OR_RETURN(const bool raised, Move(region, *next));
+      if (!raised && Withheld()) {  // not for what it would have shown
+        result_.postponed = true;
+        return absl::OkStatus();
+      }
       const double error = raised ? ErrorOf(*result_.expansion) : kMostError;
       if (error <= kMaxErrorOfRaised) return absl::OkStatus();
       if (tried.order == 0 || error < tried.error) {

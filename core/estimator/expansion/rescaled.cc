@@ -99,6 +99,8 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
   }
   state.absorbed.propagated = 0;
   state.noise = noise.ForNewExpansion();
+  state.design.element =
+      present.design().element.bounds();  // it may have been freed from bounds since
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
       RegionalExpansion::FromState(problem, std::move(state), store, threads, stop);
   if (absl::IsDataLoss(expansion.status())) {

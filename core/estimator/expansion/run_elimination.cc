@@ -105,6 +105,7 @@ LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
     const auto channel = static_cast<Eigen::Index>(c);
     noise.channels[c].scale = ended_.noise_scale[channel];
     noise.channels[c].time_constant_s = ended_.noise_time_constant_s[channel];
+    noise.channels[c].white_share = ended_.noise_white_share[channel];
     noise.channels[c].grid = {};
   }
   noise.centre = centre;

@@ -36,10 +36,12 @@ EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
   ended.remainder = Vector::Zero(ended.basis->size());
   ended.noise_scale.resize(problem.channels());
   ended.noise_time_constant_s.resize(problem.channels());
+  ended.noise_white_share.resize(problem.channels());
   for (size_t c = 0; c < channels; ++c) {
     const auto channel = static_cast<Eigen::Index>(c);
     ended.noise_scale[channel] = noise.channels[c].scale;
     ended.noise_time_constant_s[channel] = noise.channels[c].time_constant_s;
+    ended.noise_white_share[channel] = noise.channels[c].white_share;
   }
   return ended;
 }

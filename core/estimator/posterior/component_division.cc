@@ -172,6 +172,7 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   settlements_ = parent.settlements_;
   bisected_ = parent.bisected_ || parent.halves_;
   tempered_ = parent.tempered_;
+  postponed_ = parent.postponed_;
   if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
   particles_ = piece.particles;
   LearnedNoise noise = parent.expansion_->noise().ForNewExpansion();

@@ -59,10 +59,14 @@ bool HoldsAbout(const EndedRuns& ended, const GermSummary& shared) {
 
 bool HoldsWith(const EndedRuns& ended, const LearnedNoise& noise) {
   for (size_t c = 0; c < noise.channels.size(); ++c) {
-    const double ratio = noise.channels[c].scale / ended.noise_scale[static_cast<Eigen::Index>(c)];
+    const ChannelNoise& present = noise.channels[c];
+    const auto channel = static_cast<Eigen::Index>(c);
+    const double ratio = present.scale / ended.noise_scale[channel];
     if (ratio > kMostRescaled || ratio < 1 / kMostRescaled) return false;
-    const double before = ended.noise_time_constant_s[static_cast<Eigen::Index>(c)];
-    if (noise.channels[c].time_constant_s != before) return false;
+    if (present.time_constant_s != ended.noise_time_constant_s[channel] ||
+        present.white_share != ended.noise_white_share[channel]) {
+      return false;
+    }
   }
   return true;
 }

@@ -184,6 +184,7 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   }
   if (must_divide()) return true;
   bool settled = false;
+  const int64_t row = taken_;
   if (WindowEnds()) {
     POLYEST_ASSIGN_OR_RETURN(settled, SettleAfterWindow(stop));
   } else if (LooksAtEdges()) {
@@ -191,6 +192,7 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   } else if (LooksAhead()) {
     POLYEST_ASSIGN_OR_RETURN(settled, SettleAhead(stop));
   }
+  ahead_row_ = std::max(ahead_row_, row + 1);  // a row is looked at once, in one of these ways
   return moved || settled;
 }
 

@@ -40,6 +40,21 @@ bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& re
   return false;
 }
 
+// Completes the information about parameters of variances. A whitened innovation w = ν/√S changes
+// with them by −½ w ∂log S, so that I_w has ¼ Σ (∂log S)², where the variance of their scores is
+// ½ Σ (∂log S)².
+void CompleteInformation(const ResolvedProblem& problem, std::vector<WindowScore>& windows) {
+  std::vector<int> of_variance;
+  for (int i = 0; i < problem.dimension(); ++i) {
+    if (problem.IsOfVariance(i)) of_variance.push_back(i);
+  }
+  if (of_variance.empty()) return;
+  for (WindowScore& window : windows) {
+    const Matrix part = window.information(of_variance, of_variance);
+    window.information(of_variance, of_variance) = 2 * part;
+  }
+}
+
 double LargestDispersion(const ResolvedProblem& problem,
                          const std::vector<ChannelEstimate>& channels) {
   double largest = 1;
@@ -128,7 +143,7 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
   assessment.doubtful.assign(static_cast<size_t>(prior.dimension()), false);
   const Vector xi = expansion.design().region.ToGerm(eta);
   const bool has_ended = problem.ended_runs() != nullptr;
-  const std::vector<WindowScore> windows =
+  std::vector<WindowScore> windows =
       has_ended ? ScoresByEndedRuns(problem, xi) : ScoresByWindow(expansion, prior, eta);
   if (windows.empty()) {
     // Runs that share a population have no windows, and the residuals alone tell of a wrong model.
@@ -136,6 +151,7 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
     if (assessment.contradicted) Widen(LargestDispersion(problem, channels), assessment);
     return assessment;
   }
+  CompleteInformation(problem, windows);
   const Matrix precision = PriorPrecision(prior);
   const double dispersion = LargestDispersion(problem, channels);
   assessment.robust = RobustCovarianceOf(windows, precision);

@@ -99,6 +99,7 @@ bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
          IsFiniteMatrix(ended.discount, channels, 1) &&
          IsFiniteMatrix(ended.largest, channels, 1) && IsFiniteMatrix(ended.remainder, terms, 1) &&
          IsFiniteMatrix(ended.noise_time_constant_s, channels, 1) &&
+         IsFiniteMatrix(ended.noise_white_share, channels, 1) &&
          IsFiniteMatrix(ended.left_out, shared, 1) && AreShapes(ended.shapes) &&
          (ended.shapes.empty() || std::ssize(ended.shapes) == runs) &&
          std::isfinite(ended.unresolved) && IsFiniteMatrix(ended.noise_scale, channels, 1) &&

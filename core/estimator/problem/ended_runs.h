@@ -82,8 +82,9 @@ struct EndedRuns {
   double unresolved = 0;
 
   Vector remainder;  // coefficients of Σ_r E_r, S
-  // By channel, the noise with which the sums were taken: ChannelNoise::scale and time_constant_s.
-  Vector noise_scale, noise_time_constant_s;
+  // By channel, the noise with which the sums were taken: ChannelNoise::scale, time_constant_s and
+  // white_share.
+  Vector noise_scale, noise_time_constant_s, noise_white_share;
 
   // The sums of windows of runs, one run a row, with the remainder as a channel of its own after
   // the others (SumsWithRemainder). Without any if the runs share a population.

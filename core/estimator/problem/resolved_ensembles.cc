@@ -49,6 +49,14 @@ EnsembleSpecification ResolvedProblem::MakeEnsemble(const ConstMatrixRef& thetas
   return specification;
 }
 
+bool ResolvedProblem::IsOfVariance(int parameter) const {
+  const int target = targets_[static_cast<size_t>(parameter)];
+  if (target < 0) return false;
+  const auto kind = settable_[target].kind;
+  return kind == SettableQuantities::Kind::kSpectralDensity ||
+         kind == SettableQuantities::Kind::kDriftRate || kind == SettableQuantities::Kind::kNoise;
+}
+
 // Whether outliers are handled in the samples of each output (a column of the model's).
 std::vector<bool> ResolvedProblem::AreHeavyTailed(const std::vector<int>& outputs) const {
   std::vector<bool> tailed;
@@ -61,16 +69,24 @@ std::vector<bool> ResolvedProblem::AreHeavyTailed(const std::vector<int>& output
   return tailed;
 }
 
-// A derived value that is not finite makes the whole point fail.
+// A derived value that is not finite makes the whole point fail: the model's parameters and the
+// amplitudes of its inputs are then not numbers. Delays, gains and the like stay as they are, since
+// what is done with them for all points must not depend on one that fails.
 void ResolvedProblem::Derive(Matrix& values) const {
   Matrix results(values.rows(), std::ssize(derived_targets_));
   derived_->Evaluate(values(Eigen::all, derived_variables_), results);
-  for (size_t i = 0; i < derived_targets_.size(); ++i) {
-    values.col(derived_targets_[i]) = results.col(static_cast<Eigen::Index>(i));
-  }
   for (Eigen::Index row = 0; row < values.rows(); ++row) {
-    if (results.row(row).allFinite()) continue;
-    values.row(row).setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (results.row(row).allFinite()) {
+      values(row, derived_targets_) = results.row(row);
+      continue;
+    }
+    for (int i = 0; i < settable_.size(); ++i) {
+      const auto kind = settable_[i].kind;
+      if (kind == SettableQuantities::Kind::kParameter ||
+          kind == SettableQuantities::Kind::kAmplitude) {
+        values(row, i) = std::numeric_limits<double>::quiet_NaN();
+      }
+    }
   }
 }
 

@@ -92,9 +92,12 @@ std::vector<absl::Status> CheckOptions(const Problem& problem, int runs, int fir
   } else if (!problem.uncertain.empty()) {
     const auto parameters = ParametersOfRuns(problem.uncertain, runs, first_run);
     add(problem.expansion.Validate(static_cast<int>(parameters.size())));
-    const absl::StatusOr<Prior> prior =
-        PriorOfRuns(problem.uncertain, problem.correlations, runs, first_run);
-    add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
+    // The prior of more than any expansion bears, whose matrices are large, is not made.
+    if (parameters.size() <= kMaxTerms) {
+      const absl::StatusOr<Prior> prior =
+          PriorOfRuns(problem.uncertain, problem.correlations, runs, first_run);
+      add(prior.ok() ? ValidateGerms(problem.expansion, *prior) : prior.status());
+    }
   }
   if (const absl::Status status = problem.integration.Validate(); !status.ok()) {
     add(Within("integration", status));
@@ -368,7 +371,10 @@ std::vector<absl::Status> ResolvedProblem::Check(Problem problem) {
   problem = WithHyperparameters(std::move(problem));
   problem.uncertain = WithPopulations(std::move(problem.uncertain));
   std::vector<absl::Status> refusals = CheckOptions(problem, 1, 0);
-  if (problem.model == nullptr || !ValidatePriors(problem).ok()) return refusals;
+  if (problem.model == nullptr || !ValidatePriors(problem).ok() ||
+      problem.uncertain.size() > kMaxTerms) {
+    return refusals;
+  }
   // The prior only provides the names, because the correlations may be invalid. It needs at least
   // one parameter; without any, a placeholder that no name refers to is used.
   Prior prior(problem.uncertain.empty() ? std::vector<UncertainParameter>(1) : problem.uncertain);

@@ -74,6 +74,12 @@ class ResolvedProblem {
   // Returns the uncertain parameters that all runs share, and those of one run.
   std::vector<int> SharedParameters() const;
   std::vector<int> OwnParameters(int run) const;
+  // Whether the variance of what filters predict, and little else, depends on an uncertain
+  // parameter: a spectral density, the rate of a drift or the noise of a sensor.
+  bool IsOfVariance(int parameter) const;
+  // Returns `thetas` (draws × n) with draws of an ended run's own parameters, given the shared
+  // ones, in place of those of first_run(). Requires run < first_run().
+  Matrix ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const;
   // The germs of the population that a parameter of the runs shares, and which of OwnParameters
   // that parameter is; nothing without a population.
   struct Population {
@@ -145,7 +151,6 @@ class ResolvedProblem {
   void SetTargets(const std::vector<std::optional<int>>& found);
   void Derive(Matrix& values) const;
   std::vector<bool> AreHeavyTailed(const std::vector<int>& outputs) const;
-  Matrix ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const;
 
   Problem problem_;
   Prior prior_;

@@ -32,7 +32,7 @@ absl::Status KnownInputsStore::Append(const RowBlock& block) {
       const bool held = knots_needed_[i] == 0 && std::isfinite(known_to_s_[i]);
       if (held || !std::isnan(block.values[k * width + channels_ + i])) known_to_s_[i] = row.time_s;
     }
-    runs_.back().used_to_s = *std::ranges::min_element(known_to_s_) - lead_s_;
+    runs_.back().known_to_s = *std::ranges::min_element(known_to_s_);
   }
   return absl::OkStatus();
 }
@@ -43,7 +43,8 @@ absl::Status KnownInputsStore::Read(int64_t first, int64_t count, RowBlock& bloc
   for (size_t k = 0; k < block.rows.size(); ++k) {
     const SampleRow& row = block.rows[k];
     const auto run = std::ranges::lower_bound(runs_, row.run, {}, &Run::number);
-    if (row.time_s <= run->used_to_s) continue;
+    // Compared as RunInputs does, so that rounding tells the two the same.
+    if (row.time_s + lead_s_ <= run->known_to_s) continue;
     std::fill_n(block.values.begin() + static_cast<std::ptrdiff_t>(k * width), channels_,
                 std::numeric_limits<double>::quiet_NaN());
     std::fill_n(block.noise.begin() + static_cast<std::ptrdiff_t>(k * channels_), channels_, 0);

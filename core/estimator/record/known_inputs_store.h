@@ -24,7 +24,7 @@ class KnownInputsStore final : public SampleStore {
  private:
   struct Run {
     int number = 0;
-    double used_to_s = 0;  // the time of its last samples whose inputs are known
+    double known_to_s = 0;  // the time up to which all its inputs are known
   };
 
   const std::shared_ptr<SampleStore> store_;

@@ -10,6 +10,7 @@
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/propagation/output_limit.h"
 
 namespace polyest::internal {
 namespace {
@@ -22,6 +23,8 @@ constexpr double kMaxSignalToNoise = 1e9;
 // time stamps in other units, such as nanoseconds since 1970, and no solver could reach them.
 constexpr double kMinTimeS = 1e-30;
 constexpr double kMaxTimeS = 1e12;
+// A sample, or noise, below this magnitude is 0: its square would be none. No unit has such values.
+constexpr double kLeastSize = 1e-100;
 
 // Returns an error that names the place by row and column, as the user knows it. `field` is
 // relative to the samples.
@@ -158,7 +161,8 @@ absl::Status SampleChecks::CheckSizes(const Samples& samples, const SampleColumn
     if (Missing(column, k) || samples.time_s[k] < problem_.used_from_s()[place]) continue;
     const double z = column.value[k];
     const double sigma = noise.StandardDeviation(z, std::max(largest_so_far, std::abs(z)));
-    if (sigma > 0) POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
+    if (sigma < kLeastSize) continue;
+    POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
   }
   return absl::OkStatus();
 }
@@ -202,10 +206,11 @@ absl::Status SampleChecks::PlaceColumn(const Samples& samples, const SampleColum
     // Before the largest delay the sensor shows what was before the run.
     const bool before_run = samples.time_s[k] < problem_.used_from_s()[place];
     if (Missing(column, k) || !used[k] || before_run) continue;
-    const double z = column.value[k];
+    const double z = std::abs(column.value[k]) < kLeastSize ? 0 : column.value[k];
     largest = std::max(largest, std::abs(z));
     const double sigma = noise.StandardDeviation(z, largest);
-    if (sigma <= 0) continue;  // 0 before any other value: without a size, it counts as missing
+    // 0 before any other value: without a size, it counts as missing.
+    if (sigma < kLeastSize) continue;
     POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
     checked.values[k * width_ + place] = z;
     checked.noise[k * channels + place] = sigma;
@@ -279,6 +284,10 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
 absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const {
   const double time_s = samples.time_s[row];
   const int run = samples.run.empty() ? 0 : samples.run[row];
+  if (run < 0) {
+    return Refusal({"run", row}, "row %d, column run: %d; runs start at 0 and never decrease", row,
+                   run);
+  }
   if (run >= max_runs_) {
     return Refusal(
         {"run", row},
@@ -301,10 +310,10 @@ absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const 
 absl::Status SampleChecks::CheckValues(const Samples& samples) const {
   for (const SampleColumn& column : samples.columns) {
     for (size_t k = 0; k < samples.rows(); ++k) {
-      if (!Missing(column, k) && !std::isfinite(column.value[k])) {
-        return Refusal(ValueAt(samples, column, k), "row %d, column %s: %g must be a finite number",
-                       k, column.name, column.value[k]);
-      }
+      if (Missing(column, k) || std::abs(column.value[k]) <= kMaxOutput) continue;
+      return Refusal(ValueAt(samples, column, k),
+                     "row %d, column %s: %g must be a finite number, of at most 1e100 in magnitude",
+                     k, column.name, column.value[k]);
     }
   }
   return absl::OkStatus();

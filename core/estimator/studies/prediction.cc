@@ -123,6 +123,9 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
                                         : "true needs likelihood PREDICTION_ERROR; a perfect model "
                                           "is predicted from all samples anyway");
   }
+  if (options.same_runs && !options.record) {
+    return InvalidField("same_runs", "true needs a record, whose runs it is about");
+  }
   POLYEST_RETURN_IF_ERROR(CheckRange("lags", options.lags, 0, kMaxPredictionLags));
   POLYEST_RETURN_IF_ERROR(CheckRange("first_scored_row", options.first_scored_row, 0,
                                      std::numeric_limits<int64_t>::max()));
@@ -150,10 +153,21 @@ void DrawFromPopulation(const ResolvedProblem& problem, const Matrix& xis,
   }
 }
 
+// Sets the parameters of the runs of `other` that `own` has estimated.
+void TakeOwnRuns(const ResolvedProblem& own, const Matrix& thetas, const ResolvedProblem& other,
+                 Matrix& result) {
+  for (int run = 0; run < std::min(own.runs(), other.runs()); ++run) {
+    const bool ended = run < own.first_run();
+    const std::vector<int> from = own.OwnParameters(ended ? own.first_run() : run);
+    const Matrix of_run = ended ? own.ThetasOfEndedRun(thetas, run) : thetas;
+    result(Eigen::all, other.OwnParameters(run)) = of_run(Eigen::all, from);
+  }
+}
+
 }  // namespace
 
 Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
-                         const ResolvedProblem& other) {
+                         const ResolvedProblem& other, bool same_runs) {
   const Prior& prior = other.prior();
   const auto draws = static_cast<int>(thetas.rows());
   // The points of Halton's sequence are distributed as the prior.
@@ -170,6 +184,7 @@ Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
     if (!given[i].per_run) result.col(column) = thetas.col(column);
   }
   if (other.population()) DrawFromPopulation(other, xis, order, result);
+  if (same_runs && own.per_run()) TakeOwnRuns(own, thetas, other, result);
   return result;
 }
 

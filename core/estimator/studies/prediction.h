@@ -53,9 +53,9 @@ struct PredictionSubject {
 
 // Returns values of the uncertain parameters of `other`, the same problem for other runs: `thetas`
 // (draws × parameters of `own`) where the parameter is shared by all runs, and draws of the prior
-// where each run has its own.
+// where each run has its own. If the runs are the same, those of `own` keep their parameters.
 Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
-                         const ResolvedProblem& other);
+                         const ResolvedProblem& other, bool same_runs);
 
 // Computes the prediction, without diagnostics. `options` must be valid. FailedPrecondition if too
 // few trajectories can be integrated.

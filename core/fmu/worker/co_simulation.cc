@@ -46,9 +46,16 @@ bool CoSimulationPoint::AdvanceTo(double time_s) {
       good_s_ = time_s_;
       return false;
     }
+    while (inputs_.NextBreak().time_s <= time_s_ + close_s) {
+      inputs_.Pass(inputs_.NextBreak().time_s);
+    }
     const double break_s = inputs_.NextBreak().time_s;
-    if (interface_.can_vary_step && break_s > time_s_ + close_s && break_s < to_s - close_s) {
-      to_s = break_s;
+    if (interface_.can_vary_step && break_s < to_s - close_s) to_s = break_s;
+    if (!(to_s > time_s_)) {
+      failure_ = absl::StrFormat("communication steps of %g s are too small to tell at t = %g s",
+                                 interface_.communication_step_s, time_s_);
+      good_s_ = time_s_;
+      return false;
     }
     if (!Step(to_s)) return false;
   }

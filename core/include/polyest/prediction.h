@@ -66,6 +66,9 @@ struct PredictionOptions {
   // Another record of the same problem to predict, whose samples did not enter the estimate. Its
   // runs' own parameters are drawn from the prior.
   std::optional<Samples> record;
+  // Whether the runs of `record` are those of the estimate's record, of which it may have more
+  // rows: parameters that runs have of their own are then as they have been estimated.
+  bool same_runs = false;
 };
 
 // The agreement of a prediction with the samples of one channel, over all rows of the record from

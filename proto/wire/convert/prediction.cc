@@ -71,6 +71,7 @@ absl::StatusOr<PredictionOptions> ToPredictionOptions(const v1::PredictRequest& 
   options.forecast_s = request.forecast_s();
   if (request.lag_count() != 0) options.lags = request.lag_count();
   options.first_scored_row = request.first_scored_row();
+  options.same_runs = request.same_runs();
   if (request.has_record()) {
     absl::StatusOr<Samples> record = ToSamples(request.record(), model);
     if (!record.ok()) return OfRecord(record.status());

@@ -30,6 +30,7 @@ TEST(ModelComparisonTest, EstimatesFromTheFirstRowsAndScoresTheOthers) {
               ElementsAre(10, 20, 30, 40, 50, 60, 70));
   EXPECT_EQ(request.record().time_s_size(), 10);
   EXPECT_EQ(request.first_scored_row(), 7);
+  EXPECT_TRUE(request.same_runs());  // what was estimated of a run serves for its other rows
 }
 
 TEST(ModelComparisonTest, OnlyFiltersHaveAHorizon) {

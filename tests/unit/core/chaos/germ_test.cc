@@ -332,6 +332,7 @@ TEST(Germ, NormalScoresMapThereAndBackInBothTails) {
     }
     EXPECT_LE(germ.OfNormalScore(-40), germ.OfNormalScore(-30));
     EXPECT_GE(germ.OfNormalScore(40), germ.OfNormalScore(30));
+    EXPECT_TRUE(std::isnan(germ.OfNormalScore(std::nan(""))));
     EXPECT_TRUE(std::isfinite(germ.OfNormalScore(1000)));
   }
   // The score is exact even though 1 − p has rounded to 0: 1 − e^{−x} = Φ(20), x = −log Φ(−20).

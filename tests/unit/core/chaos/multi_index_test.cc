@@ -73,6 +73,7 @@ TEST(MultiIndex, CountingStopsPastTheMost) {
   EXPECT_EQ(TermCount(40, {40, 0.9}, 2000), 2001);
   EXPECT_EQ(TermCount(40, {40, 1}, 2000), 2001);
   EXPECT_EQ(TermCount(12, {3, 0.7}, 2000), MultiIndices(12, {3, 0.7}).rows());
+  EXPECT_EQ(TermCount(2'000, {1'999, 0.5}, 2'000), 2'001);
   // However far, and without listing the degrees.
   EXPECT_EQ(TermCount(2, {std::numeric_limits<int>::max(), 0.5}, 500), 501);
 }

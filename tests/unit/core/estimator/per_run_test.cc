@@ -252,6 +252,87 @@ TEST(PerRun, ThePiecesOfAPosteriorTakeNewRunsEach) {
   }
 }
 
+// What was estimated of a run serves for its other rows. The oracle is linear, for joint runs.
+TEST(PerRun, OtherRowsOfTheSameRunsArePredictedAsTheyAre) {
+  const Samples samples = ThreeLines();
+  const Exact exact = LeastSquaresWithPrior(samples);
+  const auto estimator = MakeEstimator(LineProblem());
+  ASSERT_TRUE(estimator->Append(samples).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  PredictionOptions options;
+  options.record.emplace();
+  options.record->time_s = {6, 6, 6};
+  options.record->run = {0, 1, 2};
+  options.record->columns = {{"y", {0, 0, 0}, {}}};
+  options.draws = 2'000;
+  const Prediction prior = estimator->CurrentPrediction(options).value();
+  options.same_runs = true;
+  const Prediction own = estimator->CurrentPrediction(options).value();
+  const int place[] = {0, 2, 3};
+  for (int run = 0; run < 3; ++run) {
+    Vector row = Vector::Zero(4);
+    row[1] = 6;
+    row[place[run]] = 1;
+    const double std_dev = std::sqrt(row.dot(exact.covariance * row));
+    EXPECT_NEAR(own.outputs[0].mean[run], row.dot(exact.mean), 0.1 * std_dev);
+    EXPECT_NEAR(own.outputs[0].std_dev[run], std_dev, 0.1 * std_dev);
+    EXPECT_GT(prior.outputs[0].std_dev[run], 2.5);  // b has the standard deviation 3
+  }
+  options.record.reset();
+  EXPECT_THAT(std::string(estimator->CurrentPrediction(options).status().message()),
+              HasSubstr("same_runs: true needs a record"));
+}
+
+// Lines of slope 0.7 with noise of 0.3 that is correlated over two samples.
+Samples CorrelatedLines(int runs) {
+  std::mt19937_64 generator(9);
+  std::normal_distribution<double> normal(0, 1);
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  const double a = std::exp(-0.5);
+  for (int run = 0; run < runs; ++run) {
+    const double offset = normal(generator);
+    double noise = normal(generator);
+    for (int k = 0; k < 40; ++k) {
+      samples.run.push_back(run);
+      samples.time_s.push_back(0.1 * k);
+      samples.columns[0].value.push_back(0.7 * samples.time_s.back() + offset + 0.3 * noise);
+      noise = a * noise + std::sqrt(1 - a * a) * normal(generator);
+    }
+  }
+  return samples;
+}
+
+// Only the runs that are not eliminated tell of other time constants of the noise, and must not be
+// taken for all.
+TEST(PerRun, TheNoiseOfEliminatedRunsIsNotJudgedByTheLastOne) {
+  Problem problem = LineProblem();
+  problem.measured[0].noise = {.unknown = true, .correlation = NoiseCorrelation::kUnknown};
+  const Estimate estimate = EstimateOf(problem, CorrelatedLines(16));
+  const ParameterEstimate& a = estimate.parameters[1];
+  ASSERT_EQ(a.name, "a");
+  // Of 16 runs of 40 samples with 2 sums of noise each: 0.3 √(2 · 2 / (640 · 1.33)) = 0.02.
+  EXPECT_NEAR(a.std_dev, 0.02, 0.01);
+  EXPECT_NEAR(a.mean, 0.7, 4 * a.std_dev);
+  EXPECT_NEAR(a.mean, a.map, 0.5 * a.std_dev);
+  EXPECT_GT(a.upper95 - a.lower95, 2.5 * a.std_dev);
+
+  // Other rows of runs that have been eliminated are predicted, too.
+  const auto estimator = MakeEstimator(problem);
+  ASSERT_TRUE(estimator->Append(CorrelatedLines(16)).ok());
+  ASSERT_TRUE(estimator->Process().ok());
+  PredictionOptions options;
+  options.record.emplace();
+  for (int run = 0; run < 10; ++run) {
+    options.record->time_s.push_back(4);
+    options.record->run.push_back(run);
+  }
+  options.record->columns = {{"y", std::vector<double>(10, 0), {}}};
+  options.same_runs = true;
+  const Prediction prediction = estimator->CurrentPrediction(options).value();
+  EXPECT_LT(prediction.outputs[0].std_dev.maxCoeff(), 0.5);
+}
+
 // The oracle is −log of the posterior density: a parabola along any line, with the curvature 1/σ²
 // of the conditional density.
 TEST(PerRun, TheCostGridRunsEachRunWithItsOwn) {

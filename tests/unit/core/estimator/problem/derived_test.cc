@@ -57,6 +57,21 @@ TEST(DerivedParameters, MayUseAndBeChannelParameters) {
   EXPECT_DOUBLE_EQ(ensemble.output_offsets(0, 0), 2.05);
 }
 
+// Such a point fails, and the others are treated as if it were not there.
+TEST(DerivedParameters, ThatAreNoNumbersLeaveWhatAllPointsShareAsItIs) {
+  Problem problem = TwoSprings();
+  problem.derived["k2"] = "sqrt(k1 - 15e3)";
+  const ResolvedProblem resolved = ResolvedProblem::Make(problem).value();
+  Matrix thetas(2, 2);
+  thetas << 12e3, 1.2, 20e3, 1.8;
+  const EnsembleSpecification ensemble = resolved.MakeEnsemble(thetas, resolved.outputs(), 1);
+  EXPECT_TRUE(ensemble.parameters.row(0).array().isNaN().all());
+  EXPECT_TRUE(ensemble.parameters.row(1).allFinite());
+  EXPECT_EQ(ensemble.input_delays_s.size(), 0);
+  EXPECT_EQ(ensemble.output_delays_s.size(), 0);
+  EXPECT_EQ(ensemble.output_gains.size(), 0);
+}
+
 TEST(DerivedParameters, AreRefusedWithTheirPlace) {
   EXPECT_THAT(RefusalOf([](Problem& p) { p.derived["k2"] = "1.5*k11"; }),
               HasSubstr("derived.k2: column 5"));

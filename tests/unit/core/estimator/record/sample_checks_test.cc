@@ -107,7 +107,7 @@ TEST_F(SampleChecksTest, IgnoreTheValueOfAMissingSample) {
 TEST_F(SampleChecksTest, TakeValuesOfZeroBeforeAnyOtherForMissing) {
   for (const double unit : {1e-9, 1.0, 1e9}) {
     Samples samples = ThreeRows();
-    samples.columns.push_back({"v", {0, 4 * unit, 0}, {}});
+    samples.columns.push_back({"v", {1e-110 * unit, 4 * unit, 0}, {}});
     const CheckedSamples checked = checks_.Check(samples).value();
     EXPECT_EQ(RowNoise(checked, 0)[1], 0);
     EXPECT_TRUE(std::isnan(RowValues(checked, 0)[1]));
@@ -258,10 +258,15 @@ TEST_F(SampleChecksTest, TakeAnyColumnMissingInAnyRow) {
 TEST_F(SampleChecksTest, RefuseValuesThatAreNoNumbers) {
   Samples samples = ThreeRows();
   samples.columns[0].value[1] = kNan;
-  EXPECT_EQ(Refusal(samples), "row 1, column x: nan must be a finite number");
+  EXPECT_EQ(Refusal(samples),
+            "row 1, column x: nan must be a finite number, of at most 1e100 in magnitude");
   samples = ThreeRows();
   samples.columns[1].value[0] = -std::numeric_limits<double>::infinity();
-  EXPECT_EQ(Refusal(samples), "row 0, column force: -inf must be a finite number");
+  EXPECT_EQ(Refusal(samples),
+            "row 0, column force: -inf must be a finite number, of at most 1e100 in magnitude");
+  samples.columns[1].value[0] = -2e100;  // its square would soon be infinite
+  EXPECT_EQ(Refusal(samples),
+            "row 0, column force: -2e+100 must be a finite number, of at most 1e100 in magnitude");
 }
 
 }  // namespace
