@@ -32,15 +32,17 @@ absl::Status Annotate(const std::string& name, const absl::Status& status) {
 }
 
 absl::Status UnpackInto(const std::filesystem::path& file, UnpackedFmu& fmu) {
-  POLYEST_ASSIGN_OR_RETURN(const Archive archive, Archive::Open(file));
-  // The file may have been replaced since its description was read.
+  // The file may have been replaced since its description was read, or may be just being copied.
+  const absl::StatusOr<Archive> archive = Archive::Open(file);
+  if (!archive.ok()) return absl::UnavailableError(archive.status().message());
   const std::string& name = fmu.description.interface.name;
-  POLYEST_ASSIGN_OR_RETURN(const FmuDescription now, ReadDescription(archive, name));
-  if (now.interface.token != fmu.description.interface.token) {
-    return absl::FailedPreconditionError("the file was replaced in the meantime; try again");
+  const absl::StatusOr<FmuDescription> now = ReadDescription(*archive, name);
+  if (!now.ok()) return absl::UnavailableError(now.status().message());
+  if (now->interface.token != fmu.description.interface.token) {
+    return absl::UnavailableError("the file was replaced in the meantime; try again");
   }
   POLYEST_ASSIGN_OR_RETURN(fmu.folder, TemporaryFolder::Make());
-  return archive.Unpack(fmu.folder->path());
+  return archive->Unpack(fmu.folder->path());
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ class FmuModel final : public SelfPropagatingModel {
   const FmuInterface& interface() const { return description_.interface; }
 
   // Starts an ensemble. If the FMU cannot be run, the ensemble's first Advance fails with
-  // FailedPrecondition.
+  // FailedPrecondition, or with Unavailable if that may change.
   std::unique_ptr<TrajectoryEnsemble> StartEnsemble(EnsembleSpecification specification,
                                                     const InputSignals* inputs) const override;
   std::string WhyNotFiltered() const override;

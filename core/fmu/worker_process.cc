@@ -36,7 +36,7 @@ constexpr std::chrono::milliseconds kLongestEnd{1'000};
 constexpr std::chrono::milliseconds kEndPause{1};
 
 absl::Status SystemError(const char* what) {
-  return absl::ResourceExhaustedError(
+  return absl::UnavailableError(
       absl::StrCat("a worker process cannot be started: ", what, ": ", std::strerror(errno)));
 }
 
@@ -80,6 +80,12 @@ pid_t Reap(pid_t pid, int flags, int& status, rusage& usage) {
   return reaped;
 }
 
+// Whether something else has stopped the process: the kernel for lack of memory, or the operator.
+// An FMU that fails causes other signals.
+bool IsStopped(int status) {
+  return WIFSIGNALED(status) && (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
+}
+
 bool IsProgram(const std::filesystem::path& path) { return access(path.c_str(), X_OK) == 0; }
 
 }  // namespace
@@ -87,7 +93,7 @@ bool IsProgram(const std::filesystem::path& path) { return access(path.c_str(), 
 absl::StatusOr<std::filesystem::path> FindWorkerProgram() {
   if (const char* const named = std::getenv("POLYEST_FMU_WORKER")) {
     if (IsProgram(named)) return named;
-    return absl::FailedPreconditionError(
+    return absl::UnavailableError(
         absl::StrFormat("POLYEST_FMU_WORKER: \"%s\" is not a program that can be run", named));
   }
   std::error_code error;
@@ -97,7 +103,7 @@ absl::StatusOr<std::filesystem::path> FindWorkerProgram() {
        {folder / kProgram, folder / "../libexec/polyest" / kProgram}) {
     if (IsProgram(candidate)) return candidate.lexically_normal();
   }
-  return absl::FailedPreconditionError(absl::StrFormat(
+  return absl::UnavailableError(absl::StrFormat(
       "%s, which runs FMUs, is neither in %s nor in its ../libexec/polyest; POLYEST_FMU_WORKER may "
       "name it",
       kProgram, folder.string()));
@@ -281,7 +287,9 @@ absl::Status WorkerProcess::Died() {
           ? absl::StrFormat("; it had used %d MiB of memory and the limit is %d MiB",
                             used_bytes >> 20, limits_.max_memory_bytes >> 20)
           : "";
-  return absl::FailedPreconditionError(
+  const bool stopped = ended > 0 && IsStopped(status);
+  return absl::Status(
+      stopped ? absl::StatusCode::kUnavailable : absl::StatusCode::kFailedPrecondition,
       absl::StrFormat("fmu %s: the worker %s %s%s", fmu_, end, WhatItDid(), memory));
 }
 

@@ -25,14 +25,14 @@ struct WorkerLimits {
 };
 
 // Returns the path of polyest-fmu-worker: the value of POLYEST_FMU_WORKER if it is set, else the
-// program beside this one, else the one in ../libexec/polyest relative to it. Returns
-// FailedPrecondition if there is none.
+// program beside this one, else the one in ../libexec/polyest relative to it. Returns Unavailable
+// if there is none.
 absl::StatusOr<std::filesystem::path> FindWorkerProgram();
 
 class WorkerProcess {
  public:
-  // Starts a worker. `fmu` is the FMU's name, for messages. Returns FailedPrecondition if the
-  // worker program is missing, or ResourceExhausted if the process cannot be started.
+  // Starts a worker. `fmu` is the FMU's name, for messages. Returns Unavailable if the
+  // worker program is missing or the process cannot be started.
   static absl::StatusOr<std::unique_ptr<WorkerProcess>> Start(std::string fmu,
                                                               const WorkerLimits& limits);
   ~WorkerProcess();
@@ -51,6 +51,7 @@ class WorkerProcess {
   bool has_to_send() const { return sent_ < outgoing_.size(); }
   // Sends and receives as much as possible without waiting. Returns FailedPrecondition when the
   // worker has died, or when one call takes longer than the limit; the worker is then killed.
+  // Returns Unavailable when something else has stopped the worker.
   absl::Status Exchange();
   // Returns the answer. It is available once awaits_answer() is false.
   std::string TakeAnswer() { return std::move(answer_); }

@@ -208,7 +208,7 @@ void EvaluationPool::Rest(Server& server, const std::string& fault) {
   server.rest = std::min<Clock::duration>(2 * server.rest, kLongestRest);
 }
 
-// Returns FailedPrecondition with what is wrong with each server if all are down for too long.
+// Returns Unavailable with what is wrong with each server if all are down for too long.
 absl::Status EvaluationPool::CheckServers() const {
   const Clock::time_point now = Clock::now();
   const std::chrono::duration<double> patience(options_.give_up_after_s);
@@ -217,7 +217,7 @@ absl::Status EvaluationPool::CheckServers() const {
     if (!server.down_since || now - *server.down_since < patience) return absl::OkStatus();
     absl::StrAppend(&faults, faults.empty() ? "" : "; ", server.url, ": ", server.fault);
   }
-  return absl::FailedPreconditionError(absl::StrFormat(
+  return absl::UnavailableError(absl::StrFormat(
       "no server could be reached for %g s (giveUpAfterS): %s", options_.give_up_after_s, faults));
 }
 

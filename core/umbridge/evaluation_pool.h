@@ -50,7 +50,7 @@ class EvaluationPool {
   using RequestOf = std::function<std::string(size_t)>;
 
   // Returns what came of each of `count` requests, in their order. Returns Cancelled or
-  // DeadlineExceeded on a stop request, FailedPrecondition if no server could be reached for
+  // DeadlineExceeded on a stop request, Unavailable if no server could be reached for
   // EvaluationServers::give_up_after_s.
   absl::StatusOr<std::vector<Evaluation>> Evaluate(size_t count, RequestOf request_of,
                                                    const Stop& stop);

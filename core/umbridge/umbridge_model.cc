@@ -85,9 +85,9 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
 };
 
 absl::Status UmBridgeEnsemble::Annotate(const absl::Status& status) const {
-  if (!absl::IsFailedPrecondition(status)) return status;
-  return absl::FailedPreconditionError(
-      absl::StrCat("umbridge ", description_->model.name, ": ", status.message()));
+  if (!absl::IsFailedPrecondition(status) && !absl::IsUnavailable(status)) return status;
+  return absl::Status(status.code(),
+                      absl::StrCat("umbridge ", description_->model.name, ": ", status.message()));
 }
 
 // Evaluates the points that have not failed; those that fail now are noted. Others are empty.

@@ -87,7 +87,7 @@ class LoadedSession {
   int64_t memory_bytes() const;
   // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes
   // them. FAILED_PRECONDITION when the model cannot be computed at a row; EndFailedRun then lets
-  // the session go on.
+  // the session go on. UNAVAILABLE while the model cannot be asked; a later call goes on.
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
   // Leaves out the row at which ProcessUpTo has failed, for this reason, and the rest of its run.
   // The journal must keep all batches that the estimator has. Waits for the disk.

@@ -198,7 +198,7 @@ def test_a_model_that_refuses_points_says_why(daemon, folder, record_of_module):
 
 def test_no_server_is_named_with_its_fault(daemon, folder, record_of_module):
     describe(folder, ["http://127.0.0.1:1"], giveUpAfterS=0)
-    with pytest.raises(polyest.FailedPrecondition,
+    with pytest.raises(polyest.Unavailable,
                        match="no server could be reached for 0 s .*127.0.0.1:1: no connection"):
         daemon.estimate(PROBLEM, record_of_module)
 

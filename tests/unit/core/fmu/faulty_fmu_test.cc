@@ -240,8 +240,9 @@ TEST_F(FaultyFmu, NeedsTheProgramThatRunsIt) {
   setenv("POLYEST_FMU_WORKER", "/nowhere", 1);
   const absl::Cleanup unset = [] { unsetenv("POLYEST_FMU_WORKER"); };
   FmuEnsemble ensemble("oscillator_me2", 1, {"x"});
-  EXPECT_THAT(ensemble.TryPropagate({1}).status().message(),
-              HasSubstr("POLYEST_FMU_WORKER: \"/nowhere\""));
+  const absl::Status missing = ensemble.TryPropagate({1}).status();
+  EXPECT_EQ(missing.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(missing.message(), HasSubstr("POLYEST_FMU_WORKER: \"/nowhere\""));
 }
 
 }  // namespace

@@ -130,6 +130,20 @@ TEST_F(FmuFolder, SeesFilesThatComeChangeAndGo) {
   EXPECT_THAT(fmus.Models(), IsEmpty());
 }
 
+TEST_F(FmuFolder, MayLackAnFmuForATime) {
+  Copy("oscillator_me2", "rig");
+  FmuEnsemble ensemble(*Open().Find("rig"), 1, {"x"});
+  std::filesystem::resize_file(folder_ / "rig.fmu", 100);
+  const absl::Status half_copied = ensemble.TryPropagate({1}).status();
+  EXPECT_EQ(half_copied.code(), absl::StatusCode::kUnavailable) << half_copied;
+  std::filesystem::remove(folder_ / "rig.fmu");
+  const absl::Status removed = ensemble.TryPropagate({1}).status();
+  EXPECT_EQ(removed.code(), absl::StatusCode::kUnavailable) << removed;
+  EXPECT_EQ(removed.message().substr(0, 9), "fmu rig: ");
+  Copy("oscillator_me2", "rig");
+  EXPECT_TRUE(ensemble.TryPropagate({1}).ok());
+}
+
 TEST_F(FmuFolder, ReportsABrokenFileAndServesTheOthers) {
   Copy("oscillator_me2", "good");
   std::ofstream(folder_ / "bad.fmu") << "not a zip archive";

@@ -235,7 +235,7 @@ TEST(EvaluationPool, ComputesASlowPointElsewhereToo) {
 TEST(EvaluationPool, SaysWhichServersCannotBeReached) {
   EvaluationPool pool({.urls = {kNobody}, .give_up_after_s = 0});
   const absl::Status status = Squares(pool, 1).status();
-  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(std::string(status.message()),
               AllOf(HasSubstr("no server could be reached for 0 s (giveUpAfterS)"),
                     HasSubstr("http://127.0.0.1:1: no connection")));

@@ -224,6 +224,7 @@ TEST(UmBridgeModel, EndsAnEstimateIfNoServerIsLeft) {
   const UmBridgeDescription description = Description(*server);
   server.reset();
   const absl::Status status = EstimateWith(std::make_shared<UmBridgeModel>(description)).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(std::string(status.message()),
               HasSubstr("umbridge decay: no server could be reached for 0 s"));
 }
