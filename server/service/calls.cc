@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "proto/wire/operations/names.h"
+#include "server/execution/guarded.h"
 
 namespace polyest::internal {
 namespace {
@@ -29,9 +30,10 @@ absl::Status SubmitWhenFound(const ServiceContext& context, const Caller& caller
                              const std::string& name, const std::shared_ptr<FoundSession>& found,
                              Task task) {
   const auto look = [&context, caller, name, found, task = std::move(task)] {
-    *found = context.sessions.Find(caller.tenant, name);
-    if (!found->ok()) return task();
-    const absl::Status accepted = (**found)->strand().Submit(task);
+    const absl::Status accepted = Guarded([&]() -> absl::Status {
+      POLYEST_ASSIGN_OR_RETURN(*found, context.sessions.Find(caller.tenant, name));
+      return (**found)->strand().Submit(task);
+    });
     if (accepted.ok()) return;
     *found = accepted;
     task();

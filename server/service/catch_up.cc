@@ -1,7 +1,7 @@
 #include "server/service/catch_up.h"
 
 #include "core/common/status.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 
 namespace polyest::internal {
 

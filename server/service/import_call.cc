@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/common/status.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest::internal {

@@ -8,7 +8,7 @@
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
 #include "server/service/call_stop.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
 #include "server/telemetry/request_id.h"
 

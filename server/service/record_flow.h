@@ -20,7 +20,7 @@
 
 #include "polyest/stop.h"
 #include "server/execution/executor.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 #include "server/service/open_calls.h"
 #include "server/service/status_mapping.h"
 #include "server/service/stream_relay.h"
@@ -144,8 +144,12 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
     } else if (next->empty()) {
       End(absl::OkStatus());
     } else if (!end_) {
-      records_.insert(records_.end(), std::make_move_iterator(next->begin()),
-                      std::make_move_iterator(next->end()));
+      const absl::Status taken = Guarded([&] {
+        records_.insert(records_.end(), std::make_move_iterator(next->begin()),
+                        std::make_move_iterator(next->end()));
+        return absl::OkStatus();
+      });
+      if (!taken.ok()) End(taken);
     }
     Advance();
   }

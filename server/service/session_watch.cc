@@ -10,7 +10,7 @@
 #include "core/common/status.h"
 #include "proto/wire/operations/names.h"
 #include "proto/wire/operations/operations.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
 
 namespace polyest::internal {

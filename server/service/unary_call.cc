@@ -1,7 +1,7 @@
 #include "server/service/unary_call.h"
 
 #include "core/common/status.h"
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 #include "server/service/passed_on.h"
 #include "server/service/status_mapping.h"
 

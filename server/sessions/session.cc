@@ -12,6 +12,7 @@
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
 #include "server/digest/digest.h"
+#include "server/execution/guarded.h"
 #include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/structured_log.h"
@@ -173,8 +174,8 @@ absl::Status Session::Own() {
   SharedJournal* const shared = services_.journal.shared();
   if (shared == nullptr) return absl::OkStatus();
   if (ReadyToTake()) return absl::OkStatus();
-  // A batch that is just being taken goes to the journal before the claim, which settles it.
-  { const std::lock_guard taking(taking_); }
+  // The claim settles a batch that is just being taken. The next waits for what the claim changes.
+  const std::lock_guard taking(taking_);
   const absl::StatusOr<SessionPlace> place = shared->Claim(number());
   if (!place.ok()) {
     const std::optional<Refusal> refusal = RefusalOf(place.status());
@@ -271,10 +272,6 @@ void Session::Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t va
         if (!kept.ok()) self->ReleaseRoom(amount);
         self->ledger_.Settle(losses, sequence, kept);
       });
-}
-
-absl::Status Session::Process(const Stop& stop) {
-  return ProcessUpTo(std::numeric_limits<int64_t>::max(), stop);
 }
 
 absl::Status Session::ProcessUpTo(int64_t sequence, const Stop& stop) {
@@ -378,12 +375,15 @@ void Session::Drop() {
   history_.reset();
 }
 
-void Session::Unobserve(const SessionObserver* observer) {
-  observers_.Remove(observer);
-  activity_.OnUsed();
+void Session::Unload() {
+  // What it still holds after a lack of memory leaves the next time.
+  Guarded([this] {
+    UnloadIfIdle();
+    return absl::OkStatus();
+  }).IgnoreError();
 }
 
-void Session::Unload() {
+void Session::UnloadIfIdle() {
   // A writer that claims the session does so before this lock, and it stays in memory, or sees that
   // it is gone.
   std::unique_lock lock(mutex_);

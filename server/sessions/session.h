@@ -7,6 +7,7 @@
 #include <absl/status/statusor.h>
 
 #include <atomic>
+#include <limits>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -152,7 +153,9 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status Load(const Stop& stop) { return Loaded(stop).status(); }
   // Process everything added, or everything added up to batch `sequence`. Where the model cannot be
   // computed, the run ends (RunCuts), and a diagnostic of every further estimate says so.
-  absl::Status Process(const Stop& stop);
+  absl::Status Process(const Stop& stop) {
+    return ProcessUpTo(std::numeric_limits<int64_t>::max(), stop);
+  }
   absl::Status ProcessUpTo(int64_t sequence, const Stop& stop);
   // Returns the estimate from everything processed. It may be shown once WhenKept reports its last
   // batch as kept; a new estimate is then passed on to the observers.
@@ -169,7 +172,10 @@ class Session : public std::enable_shared_from_this<Session> {
   // on. NOT_FOUND when the session is closed.
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   // Removes an observer. May be called from any thread, as may the next.
-  void Unobserve(const SessionObserver* observer);
+  void Unobserve(const SessionObserver* observer) {
+    observers_.Remove(observer);
+    activity_.OnUsed();
+  }
   bool observed() const { return observers_.size() > 0; }
   // Weighs what is in memory of the session. May be called on the strand, or before others know
   // the session.
@@ -211,6 +217,7 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status LoadHistory();
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
+  void UnloadIfIdle();
   const SessionServices services_;
   const SessionHead head_;
   const std::shared_ptr<Strand> strand_;

@@ -1,10 +1,13 @@
 #include "server/web/web_server.h"
 
+#include <absl/cleanup/cleanup.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
+#include <exception>
 #include <iterator>
+#include <new>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "core/common/status.h"
@@ -55,23 +58,38 @@ void WebServer::AcceptAll(const HttpHandler& handler) {
 }
 
 void WebServer::Take(int descriptor, const HttpHandler& handler) {
-  const std::lock_guard lock(mutex_);
-  open_.emplace_back(descriptor, tls_);
-  const auto connection = std::prev(open_.end());
-  const auto host = hosts_.try_emplace(connection->host, 0).first;
-  if (static_cast<int>(open_.size()) <= options_.connections &&
-      host->second < options_.connections_of_host) {
-    // The system may not have another thread.
-    try {
-      connection->thread = std::thread([this, connection, &handler] { Run(connection, handler); });
-      ++host->second;
-      return;
-    } catch (const std::system_error&) {
-    }
+  Connections taken;
+  // The system may not have the memory, which costs this connection only.
+  try {
+    taken.emplace_back();
+  } catch (const std::bad_alloc&) {
+    close(descriptor);
+    return;
   }
-  if (tls_ == nullptr) RefuseConnection(descriptor);
-  if (host->second == 0) hosts_.erase(host);
-  open_.erase(connection);
+  const std::lock_guard lock(mutex_);
+  taken.front().socket.emplace(descriptor, tls_);
+  if (!Start(taken, handler) && tls_ == nullptr) RefuseConnection(descriptor);
+}
+
+bool WebServer::Start(Connections& taken, const HttpHandler& handler) {
+  const auto connection = taken.begin();
+  // The system may not have the memory, or another thread.
+  try {
+    connection->host = connection->socket->PeerHost();
+    const auto host = hosts_.try_emplace(connection->host, 0).first;
+    const absl::Cleanup forget = [&] {
+      if (host->second == 0) hosts_.erase(host);
+    };
+    if (std::ssize(open_) >= options_.connections || host->second >= options_.connections_of_host) {
+      return false;
+    }
+    connection->thread = std::thread([this, connection, &handler] { Run(connection, handler); });
+    ++host->second;
+    open_.splice(open_.end(), taken);
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
 }
 
 void WebServer::Run(Connections::iterator connection, const HttpHandler& handler) {

@@ -49,11 +49,9 @@ class WebServer {
 
  private:
   struct Connection {
-    explicit Connection(int descriptor, std::shared_ptr<SSL_CTX> tls)
-        : socket(std::in_place, descriptor, std::move(tls)), host(socket->PeerHost()) {}
     std::optional<ClientSocket> socket;  // none once it is closed
-    const std::string host;
-    std::thread thread{};
+    std::string host;
+    std::thread thread;
   };
   using Connections = std::list<Connection>;
 
@@ -61,6 +59,9 @@ class WebServer {
   void AcceptAll(const HttpHandler& handler);
   // Serves a connection, or refuses it when there are too many.
   void Take(int descriptor, const HttpHandler& handler);
+  // Begins to serve the only connection of `taken`, which then is one of those that are open.
+  // Returns false if there are too many. Called with the mutex held.
+  bool Start(Connections& taken, const HttpHandler& handler);
   void Run(Connections::iterator connection, const HttpHandler& handler);
   // Joins the threads that have ended.
   void Reap();

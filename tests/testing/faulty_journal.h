@@ -36,6 +36,9 @@ class FaultyJournal final : public SessionJournal {
     failure_ = status;
   }
 
+  // Acts as a journal that daemons share.
+  void Share(SharedJournal* shared) { shared_ = shared; }
+
   // Calls `then` once the journal has deleted a session, before the caller hears of it.
   void AfterDeleting(std::function<void()> then) {
     const std::lock_guard lock(mutex_);
@@ -43,6 +46,7 @@ class FaultyJournal final : public SessionJournal {
   }
 
   bool durable() const override { return true; }
+  SharedJournal* shared() override { return shared_; }
   absl::StatusOr<std::vector<SessionHead>> Heads() const override { return journal_.Heads(); }
   absl::StatusOr<int64_t> Create(const SessionHead& head, const v1::Problem& problem,
                                  bool hidden) override {
@@ -108,6 +112,7 @@ class FaultyJournal final : public SessionJournal {
   std::deque<std::pair<JournalEntry, Done>> held_;
   absl::Status failure_;
   std::function<void()> then_;
+  SharedJournal* shared_ = nullptr;
 };
 
 }  // namespace polyest::internal

@@ -1,6 +1,6 @@
 // Tests that exceptions of a request end the request alone.
 
-#include "server/service/guarded.h"
+#include "server/execution/guarded.h"
 
 #include <absl/status/statusor.h>
 #include <gtest/gtest.h>
