@@ -6,12 +6,21 @@
 #include "core/common/status.h"
 #include "core/estimator/record/sample_checks.h"
 #include "proto/wire/convert/measurements.h"
+#include "server/sessions/loaded_session.h"
 #include "server/sessions/row_reorder.h"
 
 namespace polyest::internal {
+namespace {
+
+// The rows as a message, as the samples made of it, and as the study keeps them.
+constexpr int64_t kCopies = 3;
+
+}  // namespace
 
 absl::StatusOr<int64_t> ReadRows(const Session& session, const ResolvedProblem& problem,
                                  const Stop& stop, v1::Measurements& measurements) {
+  POLYEST_RETURN_IF_ERROR(
+      session.CheckMemory(kCopies * session.place().rows * LoadedSession::RowBytes(problem)));
   const Model& model = *problem.problem().model;
   std::optional<RowReorder> reorder;
   if (session.reorder_window_s() > 0) {

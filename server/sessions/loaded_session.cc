@@ -151,13 +151,16 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
   return absl::OkStatus();
 }
 
-int64_t LoadedSession::memory_bytes() const {
-  const ResolvedProblem& problem = intake_.problem();
+int64_t LoadedSession::RowBytes(const ResolvedProblem& problem) {
   const auto columns =
       std::ssize(problem.problem().measured) + std::ssize(problem.streamed_inputs());
   // Each column has a value and a standard deviation.
-  const auto row_bytes = static_cast<int64_t>(sizeof(SampleRow) + 2 * sizeof(double) * columns);
-  return EstimatorAccess::MemoryBytes(*computed_.estimator) + rows_in_memory() * row_bytes +
+  return static_cast<int64_t>(sizeof(SampleRow) + 2 * sizeof(double) * columns);
+}
+
+int64_t LoadedSession::memory_bytes() const {
+  return EstimatorAccess::MemoryBytes(*computed_.estimator) +
+         rows_in_memory() * RowBytes(intake_.problem()) +
          kCopiesOfProblem * static_cast<int64_t>(problem_.ByteSizeLong());
 }
 

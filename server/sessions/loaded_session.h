@@ -83,6 +83,8 @@ class LoadedSession {
   int64_t rows_in_memory() const {
     return intake_.waiting_rows() + computed_.store->rows_in_memory();
   }
+  // Returns the bytes of a row of the problem in memory.
+  static int64_t RowBytes(const ResolvedProblem& problem);
   // Returns about how many bytes of memory the session holds.
   int64_t memory_bytes() const;
   // Gives the estimator the batches up to `sequence`, or as many as have been taken, and processes

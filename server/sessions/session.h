@@ -97,6 +97,8 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionPlace place() const { return ledger_.kept(); }
   // Returns the place of the session after the last batch taken, acknowledged or not yet.
   SessionPlace taken() const { return ledger_.taken(); }
+  // Checks whether the tenant may hold about so many bytes of memory more.
+  absl::Status CheckMemory(int64_t bytes) const;
   bool loaded() const { return activity_.loaded(); }
   // Returns the time since the session was last used; nothing while it is in use.
   std::optional<Clock::duration> IdleTime() const;
@@ -200,8 +202,6 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
                         int64_t bytes) const;
   void ReleaseRoom(const StoredAmount& amount) const;
-  // Checks whether the tenant may hold about so many bytes of memory more.
-  absl::Status CheckMemory(int64_t bytes) const;
   // Returns the loaded session; loads it first if need be. Batches taken may wait in it for the
   // numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);

@@ -23,9 +23,9 @@ int64_t Mebibytes(int64_t bytes) { return (bytes + kBytesOfMebibyte - 1) / kByte
 absl::Status TooLarge(int64_t bytes, int64_t max_mb) {
   return LimitExceeded(
       "--max-tenant-memory-mb",
-      absl::StrFormat("problem: its session needs about %d MiB of memory, more than all loaded "
-                      "sessions of a tenant may hold, %d MiB (--max-tenant-memory-mb); a lower "
-                      "order or fewer points per term need less",
+      absl::StrFormat("about %d MiB of memory are needed, more than all loaded sessions of a "
+                      "tenant may hold, %d MiB (--max-tenant-memory-mb); a lower order, fewer "
+                      "points per term or fewer rows need less",
                       Mebibytes(bytes), max_mb));
 }
 
