@@ -2,6 +2,7 @@
 
 // What a stream of events to an HTTP client is made of.
 
+#include <absl/status/statusor.h>
 #include <google/protobuf/descriptor.h>
 
 #include <memory>
@@ -27,25 +28,25 @@ class EventSource {
   virtual grpc::Status status() const = 0;
 };
 
-// Returns a message of this type, serialized, as an event.
-EventSource::Text ToEvent(const std::string& message, const google::protobuf::Descriptor& type);
+// Returns a message of this type, serialized, as an event; the errors of ToJsonText.
+absl::StatusOr<EventSource::Text> ToEvent(const std::string& message,
+                                          const google::protobuf::Descriptor& type);
 
-// The messages of a call of the client's own.
+// The messages of a call of the client's own. Ends with the first that has no form in JSON.
 class CallEvents final : public EventSource {
  public:
   CallEvents(const std::shared_ptr<grpc::Channel>& channel, const WebCall::Request& request,
              const google::protobuf::Descriptor& type)
       : call_(channel, request), type_(type) {}
 
-  WebCall::Event Await(int client, WebCall::Clock::time_point deadline) override {
-    return call_.Await(client, deadline);
-  }
-  Text Take() override { return ToEvent(call_.TakeMessage(), type_); }
-  grpc::Status status() const override { return call_.status(); }
+  WebCall::Event Await(int client, WebCall::Clock::time_point deadline) override;
+  Text Take() override { return *event_; }
+  grpc::Status status() const override;
 
  private:
   WebCall call_;
   const google::protobuf::Descriptor& type_;
+  absl::StatusOr<Text> event_ = Text();  // of the last message
 };
 
 }  // namespace polyest::internal

@@ -216,7 +216,12 @@ HttpAnswer Gateway::AnswerOnce(WebCall& call, const WebMethod& method,
   }
   HttpAnswer answer{.content_type = kJson};
   if (status->ok()) {
-    answer.body = ToJsonText(message, *method.method->output_type());
+    auto json = ToJsonText(message, *method.method->output_type());
+    if (json.ok()) {
+      answer.body = *std::move(json);
+    } else {
+      answer = ErrorAnswer(ToRpcStatus(json.status()));
+    }
   } else {
     answer = ErrorAnswer(ToRpcStatus(*status));
   }

@@ -6,6 +6,7 @@
 
 #include "core/common/check.h"
 #include "polyest/v1/session_service.pb.h"
+#include "server/service/status_mapping.h"
 
 namespace polyest::internal {
 namespace {
@@ -78,10 +79,12 @@ grpc::Status SharedWatch::ReadAll() {
   while (call_.Await(kNoClient, WebCall::Clock::now() + kForever) == WebCall::Event::kMessage) {
     const std::string bytes = call_.TakeMessage();
     v1::WatchSessionResponse response;
-    POLYEST_CHECK(response.ParseFromString(bytes));  // the daemon's own server wrote it
+    const auto event = ToEvent(bytes, *response.GetDescriptor());
+    if (!event.ok()) return ToGrpc(event.status());
+    POLYEST_CHECK(response.ParseFromString(bytes));  // as ToEvent has done
     Publish(
         response.has_prediction() ? LatestEvents::Kind::kPrediction : LatestEvents::Kind::kEstimate,
-        ToEvent(bytes, *response.GetDescriptor()));
+        *event);
   }
   return call_.status();
 }

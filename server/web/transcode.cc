@@ -9,12 +9,12 @@
 #include <memory>
 #include <vector>
 
-#include "core/common/check.h"
 #include "proto/wire/json/json_error.h"
 #include "proto/wire/json/json_format.h"
 #include "proto/wire/json/json_structure.h"
 #include "proto/wire/json/unknown_fields.h"
 #include "proto/wire/transport/automatic_order.h"
+#include "server/telemetry/structured_log.h"
 
 namespace polyest::internal {
 namespace {
@@ -80,12 +80,17 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
   return InBody(DescribeJsonError(json, {read.message().data(), read.message().size()}));
 }
 
-std::string ToJsonText(const std::string& bytes, const google::protobuf::Descriptor& type) {
+absl::StatusOr<std::string> ToJsonText(const std::string& bytes,
+                                       const google::protobuf::Descriptor& type) {
   const google::protobuf::Message* const prototype =
       google::protobuf::MessageFactory::generated_factory()->GetPrototype(&type);
   const std::unique_ptr<google::protobuf::Message> message(prototype->New());
-  POLYEST_CHECK(message->ParseFromString(bytes));
-  return ToJson(*message, /*several_lines=*/false);
+  absl::StatusOr<std::string> json = absl::InternalError("a text is not valid UTF-8");
+  if (message->ParseFromString(bytes)) json = TryToJson(*message, /*several_lines=*/false);
+  if (json.ok()) return json;
+  Log(spdlog::level::err, "an answer has no form in JSON",
+      {{"type", type.full_name()}, {"error", std::string(json.status().message())}});
+  return absl::InternalError("the answer has no form in JSON");
 }
 
 rpc::Status ToRpcStatus(const grpc::Status& status) {

@@ -2,6 +2,7 @@
 
 // Turns JSON into serialized requests, and serialized responses and errors into JSON.
 
+#include <absl/status/statusor.h>
 #include <google/protobuf/descriptor.h>
 #include <grpcpp/support/status.h>
 
@@ -17,8 +18,9 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
                          std::string& bytes);
 
 // Returns the JSON of a serialized message of this type in one line, as `polyest --format json`
-// writes it.
-std::string ToJsonText(const std::string& bytes, const google::protobuf::Descriptor& type);
+// writes it. INTERNAL, which the log explains, if it has none.
+absl::StatusOr<std::string> ToJsonText(const std::string& bytes,
+                                       const google::protobuf::Descriptor& type);
 
 // Returns a status of gRPC with the details that it carries.
 rpc::Status ToRpcStatus(const grpc::Status& status);

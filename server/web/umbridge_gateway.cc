@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/common/check.h"
 #include "polyest/v1/session_service.pb.h"
 #include "server/security/method_roles.h"
 #include "server/service/status_mapping.h"
@@ -110,7 +109,9 @@ std::optional<HttpAnswer> UmBridgeGateway::Call(const std::string& method, const
   const std::optional<grpc::Status> status = call.AwaitOnly(request.client, answer);
   if (!status) return Refusal(499, "the client has closed the connection");
   if (!status->ok()) return UmError(ToRpcStatus(*status));
-  POLYEST_CHECK(response.ParseFromString(answer));  // the daemon's own server wrote it
+  if (!response.ParseFromString(answer)) {
+    return UmError(absl::InternalError("the daemon's answer has a text that is not valid UTF-8"));
+  }
   return std::nullopt;
 }
 

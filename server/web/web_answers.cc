@@ -3,6 +3,7 @@
 #include <grpcpp/support/status_code_enum.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "proto/wire/json/json_format.h"
 #include "server/web/http_status.h"
@@ -38,7 +39,10 @@ int64_t RetryDelay(const rpc::Status& status) {
 HttpAnswer ErrorAnswer(const rpc::Status& status) {
   const auto code = static_cast<grpc::StatusCode>(status.code());
   HttpAnswer answer{.status = HttpStatus(code), .content_type = "application/json"};
-  answer.body = ToJson(status, /*several_lines=*/false);
+  auto json = TryToJson(status, /*several_lines=*/false);
+  // Of an error that has no form in JSON, the code is left.
+  if (!json.ok()) return ErrorAnswer(answer.status, code, "the error has no form in JSON");
+  answer.body = *std::move(json);
   if (code == grpc::StatusCode::UNAUTHENTICATED) {
     answer.headers.emplace_back("WWW-Authenticate", "Bearer");
   }

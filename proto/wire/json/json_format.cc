@@ -13,6 +13,7 @@
 
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "core/common/check.h"
@@ -123,14 +124,21 @@ struct JsonType {
 }  // namespace
 
 std::string ToJson(const google::protobuf::Message& message, bool several_lines) {
+  absl::StatusOr<std::string> json = TryToJson(message, several_lines);
+  POLYEST_CHECK(json.ok());
+  return *std::move(json);
+}
+
+absl::StatusOr<std::string> TryToJson(const google::protobuf::Message& message,
+                                      bool several_lines) {
   google::protobuf::util::JsonPrintOptions options;
   options.add_whitespace = several_lines;
   options.always_print_primitive_fields = true;
   const JsonType type(message);
   std::string json;
-  POLYEST_CHECK(google::protobuf::util::BinaryToJsonString(type.resolver.get(), type.url,
-                                                           Serialize(message), &json, options)
-                    .ok());
+  const auto written = google::protobuf::util::BinaryToJsonString(
+      type.resolver.get(), type.url, Serialize(message), &json, options);
+  if (!written.ok()) return absl::InternalError(written.ToString());
   absl::StripTrailingAsciiWhitespace(&json);
   return json;
 }
@@ -144,7 +152,9 @@ absl::Status FromJson(const std::string& json, google::protobuf::Message& messag
   const auto read =
       google::protobuf::util::JsonToBinaryString(type.resolver.get(), type.url, json, &bytes);
   if (!read.ok()) return absl::InvalidArgumentError(read.ToString());
-  POLYEST_CHECK(message.ParseFromString(bytes));
+  if (!message.ParseFromString(bytes)) {
+    return absl::InvalidArgumentError("a text is not valid UTF-8");
+  }
   return absl::OkStatus();
 }
 

@@ -117,6 +117,27 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   import->OnDone();
 }
 
+TEST_F(ImportCallTest, RefusesATimeThatNoListCouldShow) {
+  for (const auto& [seconds, nanos] : {std::pair<int64_t, int32_t>{1'000'000'000'000'000, 0},
+                                       {-62'135'596'801, 0},
+                                       {0, 1'000'000'000},
+                                       {0, -1}}) {
+    ServiceContext context = Context();
+    auto* const import = new ImportCall(context, call_, &imported_);
+    std::promise<grpc::Status> finished;
+    Reader reader(*import, [&](const grpc::Status& status) { finished.set_value(status); });
+    v1::SessionRecord head = Head();
+    head.mutable_head()->mutable_create_time()->set_seconds(seconds);
+    head.mutable_head()->mutable_create_time()->set_nanos(nanos);
+    reader.Give(head);
+    const grpc::Status refused = finished.get_future().get();
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_EQ(refused.error_message().find("record.head.createTime: "), 0u)
+        << refused.error_message();
+    import->OnDone();
+  }
+}
+
 TEST_F(ImportCallTest, EndsWhereNothingComes) {
   ServiceContext context = Context();
   context.first_message = std::chrono::milliseconds(0);

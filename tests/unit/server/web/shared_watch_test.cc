@@ -105,7 +105,7 @@ class SharedWatchTest : public ::testing::Test {
     return *client.Take();
   }
   static std::string Text(const v1::WatchSessionResponse& message) {
-    return "data: " + ToJsonText(message.SerializeAsString(), *message.GetDescriptor()) + "\n\n";
+    return "data: " + *ToJsonText(message.SerializeAsString(), *message.GetDescriptor()) + "\n\n";
   }
 
   Watched service_;
@@ -121,6 +121,17 @@ TEST_F(SharedWatchTest, GivesEachMessageOfOneCallToAll) {
     EXPECT_EQ(Next(*second), Text(EstimateOf(sequence)));
   }
   EXPECT_EQ(service_.calls(), 1);
+}
+
+TEST_F(SharedWatchTest, EndsWithAMessageThatHasNoFormInJson) {
+  const auto client = Join("reader");
+  service_.Send(EstimateOf(1));
+  EXPECT_EQ(Next(*client), Text(EstimateOf(1)));
+  v1::WatchSessionResponse bad = EstimateOf(2);
+  bad.mutable_estimate()->add_parameters()->set_name("\xff");
+  service_.Send(bad);
+  EXPECT_EQ(Await(*client), Event::kEnd);
+  EXPECT_EQ(client->status().error_code(), grpc::StatusCode::INTERNAL);
 }
 
 TEST_F(SharedWatchTest, CallsForEachKeyAnew) {

@@ -97,7 +97,8 @@ TEST(Transcode, WritesWhatTheCommandWrites) {
   coefficient.set_parameter("k");
   coefficient.set_value(0.5);
   response.mutable_estimate()->set_sequence(7);
-  const std::string json = ToJsonText(response.SerializeAsString(), *response.GetDescriptor());
+  const std::string json =
+      ToJsonText(response.SerializeAsString(), *response.GetDescriptor()).value();
   EXPECT_THAT(json, HasSubstr(R"("sequence":"7")"));
   EXPECT_THAT(json, HasSubstr(R"("coefficients":{"k":0.5})"));
   EXPECT_THAT(json, Not(HasSubstr("\n")));
@@ -124,8 +125,28 @@ TEST(Transcode, WritesTheErrorOfAnOperation) {
   v1::Operation operation;
   *operation.mutable_error() = ToRpcStatus(
       Refuse(absl::StatusCode::kResourceExhausted, "no time", {.reason = kLimitExceeded}));
-  EXPECT_THAT(ToJsonText(operation.SerializeAsString(), *operation.GetDescriptor()),
+  EXPECT_THAT(ToJsonText(operation.SerializeAsString(), *operation.GetDescriptor()).value(),
               HasSubstr(R"("reason":"LIMIT_EXCEEDED")"));
+}
+
+TEST(Transcode, RefusesToWriteWhatHasNoFormInJson) {
+  v1::Session session;
+  session.mutable_create_time()->set_seconds(1'000'000'000'000'000);
+  EXPECT_EQ(ToJsonText(session.SerializeAsString(), *session.GetDescriptor()).status().code(),
+            absl::StatusCode::kInternal);
+  session.Clear();
+  session.set_name("a\xed\xa0\x80");  // half of a pair of UTF-16
+  EXPECT_EQ(ToJsonText(session.SerializeAsString(), *session.GetDescriptor()).status().code(),
+            absl::StatusCode::kInternal);
+}
+
+TEST(Transcode, WritesTheCodeOfAnErrorWhoseDetailsAreUnknown) {
+  rpc::Status status;
+  status.set_code(grpc::StatusCode::NOT_FOUND);
+  status.add_details()->set_type_url("type.googleapis.com/nobody.Knows");
+  const HttpAnswer answer = ErrorAnswer(status);
+  EXPECT_EQ(answer.status, 404);
+  EXPECT_THAT(answer.body, HasSubstr(R"("code":5,)"));
 }
 
 TEST(HttpStatus, IsThatOfTheTableOfGoogleRpcCode) {
