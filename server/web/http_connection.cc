@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <exception>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,8 +27,12 @@ constexpr size_t kMaxLinger = size_t{256} << 20;
 constexpr std::chrono::seconds kLinger{2};
 // Bytes of an answer that count against the memory for bodies.
 constexpr int64_t kLargeAnswer = 1 << 20;
+// Bytes that are read from one piece of a body to the next. The library reads pieces of 4 KiB, and
+// keeps the lines around chunks in memory that nobody else counts.
+constexpr size_t kMaxBetweenPieces = size_t{8} << 10;
 
-// What the library reads from and writes to. Refuses to read more of a head than is allowed.
+// What the library reads from and writes to. Refuses to read more of a head, or of what is around
+// the pieces of a body, than is allowed.
 class LimitedStream final : public httplib::Stream {
  public:
   LimitedStream(ClientSocket& socket, const HttpLimits& limits)
@@ -38,14 +41,18 @@ class LimitedStream final : public httplib::Stream {
   // Begins to count the bytes and the time of a head.
   void BeginHead() {
     left_ = limits_.head_bytes;
+    status_at_limit_ = 431;
     deadline_ = Clock::now() + limits_.head;
     failure_ = 0;
   }
   // Ends the head: a body of so many bytes follows.
   void BeginBody(uint64_t bytes) {
-    left_ = std::numeric_limits<size_t>::max();
+    left_ = kMaxBetweenPieces;
+    status_at_limit_ = 400;
     deadline_ = Clock::now() + TransferTime(bytes);
   }
+  // A piece of the body has been taken.
+  void OnPiece() { left_ = kMaxBetweenPieces; }
   // Returns the status of HTTP that says why reading failed; 0: it did not.
   int failure() const { return failure_; }
 
@@ -57,7 +64,7 @@ class LimitedStream final : public httplib::Stream {
 
   ssize_t read(char* bytes, size_t size) override {
     if (left_ == 0) {
-      failure_ = 431;
+      failure_ = status_at_limit_;
       return -1;
     }
     if (begin_ == end_) {
@@ -99,6 +106,7 @@ class LimitedStream final : public httplib::Stream {
   size_t begin_ = 0;
   size_t end_ = 0;
   size_t left_ = 0;  // bytes that may still be read
+  int status_at_limit_ = 0;
   Clock::time_point deadline_;
   int failure_ = 0;
   bool broken_ = false;
@@ -269,6 +277,7 @@ std::optional<HttpAnswer> RequestLoop::ReadBody(const httplib::ContentReader& re
   bool too_large = false;
   bool no_memory = false;
   const bool read = reader([&](const char* bytes, size_t size) {
+    stream_.OnPiece();
     too_large = body.size() + size > limits_.body_bytes;
     if (too_large) return false;
     no_memory = !share_->Take(static_cast<int64_t>(size));
@@ -283,7 +292,7 @@ std::optional<HttpAnswer> RequestLoop::ReadBody(const httplib::ContentReader& re
                                               " MiB (--max-message-mb)"));
   }
   if (no_memory) return handler_.Refusal(429, "too many large requests at once; try again later");
-  if (stream_.failure() != 0) return handler_.Refusal(stream_.failure(), "the body is too slow");
+  if (stream_.failure() == 408) return handler_.Refusal(408, "the body is too slow");
   return handler_.Refusal(400, "the body ends too early, or its chunks are wrong");
 }
 

@@ -221,6 +221,20 @@ TEST_F(HttpConnectionTest, RefusesTooLargeBodiesHoweverTheyCome) {
               StartsWith("HTTP/1.1 415"));
 }
 
+// What is around the chunks counts against no limit of bodies.
+TEST_F(HttpConnectionTest, RefusesLongLinesAroundChunks) {
+  limits_.body_bytes = 100'000;
+  const std::string head = "POST /a HTTP/1.1\r\nHost: h\r\nTransfer-Encoding: chunked\r\n\r\n";
+  const std::string end = "\r\n0\r\n\r\n";
+  const std::string zeros(10'000, '0');
+  EXPECT_THAT(Ask(head + "c350\r\n" + std::string(50'000, 'x') + end), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Ask(head + "00000001\r\nx" + end), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Ask(head + zeros + "1\r\nx" + end), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(Ask(head + "1\r\nx\r\n" + zeros + "1\r\nx" + end), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(Ask(head + "1\r\nx\r\n0\r\nTrailer: " + zeros + "\r\n\r\n"),
+              StartsWith("HTTP/1.1 400"));
+}
+
 TEST_F(HttpConnectionTest, HoldsNoMoreBodiesThanThereIsMemoryFor) {
   const std::string head = "POST /a HTTP/1.1\r\nHost: h\r\n";
   const std::string request = head + "Content-Length: 600\r\n\r\n" + std::string(600, 'x');
