@@ -3,6 +3,7 @@
 // Rules of paging that all lists share.
 
 #include <absl/status/statusor.h>
+#include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/string_view.h>
 
@@ -28,8 +29,8 @@ inline absl::StatusOr<size_t> PageSize(int requested) {
 
 // Returns the error for a token that does not belong to a page.
 inline absl::Status UnknownPageToken(absl::string_view token) {
-  return InvalidField("pageToken",
-                      absl::StrCat("\"", token, "\" is not the nextPageToken of a page"));
+  return InvalidField("pageToken", absl::StrCat("\"", absl::Utf8SafeCEscape(token),
+                                                "\" is not the nextPageToken of a page"));
 }
 
 }  // namespace polyest::internal

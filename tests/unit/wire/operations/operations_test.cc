@@ -84,6 +84,16 @@ TEST(ResourceId, TakesTheLastPartOfAName) {
   }
 }
 
+TEST(ResourceId, HasNoControlCharacters) {
+  EXPECT_EQ(*ResourceId("name", "models", "models/Ärger 2"), "Ärger 2");
+  EXPECT_EQ(ResourceId("name", "sessions", std::string("sessions/a\0b", 12)).status().message(),
+            "name: \"sessions/a\\000b\" must be of the form sessions/{id}");
+  for (const char* bad : {"sessions/a\n", "sessions/\x1f", "sessions/\x7f"}) {
+    EXPECT_EQ(ResourceId("name", "sessions", bad).status().code(),
+              absl::StatusCode::kInvalidArgument);
+  }
+}
+
 TEST(ComputeEstimate, RefusesAProblemThatMeasuresNothing) {
   v1::ComputeEstimateRequest request;
   *request.mutable_subject()->mutable_experiment()->mutable_problem() = SmallProblem();
