@@ -81,6 +81,7 @@ absl::StatusOr<v1::Measurements> RecordOf(Client& client, const v1::Session& ses
         return ended ? absl::CancelledError("the first run is complete") : absl::OkStatus();
       });
   if (!exported.ok() && !ended) return exported;
+  if (session.reorder_window_s() > 0) PutInTimeOrder(record);
   return record;
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
@@ -116,6 +118,30 @@ void FillUp(int rows, v1::Measurements::Channel& channel) {
   }
 }
 
+// Returns the channel with the sample of each row moved to row `to` of `count`.
+v1::Measurements::Channel Moved(const v1::Measurements::Channel& channel,
+                                const std::vector<int>& to, int count) {
+  v1::Measurements::Channel moved;
+  moved.set_name(channel.name());
+  moved.set_unit(channel.unit());
+  moved.mutable_values()->Resize(count, 0);
+  std::vector<bool> has(static_cast<size_t>(count), false);
+  auto missing = channel.missing().begin();
+  for (int row = 0; row < channel.values_size(); ++row) {
+    if (missing != channel.missing().end() && *missing == row) {
+      ++missing;
+      continue;
+    }
+    const int place = to[static_cast<size_t>(row)];
+    moved.set_values(place, channel.values(row));
+    has[static_cast<size_t>(place)] = true;
+  }
+  for (int row = 0; row < count; ++row) {
+    if (!has[static_cast<size_t>(row)]) moved.add_missing(row);
+  }
+  return moved;
+}
+
 }  // namespace
 
 absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements) {
@@ -182,6 +208,29 @@ void AppendRows(const Samples& rows, v1::Measurements& all) {
     }
   }
   AppendRows(batch, all);
+}
+
+void PutInTimeOrder(v1::Measurements& rows) {
+  const auto place = [&](int row) {
+    return std::pair(rows.run().empty() ? 0 : rows.run(row), rows.time_s(row));
+  };
+  std::vector<int> order(static_cast<size_t>(rows.time_s_size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, place);
+  v1::Measurements ordered;
+  std::vector<int> becomes(order.size());  // the row that each becomes a part of
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || place(order[i]) != place(order[i - 1])) {
+      ordered.add_time_s(rows.time_s(order[i]));
+      if (!rows.run().empty()) ordered.add_run(rows.run(order[i]));
+    }
+    becomes[static_cast<size_t>(order[i])] = ordered.time_s_size() - 1;
+  }
+  for (const v1::Measurements::Channel& channel : rows.channels()) {
+    *ordered.add_channels() = Moved(channel, becomes, ordered.time_s_size());
+  }
+  ordered.set_end_of_run(rows.end_of_run());
+  rows = std::move(ordered);
 }
 
 }  // namespace polyest::internal

@@ -27,4 +27,8 @@ void AppendRows(const v1::Measurements& batch, v1::Measurements& all);
 // Appends rows in units of the model, as above.
 void AppendRows(const Samples& rows, v1::Measurements& all);
 
+// Puts the rows of a session with a reorder window, all of which are given, into the order of runs
+// and times; samples of different channels at the same time become one row.
+void PutInTimeOrder(v1::Measurements& rows);
+
 }  // namespace polyest::internal

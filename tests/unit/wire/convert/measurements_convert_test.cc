@@ -124,5 +124,31 @@ TEST(ToSamples, ConvertsToTheUnitsOfTheModel) {
             "it to");
 }
 
+// Rows as they arrive within a reorder window: the input comes later than what is measured.
+TEST(PutInTimeOrder, SortsRowsByRunAndTimeAndUnitesThoseOfTheSameTime) {
+  v1::Measurements rows;
+  for (const double t : {0.0, 0.2, 0.0, 0.1, 0.2, 0.0}) rows.add_time_s(t);
+  for (const int run : {0, 0, 0, 0, 0, 1}) rows.add_run(run);
+  v1::Measurements::Channel& x = *rows.add_channels();
+  x.set_name("x");
+  for (const double value : {1., 2., 0., 0., 0., 4.}) x.add_values(value);
+  for (const int row : {2, 3, 4}) x.add_missing(row);
+  v1::Measurements::Channel& u = *rows.add_channels();
+  u.set_name("u");
+  u.set_unit("N");
+  for (const double value : {0., 0., 5., 6., 7., 0.}) u.add_values(value);
+  for (const int row : {0, 1, 5}) u.add_missing(row);
+  rows.set_end_of_run(true);
+  PutInTimeOrder(rows);
+  EXPECT_THAT(rows.time_s(), ::testing::ElementsAre(0, 0.1, 0.2, 0));
+  EXPECT_THAT(rows.run(), ::testing::ElementsAre(0, 0, 0, 1));
+  EXPECT_THAT(rows.channels(0).values(), ::testing::ElementsAre(1, 0, 2, 4));
+  EXPECT_THAT(rows.channels(0).missing(), ::testing::ElementsAre(1));
+  EXPECT_THAT(rows.channels(1).values(), ::testing::ElementsAre(5, 6, 7, 0));
+  EXPECT_THAT(rows.channels(1).missing(), ::testing::ElementsAre(3));
+  EXPECT_EQ(rows.channels(1).unit(), "N");
+  EXPECT_TRUE(rows.end_of_run());
+}
+
 }  // namespace
 }  // namespace polyest::internal::measurements_convert_test
