@@ -11,6 +11,9 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kLeastRange = 1e-9;  // of the largest value
+// Beyond these, powers of ten of a step or of a unit are not numbers any more.
+constexpr double kShortest = 1e-300;
+constexpr double kLongest = 1e300;
 
 // Returns the least of 1, 2, 5 · 10^n that is at least `step`.
 double RoundStep(double step) {
@@ -30,6 +33,10 @@ Axis MakeAxis(double lower, double upper, int count, double first_pixel, double 
     const double half = middle == 0 ? 0.5 : std::abs(middle) / 2;
     lower = middle - half;
     upper = middle + half;
+  }
+  if (!(upper - lower >= kShortest && upper - lower <= kLongest)) {
+    lower = 0;
+    upper = 1;
   }
   Axis axis{lower, upper, first_pixel, last_pixel, {}, 0};
   const double step = RoundStep((upper - lower) / count);

@@ -26,7 +26,8 @@ struct Axis {
 };
 
 // Returns an axis over [lower, upper] with about `count` ticks at multiples of 1, 2 or 5 · 10^n. An
-// empty range is widened around its value.
+// empty range is widened around its value. A range that is not finite, or whose length is not from
+// 1e-300 to 1e300, becomes [0, 1].
 Axis MakeAxis(double lower, double upper, int count, double first_pixel, double last_pixel);
 
 // Returns 10^exponent with raised digits, as in "×10⁻³".

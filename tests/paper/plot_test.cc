@@ -100,6 +100,23 @@ TEST(Axis, OfAConstantHasFewTicks) {
   }
 }
 
+TEST(Axis, OfWhatIsNotFiniteIsThatFromZeroToOne) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [lower, upper] : {std::pair{kNaN, kNaN},
+                                     {0.0, kNaN},
+                                     {0.0, kInfinity},
+                                     {-kInfinity, kInfinity},
+                                     {kInfinity, kInfinity},
+                                     {-1e308, 1e308},
+                                     {0.0, 5e-324}}) {
+    const Axis axis = MakeAxis(lower, upper, 5, 0, 100);
+    EXPECT_EQ(axis.lower, 0) << lower << ", " << upper;
+    EXPECT_EQ(axis.upper, 1) << lower << ", " << upper;
+    EXPECT_EQ(axis.exponent, 0) << lower << ", " << upper;
+    EXPECT_EQ(axis.ticks.size(), 6u) << lower << ", " << upper;
+  }
+}
+
 class EveryFigure : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryFigure, PlotsAsWellFormedSvgWithoutOutsideResources) {
