@@ -191,6 +191,7 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
   POLYEST_RETURN_IF_ERROR(daemon->TellMetrics());
   POLYEST_RETURN_IF_ERROR(daemon->OpenWeb());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
+  daemon->WatchFiles();
   return daemon;
 }
 
@@ -348,6 +349,7 @@ bool Daemon::Stop() {
 }
 
 Daemon::~Daemon() {
+  watch_ = nullptr;
   Stop();
   if (closing_.joinable()) closing_.join();
   web_ = nullptr;

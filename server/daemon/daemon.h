@@ -121,6 +121,8 @@ class Daemon {
   // Logs which of the files that hold secrets others may read.
   void WarnOfReadableSecrets() const;
   absl::Status Secure();
+  // Begins to look at the files of tokens and certificates.
+  void WatchFiles();
   absl::Status OpenWeb();
   absl::StatusOr<std::unique_ptr<WebPort>> OpenHttp(WebPort::Protocol protocol,
                                                     std::optional<ListenAddress>& address);
@@ -162,9 +164,10 @@ class Daemon {
   std::unique_ptr<WebPort> umbridge_;
   std::jthread closing_;  // closes the server during Stop
   std::unique_ptr<SelfCheck> self_check_;
-  std::unique_ptr<FileWatch> watch_;  // null without files to watch
   std::optional<ListenAddress> metrics_address_;
   std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
+  std::optional<FileChanges> file_changes_;  // none without files to watch
+  std::unique_ptr<FileWatch> watch_;         // uses the other members
 };
 
 }  // namespace polyest::internal

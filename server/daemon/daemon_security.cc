@@ -44,7 +44,7 @@ absl::Status Daemon::Secure() {
                                   options_.tls.client_ca, options_.node_ca}) {
     if (!file.empty()) files.push_back(file);
   }
-  FileChanges changes(files);
+  if (!files.empty()) file_changes_.emplace(std::move(files));
   AccessOptions access{options_.token_file, !options_.tls.client_ca.empty(), options_.behind_edge};
   if (!options_.node_secret.empty()) {
     POLYEST_ASSIGN_OR_RETURN(access.nodes, ReadNodeSecret(options_.node_secret));
@@ -58,11 +58,14 @@ absl::Status Daemon::Secure() {
                              NodeChannels::Open({.ca = options_.node_ca, .tls = options_.tls}));
     nodes_ = std::make_unique<NodeForwarder>(*access_, std::move(channels));
   }
-  if (!files.empty()) {
-    watch_ = std::make_unique<FileWatch>(std::move(changes), kWatchInterval, [this] { Reload(); });
-  }
   WarnOfReadableSecrets();
   return absl::OkStatus();
+}
+
+void Daemon::WatchFiles() {
+  if (!file_changes_) return;
+  watch_ =
+      std::make_unique<FileWatch>(*std::move(file_changes_), kWatchInterval, [this] { Reload(); });
 }
 
 void Daemon::Reload() {
