@@ -10,6 +10,14 @@ namespace polyest::internal {
 
 namespace {
 
+// Returns whether the problem is the session's. The daemon does not keep the address of its schema.
+bool IsProblemOf(const v1::Session& session, const v1::Problem& problem) {
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.IgnoreField(
+      v1::Problem::descriptor()->FindFieldByNumber(v1::Problem::kSchemaFieldNumber));
+  return differencer.Compare(session.problem(), problem);
+}
+
 // Checks that a session can be resumed with this window.
 absl::Status CheckWindow(const v1::Session& session, const std::string& id, double window_s) {
   if (session.reorder_window_s() != window_s) {
@@ -40,7 +48,7 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
   v1::GetSessionRequest get;
   get.set_name(absl::StrCat("sessions/", id));
   POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client.GetSession(get));
-  if (!google::protobuf::util::MessageDifferencer::Equals(session.problem(), problem)) {
+  if (!IsProblemOf(session, problem)) {
     return absl::AlreadyExistsError(absl::StrCat("session ", id,
                                                  " already exists with a different problem; resume "
                                                  "it with its own problem or choose another name"));

@@ -199,6 +199,19 @@ TEST_F(StreamTest, DoesNotMixProblemsInASession) {
   EXPECT_THAT(run.err, HasSubstr("session rig-1 already exists with a different problem"));
 }
 
+TEST_F(StreamTest, ResumesWithAProblemFileThatNamesItsSchema) {
+  const std::string problem = File("problem.json", R"({"$schema": "https://example.org/p.json",
+    "model": {"builtin": "mass_spring_damper"}, "fixed": {"m": 1, "x0": 1},
+    "uncertain": [{"name": "k", "uniform": {"lower": 30, "upper": 50}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}]
+  })");
+  for (const int rows : {30, 60}) {
+    const Finished run = Run({"stream", problem, File("d.csv", DemoRows(rows)), "--server",
+                              daemon_.address(), "--session", "rig-1"});
+    EXPECT_EQ(run.exit_status, 0) << run.err;
+  }
+}
+
 TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
   std::vector<std::string> arguments = Command("-", {});
   arguments.insert(arguments.begin(), POLYEST_PROGRAM);
