@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
@@ -21,6 +22,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/progress_line.h"
+#include "client/cli/refused_row.h"
 #include "client/cli/stream_progress.h"
 #include "client/cli/stream_session.h"
 #include "client/cpp/file_kind.h"
@@ -87,7 +89,7 @@ class StreamCommand {
                              ReadCheckedProblem(arguments_.problem_file, arguments_.place));
     ProgressLine line([this] { return progress_.Describe(); });
     line_ = &line;
-    if (arguments_.data_file == "-") return Read(STDIN_FILENO, "standard input");
+    if (arguments_.data_file == "-") return Read(STDIN_FILENO);
     POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(arguments_.data_file));
     const int descriptor = open(arguments_.data_file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {
@@ -95,7 +97,7 @@ class StreamCommand {
           absl::StrCat(arguments_.data_file, ": cannot be opened: ", std::strerror(errno)));
     }
     if (isatty(STDERR_FILENO) != 0) progress_.CountRowsOf(descriptor);
-    auto last = Read(descriptor, arguments_.data_file);
+    auto last = Read(descriptor);
     close(descriptor);
     return last;
   }
@@ -105,7 +107,11 @@ class StreamCommand {
  private:
   using LastEstimate = absl::StatusOr<std::optional<v1::Estimate>>;
 
-  LastEstimate Read(int descriptor, const std::string& name) {
+  std::string DataName() const {
+    return arguments_.data_file == "-" ? "standard input" : arguments_.data_file;
+  }
+
+  LastEstimate Read(int descriptor) {
     InterruptibleInput input(descriptor, interrupt_);
     std::istream in(&input);
     DataFileOptions options = arguments_.data_options;
@@ -114,7 +120,7 @@ class StreamCommand {
     options.any_first_run = !arguments_.session.empty();
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem_, arguments_.place, options));
-    auto reader = DataReader::Open(in, name, columns);
+    auto reader = DataReader::Open(in, DataName(), columns);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());
     // The first batch is read before the session is created, so that a file without any valid row
@@ -126,10 +132,14 @@ class StreamCommand {
     line_->Interject([&] { TellOfDataFile(reader->Found()); });
     auto session = WaitForSession();
     if (!session.ok() && interrupted()) return std::nullopt;
-    if (!session.ok()) return InFile(session.status(), arguments_.problem_file, name);
+    if (!session.ok()) return InFiles(session.status());
     auto last = Send(*session, *reader, std::move(first), read);
-    if (!last.ok()) return InFile(last.status(), arguments_.problem_file, name);
+    if (!last.ok()) return InFiles(last.status());
     return last;
+  }
+
+  absl::Status InFiles(const absl::Status& status) const {
+    return InFile(status, arguments_.problem_file, DataName());
   }
 
   // Opens the session. Waits and tries again while the daemon has no room for it.
@@ -149,37 +159,49 @@ class StreamCommand {
     return session;
   }
 
-  // Sends `batch`, with which reading has ended with the status `read`, and all rows after it.
-  LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch,
-                    absl::Status read) {
+  MeasurementStreamOptions StreamOptions() {
     MeasurementStreamOptions options;
     options.wait = [this](std::chrono::milliseconds delay) {
       interrupt_.WaitUntil(std::chrono::steady_clock::now() + delay);
       return !interrupted();
     };
-    MeasurementStream stream(client_, session.name, std::move(options), Callbacks());
+    return options;
+  }
+
+  // Sends `batch`, with which reading has ended with the status `read`, and all rows after it.
+  LastEstimate Send(const StreamSession& session, DataReader& reader, v1::Measurements batch,
+                    const absl::Status& read) {
+    MeasurementStream stream(client_, session.name, StreamOptions(), Callbacks());
+    auto last = SendAll(session, reader, stream, std::move(batch), read);
+    if (last.ok()) return last;
+    std::vector<v1::Measurements> refused = stream.Unacknowledged();
+    if (refused.empty()) return last;
+    return EndAtRefusal(session, std::move(refused), last.status());
+  }
+
+  LastEstimate SendAll(const StreamSession& session, DataReader& reader, MeasurementStream& stream,
+                       v1::Measurements batch, absl::Status read) {
     POLYEST_RETURN_IF_ERROR(stream.Open());
     if (isatty(STDERR_FILENO) != 0) {
       line_->Interject([&] { err_ << "streaming to " << session.name << std::endl; });
     }
     Pace pace(arguments_.rate, interrupt_);
-    int64_t skipped = 0, sent = 0;
     while (batch.time_s_size() > 0) {
       progress_.AddRows(batch.time_s_size());
-      if (session.resumed_after) skipped += RemoveRowsUpTo(*session.resumed_after, batch);
+      if (session.resumed_after) skipped_ += RemoveRowsUpTo(*session.resumed_after, batch);
       if (const int rows = batch.time_s_size(); rows > 0) {
-        if (sent == 0) TellOfResumption(session, skipped);
+        if (sent_ == 0) TellOfResumption(session);
         pace.Wait(batch);
         POLYEST_RETURN_IF_ERROR(stream.Send(std::move(batch)));
-        sent += rows;
+        sent_ += rows;
       }
       if (interrupted() || !read.ok()) break;
       read = reader.Read(arguments_.batch_rows, batch);
       if (interrupted()) break;  // the rows read may end within a row
     }
-    if (sent == 0) TellOfResumption(session, skipped);
-    if (!read.ok() && !interrupted()) return EndAtBadLine(session, stream, read, sent);
-    if (EndsRun() && sent > 0 && !interrupted()) {
+    if (sent_ == 0) TellOfResumption(session);
+    if (!read.ok() && !interrupted()) return EndAtBadLine(session, stream, read);
+    if (EndsRun() && sent_ > 0 && !interrupted()) {
       v1::Measurements end;
       end.set_end_of_run(true);
       POLYEST_RETURN_IF_ERROR(stream.Send(std::move(end)));
@@ -190,24 +212,61 @@ class StreamCommand {
   // Waits until the session has the rows before a line that was refused with `read`, and returns
   // that error with their number. The run goes on: the line may be corrected.
   absl::Status EndAtBadLine(const StreamSession& session, MeasurementStream& stream,
-                            const absl::Status& read, int64_t sent) {
+                            const absl::Status& read) {
     const absl::Status kept = stream.Finish().status();
-    if (!kept.ok()) {
-      Tell(read.message());
-      return kept;
+    if (kept.ok()) return WithRowsKept(read, session, sent_);
+    Tell(read.message());
+    return kept;
+  }
+
+  // Sends what comes before the row that the daemon refuses in the first of the batches that it has
+  // not taken, and returns the refusal with the row's number in the data and the number of rows
+  // kept. The run goes on, as it does after a bad line.
+  absl::Status EndAtRefusal(const StreamSession& session, std::vector<v1::Measurements> refused,
+                            absl::Status refusal) {
+    int64_t kept = sent_;
+    for (const v1::Measurements& batch : refused) kept -= batch.time_s_size();
+    const int64_t rows_before = skipped_ + kept;
+    v1::Measurements& batch = refused.front();
+    // The daemon need not name the first of several bad rows.
+    for (int row; (row = RefusedRow(refusal).value_or(0)) > 0 && row < batch.time_s_size();) {
+      RemoveRowsFrom(row, batch);
+      const absl::Status sent = SendAlone(session, batch);
+      if (sent.ok()) {
+        kept += row;
+        break;
+      }
+      if (!RefusedRow(sent)) {
+        Tell(AtRowOfData(refusal, rows_before).message());
+        return sent;
+      }
+      refusal = sent;
     }
-    if (sent == 0) return read;
+    if (!absl::IsInvalidArgument(refusal) && !absl::IsResourceExhausted(refusal)) return refusal;
+    return WithRowsKept(InFiles(AtRowOfData(refusal, rows_before)), session, kept);
+  }
+
+  absl::Status SendAlone(const StreamSession& session, const v1::Measurements& batch) {
+    MeasurementStream stream(client_, session.name, StreamOptions(), Callbacks());
+    POLYEST_RETURN_IF_ERROR(stream.Open());
+    POLYEST_RETURN_IF_ERROR(stream.Send(batch));
+    return stream.Finish().status();
+  }
+
+  static absl::Status WithRowsKept(const absl::Status& status, const StreamSession& session,
+                                   int64_t rows) {
+    if (rows == 0) return status;
     return absl::Status(
-        read.code(),
-        absl::StrCat(read.message(), "; ", session.name, " has kept ",
-                     sent == 1 ? "the row" : absl::StrCat("the ", sent, " rows"), " sent before"));
+        status.code(),
+        absl::StrCat(status.message(), "; ", session.name, " has kept ",
+                     rows == 1 ? "the row" : absl::StrCat("the ", rows, " rows"), " sent before"));
   }
 
   // Reports that a session is resumed, once the number of rows is known that it does not take.
-  void TellOfResumption(const StreamSession& session, int64_t skipped) {
+  void TellOfResumption(const StreamSession& session) {
     if (!session.resumed_after) return;
     const RowPlace& last = *session.resumed_after;
-    if (skipped == 0) {
+    if (skipped_ == 0) {
       Tell(absl::StrFormat("resumed %s after t = %g s of run %d", session.name, last.time_s,
                            last.run));
       return;
@@ -215,8 +274,8 @@ class StreamCommand {
     Tell(absl::StrFormat(
         "resumed %s; %s not later than t = %g s of run %d, up to which the session has its data, "
         "and %s skipped; rows of another record need a column run with the next number, %d",
-        session.name, skipped == 1 ? "1 row is" : absl::StrCat(skipped, " rows are"), last.time_s,
-        last.run, skipped == 1 ? "was" : "were", last.run + 1));
+        session.name, skipped_ == 1 ? "1 row is" : absl::StrCat(skipped_, " rows are"), last.time_s,
+        last.run, skipped_ == 1 ? "was" : "were", last.run + 1));
   }
 
   // Returns whether the stream must end the run, because the last rows of a streamed input would
@@ -255,6 +314,8 @@ class StreamCommand {
   Client client_;
   v1::Problem problem_;
   StreamProgress progress_;
+  // Rows left out at the beginning of the data, because the session has them, and rows sent.
+  int64_t skipped_ = 0, sent_ = 0;
   ProgressLine* line_ = nullptr;  // valid during Run()
 };
 

@@ -31,5 +31,7 @@ absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& pro
 
 // Removes the leading rows up to and including `place` and returns their number.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
+// Removes the rows from number `row` on, counted from 0.
+void RemoveRowsFrom(int row, v1::Measurements& batch);
 
 }  // namespace polyest::internal

@@ -336,4 +336,11 @@ absl::StatusOr<std::optional<v1::Estimate>> MeasurementStream::Finish() {
   return last_estimate_;
 }
 
+std::vector<v1::Measurements> MeasurementStream::Unacknowledged() {
+  const Lock lock(mutex_);
+  std::vector<v1::Measurements> batches;
+  for (const auto& request : pending_) batches.push_back(request->measurements());
+  return batches;
+}
+
 }  // namespace polyest

@@ -246,6 +246,25 @@ TEST_F(StreamTest, KeepsTheRowsBeforeABadOneInItsFirstBatchToo) {
                                  "sessions/rig-1 has kept the row sent before"));
 }
 
+TEST_F(StreamTest, KeepsTheRowsBeforeOneThatTheDaemonRefusesAndSaysWhichItIs) {
+  const std::string good = DemoRows(60);
+  const std::string bad = DemoRows(52) + "2.65,1e200\n2.7,0\n";
+  const std::vector<std::string> options = {"--session", "rig-1",    "--batch",
+                                            "20",        "--format", "jsonl"};
+  const Finished run = Run(Command(File("bad.csv", bad), options));
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("bad.csv: row 52, column x: 1e+200 must be"));
+  EXPECT_THAT(run.err, HasSubstr("; sessions/rig-1 has kept the 52 rows sent before\n"));
+  EXPECT_EQ(LastEstimate(run.out).samples(), 52);
+  // The rows that the session has already count as rows of the file, too.
+  const Finished again = Run(Command(File("bad.csv", bad), options));
+  EXPECT_EQ(again.exit_status, 2);
+  EXPECT_THAT(again.err, HasSubstr("bad.csv: row 52, column x: 1e+200 must be"));
+  const Finished second = Run(Command(File("good.csv", good), options));
+  ASSERT_EQ(second.exit_status, 0) << second.err;
+  ExpectSame(LastEstimate(second.out), EstimateOf(60));
+}
+
 TEST_F(StreamTest, CreatesNoSessionForDataWithoutAnyValidRow) {
   const Finished run = Run(Command("-", {"--session", "rig-1"}), "t,x\n0,many\n");
   EXPECT_EQ(run.exit_status, 2);
@@ -387,6 +406,7 @@ TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {
   EXPECT_EQ(run.exit_status, 3);
   EXPECT_THAT(Lines(run.err), testing::SizeIs(1));
   EXPECT_THAT(run.err, HasSubstr("(--max-session-rows)"));
+  EXPECT_THAT(run.err, HasSubstr(" has kept the 30 rows sent before\n"));
 }
 
 TEST_F(StreamTest, SaysThatARestartedDaemonHasLostTheSession) {

@@ -71,6 +71,7 @@ class FakeDaemon : public v1::SessionService::Service {
         }
         continue;
       }
+      if (time == refused_time) return {grpc::StatusCode::INVALID_ARGUMENT, "not this one"};
       last_sequence = request.sequence();
       times.push_back(time);
       ++taken;
@@ -90,6 +91,7 @@ class FakeDaemon : public v1::SessionService::Service {
 
   int breaks = 0;  // the number of connections that break after three batches
   std::function<void()> on_break;
+  double refused_time = -1;  // of a batch that is refused
   int acknowledge_every = 1;
   std::atomic<bool> lost = false;
   std::atomic<int> absences = 0;        // how often GetSession does not reach the daemon
@@ -231,6 +233,20 @@ TEST_F(MeasurementStreamTest, FailsWithTheDaemonsReasonWhenABatchIsRefused) {
   if (status.ok()) status = stream.Finish().status();
   EXPECT_EQ(status, absl::InvalidArgumentError("measurements.time[0]: no"));
   EXPECT_THAT(told_, IsEmpty());
+}
+
+TEST_F(MeasurementStreamTest, ReturnsTheRefusedBatchAndThoseAfterIt) {
+  daemon_.refused_time = 4;
+  options_.max_unacknowledged = 3;
+  MeasurementStream stream(client_, "sessions/a", options_, callbacks_);
+  ASSERT_TRUE(stream.Open().ok());
+  EXPECT_TRUE(stream.Unacknowledged().empty());
+  absl::Status status = SendBatches(stream, 10);
+  if (status.ok()) status = stream.Finish().status();
+  EXPECT_EQ(status, absl::InvalidArgumentError("not this one"));
+  const std::vector<v1::Measurements> rest = stream.Unacknowledged();
+  ASSERT_FALSE(rest.empty());
+  EXPECT_EQ(rest.front().time_s(0), 4);
 }
 
 TEST_F(MeasurementStreamTest, DoesNotFightAnotherWriter) {

@@ -7,7 +7,7 @@
 
 #include "client/cli/remedy_trial.h"
 
-namespace polyest::internal {
+namespace polyest::internal::remedy_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -132,4 +132,4 @@ TEST(RemedyTest, AProblemThatMeasuresNothingHasNoRemedy) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::remedy_test

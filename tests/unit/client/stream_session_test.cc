@@ -50,5 +50,15 @@ TEST(RemoveRowsUpTo, TakesEarlierRunsWhole) {
   EXPECT_THAT(batch.time_s(), ElementsAre(4));
 }
 
+TEST(RemoveRowsFrom, KeepsWhatIsEarlier) {
+  v1::Measurements batch = Rows();
+  for (const int run : {0, 0, 1, 1}) batch.add_run(run);
+  RemoveRowsFrom(2, batch);
+  EXPECT_THAT(batch.time_s(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.run(), ElementsAre(0, 0));
+  EXPECT_THAT(batch.channels(0).values(), ElementsAre(10, 20));
+  EXPECT_THAT(batch.channels(0).missing(), ElementsAre(0));
+}
+
 }  // namespace
 }  // namespace polyest::internal::stream_session_test

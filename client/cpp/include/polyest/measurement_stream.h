@@ -22,6 +22,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "polyest/client.h"
 
@@ -77,6 +78,9 @@ class MeasurementStream {
   // Ends the stream: waits for all acknowledgements and returns the last estimate, or none if the
   // session has no samples. Fails as Send.
   absl::StatusOr<std::optional<v1::Estimate>> Finish();
+  // Returns the batches that have no acknowledgement, in their order. If Send or Finish has failed
+  // because the daemon refused a batch, that is the first of them.
+  std::vector<v1::Measurements> Unacknowledged();
 
  private:
   class Connection;
