@@ -101,15 +101,18 @@ void BatchIntake::RemoveOldest() {
 TakenBatch BatchIntake::Following(const Samples& samples) const {
   SessionPlace place = place_;
   double measured_s = measured_s_;
+  bool any_row = place.rows > 0;
   ++place.sequence;
   place.samples += CountValues(samples);
   place.rows += static_cast<int64_t>(samples.rows());
   for (size_t row = 0; row < samples.rows(); ++row) {
     const SampleRow next{samples.run.empty() ? 0 : samples.run[row], samples.time_s[row]};
-    const bool same_run = next.run == place.last_row.run;
+    const bool same_run = any_row && next.run == place.last_row.run;
     if (same_run && next.time_s < place.last_row.time_s) continue;  // out of order
-    measured_s += next.time_s - (same_run ? place.last_row.time_s : 0);
+    // A run is measured from its first row on, which may bear the time since 1970.
+    if (same_run) measured_s += next.time_s - place.last_row.time_s;
     place.last_row = next;
+    any_row = true;
   }
   return {.samples = {}, .place = place, .measured_s = measured_s};
 }

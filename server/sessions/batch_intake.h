@@ -27,7 +27,7 @@ namespace polyest::internal {
 struct TakenBatch {
   Samples samples;        // what it gives the estimator; may be nothing if rows are held back
   SessionPlace place;     // of the session after this batch
-  double measured_s = 0;  // seconds of measurements up to its end, over all runs
+  double measured_s = 0;  // seconds from the first row of a run to its end, over all runs
   int64_t held_from = 0;  // RowReorder::held_from after it; 0: rows come in time order
 };
 
@@ -40,7 +40,7 @@ class BatchIntake {
   // Returns the problem without parameters for runs other than the first.
   const ResolvedProblem& problem() const { return problem_; }
   // Return the place of the session after the last batch taken, and the seconds of measurements up
-  // to there, over all runs.
+  // to there: those between the rows of a run, over all runs.
   SessionPlace place() const;
   double measured_s() const;
 

@@ -24,7 +24,7 @@ class BatchIntakeTest : public testing::Test {
   void ExpectUntouched() {
     EXPECT_EQ(intake_.place().sequence, 1);
     EXPECT_EQ(intake_.place().rows, 1);
-    EXPECT_EQ(intake_.measured_s(), 0.1);
+    EXPECT_EQ(intake_.measured_s(), 0);
   }
 
   ModelLibrary models_;
@@ -56,6 +56,20 @@ TEST_F(BatchIntakeTest, TakesOnlyWhatCanBeRecorded) {
   EXPECT_EQ(intake_.Oldest(2)->place.sequence, 2);
   intake_.RemoveOldest();
   EXPECT_EQ(intake_.Oldest(2), nullptr);
+}
+
+// Times may be those since 1970, and a run may begin long after the time 0 of its model.
+TEST_F(BatchIntakeTest, MeasuresARunFromItsFirstRowOn) {
+  ASSERT_TRUE(intake_.Take(Row(1.75e9)).ok());
+  EXPECT_EQ(intake_.measured_s(), 0);
+  ASSERT_TRUE(intake_.Take(Row(1.75e9 + 2)).ok());
+  EXPECT_EQ(intake_.measured_s(), 2);
+  for (const double time_s : {1.75e9 + 60, 1.75e9 + 61.5}) {
+    v1::Measurements next_run = Row(time_s);
+    next_run.add_run(1);
+    ASSERT_TRUE(intake_.Take(next_run).ok());
+  }
+  EXPECT_EQ(intake_.measured_s(), 3.5);
 }
 
 }  // namespace
