@@ -38,10 +38,12 @@ void BoundHeap() {
   mallopt(M_TRIM_THRESHOLD, kLargeBlock);
 }
 
-// Blocks the signals that only sigwait takes. Called before there are threads, so that the signals
-// are blocked in all of them.
+// Blocks the signals that only sigwait takes, and ignores those after which a write fails with an
+// error: to a connection that is closed, and to a file that may not grow (ulimit -f). Called before
+// there are threads, so that the signals are blocked in all of them.
 sigset_t BlockSignals() {
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);

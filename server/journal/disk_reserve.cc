@@ -2,12 +2,14 @@
 
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <limits>
 #include <vector>
 
 namespace polyest::internal {
@@ -15,6 +17,14 @@ namespace {
 
 // Bytes that are written at once where the file system cannot set room aside.
 constexpr size_t kPiece = size_t{1} << 20;
+
+// Returns the size that a file of this process may have (ulimit -f).
+int64_t LargestFile() {
+  struct rlimit limit {};
+  if (getrlimit(RLIMIT_FSIZE, &limit) != 0) return std::numeric_limits<int64_t>::max();
+  return static_cast<int64_t>(
+      std::min<rlim_t>(limit.rlim_cur, std::numeric_limits<int64_t>::max()));
+}
 
 int64_t Bytes(fsblkcnt_t blocks, const struct statvfs& disk) {
   return static_cast<int64_t>(blocks) * static_cast<int64_t>(disk.f_frsize);
@@ -31,7 +41,7 @@ DiskReserve::DiskReserve(const std::string& file)
     held_ = Held::kAll;
     return;
   }
-  bytes_ = std::min(kMaxBytes, Bytes(disk.f_blocks, disk) / kShareOfDisk);
+  bytes_ = std::min({kMaxBytes, Bytes(disk.f_blocks, disk) / kShareOfDisk, LargestFile()});
 }
 
 DiskReserve::~DiskReserve() {

@@ -16,8 +16,8 @@ namespace polyest::internal {
 // Thread-safe.
 class DiskReserve {
  public:
-  // Size of the reserve; on a small disk it is the given share of the disk. The log has to fit into
-  // half of it.
+  // Size of the reserve; on a small disk it is the given share of the disk, and at most as large as
+  // a file may be. The log has to fit into half of it.
   static constexpr int64_t kMaxBytes = int64_t{64} << 20;
   static constexpr int64_t kShareOfDisk = 8;
 

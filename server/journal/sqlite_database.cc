@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 #include <sqlite3.h>
 
+#include <cerrno>
 #include <chrono>
 #include <string>
 
@@ -52,6 +53,9 @@ absl::Status FromSqlite(int code, std::string_view doing) {
   if (code == SQLITE_OK || code == SQLITE_ROW || code == SQLITE_DONE) return absl::OkStatus();
   // The index of the write-ahead log cannot grow on a full disk either.
   if ((code & 0xff) == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE) return DiskFull();
+  // No file of the process may be as large (ulimit -f). The write that failed has set errno, which
+  // SQLite does not pass on for a commit.
+  if ((code & 0xff) == SQLITE_IOERR && errno == EFBIG) return DiskFull();
   return absl::Status(CodeOf(code),
                       absl::StrFormat("%s: %s (SQLite %d)", doing, sqlite3_errstr(code), code));
 }

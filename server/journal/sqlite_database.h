@@ -19,10 +19,10 @@ struct sqlite3_stmt;
 
 namespace polyest::internal {
 
-// Returns the status of an SQLite code: RESOURCE_EXHAUSTED when the disk or the memory is full or a
-// value is too large, DATA_LOSS when the file is damaged, ALREADY_EXISTS when a constraint fails,
-// UNAVAILABLE when the disk or a lock fails, INTERNAL otherwise. `doing` says in the message what
-// was tried.
+// Returns the status of an SQLite code, just after the call that returned it: RESOURCE_EXHAUSTED
+// when the disk or the memory is full or a value or a file is too large, DATA_LOSS when the file is
+// damaged, ALREADY_EXISTS when a constraint fails, UNAVAILABLE when the disk or a lock fails,
+// INTERNAL otherwise. `doing` says in the message what was tried.
 absl::Status FromSqlite(int code, std::string_view doing);
 
 // Returns how a full disk refuses what is to be written.

@@ -1,6 +1,7 @@
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 
@@ -120,6 +121,41 @@ TEST_F(NoDrainTest, EndsALongComputation) {
   EXPECT_EQ(daemon_.Wait(), 0);
   EXPECT_THAT(daemon_.Errors(), HasSubstr("[info] stopped"));
   EXPECT_THAT(daemon_.Errors(), ::testing::Not(HasSubstr("went on after they were cancelled")));
+}
+
+// Limits the size of the files of programs that are started before it is lifted (ulimit -f).
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit lower{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &lower);
+  }
+  void Lift() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+class SmallFilesTest : private FileSizeLimit, public DaemonTest {
+ protected:
+  SmallFilesTest() : FileSizeLimit(rlim_t{2} << 20) { Lift(); }
+};
+
+TEST_F(SmallFilesTest, RefusesWhatItsFilesCannotHoldAsOnAFullDisk) {
+  constexpr int kRows = 5'000;
+  ASSERT_TRUE(Create("rig").ok());
+  grpc::Status added;
+  for (int batch = 0; batch < 100 && added.ok(); ++batch) {
+    v1::Measurements rows = OscillatorRows(batch * kRows, (batch + 1) * kRows);
+    // Rows without samples are soon computed.
+    for (int row = 0; row < kRows; ++row) rows.mutable_channels(0)->add_missing(row);
+    added = Add("sessions/rig", batch + 1, rows);
+  }
+  EXPECT_EQ(added.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << added.error_message();
+  EXPECT_THAT(added.error_message(), HasSubstr("the disk is full"));
+  daemon_.Signal(SIGTERM);
+  EXPECT_EQ(daemon_.Wait(), 0) << daemon_.Errors();
 }
 
 TEST_F(LifecycleTest, EndsOnAnInterruptToo) {
