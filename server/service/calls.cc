@@ -16,7 +16,8 @@ Job JobInLane(const ServiceContext& context, const Caller& caller, const char* l
   return {[&executor = context.executor, lane = absl::StrCat(caller.tenant, lane)](Task task) {
             return executor.Submit(lane, std::move(task));
           },
-          [caller, work = std::move(work)](const Stop& stop, const UnaryCall::Finisher& finish) {
+          [caller, work = std::move(work)](const Stop& stop, std::stop_source&,
+                                           const UnaryCall::Finisher& finish) {
             finish(work(caller, stop));
             return absl::OkStatus();
           }};
@@ -71,11 +72,15 @@ absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& ca
     return SubmitWhenFound(context, caller, name, found, std::move(task));
   };
   return Job{submit,
-             [found, work = std::move(work)](const Stop& stop,
+             [found, work = std::move(work)](const Stop& stop, std::stop_source& source,
                                              UnaryCall::Finisher finish) -> absl::Status {
                POLYEST_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, *found);
                const uint64_t losses = session->losses();
-               POLYEST_RETURN_IF_ERROR(work(session, stop));
+               const std::stop_callback closing(session->closing(),
+                                                [&source] { source.request_stop(); });
+               const absl::Status done = work(session, stop);
+               POLYEST_RETURN_IF_ERROR(session->CheckOpen());
+               POLYEST_RETURN_IF_ERROR(done);
                session->WhenAllKept(losses, std::move(finish));
                return absl::OkStatus();
              }};

@@ -36,7 +36,8 @@ Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork 
 // wait for long requests.
 Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
 // Returns a job that finds the caller's session, as FindSession does, and runs on its strand. The
-// call is finished when everything is kept that the work may have seen.
+// call is finished when everything is kept that the work may have seen, and soon with NOT_FOUND
+// when the session is deleted meanwhile.
 absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& caller,
                                  const std::string& field, const std::string& name,
                                  SessionWork work);

@@ -185,17 +185,16 @@ class OperationService final : public v1::OperationService::CallbackService {
     }
     // The operation needs a copy, because the call's own request is destroyed with the call.
     const auto request = std::make_shared<v1::StartComputationRequest>(given);
-    return operations_.Start(caller.tenant, MethodOf(*request),
-                             [&](v1::ComputationResult* result) -> absl::StatusOr<Job> {
-                               POLYEST_ASSIGN_OR_RETURN(
-                                   Job job,
+    return operations_.Start(
+        caller.tenant, MethodOf(*request),
+        [&](v1::ComputationResult* result) -> absl::StatusOr<Job> {
+          POLYEST_ASSIGN_OR_RETURN(Job job,
                                    ComputationJob(context_, caller, request.get(), result));
-                               job.work = [request, work = std::move(job.work)](
-                                              const Stop& stop, const UnaryCall::Finisher& finish) {
-                                 return work(stop, finish);
-                               };
-                               return job;
-                             });
+          job.work = [request, work = std::move(job.work)](
+                         const Stop& stop, std::stop_source& source,
+                         const UnaryCall::Finisher& finish) { return work(stop, source, finish); };
+          return job;
+        });
   }
 
   // Starts a call whose answer needs no computation.

@@ -51,6 +51,7 @@ class OperationStore::Entry {
   // Returns the result, which only the job may use before its end.
   v1::ComputationResult* result() { return &result_; }
   std::stop_token token() const { return stop_.get_token(); }
+  std::stop_source& stop_source() { return stop_; }
 
   // Begins the work; returns false if it was cancelled while it waited.
   bool Begin() {
@@ -210,7 +211,7 @@ void OperationStore::Run(const std::shared_ptr<Entry>& entry,
   const auto finish = [this, entry, place, call_stop](const absl::Status& outcome) {
     entry->End(call_stop.Name(outcome), wall_clock_(), now_());
   };
-  const absl::Status status = Guarded([&] { return work(stop, finish); });
+  const absl::Status status = Guarded([&] { return work(stop, entry->stop_source(), finish); });
   if (!status.ok()) finish(status);
 }
 

@@ -28,9 +28,10 @@ namespace polyest::internal {
 class UnaryCall final : public grpc::ServerUnaryReactor {
  public:
   using Finisher = std::function<void(const absl::Status&)>;
-  // Does the work. If it returns an error, the call is finished with that. Otherwise the work calls
-  // the finisher, before it returns or later, from any thread.
-  using Work = std::function<absl::Status(const Stop&, Finisher)>;
+  // Does the work until the Stop ends it, which the work may ask for by the source. If it returns
+  // an error, the call is finished with that. Otherwise the work calls the finisher, before it
+  // returns or later, from any thread.
+  using Work = std::function<absl::Status(const Stop&, std::stop_source&, Finisher)>;
   using Submit = std::function<absl::Status(Task)>;
   // Names what gRPC calls, and owns until the call is finished.
   struct Call {

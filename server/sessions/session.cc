@@ -93,7 +93,7 @@ void Session::ReleaseWriter(const SessionObserver* writer) {
 }
 
 void Session::Close() {
-  closed_ = true;
+  closing_.request_stop();
   for (const auto& observer : observers_.Close()) observer->OnClosed();
   if (const auto writer = writer_.Close(); writer != nullptr) writer->OnClosed();
 }
@@ -104,8 +104,8 @@ void Session::SendAway() {
 }
 
 absl::Status Session::CheckOpen() const {
-  if (closed_) return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
-  return absl::OkStatus();
+  if (!closing_.stop_requested()) return absl::OkStatus();
+  return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
 }
 
 Session::InMemory Session::Present() const {
@@ -116,7 +116,7 @@ Session::InMemory Session::Present() const {
 bool Session::ReadyToTake() const {
   const SharedJournal* const shared = services_.journal.shared();
   const InMemory present = Present();
-  return !closed_ && present.loaded != nullptr && present.losses == ledger_.losses() &&
+  return CheckOpen().ok() && present.loaded != nullptr && present.losses == ledger_.losses() &&
          (shared == nullptr || shared->Owns(number()));
 }
 

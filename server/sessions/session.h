@@ -6,12 +6,12 @@
 
 #include <absl/status/statusor.h>
 
-#include <atomic>
-#include <limits>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include "core/external/model_library.h"
@@ -120,6 +120,10 @@ class Session : public std::enable_shared_from_this<Session> {
   // Ends the session for everybody: tells its observers and its writer. Calls on it are NOT_FOUND
   // from here on.
   void Close();
+  // NOT_FOUND when the session is closed.
+  absl::Status CheckOpen() const;
+  // Returns what asks for a stop when the session is closed.
+  std::stop_token closing() const { return closing_.get_token(); }
 
   // Calls `done` when every batch up to `sequence` is kept, at once if all are, for a caller that
   // has seen `losses` losses; with the reason when one of them is lost or there were more losses.
@@ -195,7 +199,6 @@ class Session : public std::enable_shared_from_this<Session> {
     uint64_t losses = 0;
   };
 
-  absl::Status CheckOpen() const;
   // Makes this daemon the session's owner if it may be another one's.
   absl::Status Own();
   // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
@@ -214,10 +217,10 @@ class Session : public std::enable_shared_from_this<Session> {
   InMemory Present() const;
   void Replace(InMemory in_memory);
   void Drop();
+  void UnloadIfIdle();
   absl::Status LoadHistory();
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
-  void UnloadIfIdle();
   const SessionServices services_;
   const SessionHead head_;
   const std::shared_ptr<Strand> strand_;
@@ -227,7 +230,7 @@ class Session : public std::enable_shared_from_this<Session> {
   SharedEstimate passed_on_;                // the last estimate given to the observers
   std::optional<EstimateHistory> history_;  // none until an estimate is passed on
 
-  std::atomic<bool> closed_ = false;
+  std::stop_source closing_;
   WriterLease writer_;
   ObserverList observers_;
   SessionActivity activity_;

@@ -1,3 +1,5 @@
+#include <future>
+
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest::internal {
@@ -120,6 +122,26 @@ TEST_F(SessionRpcTest, AnswersUnknownSessionsWithNotFound) {
   const grpc::Status status = GetEstimate("sessions/none", &estimate);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
   EXPECT_EQ(status.error_message(), "there is no session \"sessions/none\"");
+}
+
+// Without the end of its session the batch would be computed for seconds, and then acknowledged.
+TEST_F(SessionRpcTest, EndsABatchThatIsComputedWhenItsSessionIsDeleted) {
+  v1::Problem problem = Oscillator();
+  problem.mutable_expansion()->set_order(12);
+  ASSERT_TRUE(Create("rig", problem).ok());
+  std::future<grpc::Status> added = std::async(
+      std::launch::async, [this] { return Add("sessions/rig", 1, OscillatorRows(0, 100'000)); });
+  v1::GetSessionRequest request;
+  request.set_name("sessions/rig");
+  v1::Session session;
+  while (session.last_sequence() == 0) {
+    grpc::ClientContext context;
+    ASSERT_TRUE(sessions_->GetSession(&context, request, &session).ok());
+  }
+  ASSERT_TRUE(Delete("sessions/rig").ok());
+  const grpc::Status ended = added.get();
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(ended.error_message(), testing::HasSubstr("sessions/rig has been deleted"));
 }
 
 class TwoSessionsTest : public DaemonTest {

@@ -16,7 +16,8 @@ class OperationStoreTest : public testing::Test {
                    queue_.push_back(std::move(task));
                    return absl::OkStatus();
                  },
-                 [this, result, outcome](const Stop& stop, const UnaryCall::Finisher& finish) {
+                 [this, result, outcome](const Stop& stop, std::stop_source&,
+                                         const UnaryCall::Finisher& finish) {
                    ++ran_;
                    result->mutable_estimate()->mutable_estimate()->set_samples(7);
                    const absl::Status stopped = stop.Check();
