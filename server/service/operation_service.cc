@@ -19,11 +19,24 @@
 namespace polyest::internal {
 namespace {
 
+// Share of a tenant's memory that the results of its operations may have besides.
+constexpr int64_t kShareOfResults = 4;
+
 // Returns how the names of a daemon's operations begin, so that any daemon of the database knows
 // whose they are.
 std::string PrefixOf(int64_t node) { return absl::StrCat("node", node, "-"); }
 std::string PrefixOf(const SharedJournal* journal) {
   return journal == nullptr ? "" : PrefixOf(journal->node());
+}
+
+OperationLimits LimitsOf(const ServiceContext& context) {
+  const SessionServices& services = context.sessions.services();
+  OperationLimits limits{.max_computing = context.max_computing,
+                         .prefix = PrefixOf(services.journal.shared())};
+  if (const int64_t memory_mb = services.limits.memory_mb_per_tenant; memory_mb > 0) {
+    limits.result_bytes_per_tenant = (memory_mb << 20) / kShareOfResults;
+  }
+  return limits;
 }
 
 // Where a page of operations begins: behind the operation `after` of the daemon `node`. Its token
@@ -82,10 +95,7 @@ class OperationService final : public v1::OperationService::CallbackService {
   using Context = grpc::CallbackServerContext;
 
   explicit OperationService(const ServiceContext& context)
-      : context_(context),
-        operations_({.max_computing = context.max_computing,
-                     .prefix = PrefixOf(context.sessions.services().journal.shared())},
-                    context.wall_clock) {}
+      : context_(context), operations_(LimitsOf(context), context.wall_clock) {}
 
   Unary* StartComputation(Context* call, const v1::StartComputationRequest* request,
                           v1::Operation* response) override {

@@ -2,13 +2,14 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
-#include "server/service/call_stop.h"
 #include "server/execution/guarded.h"
+#include "server/service/call_stop.h"
 #include "server/service/status_mapping.h"
 #include "server/telemetry/request_id.h"
 
@@ -26,6 +27,7 @@ class OperationStore::Place {
  public:
   Place(OperationStore& store, std::string tenant) : store_(store), tenant_(std::move(tenant)) {}
   ~Place() { store_.Leave(tenant_); }
+  const std::string& tenant() const { return tenant_; }
   Place(const Place&) = delete;
   Place& operator=(const Place&) = delete;
 
@@ -88,6 +90,12 @@ class OperationStore::Entry {
     return operation;
   }
 
+  // Returns the memory of the result; 0 while there is none to be fetched.
+  int64_t result_bytes() const {
+    const std::lock_guard lock(mutex_);
+    return result_bytes_;
+  }
+
   // Returns the time of the end; nothing while the operation is under way.
   std::optional<Clock::time_point> end() const {
     const std::lock_guard lock(mutex_);
@@ -103,6 +111,7 @@ class OperationStore::Entry {
     *operation_.mutable_end_time() = time;
     if (status.ok()) {
       operation_.set_state(v1::Operation::SUCCEEDED);
+      result_bytes_ = static_cast<int64_t>(result_.SpaceUsedLong());
       return;
     }
     const bool cancelled = absl::IsCancelled(status) && stop_.stop_requested();
@@ -117,6 +126,7 @@ class OperationStore::Entry {
 
   mutable std::mutex mutex_;
   v1::Operation operation_;
+  int64_t result_bytes_ = 0;
   std::optional<Clock::time_point> end_;
 };
 
@@ -178,6 +188,22 @@ absl::Status OperationStore::MakeRoom(const std::string& tenant) {
   return absl::OkStatus();
 }
 
+void OperationStore::BoundResults(const std::string& tenant) {
+  const auto [first, last] = OfTenant(tenant);
+  std::vector<Entries::iterator> kept;
+  int64_t bytes = 0;
+  for (auto one = first; one != last; ++one) {
+    if (one->second->result_bytes() == 0) continue;
+    kept.push_back(one);
+    bytes += one->second->result_bytes();
+  }
+  std::ranges::stable_sort(kept, {}, [](const auto& one) { return *one->second->end(); });
+  for (size_t i = 0; i + 1 < kept.size() && bytes > limits_.result_bytes_per_tenant; ++i) {
+    bytes -= kept[i]->second->result_bytes();
+    entries_.erase(kept[i]);
+  }
+}
+
 absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
                                                     const std::string& method,
                                                     const MakeJob& make_job) {
@@ -210,6 +236,8 @@ void OperationStore::Run(const std::shared_ptr<Entry>& entry,
   const Stop stop = call_stop.Begin();
   const auto finish = [this, entry, place, call_stop](const absl::Status& outcome) {
     entry->End(call_stop.Name(outcome), wall_clock_(), now_());
+    const std::lock_guard lock(mutex_);
+    BoundResults(place->tenant());
   };
   const absl::Status status = Guarded([&] { return work(stop, entry->stop_source(), finish); });
   if (!status.ok()) finish(status);

@@ -25,7 +25,10 @@ struct OperationLimits {
   size_t per_tenant = 64;                // largest number of operations, done or under way
   std::chrono::seconds kept_for{3'600};  // time that they are kept after their end
   std::chrono::seconds max_computing;    // longest computing time of one
-  std::string prefix{};                  // of their names, behind "operations/"
+  // Largest memory of a tenant's results. The oldest results are forgotten beyond it, with their
+  // operations; the latest one stays.
+  int64_t result_bytes_per_tenant = int64_t{256} << 20;
+  std::string prefix{};  // of their names, behind "operations/"
 };
 
 // Keeps the operations of all tenants in memory, while they run and for an hour after their end.
@@ -76,6 +79,8 @@ class OperationStore {
   // The following are called with the mutex held.
   void ForgetOld();
   absl::Status MakeRoom(const std::string& tenant);
+  // Forgets the oldest results of the tenant beyond their limit.
+  void BoundResults(const std::string& tenant);
   std::pair<Entries::iterator, Entries::iterator> OfTenant(const std::string& tenant);
   absl::StatusOr<Entries::iterator> Find(const std::string& tenant, const std::string& name);
   void Cancel(Entry& entry);

@@ -20,6 +20,7 @@ class OperationStoreTest : public testing::Test {
                                          const UnaryCall::Finisher& finish) {
                    ++ran_;
                    result->mutable_estimate()->mutable_estimate()->set_samples(7);
+                   if (rows_ > 0) result->mutable_prediction()->mutable_time_s()->Resize(rows_, 0);
                    const absl::Status stopped = stop.Check();
                    finish(stopped.ok() ? outcome : stopped);
                    return absl::OkStatus();
@@ -39,8 +40,11 @@ class OperationStoreTest : public testing::Test {
   std::vector<Task> queue_;
   bool full_ = false;
   int ran_ = 0;
+  int rows_ = 0;  // of the results
   OperationStore::Clock::time_point now_{};
-  OperationStore store_{{.per_tenant = 2, .max_computing = std::chrono::seconds(60)},
+  OperationStore store_{{.per_tenant = 2,
+                         .max_computing = std::chrono::seconds(60),
+                         .result_bytes_per_tenant = 12'000},
                         [] { return google::protobuf::Timestamp(); },
                         [this] { return now_; }};
 };
@@ -127,6 +131,25 @@ TEST_F(OperationStoreTest, MakesRoomByForgettingWhatEndedFirst) {
   EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
   EXPECT_TRUE(Start("b").ok());
   RunAll();
+}
+
+TEST_F(OperationStoreTest, ForgetsTheOldestResultsBeyondTheTenantsMemory) {
+  rows_ = 1'000;  // 8000 bytes
+  const std::string first = Start()->name(), other = Start("b")->name();
+  RunAll();
+  EXPECT_TRUE(store_.Get("a", first).ok());
+  const std::string second = Start()->name();
+  now_ += std::chrono::seconds(1);
+  RunAll();
+  EXPECT_TRUE(absl::IsNotFound(store_.Get("a", first).status()));
+  EXPECT_TRUE(store_.Get("a", second).ok());
+  EXPECT_TRUE(store_.Get("b", other).ok());
+  rows_ = 10'000;  // more than all may have
+  const std::string large = Start()->name();
+  now_ += std::chrono::seconds(1);
+  RunAll();
+  EXPECT_TRUE(absl::IsNotFound(store_.Get("a", second).status()));
+  EXPECT_EQ(store_.Get("a", large)->response().prediction().time_s_size(), rows_);
 }
 
 TEST_F(OperationStoreTest, ForgetsAnHourAfterTheEnd) {
