@@ -1,14 +1,18 @@
 """Connections that break: the daemon is killed and restarted while rows are appended."""
 
+import asyncio
+import contextlib
 from concurrent import futures
 
 import pytest
 
 import polyest
+from polyest import aio
 from polyest._proto.v1 import measurements_pb2
 from polyest._resume import BatchQueue, StreamOptions
 
 FAST = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.1, max_attempts=1000)
+FEW = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.01, max_attempts=2)
 
 
 def test_a_daemon_killed_under_append_loses_nothing_and_counts_nothing_twice(
@@ -52,8 +56,7 @@ def test_the_end_of_the_stream_survives_a_restart(restartable, problem, rows):
 
 def test_rows_stay_pending_while_the_daemon_is_away(restartable, problem, rows):
     daemon = restartable()
-    options = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.01, max_attempts=2)
-    session = polyest.connect(daemon.address).session("away", problem, options=options)
+    session = polyest.connect(daemon.address).session("away", problem, options=FEW)
     session.append(rows(0, 10))
     daemon.kill()
     with pytest.raises(polyest.Unavailable) as raised:
@@ -86,6 +89,48 @@ def test_a_second_writer_is_aborted(client, problem, rows):
         assert first.append(rows(10, 20)) == 2
 
 
+def test_batches_of_another_client_are_not_taken_for_the_own_ones(restartable, problem, rows):
+    daemon = restartable()
+    session = polyest.connect(daemon.address).session("shared", problem, options=FEW)
+    session.append(rows(0, 40))
+    daemon.kill()
+    for first in (40, 60):
+        with pytest.raises(polyest.Unavailable):
+            session.append(rows(first, first + 20))
+    write_other_batches(restartable().address, rows)
+    with pytest.raises(polyest.Aborted, match="another client writes to sessions/shared: .*2 was "
+                       r"taken with other measurements.*\(2 batches were not kept\)"):
+        session.flush()
+    assert session.info().sample_count == 50
+    assert session.append(rows(50, 60)) == 4
+
+
+def test_batches_of_another_client_are_not_taken_for_those_of_a_task(restartable, problem, rows):
+    async def run():
+        daemon = restartable()
+        async with aio.connect(daemon.address) as client:
+            session = await client.session("shared", problem, options=FEW)
+            await session.append(rows(0, 40))
+            daemon.kill()
+            for first in (40, 60):
+                with pytest.raises(polyest.Unavailable):
+                    await session.append(rows(first, first + 20))
+            write_other_batches(restartable().address, rows)
+            with pytest.raises(polyest.Aborted, match="2 was taken with other measurements"):
+                while True:
+                    with contextlib.suppress(polyest.Unavailable):
+                        await session.flush()
+                        return
+
+    asyncio.run(run())
+
+
+def write_other_batches(server, rows):
+    with polyest.connect(server) as other, other.session("shared") as session:
+        session.append(rows(40, 45))
+        session.append(rows(45, 50))
+
+
 def queue_with(batches, **options):
     queue = BatchQueue("sessions/any", StreamOptions(**options))
     queue.connected(10)
@@ -105,12 +150,12 @@ def test_batches_are_numbered_from_the_sessions_last_one():
     assert len(queue) == 1 and written(queue) == []
 
 
-def test_a_new_connection_sends_what_the_session_lacks():
+def test_a_new_connection_sends_all_that_was_not_acknowledged():
     queue = queue_with(4)
     assert written(queue) == [11, 12, 13, 14]
     queue.acknowledge(11)
-    queue.connected(13)  # 12 and 13 had arrived, but their acknowledgement had not
-    assert written(queue) == [14]
+    queue.connected(13)  # 12 and 13 may be another client's
+    assert written(queue) == [12, 13, 14]
 
 
 def test_a_session_with_other_batches_has_another_writer():
@@ -147,6 +192,14 @@ def test_a_new_token_is_tried_and_a_wrong_one_is_not():
     refused = polyest.Unauthenticated("unknown token")
     assert queue.delay_s(refused, new_token=False) is None
     assert queue.delay_s(refused, new_token=True) is not None
+
+
+def test_a_session_with_other_batches_is_not_waited_for():
+    queue = queue_with(1)
+    assert queue.delay_s(polyest.Unavailable("gone"), new_token=False) is not None
+    with pytest.raises(polyest.Aborted) as raised:
+        queue.connected(12)
+    assert queue.delay_s(raised.value, new_token=False) is None
 
 
 def test_another_writer_is_waited_for_only_after_a_break():

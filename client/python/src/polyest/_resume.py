@@ -1,7 +1,9 @@
 """Which batches of a stream are kept, under way or still to be sent, without any transport.
 
-A batch is kept here until the daemon has acknowledged it. After a lost connection the batches after
-the session's last one are sent again under their numbers: nothing is lost, nothing counts twice.
+A batch is kept here until the daemon has acknowledged it. After a lost connection all others are
+sent again under their numbers, also those that the session seems to have: another client may have
+written batches of these numbers, and only the daemon can tell by their content. One that had
+arrived is acknowledged and not counted again: nothing is lost, nothing counts twice.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import Optional
 from polyest._proto.v1 import measurements_pb2, session_service_pb2
 from polyest.errors import (
     Aborted,
+    AlreadyExists,
     Cancelled,
     DataLoss,
     NotFound,
@@ -61,6 +64,7 @@ class BatchQueue:
         self._attempts = 0  # to reach the daemon, since the last acknowledgement or refusal
         self._refusals = 0  # for lack of room, since the last acknowledgement
         self._begun = False
+        self._overtaken = False  # by another client, whose batches follow those of this one
         #: Connections made so far.
         self.connections = 0
 
@@ -92,13 +96,13 @@ class BatchQueue:
         if not self._begun:
             self._begin(last_sequence)
         first = self.last_sequence - len(self._pending) + 1
-        if last_sequence > self.last_sequence:
+        self._overtaken = last_sequence > self.last_sequence
+        if self._overtaken:
             raise Aborted(f"{self.session} has batch {last_sequence}, the last one sent is "
                           f"{self.last_sequence}: another client writes to it")
         if last_sequence < first - 1:
             raise DataLoss(f"{self.session} has batches up to {last_sequence}, but acknowledged "
                            f"them up to {first - 1}")
-        self._drop(last_sequence)
         self._written = 0
         self.connections += 1
 
@@ -134,10 +138,7 @@ class BatchQueue:
 
     def acknowledge(self, sequence: int) -> None:
         """Forgets the batches up to a number: the daemon keeps them."""
-        self._drop(sequence)
         self._attempts = self._refusals = 0
-
-    def _drop(self, sequence: int) -> None:
         while self._pending and self._pending[0].sequence <= sequence:
             self._pending.popleft()
             self._written = max(self._written - 1, 0)
@@ -179,7 +180,7 @@ class BatchQueue:
         if isinstance(error, Unauthenticated):
             return new_token
         # After a break the daemon may still hold the old connection as the session's writer.
-        return isinstance(error, Aborted) and self._attempts > 0
+        return isinstance(error, Aborted) and self._attempts > 0 and not self._overtaken
 
     def final(self, error: PolyestError) -> PolyestError:
         """Returns what to raise after `error`, which no attempt can mend."""
@@ -188,4 +189,6 @@ class BatchQueue:
             return DataLoss(f"the daemon has lost {self.session} and the batches it had "
                             f"acknowledged, up to number {kept} (it was restarted without a data "
                             "directory, or the session was deleted)")
+        if isinstance(error, AlreadyExists):
+            return Aborted(f"another client writes to {self.session}: {error.message}")
         return error
