@@ -103,6 +103,14 @@ def test_a_session_goes_on_where_it_was_left(client, problem, rows):
         assert session.problem == problem
 
 
+def test_a_problem_with_the_address_of_its_schema_finds_its_session(client, problem, rows):
+    wanted = {"$schema": "problem.schema.json", **problem.as_dict()}
+    for first in (0, 100):
+        with client.session("with-schema", wanted) as session:
+            session.append(rows(first, first + 100))
+    assert client.session("with-schema", problem).info().sample_count == 200
+
+
 def test_a_history_shows_how_the_estimate_came_about(client, problem, rows):
     with client.session("history", problem) as session:
         for first in range(0, 400, 100):

@@ -33,7 +33,10 @@ Result = TypeVar("Result")
 def created_or_same(name: str, wanted: problem_pb2.Problem, window_s: Optional[float],
                     found: session_service_pb2.Session) -> session_service_pb2.Session:
     """Returns an existing session. Raises AlreadyExists if its problem or window is another one."""
-    if found.problem != wanted:
+    stored = problem_pb2.Problem()
+    stored.CopyFrom(wanted)
+    stored.ClearField("schema")  # it is for editors, and the daemon does not keep it
+    if found.problem != stored:
         raise AlreadyExists(f"session '{name}' exists with another problem; choose another name, "
                             "or open it without a problem")
     if window_s is not None and found.reorder_window_s != window_s:
