@@ -1,6 +1,7 @@
 """The package for asyncio: the same results, many sessions at once, a daemon that is restarted."""
 
 import asyncio
+import contextlib
 
 import pytest
 
@@ -111,6 +112,26 @@ def test_estimates_come_and_are_followed(client, problem, rows):
     first, second, last, kept = asyncio.run(run())
     assert (first, second, last) == (1, 2, 2) and kept >= 1
     assert told[-1].sequence == 2
+
+
+def test_an_exception_of_on_estimate_is_raised_by_a_later_call(client, problem, rows):
+    def broken(estimate):
+        raise ArithmeticError("of the program")
+
+    async def run():
+        async with aio.connect(client.server) as other:
+            session = await other.session("raised-aio", problem, on_estimate=broken)
+            with pytest.raises(ArithmeticError, match="of the program"):
+                for first in range(0, 900, 20):
+                    await session.append(rows(first, first + 20))
+            with contextlib.suppress(ArithmeticError):  # of an estimate since
+                await session.append(rows(first + 20, first + 40))
+            with pytest.raises(ArithmeticError):
+                await session.close()  # after the last estimate
+            await session.close()
+            return (await session.info()).sample_count - first
+
+    assert asyncio.run(run()) == 40
 
 
 def test_sessions_are_exported_imported_and_deleted(client, problem, rows, tmp_path):

@@ -69,6 +69,40 @@ def test_rows_stay_pending_while_the_daemon_is_away(restartable, problem, rows):
     assert session.info().sample_count == 30
 
 
+def test_rows_stay_pending_after_an_end_without_the_daemon(restartable, problem, rows):
+    daemon = restartable()
+    session = polyest.connect(daemon.address).session("ended", problem, options=FEW)
+    session.append(rows(0, 10))
+    daemon.kill()
+    for end in (lambda: session.append(rows(10, 20)), session.close, session.close):
+        with pytest.raises(polyest.Unavailable):
+            end()
+    restartable()
+    session.flush()
+    assert session.append(rows(20, 30)) == 3
+    session.close()
+    assert session.info().sample_count == 30 and not session.info().has_writer
+
+
+def test_rows_of_a_task_stay_pending_after_an_end_without_the_daemon(restartable, problem, rows):
+    async def run():
+        daemon = restartable()
+        async with aio.connect(daemon.address) as client:
+            session = await client.session("ended", problem, options=FEW)
+            await session.append(rows(0, 10))
+            daemon.kill()
+            for end in (lambda: session.append(rows(10, 20)), session.close, session.close):
+                with pytest.raises(polyest.Unavailable):
+                    await end()
+            restartable()
+            while True:
+                with contextlib.suppress(polyest.Unavailable):
+                    await session.close()
+                    return await session.info()
+
+    assert asyncio.run(run()).sample_count == 20
+
+
 def test_a_daemon_that_forgets_is_a_loss_of_data(restartable, problem, rows):
     daemon = restartable(durable=False)
     session = polyest.connect(daemon.address).session("lost", problem, options=FAST)

@@ -1,5 +1,6 @@
 """Sessions: rows that come batch by batch, estimates as they come, a session found again."""
 
+import contextlib
 import os
 import select
 import subprocess
@@ -90,6 +91,40 @@ def test_each_estimate_of_the_stream_is_told(client, problem, rows):
     # A last one comes before the stream ends; a slow estimator may pass over others.
     numbers = [one.sequence for one in told]
     assert numbers[-1] == 3 and numbers == sorted(numbers)
+
+
+def broken(estimate):
+    raise ArithmeticError("of the program")
+
+
+def test_an_exception_of_on_estimate_is_raised_by_a_later_call(client, problem, rows):
+    session = client.session("raised", problem, on_estimate=broken)
+    with pytest.raises(ArithmeticError, match="of the program"):
+        for first in range(0, 900, 20):
+            session.append(rows(first, first + 20))
+    with contextlib.suppress(ArithmeticError):  # of an estimate since
+        session.append(rows(first + 20, first + 40))
+    with pytest.raises(ArithmeticError):
+        session.close()  # after the last estimate
+    session.close()
+    assert session.info().sample_count == first + 40 and not session.info().has_writer
+
+
+def test_on_estimate_may_ask_the_session(client, problem, rows):
+    asked = []
+
+    def ask(estimate):
+        asked.append((session.estimate().samples, session.predict(max_rows=10).row_count))
+        for write in (lambda: session.append(rows(0, 10)), session.flush, session.close,
+                      session.delete):
+            with pytest.raises(polyest.FailedPrecondition, match="^on_estimate must not write"):
+                write()
+
+    session = client.session("asked", problem, on_estimate=ask)
+    with session:
+        for first in range(0, 200, 20):
+            session.append(rows(first, first + 20))
+    assert asked[-1] == (200, 200)
 
 
 def test_a_session_goes_on_where_it_was_left(client, problem, rows):

@@ -11,7 +11,7 @@ import grpc
 from polyest import _methods
 from polyest._proto.v1 import estimate_pb2, measurements_pb2, session_service_pb2
 from polyest._resume import BatchQueue, Request, StreamOptions
-from polyest.errors import InternalError, PolyestError, Unavailable
+from polyest.errors import FailedPrecondition, InternalError, PolyestError, Unavailable
 
 if TYPE_CHECKING:
     from polyest._transport import Transport
@@ -70,13 +70,23 @@ class MeasurementStream:
 
     def __init__(self, transport: Transport, session: str, options: StreamOptions,
                  on_estimate: Optional[Callable[[estimate_pb2.Estimate], None]] = None) -> None:
-        """`on_estimate` is called from a thread of its own, one estimate at a time."""
+        """`on_estimate` is called from a thread of its own, one estimate at a time.
+
+        This thread takes acknowledgements, too, so that `on_estimate` must not wait for them.
+        """
         self.transport = transport
         self.queue = BatchQueue(session, options, transport.left_writers.pop(session, None))
         self.changed = threading.Condition()
         self.connection: Optional[_Connection] = None
         self.finishing = False
         self._on_estimate = on_estimate
+        self._teller: Optional[int] = None  # the thread that calls `on_estimate` at the moment
+        self._raised: Optional[BaseException] = None  # by `on_estimate`
+
+    @property
+    def is_telling(self) -> bool:
+        """Whether the caller has been called by `on_estimate`."""
+        return self._teller == threading.get_ident()
 
     def take(self, connection: _Connection, response: Response) -> None:
         """Takes a message of the daemon; called by a connection."""
@@ -86,10 +96,33 @@ class MeasurementStream:
                     self.queue.acknowledge(response.acknowledgement.sequence)
                 self.changed.notify_all()
         elif response.HasField("estimate") and self._on_estimate is not None:
-            self._on_estimate(response.estimate)
+            self._tell(self._on_estimate, response.estimate)
+
+    def _tell(self, on_estimate: Callable[[estimate_pb2.Estimate], None],
+              estimate: estimate_pb2.Estimate) -> None:
+        """Calls `on_estimate`. What it raises must not end this thread, for which others wait."""
+        self._teller = threading.get_ident()
+        try:
+            on_estimate(estimate)
+        except BaseException as error:
+            self._raised = self._raised or error
+        finally:
+            self._teller = None
+
+    def check(self) -> None:
+        """Raises what `on_estimate` has raised, once."""
+        error, self._raised = self._raised, None
+        if error is not None:
+            raise error
+
+    def _refuse_teller(self) -> None:
+        if self.is_telling:
+            raise FailedPrecondition(f"on_estimate must not write to {self.queue.session} or end "
+                                     "its stream, which waits until it returns")
 
     def send(self, batches: Iterable[measurements_pb2.Measurements]) -> None:
         """Hands over batches, all of them; waits while too many are not acknowledged."""
+        self._refuse_teller()
         with self.changed:
             for batch in batches:
                 self.queue.add(batch)
@@ -97,27 +130,30 @@ class MeasurementStream:
             self._wait_until(lambda: not self.queue.full)
 
     def flush(self) -> None:
-        """Waits until all batches are acknowledged."""
+        """Waits until all batches are acknowledged. Raises what `on_estimate` has raised, too."""
+        self._refuse_teller()
         with self.changed:
             self._wait_until(lambda: len(self.queue) == 0)
+        self.check()
 
     def finish(self) -> None:
-        """Ends the stream once all batches are acknowledged and the last estimate is made."""
+        """Ends the stream once all batches are acknowledged and the last estimate is made.
+
+        After a failure the stream goes on: what is pending can be tried again.
+        """
+        self._refuse_teller()
         with self.changed:
             self.finishing = True
             self.changed.notify_all()
-            while True:
-                if self.connection is None:
-                    self._connect_again(None)
-                elif not self.connection.done:
-                    self.changed.wait()
-                elif self.connection.error is None and len(self.queue) == 0:
-                    return
-                else:
-                    self._connect_again(self._failure())
+            try:
+                self._wait_until_ended()
+            except PolyestError:
+                self.finishing = False
+                raise
 
     def cancel(self) -> None:
         """Ends the stream at once; batches without acknowledgement may be lost."""
+        self._refuse_teller()
         with self.changed:
             connection, self.finishing = self.connection, True
             if connection is not None:
@@ -138,6 +174,18 @@ class MeasurementStream:
                 return
             else:
                 self.changed.wait()
+
+    def _wait_until_ended(self) -> None:
+        """Connects again until the daemon has ended the stream. The caller has the lock."""
+        while True:
+            if self.connection is None:
+                self._connect_again(None)
+            elif not self.connection.done:
+                self.changed.wait()
+            elif self.connection.error is None and len(self.queue) == 0:
+                return
+            else:
+                self._connect_again(self._failure())
 
     def _failure(self) -> PolyestError:
         assert self.connection is not None

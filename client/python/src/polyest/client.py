@@ -158,7 +158,10 @@ class Client:
 
         name: 1 … 63 of [a-z0-9-], first a letter.
         units: of columns, for all rows that are appended.
-        on_estimate: called with each estimate of the stream, from a thread of its own.
+        on_estimate: called with each estimate of the stream, from a thread of its own. It may ask
+            the session: an estimate or a study takes the rows that the daemon keeps by then. It
+            must not write to it or close it, which raises FailedPrecondition. What it raises, the
+            program's next `append`, `flush` or `close` raises.
         options: how batches are sent and connections made again.
         reorder_window_s: of a new session, how much later than rows of other channels a row may
             arrive, s, in [0, 3600]; so long rows are held back. 0, the default: rows come in the

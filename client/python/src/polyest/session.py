@@ -75,14 +75,17 @@ class Session(Studies):
 
         A lost connection is made again, and rows without acknowledgement are sent again: none is
         lost or counted twice. Raises Unavailable if all attempts fail; the rows are still pending
-        then, and `flush` tries again. Any other exception means that the rows were refused, and
-        that those before them are kept.
+        then, and `flush` tries again. Any other PolyestError means that the rows were refused, and
+        that those before them are kept. What `on_estimate` has raised is raised here, too, or by
+        the next `flush`, `estimate`, study or `close`; it refuses no rows.
         """
         sequence = 0
         for part in self._converter.convert_each(data, end_of_run=end_of_run):
             sequence = self._send(part, False)
         if wait:
             self.flush()
+        elif self._stream is not None:
+            self._stream.check()
         return sequence
 
     def end_run(self) -> None:
@@ -111,11 +114,21 @@ class Session(Studies):
         if self._stream is not None:
             self._stream.flush()
 
+    def _settle(self) -> None:
+        """Flushes before a question; to one of `on_estimate` the rows that are kept must do."""
+        if self._stream is None or not self._stream.is_telling:
+            self.flush()
+
     def close(self) -> None:
-        """Ends the stream once all rows are kept. The session stays. Raises as `append`."""
-        stream, self._stream = self._stream, None
+        """Ends the stream once all rows are kept. The session stays. Raises as `append`.
+
+        If it raises Unavailable, rows are still pending, and `flush` or `close` tries again.
+        """
+        stream = self._stream
         if stream is not None:
             stream.finish()
+            self._stream = None
+            stream.check()
 
     def __enter__(self) -> Session:
         """Returns the session."""
@@ -132,7 +145,7 @@ class Session(Studies):
 
     def estimate(self) -> Estimate:
         """Returns the estimate from all rows so far."""
-        self.flush()
+        self._settle()
         return self._transport.run(_calls.get_estimate(self._resource, self))
 
     def estimates(self, *, follow: bool = False) -> Iterator[Estimate]:
@@ -141,7 +154,7 @@ class Session(Studies):
         Ends with the estimate that takes in the last batch of this moment; `follow` goes on until
         the loop is left or the session is deleted (NotFound).
         """
-        self.flush()
+        self._settle()
         last = self.info().last_sequence
         if last == 0 and not follow:
             return
@@ -163,7 +176,7 @@ class Session(Studies):
         from one to the next, s (1). The daemon spends at most a tenth of its time on them. Goes on
         until the loop is left or the session is deleted (NotFound).
         """
-        self.flush()
+        self._settle()
         request = _calls.watch_predictions(self._resource, outputs, draws, max_rows,
                                            min_interval_s)
         for response in self._transport.server_stream(_methods.WATCH_SESSION, request):
@@ -172,12 +185,12 @@ class Session(Studies):
 
     def history(self) -> results.History:
         """Returns how the session's estimates came about: at most 512 of them and the newest."""
-        self.flush()
+        self._settle()
         return self._transport.run(_calls.get_history(self._resource))
 
     def export(self, file: Union[str, os.PathLike[str]]) -> None:
         """Writes the session to a file, as `polyest export`; `Client.import_session` reads it."""
-        self.flush()
+        self._settle()
         request = session_service_pb2.ExportSessionRequest(name=self._resource)
         with SessionFileWriter(file) as writer:
             for record in self._transport.server_stream(_methods.EXPORT_SESSION, request):
@@ -198,7 +211,7 @@ class Session(Studies):
         return self._problem_message
 
     def _run(self, call: Call[Result]) -> Result:
-        self.flush()
+        self._settle()
         return self._transport.run(call)
 
     def __repr__(self) -> str:

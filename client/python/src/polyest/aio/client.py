@@ -116,7 +116,8 @@ class Client:
                       reorder_window_s: Optional[float] = None) -> Session:
         """Opens a session; creates it if it does not exist and a problem is given.
 
-        on_estimate: called in the event loop with each estimate of the stream.
+        on_estimate: called in the event loop with each estimate of the stream. What it raises, the
+            next `append`, `flush` or `close` raises.
         """
         options = options or StreamOptions()
         if problem is None:

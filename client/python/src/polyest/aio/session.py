@@ -66,6 +66,8 @@ class Session(Studies):
             sequence = await self._send(part, False)
         if wait:
             await self.flush()
+        elif self._stream is not None:
+            self._stream.check()
         return sequence
 
     async def end_run(self) -> None:
@@ -95,9 +97,11 @@ class Session(Studies):
     async def close(self) -> None:
         """Ends the stream once all rows are kept. The session stays."""
         async with self._turn:
-            stream, self._stream = self._stream, None
+            stream = self._stream
             if stream is not None:
                 await stream.finish()
+                self._stream = None
+                stream.check()
 
     async def __aenter__(self) -> Session:
         """Returns the session."""

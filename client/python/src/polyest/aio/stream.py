@@ -74,6 +74,7 @@ class MeasurementStream:
         self.reason_is_hidden = False
         self._connection: Optional[_Connection] = None
         self._on_estimate = on_estimate
+        self._raised: Optional[Exception] = None  # by `on_estimate`
         self._changed = asyncio.Condition()
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
@@ -92,7 +93,21 @@ class MeasurementStream:
             self.queue.acknowledge(response.acknowledgement.sequence)
             await self.notify()
         elif response.HasField("estimate") and self._on_estimate is not None:
-            self._on_estimate(response.estimate)
+            self._tell(self._on_estimate, response.estimate)
+
+    def _tell(self, on_estimate: Callable[[estimate_pb2.Estimate], None],
+              estimate: estimate_pb2.Estimate) -> None:
+        """Calls `on_estimate`. What it raises must not end the reader, for which others wait."""
+        try:
+            on_estimate(estimate)
+        except Exception as error:
+            self._raised = self._raised or error
+
+    def check(self) -> None:
+        """Raises what `on_estimate` has raised, once."""
+        error, self._raised = self._raised, None
+        if error is not None:
+            raise error
 
     async def send(self, batches: Iterable[measurements_pb2.Measurements]) -> None:
         """Hands over batches, all of them; waits while too many are not acknowledged."""
@@ -102,13 +117,25 @@ class MeasurementStream:
         await self._wait_until(lambda: not self.queue.full)
 
     async def flush(self) -> None:
-        """Waits until all batches are acknowledged."""
+        """Waits until all batches are acknowledged. Raises what `on_estimate` has raised, too."""
         await self._wait_until(lambda: len(self.queue) == 0)
+        self.check()
 
     async def finish(self) -> None:
-        """Ends the stream once all batches are acknowledged and the last estimate is made."""
+        """Ends the stream once all batches are acknowledged and the last estimate is made.
+
+        After a failure the stream goes on: what is pending can be tried again.
+        """
         self.finishing = True
         await self.notify()
+        try:
+            await self._wait_until_ended()
+        except PolyestError:
+            self.finishing = False
+            raise
+
+    async def _wait_until_ended(self) -> None:
+        """Connects again until the daemon has ended the stream."""
         while True:
             connection = self._connection
             if connection is None:
