@@ -14,6 +14,7 @@ import polyest
 from conftest import TRUTH
 from polyest._proto.v1 import estimate_pb2
 from polyest.results import history
+from rig import wait_for
 
 
 def test_batches_give_the_estimate_of_the_whole_record(client, problem, record, rows):
@@ -172,6 +173,15 @@ def test_an_exception_leaves_the_session_to_the_next_writer(client, problem, row
         raise RuntimeError("the rig stopped")
     with client.session("broken-off") as session:
         assert session.append(rows(100, 200)) == 2
+
+
+def test_a_session_that_is_dropped_is_left_to_the_next_writer(client, problem, rows):
+    told = []
+    client.session("dropped", problem, on_estimate=told.append).append(rows(0, 100))
+    assert client.session("dropped").append(rows(100, 200)) == 2
+    with polyest.connect(client.server) as other:
+        wait_for(lambda: not client.session("dropped").info().has_writer)
+        assert other.session("dropped").append(rows(200, 300)) == 3
 
 
 def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem, rows):

@@ -80,13 +80,13 @@ class MeasurementStream:
         self.connection: Optional[_Connection] = None
         self.finishing = False
         self._on_estimate = on_estimate
-        self._teller: Optional[int] = None  # the thread that calls `on_estimate` at the moment
+        self._telling: Optional[int] = None  # the thread that calls `on_estimate` at the moment
         self._raised: Optional[BaseException] = None  # by `on_estimate`
 
     @property
     def is_telling(self) -> bool:
         """Whether the caller has been called by `on_estimate`."""
-        return self._teller == threading.get_ident()
+        return self._telling == threading.get_ident()
 
     def take(self, connection: _Connection, response: Response) -> None:
         """Takes a message of the daemon; called by a connection."""
@@ -101,13 +101,13 @@ class MeasurementStream:
     def _tell(self, on_estimate: Callable[[estimate_pb2.Estimate], None],
               estimate: estimate_pb2.Estimate) -> None:
         """Calls `on_estimate`. What it raises must not end this thread, for which others wait."""
-        self._teller = threading.get_ident()
+        self._telling = threading.get_ident()
         try:
             on_estimate(estimate)
         except BaseException as error:
             self._raised = self._raised or error
         finally:
-            self._teller = None
+            self._telling = None
 
     def check(self) -> None:
         """Raises what `on_estimate` has raised, once."""
@@ -115,14 +115,14 @@ class MeasurementStream:
         if error is not None:
             raise error
 
-    def _refuse_teller(self) -> None:
+    def _refuse_to_wait(self) -> None:
         if self.is_telling:
             raise FailedPrecondition(f"on_estimate must not write to {self.queue.session} or end "
                                      "its stream, which waits until it returns")
 
     def send(self, batches: Iterable[measurements_pb2.Measurements]) -> None:
         """Hands over batches, all of them; waits while too many are not acknowledged."""
-        self._refuse_teller()
+        self._refuse_to_wait()
         with self.changed:
             for batch in batches:
                 self.queue.add(batch)
@@ -131,7 +131,7 @@ class MeasurementStream:
 
     def flush(self) -> None:
         """Waits until all batches are acknowledged. Raises what `on_estimate` has raised, too."""
-        self._refuse_teller()
+        self._refuse_to_wait()
         with self.changed:
             self._wait_until(lambda: len(self.queue) == 0)
         self.check()
@@ -141,7 +141,7 @@ class MeasurementStream:
 
         After a failure the stream goes on: what is pending can be tried again.
         """
-        self._refuse_teller()
+        self._refuse_to_wait()
         with self.changed:
             self.finishing = True
             self.changed.notify_all()
@@ -151,9 +151,17 @@ class MeasurementStream:
                 self.finishing = False
                 raise
 
+    def leave(self) -> None:
+        """Ends the stream without waiting. The next one of this program takes over from it."""
+        with self.changed:
+            if self.connection is not None and not self.connection.done:
+                self.transport.left_writers[self.queue.session] = self.queue.writer
+                self.finishing = True
+                self.changed.notify_all()
+
     def cancel(self) -> None:
         """Ends the stream at once; batches without acknowledgement may be lost."""
-        self._refuse_teller()
+        self._refuse_to_wait()
         with self.changed:
             connection, self.finishing = self.connection, True
             if connection is not None:

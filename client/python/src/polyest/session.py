@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Optional, TypeVar, Union
@@ -38,6 +40,7 @@ class Session(Studies):
                  units: Optional[Mapping[str, str]], options: StreamOptions,
                  on_estimate: Optional[Callable[[Estimate], None]]) -> None:
         """Use `Client.session`."""
+        self._stream: Optional[MeasurementStream] = None
         self._transport = transport
         self._resource = created.name
         self._problem_message = created.problem
@@ -46,7 +49,6 @@ class Session(Studies):
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
                                                apart=created.reorder_window_s > 0)
-        self._stream: Optional[MeasurementStream] = None
 
     @property
     def name(self) -> str:
@@ -98,16 +100,23 @@ class Session(Studies):
 
     def _send(self, measurements: Measurements, wait: bool) -> int:
         if self._stream is None:
-            self._stream = MeasurementStream(self._transport, self._resource, self._options,
-                                             self._take)
+            tell = self._on_estimate and self._teller(self._on_estimate)
+            self._stream = MeasurementStream(self._transport, self._resource, self._options, tell)
         self._stream.send(split(measurements, self._options.batch_rows))
         if wait:
             self._stream.flush()
         return self._stream.queue.last_sequence
 
-    def _take(self, message: estimate_pb2.Estimate) -> None:
-        if self._on_estimate is not None:
-            self._on_estimate(estimates.of_message(message, self))
+    def _teller(self, on_estimate: Callable[[Estimate], None]
+                ) -> Callable[[estimate_pb2.Estimate], None]:
+        """Returns what the stream calls; it does not keep the session, which may be dropped."""
+        known = weakref.ref(self)
+        return lambda message: on_estimate(estimates.of_message(message, known()))
+
+    def __del__(self) -> None:
+        """Leaves the session to the next writer. Rows on their way are still sent."""
+        if self._stream is not None and not sys.is_finalizing():
+            self._stream.leave()
 
     def flush(self) -> None:
         """Waits until the daemon keeps all rows. Raises as `append`."""

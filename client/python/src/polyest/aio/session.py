@@ -25,6 +25,11 @@ from polyest.results import prediction
 Result = TypeVar("Result")
 
 
+def _teller(on_estimate: Callable[[Estimate], None]) -> Callable[[estimate_pb2.Estimate], None]:
+    """Returns what a stream calls; it does not keep the session, which may be dropped."""
+    return lambda message: on_estimate(estimates.of_message(message))
+
+
 class Session(Studies):
     """A session, and the stream that this program writes to it; as `polyest.Session`."""
 
@@ -32,6 +37,7 @@ class Session(Studies):
                  units: Optional[Mapping[str, str]], options: StreamOptions,
                  on_estimate: Optional[Callable[[Estimate], None]]) -> None:
         """Use `Client.session`."""
+        self._stream: Optional[MeasurementStream] = None
         self._transport = transport
         self._resource = created.name
         self._problem_message = created.problem
@@ -40,7 +46,6 @@ class Session(Studies):
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
                                                apart=created.reorder_window_s > 0)
-        self._stream: Optional[MeasurementStream] = None
         # Tasks may share a session; its stream is one task's at a time.
         self._turn = asyncio.Lock()
 
@@ -77,16 +82,18 @@ class Session(Studies):
     async def _send(self, measurements: Measurements, wait: bool) -> int:
         async with self._turn:
             if self._stream is None:
+                tell = self._on_estimate and _teller(self._on_estimate)
                 self._stream = MeasurementStream(self._transport, self._resource, self._options,
-                                                 self._take)
+                                                 tell)
             await self._stream.send(split(measurements, self._options.batch_rows))
             if wait:
                 await self._stream.flush()
             return self._stream.queue.last_sequence
 
-    def _take(self, message: estimate_pb2.Estimate) -> None:
-        if self._on_estimate is not None:
-            self._on_estimate(estimates.of_message(message))
+    def __del__(self) -> None:
+        """Leaves the session to the next writer. Rows on their way are still sent."""
+        if self._stream is not None:
+            self._stream.leave()
 
     async def flush(self) -> None:
         """Waits until the daemon keeps all rows."""

@@ -76,6 +76,7 @@ class MeasurementStream:
         self._on_estimate = on_estimate
         self._raised: Optional[Exception] = None  # by `on_estimate`
         self._changed = asyncio.Condition()
+        self._loop = asyncio.get_running_loop()
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Waits until a condition holds."""
@@ -147,6 +148,18 @@ class MeasurementStream:
                 return
             else:
                 await self._connect_again(self._failure(connection))
+
+    def leave(self) -> None:
+        """Ends the stream without waiting. The next one of this program takes over from it.
+
+        Any thread may call it, since objects may be dropped in any.
+        """
+        connection = self._connection
+        if connection is None or connection.done or self._loop.is_closed():
+            return
+        self.transport.left_writers[self.queue.session] = self.queue.writer
+        self.finishing = True
+        self._loop.call_soon_threadsafe(lambda: self._loop.create_task(self.notify()))
 
     async def cancel(self) -> None:
         """Ends the stream at once; batches without acknowledgement may be lost."""
