@@ -13,6 +13,7 @@ import pytest
 import polyest
 from conftest import TRUTH
 from polyest._proto.v1 import estimate_pb2
+from polyest.io import Batch, Recording
 from polyest.results import history
 from rig import wait_for
 
@@ -191,6 +192,23 @@ def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem
             session.append(rows(0, 100))
         assert session.append(rows(100, 200)) == 2
         assert session.estimate().samples == 200
+
+
+@pytest.mark.parametrize(("bad", "said"), [
+    (1e200, "row 615, column x: 1e\\+200 is more than"),
+    (np.inf, r"measurements.channels\[0\].values\[615\]: inf of x must be finite"),
+])
+def test_a_refused_row_is_named_as_the_data_count_it(client, problem, record, bad, said):
+    name = f"counted-{'big' if bad < np.inf else 'inf'}"
+    options = polyest.StreamOptions(batch_rows=100)
+    values = np.where(np.arange(1000) == 615, bad, record["x"])
+    parts = [Batch(record["t"][at:at + 150], {"x": values[at:at + 150]})
+             for at in range(0, 1000, 150)]
+    with client.session(name, problem, options=options) as session:
+        with pytest.raises(polyest.InvalidInput, match=f"^{said}") as raised:
+            session.append(Recording("file", {"x": ""}, lambda: iter(parts)))
+        assert session.info().sample_count == 600  # up to the batch of the row
+    assert raised.value.field == "measurements.channels[0].values[615]"
 
 
 def test_streamed_inputs_need_the_end_of_the_run(client):

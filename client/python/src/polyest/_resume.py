@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Optional
 
 from polyest._proto.v1 import measurements_pb2, session_service_pb2
+from polyest._refusals import count_rows_from
 from polyest.errors import (
     Aborted,
     AlreadyExists,
@@ -49,6 +50,15 @@ class StreamOptions:
     max_attempts: int = 32
 
 
+@dataclass(frozen=True)
+class PendingBatch:
+    """A batch without acknowledgement."""
+
+    request: Request
+    #: Which row of the data that it was cut from its first row was.
+    first_row: int
+
+
 class BatchQueue:
     """The batches of one writer. Not safe for threads: its owner has the lock."""
 
@@ -59,7 +69,7 @@ class BatchQueue:
         self.last_sequence = 0
         #: The name by which the daemon knows the connections of this writer.
         self.writer = writer or secrets.token_hex(16)
-        self._pending: deque[Request] = deque()
+        self._pending: deque[PendingBatch] = deque()
         self._written = 0  # how many of them the present connection has been given
         self._attempts = 0  # to reach the daemon, since the last acknowledgement or refusal
         self._refusals = 0  # for lack of room, since the last acknowledgement
@@ -109,20 +119,20 @@ class BatchQueue:
     def _begin(self, last_sequence: int) -> None:
         """Numbers the batches that were added before the first connection."""
         self._begun = True
-        for number, request in enumerate(self._pending, last_sequence + 1):
-            request.sequence = number
+        for number, batch in enumerate(self._pending, last_sequence + 1):
+            batch.request.sequence = number
         self.last_sequence = last_sequence + len(self._pending)
 
-    def add(self, batch: measurements_pb2.Measurements) -> None:
-        """Appends a batch under the next number."""
+    def add(self, batch: measurements_pb2.Measurements, first_row: int = 0) -> None:
+        """Appends a batch, cut from data at `first_row`, under the next number."""
         self.last_sequence += 1
-        self._pending.append(Request(session=self.session, sequence=self.last_sequence,
-                                     measurements=batch))
+        self._pending.append(PendingBatch(Request(
+            session=self.session, sequence=self.last_sequence, measurements=batch), first_row))
 
     @property
     def first(self) -> Optional[Request]:
         """The first batch without acknowledgement; None if there is none."""
-        return self._pending[0] if self._pending else None
+        return self._pending[0].request if self._pending else None
 
     @property
     def has_unwritten(self) -> bool:
@@ -134,17 +144,22 @@ class BatchQueue:
         if not self.has_unwritten:
             return None
         self._written += 1
-        return self._pending[self._written - 1]
+        return self._pending[self._written - 1].request
 
     def acknowledge(self, sequence: int) -> None:
         """Forgets the batches up to a number: the daemon keeps them."""
         self._attempts = self._refusals = 0
-        while self._pending and self._pending[0].sequence <= sequence:
+        while self._pending and self._pending[0].request.sequence <= sequence:
             self._pending.popleft()
             self._written = max(self._written - 1, 0)
 
     def give_up(self, error: PolyestError) -> None:
-        """Forgets the batches without acknowledgement and says in `error` how many there were."""
+        """Forgets the batches without acknowledgement and says in `error` how many there were.
+
+        The daemon acknowledges all batches before the one that it refuses: that is the first here.
+        """
+        if self._pending:
+            count_rows_from(error, self._pending[0].first_row)
         if len(self._pending) > 1:
             error.args = (f"{error.message} ({len(self._pending)} batches were not kept)",)
         self._pending.clear()

@@ -120,12 +120,16 @@ class MeasurementStream:
             raise FailedPrecondition(f"on_estimate must not write to {self.queue.session} or end "
                                      "its stream, which waits until it returns")
 
-    def send(self, batches: Iterable[measurements_pb2.Measurements]) -> None:
-        """Hands over batches, all of them; waits while too many are not acknowledged."""
+    def send(self, batches: Iterable[measurements_pb2.Measurements], first_row: int = 0) -> None:
+        """Hands over batches, all of them; waits while too many are not acknowledged.
+
+        first_row: of the batches, which follow each other, in the data that they were cut from.
+        """
         self._refuse_to_wait()
         with self.changed:
             for batch in batches:
-                self.queue.add(batch)
+                self.queue.add(batch, first_row)
+                first_row += len(batch.time_s)
             self.changed.notify_all()
             self._wait_until(lambda: not self.queue.full)
 

@@ -81,9 +81,10 @@ class Session(Studies):
         that those before them are kept. What `on_estimate` has raised is raised here, too, or by
         the next `flush`, `estimate`, study or `close`; it refuses no rows.
         """
-        sequence = 0
+        sequence = rows = 0
         for part in self._converter.convert_each(data, end_of_run=end_of_run):
-            sequence = self._send(part, False)
+            sequence = self._send(part, False, rows)
+            rows += len(part.time_s)
         if wait:
             self.flush()
         elif self._stream is not None:
@@ -98,11 +99,11 @@ class Session(Studies):
         """
         self._send(Measurements(end_of_run=True), True)
 
-    def _send(self, measurements: Measurements, wait: bool) -> int:
+    def _send(self, measurements: Measurements, wait: bool, first_row: int = 0) -> int:
         if self._stream is None:
             tell = self._on_estimate and self._teller(self._on_estimate)
             self._stream = MeasurementStream(self._transport, self._resource, self._options, tell)
-        self._stream.send(split(measurements, self._options.batch_rows))
+        self._stream.send(split(measurements, self._options.batch_rows), first_row)
         if wait:
             self._stream.flush()
         return self._stream.queue.last_sequence

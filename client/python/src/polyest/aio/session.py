@@ -66,9 +66,10 @@ class Session(Studies):
 
     async def append(self, data: Data, *, end_of_run: bool = False, wait: bool = True) -> int:
         """Adds rows and returns the number of the last batch; as `polyest.Session.append`."""
-        sequence = 0
+        sequence = rows = 0
         for part in self._converter.convert_each(data, end_of_run=end_of_run):
-            sequence = await self._send(part, False)
+            sequence = await self._send(part, False, rows)
+            rows += len(part.time_s)
         if wait:
             await self.flush()
         elif self._stream is not None:
@@ -79,13 +80,13 @@ class Session(Studies):
         """Says that the last row's run has no further rows."""
         await self._send(Measurements(end_of_run=True), True)
 
-    async def _send(self, measurements: Measurements, wait: bool) -> int:
+    async def _send(self, measurements: Measurements, wait: bool, first_row: int = 0) -> int:
         async with self._turn:
             if self._stream is None:
                 tell = self._on_estimate and _teller(self._on_estimate)
                 self._stream = MeasurementStream(self._transport, self._resource, self._options,
                                                  tell)
-            await self._stream.send(split(measurements, self._options.batch_rows))
+            await self._stream.send(split(measurements, self._options.batch_rows), first_row)
             if wait:
                 await self._stream.flush()
             return self._stream.queue.last_sequence

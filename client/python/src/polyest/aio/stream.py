@@ -110,10 +110,15 @@ class MeasurementStream:
         if error is not None:
             raise error
 
-    async def send(self, batches: Iterable[measurements_pb2.Measurements]) -> None:
-        """Hands over batches, all of them; waits while too many are not acknowledged."""
+    async def send(self, batches: Iterable[measurements_pb2.Measurements],
+                   first_row: int = 0) -> None:
+        """Hands over batches, all of them; waits while too many are not acknowledged.
+
+        first_row: of the batches, which follow each other, in the data that they were cut from.
+        """
         for batch in batches:
-            self.queue.add(batch)
+            self.queue.add(batch, first_row)
+            first_row += len(batch.time_s)
         await self.notify()
         await self._wait_until(lambda: not self.queue.full)
 
