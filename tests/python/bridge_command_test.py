@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 
+import numpy as np
 import pytest
 
 import polyest
@@ -39,9 +40,11 @@ def bridged(folder, configuration, *options, stdin=None):
                stdin=stdin)
 
 
-def mcap_of(path, seconds=2.0):
-    """Writes x, mm, and the force of the rig; returns the columns."""
+def mcap_of(path, seconds=2.0, glitches=None):
+    """Writes x, mm, with some values by their rows, and the force of the rig; returns the columns."""
     fine, x, coarse, force = record(seconds)
+    for row, value in (glitches or {}).items():
+        x[row] = value
     both = [(round(t * 1e9), "/susp", {"defl": value}) for t, value in zip(fine, x)]
     both += [(round(t * 1e9), "/road", {"force": value}) for t, value in zip(coarse, force)]
     with path.open("wb") as file:
@@ -114,6 +117,22 @@ def test_a_bridge_that_is_killed_goes_on_when_it_is_started_again(tmp_path, clie
     assert session.info().sample_count == expected.samples
     assert session.estimate().to_dict()["parameters"] == expected.to_dict()["parameters"]
     assert not (tmp_path / "killed.state").exists()  # the run has ended
+
+
+def test_a_refused_row_is_left_out_alone(tmp_path, client):
+    mcap_of(tmp_path / "ride.mcap", glitches={500: 1e200, 503: float("inf"), 1201: 1e200})
+    good = mcap_of(tmp_path / "good.mcap").to_dict()
+    others = ~np.isin(good["t"], [0.5, 0.503, 1.201])  # which have no sample of the force
+    expected = {name: values[others] for name, values in good.items()}
+    with (tmp_path / "ride.mcap").open("rb") as stdin:
+        status, _, err = ended(bridged(
+            tmp_path, MCAP.format(server=client.server, name="glitches"), stdin=stdin))
+    assert status == 1
+    assert "left out: refused 2" in err and "2 rows were refused and are not kept" in err
+    session = client.session("glitches")
+    assert session.info().sample_count == 1997
+    estimate = client.estimate(PROBLEM, expected, units={"x": "mm"})
+    assert session.estimate().to_dict()["parameters"] == estimate.to_dict()["parameters"]
 
 
 def test_an_mcap_stream_that_is_cut_short_is_a_failure(tmp_path, client):

@@ -277,7 +277,7 @@ def test_a_last_estimate_that_takes_too_long_is_not_waited_for(rig, data, monkey
     one.send(frames(data)[:100])
     assert one.end() == 0
     computed.set()
-    assert "all rows are kept, but the last estimate is not" in capfd.readouterr().err
+    assert "no rows wait any more, but the last estimate is not" in capfd.readouterr().err
 
 
 def test_a_clock_that_is_set_back_begins_a_new_run(rig, client, data, monkeypatch):

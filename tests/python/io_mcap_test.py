@@ -106,7 +106,8 @@ def small(path, values, **described):
 
 
 def test_messages_without_the_field_have_no_sample(tmp_path):
-    path = small(tmp_path / "a.mcap", [{"v": 1}, {}, {"v": None}, {"v": 2.5}, {"v": float("nan")}])
+    path = small(tmp_path / "a.mcap", [{"v": 1}, {}, {"v": None}, {"v": 2.5}, {"v": float("nan")},
+                                      {"v": float("-inf")}])
     found = mcap.read(path, {"x": "/susp.v"}).to_dict()
     assert list(found["t"]) == [0, 0.75]
     assert list(found["x"]) == [1, 2.5]

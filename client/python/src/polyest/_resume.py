@@ -70,6 +70,7 @@ class BatchQueue:
         #: The name by which the daemon knows the connections of this writer.
         self.writer = writer or secrets.token_hex(16)
         self._pending: deque[PendingBatch] = deque()
+        self._given_up: list[PendingBatch] = []
         self._written = 0  # how many of them the present connection has been given
         self._attempts = 0  # to reach the daemon, since the last acknowledgement or refusal
         self._refusals = 0  # for lack of room, since the last acknowledgement
@@ -114,6 +115,7 @@ class BatchQueue:
             raise DataLoss(f"{self.session} has batches up to {last_sequence}, but acknowledged "
                            f"them up to {first - 1}")
         self._written = 0
+        self._given_up = []
         self.connections += 1
 
     def _begin(self, last_sequence: int) -> None:
@@ -162,8 +164,14 @@ class BatchQueue:
             count_rows_from(error, self._pending[0].first_row)
         if len(self._pending) > 1:
             error.args = (f"{error.message} ({len(self._pending)} batches were not kept)",)
+        self._given_up = list(self._pending)
         self._pending.clear()
         self._written, self._begun = 0, False
+
+    def take_back(self) -> list[PendingBatch]:
+        """Returns the batches that were given up at last, once, for those who send them again."""
+        found, self._given_up = self._given_up, []
+        return found
 
     def start_over(self) -> None:
         """Counts attempts anew, after a failure was reported."""

@@ -23,8 +23,8 @@ def _arguments(given: Optional[Sequence[str]]) -> argparse.Namespace:
         description="Streams a live CAN bus, a server of Foxglove's protocol, or MCAP into a "
         "session of polyestd, and publishes its estimates. Ends at SIGINT and SIGTERM, once the "
         "daemon has all rows.",
-        epilog="Exit status: 0 if all rows are kept, 1 after a failure, 2 for a wrong "
-        "configuration.")
+        epilog="Exit status: 0 if all rows are kept, 1 after a failure or if the daemon refused "
+        "rows, 2 for a wrong configuration.")
     parser.add_argument("configuration", help="file in TOML, or in JSON if it ends in .json")
     parser.add_argument("--server", default="", help="HOST:PORT of the daemon, instead of the "
                         "configuration's")

@@ -33,7 +33,7 @@ _GRACE_S = 10.0
 class Counts:
     """What a bridge has done so far."""
 
-    #: Rows handed to the session.
+    #: Rows handed to the session, without those that the daemon refused.
     rows: int
     #: Samples in the queue.
     queued: int
@@ -119,7 +119,7 @@ class Bridge:
     def run(self, stop: threading.Event) -> int:
         """Works until `stop` is set or the source ends.
 
-        Returns 0, or 1 after a failure or if rows were not acknowledged in the end.
+        Returns 0, or 1 after a failure or if rows were refused or not acknowledged in the end.
         """
         for publisher in self._publishers:
             publisher.start()
@@ -191,13 +191,15 @@ class Bridge:
         failure = self._failure or self._feeder.error
         if failure is not None:
             self.say(f"ended by a failure: {failure}")
+        if counts.refused:
+            self.say(f"{counts.refused} rows were refused and are not kept")
         if counts.unacknowledged:
             self.say(f"{counts.unacknowledged} batches were not acknowledged and are lost")
         if self._feeder.is_alive():
-            self.say("all rows are kept, but the last estimate is not computed in time"
+            self.say("no rows wait any more, but the last estimate is not computed in time"
                      if self._feeder.all_kept else "the daemon does not answer")
         self._client.close()
-        return 0 if failure is None and self._feeder.all_kept else 1
+        return 0 if failure is None and self._feeder.all_kept and not counts.refused else 1
 
 
 def _check_channels(channels: Mapping[str, Any], converter: MeasurementConverter) -> None:

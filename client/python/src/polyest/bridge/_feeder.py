@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Optional, TypeVar
 
+from polyest._refusals import refused_row, without_row
 from polyest._resume import StreamOptions
 from polyest._stream import MeasurementStream
 from polyest.bridge._backoff import Backoff
@@ -57,9 +58,10 @@ class Feeder(threading.Thread):
         self.ending = threading.Event()
         #: What ended it, if that was a failure.
         self.error: Optional[BaseException] = None
-        #: Whether the daemon has acknowledged all rows, in the end.
+        #: Whether the daemon has acknowledged all rows but those that it refused, in the end.
         self.all_kept = False
-        self.sent_rows = 0
+        self._handed_rows = 0
+        self._first_kept = False
         self.refused_rows = 0
         self.dropped = 0
 
@@ -78,6 +80,11 @@ class Feeder(threading.Thread):
         """Asks it to send what is queued and to end within the configured time."""
         self._last_chance = time.monotonic() + self._configuration.end_timeout_s
         self.ending.set()
+
+    @property
+    def sent_rows(self) -> int:
+        """Rows handed to the session, without those that were refused."""
+        return self._handed_rows - self.refused_rows
 
     @property
     def queued(self) -> int:
@@ -161,16 +168,10 @@ class Feeder(threading.Thread):
 
     def _append(self, session: Session, batch: Batch) -> None:
         self._keep_state(session, batch.run)
-        first = self.sent_rows == 0
-        try:
-            # The first batch is waited for: what is wrong with it, such as a unit, is so with all.
-            self._send(session, lambda: session.append(batch, wait=first))
-            self.sent_rows += len(batch)
-        except InvalidInput as error:
-            self.refused_rows += len(batch)
-            if first:
-                raise
-            self._say_at_times("refused", f"rows are refused: {error}")
+        self._handed_rows += len(batch)
+        # The first batch is waited for: what is wrong with it, such as a unit, is so with all.
+        self._send(session, lambda: session.append(batch, wait=not self._first_kept))
+        self._first_kept = True
 
     def _keep_state(self, session: Session, run: int) -> None:
         rows = self._rows
@@ -183,18 +184,41 @@ class Feeder(threading.Thread):
                                "is started again begins a new run")
 
     def _send(self, session: Session, send: Callable[[], object]) -> None:
-        """Sends, and while the daemon is away waits until what is pending has been sent."""
+        """Sends, and while the daemon is away waits until what is pending has been sent.
+
+        Rows that the daemon refuses are left out.
+        """
         while True:
             try:
                 send()
-                self._stream = session._stream
                 return
             except Unavailable as error:
                 self._stream = session._stream
                 self._say_at_times("away", f"{error}; {self.unacknowledged} batches wait")
                 if time.monotonic() > self._last_chance:
                     raise
-                send = session.flush  # the rows themselves are pending already
+            except InvalidInput as error:
+                self._leave_out_refused(session, error)
+            finally:
+                self._stream = session._stream
+            send = session.flush  # the rows themselves are pending already
+
+    def _leave_out_refused(self, session: Session, error: InvalidInput) -> None:
+        """Puts back what the stream has given up, but for the row or batch that is refused."""
+        queue = session._stream.queue if session._stream is not None else None
+        given_up = queue.take_back() if queue is not None else []
+        if queue is None or not given_up or not error.field.startswith("measurements"):
+            raise error
+        refused, row = given_up[0].request.measurements, refused_row(error)
+        self.refused_rows += len(refused.time_s) if row is None else 1
+        if not self._first_kept:
+            raise error
+        self._say_at_times("refused", f"rows are refused: {error.rule}")
+        others = [one.request.measurements for one in given_up[1:]]
+        if row is not None and len(refused.time_s) > 1:
+            others.insert(0, without_row(refused, row - given_up[0].first_row))
+        for batch in others:
+            queue.add(batch)
 
     def _say_at_times(self, what: str, said: str) -> None:
         """Says what may go on for days, now and then."""

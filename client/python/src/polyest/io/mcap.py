@@ -56,7 +56,7 @@ def read(file: File, channels: Mapping[str, str], *,
     batch_rows: the most rows of a batch; memory holds a few, the messages of the window and a chunk
         of the file.
 
-    Times are whole ns. A message without the field, or with null or NaN there, has no sample.
+    Times are whole ns. A message without the field, or with null, NaN or ∞ there, has no sample.
     Raises InvalidInput, which is a ValueError, for a file that is none or cut short, topics and
     fields that do not exist (it lists the nearest), fields that are no numbers and other encodings;
     ImportError without mcap.
@@ -145,6 +145,6 @@ def values_of(paths: Mapping[str, Path], topic: str, message: Any) -> dict[str, 
     values = {}
     for quantity, path in paths.items():
         value = path.value(message) if path.topic == topic else None
-        if value is not None and not math.isnan(value):
+        if value is not None and math.isfinite(value):
             values[quantity] = value
     return values
