@@ -181,6 +181,24 @@ def test_a_bridge_that_is_started_again_goes_on_with_the_run(rig, client, data):
     session.close()
 
 
+def test_a_stream_that_is_played_once_more_has_its_slow_channel(rig, client, data):
+    # The force arrives 50 ms after the travel of its time.
+    arriving = sorted(frames(data), key=lambda one: one.timestamp
+                      + 0.05 * (one.arbitration_id == 512))
+    for part in (arriving[:1500], arriving):
+        one = rig(session={"state": "rig.state", "reorder_window_s": 0.1}).start()
+        one.send(part)
+        wait_for(lambda sent=one: sent.bridge.latest is not None)
+        assert one.end() == 0
+        one.bus.shutdown()
+    assert one.bridge.counts().late == 1500
+    session = client.session("rig")
+    session.end_run()
+    expected = client.estimate(PROBLEM, rows_of(data)).to_dict()["parameters"]
+    assert session.estimate().to_dict()["parameters"] == expected
+    session.close()
+
+
 def test_a_bridge_without_a_state_begins_a_new_run(rig, client, data):
     for run in range(2):
         one = rig().start()

@@ -210,6 +210,20 @@ def test_a_run_goes_on_after_the_last_row():
     assert one.late == 2
 
 
+def test_a_run_with_a_window_goes_on_with_what_may_be_missing():
+    one = Assembler({"a": "", "b": ""}, 2.0, run=1, origin_ns=0, after_s=5.0)
+    for time in (3, 4, 5, 6):
+        one.add(time * SECOND, {"a": 1.0, "b": 2.0})
+    found = rows_of(one)
+    # Up to 5 s the session may have one channel's sample and lack the other's.
+    assert [times for _, times, _ in found] == [[4], [4], [5], [5], [6]]
+    np.testing.assert_array_equal(found[0][2]["a"], [1])
+    np.testing.assert_array_equal(found[0][2]["b"], [NAN])
+    assert one.late == 2
+    assert [one.may_be_kept(1, time) for time in (5.0, 5.1)] == [True, False]
+    assert not one.may_be_kept(2, 1.0)
+
+
 def test_names_and_units_are_found_as_people_write_them():
     assert nearest("DEFL", ["SUSP.defl", "road", "SUSP.deflection"])[0] == "SUSP.defl"
     assert [spelled(unit) for unit in ("1/min", "Nm", " mm ", "m/s²", "-")] == [

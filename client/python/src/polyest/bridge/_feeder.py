@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Optional, TypeVar
 
+from polyest._measurements import Measurements
 from polyest._refusals import refused_row, without_row
 from polyest._resume import StreamOptions
 from polyest._stream import MeasurementStream
@@ -170,8 +171,13 @@ class Feeder(threading.Thread):
         self._keep_state(session, batch.run)
         self._handed_rows += len(batch)
         # The first batch is waited for: what is wrong with it, such as a unit, is so with all.
-        self._send(session, lambda: session.append(batch, wait=not self._first_kept))
-        self._first_kept = True
+        # Nothing waits behind a sample that may be kept already, and would be sent again, too.
+        wait = not self._first_kept or self._may_be_kept(batch.run, batch.time_s[0])
+        self._send(session, lambda: session.append(batch, wait=wait))
+        self._first_kept = self._first_kept or self.sent_rows > 0
+
+    def _may_be_kept(self, run: int, time_s: float) -> bool:
+        return self._rows is not None and self._rows.may_be_kept(run, time_s)
 
     def _keep_state(self, session: Session, run: int) -> None:
         rows = self._rows
@@ -205,20 +211,33 @@ class Feeder(threading.Thread):
 
     def _leave_out_refused(self, session: Session, error: InvalidInput) -> None:
         """Puts back what the stream has given up, but for the row or batch that is refused."""
-        queue = session._stream.queue if session._stream is not None else None
-        given_up = queue.take_back() if queue is not None else []
-        if queue is None or not given_up or not error.field.startswith("measurements"):
+        stream, rows = session._stream, self._rows
+        given_up = stream.queue.take_back() if stream is not None else []
+        if not given_up or not error.field.startswith("measurements"):
             raise error
+        assert stream is not None and rows is not None
         refused, row = given_up[0].request.measurements, refused_row(error)
-        self.refused_rows += len(refused.time_s) if row is None else 1
-        if not self._first_kept:
-            raise error
-        self._say_at_times("refused", f"rows are refused: {error.rule}")
+        if self._is_kept(refused, error):
+            self._handed_rows -= 1
+            rows.late += 1
+        else:
+            self._count_refused(len(refused.time_s) if row is None else 1, error)
         others = [one.request.measurements for one in given_up[1:]]
         if row is not None and len(refused.time_s) > 1:
             others.insert(0, without_row(refused, row - given_up[0].first_row))
         for batch in others:
-            queue.add(batch)
+            stream.queue.add(batch)
+
+    def _is_kept(self, refused: Measurements, error: InvalidInput) -> bool:
+        """Whether a sample is refused because the session has it from an earlier bridge."""
+        return (error.field == "measurements.timeS[0]" and len(refused.time_s) == 1
+                and self._may_be_kept(refused.run[0] if refused.run else 0, refused.time_s[0]))
+
+    def _count_refused(self, rows: int, error: InvalidInput) -> None:
+        self.refused_rows += rows
+        if not self._first_kept:
+            raise error
+        self._say_at_times("refused", f"rows are refused: {error.rule}")
 
     def _say_at_times(self, what: str, said: str) -> None:
         """Says what may go on for days, now and then."""

@@ -27,7 +27,9 @@ class Assembler:
                  new_run_after_s: float = 0.0, patience_s: float = math.inf) -> None:
         """`origin_ns` is the time of t = 0 of the run, None for the first sample's.
 
-        after_s: the last time in the session, s; samples up to it are there already.
+        after_s: the last time in the session, s. Samples up to it are there already; with a window
+            those are that cannot come any more, and the later ones may be: they make batches of
+            one sample each, so that the daemon can tell.
         """
         self._units = dict(units)
         self._window = round(window_s * 1e9)
@@ -42,8 +44,9 @@ class Assembler:
         #: The time of t = 0 of the run, ns; None before its first sample.
         self.origin_ns = origin_ns
         after = round(after_s * 1e9)
+        self._resumed = run, after
         self._newest = after  # of all samples of the run, ns since its beginning
-        self._floor = after  # samples up to it come too late
+        self._floor = max(after - self._window, -1)  # samples up to it come too late
         #: Samples that came too late.
         self.late = 0
         #: Samples of a channel that has another one at the same time.
@@ -78,6 +81,11 @@ class Assembler:
         if not row:
             del self._rows[time]
 
+    def may_be_kept(self, run: int, time_s: float) -> bool:
+        """Whether the session may have the samples of a time from an earlier program."""
+        return self._window > 0 and run == self._resumed[0] and (
+            round(time_s * 1e9) <= self._resumed[1])
+
     def _out_of_patience(self) -> bool:
         now = monotonic()
         if self._late_since is None:
@@ -107,19 +115,28 @@ class Assembler:
         return taken
 
     def _batches(self) -> list[Batch]:
-        if not self._rows:
-            return []
         times = sorted(self._rows)
-        columns = {name: np.full(len(times), np.nan) for name in self._units}
-        for number, time in enumerate(times):
-            for name, value in self._rows[time].items():
-                columns[name][number] = value
-                if self._window:
+        if not times:
+            return []
+        after = self._resumed[1] if self._window and self.run == self._resumed[0] else -1
+        single = [{time: {name: value}} for time in times if time <= after
+                  for name, value in self._rows[time].items()]
+        others = {time: self._rows[time] for time in times if time > after}
+        if self._window:
+            for time in times:
+                for name in self._rows[time]:
                     self._seen.setdefault(name, set()).add(time)
         self._rows.clear()
         self._floor = max(self._floor, times[-1] if not self._window
                           else self._newest - self._window)
         for name, seen in self._seen.items():
             self._seen[name] = {time for time in seen if time > self._floor}
-        return [Batch(seconds(np.array(times, dtype=np.int64)), columns, dict(self._units),
-                      self.run)]
+        return [self._batch(rows) for rows in (*single, others) if rows]
+
+    def _batch(self, rows: Mapping[int, Mapping[str, float]]) -> Batch:
+        columns = {name: np.full(len(rows), np.nan) for name in self._units}
+        for number, row in enumerate(rows.values()):
+            for name, value in row.items():
+                columns[name][number] = value
+        return Batch(seconds(np.array(list(rows), dtype=np.int64)), columns, dict(self._units),
+                     self.run)
