@@ -1,5 +1,8 @@
 """How data become measurements, without a daemon: columns, units, times, runs, missing samples."""
 
+import datetime
+import time
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -43,6 +46,23 @@ def test_nullable_columns_of_pandas_have_missing_samples():
 def test_objects_with_none_have_missing_samples():
     found = converter().convert({"t": [0.0, 1.0], "x": [None, 2.0]})
     assert list(found.channels[0].missing) == [0]
+
+
+@pytest.mark.parametrize("kind", [float, int, bool, object])
+def test_what_a_masked_array_hides_is_missing(kind):
+    hidden = np.ma.array(np.array([1, 0, 1], dtype=kind), mask=[True, False, False])
+    table = np.ma.array([(0.0, 1.0), (1.0, 0.0), (2.0, 1.0)], dtype=[("t", float), ("x", float)],
+                        mask=[(False, True), (False, False), (False, False)])
+    for data in ({"t": [0.0, 1.0, 2.0], "x": hidden}, table):
+        channel, = converter().convert(data).channels
+        assert list(channel.missing) == [0] and list(channel.values)[1:] == [0, 1]
+
+
+def test_a_hidden_time_is_no_time():
+    dates = np.array(["2026-01-31", "2026-02-01"], dtype="datetime64[s]")
+    for times in (np.array([0.0, 1.0]), dates):
+        with pytest.raises(polyest.InvalidInput, match="t: row 1 has no time"):
+            converter().convert({"t": np.ma.array(times, mask=[False, True]), "x": [1.0, 2.0]})
 
 
 @pytest.mark.parametrize("header", ["x [mm]", "x (mm)", "x / mm"])
@@ -161,6 +181,26 @@ def test_dates_with_a_time_zone_count_as_others():
     times = pd.date_range("2026-01-31T13:00:00", periods=2, freq="250ms", tz="Europe/Berlin")
     found = converter().convert(pd.DataFrame({"t": times, "x": [1.0, 2.0]}))
     assert list(found.time_s) == [0.0, 0.25]
+
+
+def test_dates_without_a_time_zone_are_in_none(monkeypatch):
+    # Berlin skips the hour from 2:00 on; numpy and pandas, and so the daemon's times, do not.
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    dates = [datetime.datetime(2026, 3, 29, 1, 59, 59), datetime.datetime(2026, 3, 29, 3)]
+    zone = datetime.timezone(datetime.timedelta(hours=2))
+    for given in (dates, np.array(dates, dtype="datetime64[ns]"), pd.Series(dates),
+                  [date.replace(tzinfo=zone) for date in dates]):
+        assert list(converter().convert({"t": given, "x": [1.0, 2.0]}).time_s) == [0.0, 3601.0]
+    monkeypatch.undo()
+    time.tzset()
+
+
+def test_a_date_that_is_missing_does_not_begin_the_time():
+    one, dates = converter(), np.array(["NaT", "2026-01-31T13:00:05"], dtype="datetime64[ns]")
+    with pytest.raises(polyest.InvalidInput, match="t: row 0 has no time"):
+        one.convert({"t": dates, "x": [1.0, 2.0]})
+    assert list(one.convert({"t": dates[1:], "x": [2.0]}).time_s) == [0.0]
 
 
 def test_time_differences_are_times():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from typing import Any, Optional, Union
 
@@ -37,9 +38,9 @@ class Table:
         self.columns: dict[str, Array] = {}
         names = getattr(getattr(data, "dtype", None), "names", None)
         if isinstance(data, Mapping):
-            self.columns = {str(name): np.asarray(values) for name, values in data.items()}
+            self.columns = {str(name): _array(values) for name, values in data.items()}
         elif names:
-            self.columns = {name: np.asarray(data[name]) for name in names}
+            self.columns = {name: _array(data[name]) for name in names}
         elif hasattr(data, "columns") and hasattr(data, "__getitem__"):
             self._take_frame(data)
         else:
@@ -79,6 +80,19 @@ class Table:
         return None
 
 
+def _array(values: Any) -> Array:
+    """Returns a column as an array; what a masked array hides is missing."""
+    if not isinstance(values, np.ma.MaskedArray):
+        return np.asarray(values)
+    kind = values.dtype.kind
+    nothing: Any = None
+    if kind in "mM":
+        nothing = np.array("NaT", values.dtype)
+    elif kind in "fiub":
+        nothing = np.nan
+    return np.where(values.mask, nothing, values.data)
+
+
 def _values_of(series: Any) -> Array:
     """Returns the values of a pandas column; missing ones of nullable types become NaN."""
     values = np.asarray(series)
@@ -94,8 +108,11 @@ def _has_zone(values: Array) -> bool:
 
 
 def _nanoseconds(date: Any) -> np.datetime64:
+    """Returns a date; one without a time zone counts as numpy and pandas have it, in no zone."""
     value = getattr(date, "value", None)  # what pandas has in nanoseconds
-    return np.datetime64(value if value is not None else round(date.timestamp() * 1e9), "ns")
+    if value is None and getattr(date, "tzinfo", None) is not None:
+        date = date.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+    return np.datetime64(date if value is None else value, "ns")
 
 
 def floats(name: str, values: Array) -> Floats:
@@ -112,7 +129,7 @@ def floats(name: str, values: Array) -> Floats:
 
 
 class Clock:
-    """Turns times into seconds. Dates count from the first one that is seen."""
+    """Turns times into seconds. Dates count from the first one that it turns."""
 
     def __init__(self) -> None:
         self._origin: Optional[np.datetime64] = None
@@ -122,6 +139,7 @@ class Clock:
         if _has_zone(values):
             values = np.array([_nanoseconds(value) for value in values])
         if values.dtype.kind == "M":
+            _check_present(name, np.isnat(values))
             if self._origin is None and len(values):
                 self._origin = values[0]
             values = values - self._origin
@@ -132,7 +150,10 @@ class Clock:
         else:
             raise refuse(name, f"'{unit}' is no unit of time; known are "
                          f"{', '.join(unit for unit in _SECONDS if unit)}")
-        missing = np.flatnonzero(np.isnan(result))
-        if missing.size:
-            raise refuse(name, f"row {missing[0]} has no time")
+        _check_present(name, np.isnan(result))
         return result
+
+
+def _check_present(name: str, missing: npt.NDArray[np.bool_]) -> None:
+    if missing.any():
+        raise refuse(name, f"row {np.argmax(missing)} has no time")
