@@ -76,6 +76,11 @@ class MeasurementConverter:
         self._given: set[str] = set()  # the channels of all batches so far
         self._check_units()
 
+    def begin_anew(self) -> None:
+        """Forgets all batches so far, since none of them was kept."""
+        self._clock = Clock()
+        self._given.clear()
+
     @property
     def names(self) -> list[str]:
         """What the problem takes from data: outputs, inputs, and names in its condition."""
@@ -108,12 +113,15 @@ class MeasurementConverter:
         return message
 
     def convert_each(self, data: Data, *, end_of_run: bool = False) -> Iterator[Measurements]:
-        """Yields the rows of a recording batch by batch, those of other data as one message."""
+        """Yields the rows of a recording batch by batch, those of other data as one message.
+
+        Raises InvalidInput for none: the daemon would refuse it with what is sent behind it.
+        """
         if not isinstance(data, Recording):
-            yield self.convert(data, end_of_run=end_of_run)
+            yield _with_rows(self.convert(data, end_of_run=end_of_run))
             return
         for batch in data:
-            yield self.convert(batch)
+            yield _with_rows(self.convert(batch))
         if end_of_run:
             yield Measurements(end_of_run=True)
 
@@ -215,6 +223,12 @@ class MeasurementConverter:
         if unused:
             warnings.warn(f"columns that the problem does not name are not used: "
                           f"{', '.join(unused)}", stacklevel=6)
+
+
+def _with_rows(measurements: Measurements) -> Measurements:
+    if not measurements.time_s and not measurements.end_of_run:
+        raise refuse("measurements", "there are no rows")
+    return measurements
 
 
 def split(measurements: Measurements, max_rows: int) -> Iterator[Measurements]:

@@ -76,6 +76,8 @@ class BatchQueue:
         self._refusals = 0  # for lack of room, since the last acknowledgement
         self._begun = False
         self._overtaken = False  # by another client, whose batches follow those of this one
+        #: Whether the daemon has acknowledged a batch of this queue.
+        self.any_kept = False
         #: Connections made so far.
         self.connections = 0
 
@@ -151,6 +153,7 @@ class BatchQueue:
     def acknowledge(self, sequence: int) -> None:
         """Forgets the batches up to a number: the daemon keeps them."""
         self._attempts = self._refusals = 0
+        self.any_kept = True
         while self._pending and self._pending[0].request.sequence <= sequence:
             self._pending.popleft()
             self._written = max(self._written - 1, 0)

@@ -49,6 +49,7 @@ class Session(Studies):
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
                                                apart=created.reorder_window_s > 0)
+        self._any_kept = False  # of the rows before the present stream
 
     @property
     def name(self) -> str:
@@ -81,6 +82,8 @@ class Session(Studies):
         that those before them are kept. What `on_estimate` has raised is raised here, too, or by
         the next `flush`, `estimate`, study or `close`; it refuses no rows.
         """
+        if not self._has_rows():
+            self._converter.begin_anew()
         sequence = rows = 0
         for part in self._converter.convert_each(data, end_of_run=end_of_run):
             sequence = self._send(part, False, rows)
@@ -119,6 +122,11 @@ class Session(Studies):
         if self._stream is not None and not sys.is_finalizing():
             self._stream.leave()
 
+    def _has_rows(self) -> bool:
+        """Whether rows that were appended to this object are kept, or on their way."""
+        queue = self._stream.queue if self._stream is not None else None
+        return self._any_kept or (queue is not None and (queue.any_kept or len(queue) > 0))
+
     def flush(self) -> None:
         """Waits until the daemon keeps all rows. Raises as `append`."""
         if self._stream is not None:
@@ -137,6 +145,7 @@ class Session(Studies):
         stream = self._stream
         if stream is not None:
             stream.finish()
+            self._any_kept = self._has_rows()
             self._stream = None
             stream.check()
 
@@ -150,6 +159,7 @@ class Session(Studies):
         if kind is None:
             self.close()
         elif self._stream is not None:
+            self._any_kept = self._has_rows()
             stream, self._stream = self._stream, None
             stream.cancel()
 

@@ -46,6 +46,7 @@ class Session(Studies):
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
                                                apart=created.reorder_window_s > 0)
+        self._any_kept = False  # of the rows before the present stream
         # Tasks may share a session; its stream is one task's at a time.
         self._turn = asyncio.Lock()
 
@@ -66,6 +67,8 @@ class Session(Studies):
 
     async def append(self, data: Data, *, end_of_run: bool = False, wait: bool = True) -> int:
         """Adds rows and returns the number of the last batch; as `polyest.Session.append`."""
+        if not self._has_rows():
+            self._converter.begin_anew()
         sequence = rows = 0
         for part in self._converter.convert_each(data, end_of_run=end_of_run):
             sequence = await self._send(part, False, rows)
@@ -96,6 +99,11 @@ class Session(Studies):
         if self._stream is not None:
             self._stream.leave()
 
+    def _has_rows(self) -> bool:
+        """Whether rows that were appended to this object are kept, or on their way."""
+        queue = self._stream.queue if self._stream is not None else None
+        return self._any_kept or (queue is not None and (queue.any_kept or len(queue) > 0))
+
     async def flush(self) -> None:
         """Waits until the daemon keeps all rows."""
         async with self._turn:
@@ -108,6 +116,7 @@ class Session(Studies):
             stream = self._stream
             if stream is not None:
                 await stream.finish()
+                self._any_kept = self._has_rows()
                 self._stream = None
                 stream.check()
 
@@ -122,6 +131,7 @@ class Session(Studies):
         if kind is None:
             await self.close()
         elif self._stream is not None:
+            self._any_kept = self._has_rows()
             stream, self._stream = self._stream, None
             await stream.cancel()
 
