@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import polyest
@@ -161,3 +162,14 @@ def test_a_copy_is_independent(problem):
 
 def test_the_schema_of_problem_files_is_json(client):
     assert "uncertain" in json.loads(client.problem_schema())["properties"]
+
+
+def test_numbers_of_numpy_are_written_as_others(tmp_path):
+    made = (polyest.Problem.builtin("mass_spring_damper").fix(m=np.int64(1), x0=np.float32(0.5))
+            .uncertain("k", polyest.Uniform(np.float32(31.5), np.int64(47)))
+            .measure("x", noise=np.float32(0.25)))
+    made.save(tmp_path / "problem.json")
+    assert json.loads(made.as_json())["fixed"] == {"m": 1, "x0": 0.5}
+    assert polyest.Problem.read(tmp_path / "problem.json") == made
+    with pytest.raises(TypeError, match="of the type set"):
+        polyest.Problem({"fixed": {"m": {1.0}}}).as_json()

@@ -194,6 +194,31 @@ def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem
         assert session.estimate().samples == 200
 
 
+def test_rows_that_are_refused_do_not_begin_the_time(client, problem, rows):
+    dates = np.datetime64("2026-01-31T13:00:00") + np.arange(100) * np.timedelta64(50, "ms")
+    good = {"t": dates, "x": rows(0, 100)["x"]}
+    early = {**good, "t": dates - np.timedelta64(1, "h")}
+    with client.session("dated", problem) as session:
+        for bad in ({**early, "x": ["fast"] * 100}, {**early, "x": np.full(100, 1e200)}):
+            with pytest.raises(polyest.InvalidInput):
+                session.append(bad)
+        session.append(good)
+        assert session.info().last_time_s == 99 * 0.05
+        session.close()
+        session.append({**good, "t": dates + np.timedelta64(5, "s")})
+        assert session.info().last_time_s == 199 * 0.05
+
+
+def test_no_rows_are_refused_alone(client, problem, rows):
+    with client.session("no-rows", problem) as session:
+        for first in range(0, 90, 10):
+            session.append(rows(first, first + 10), wait=False)
+            with pytest.raises(polyest.InvalidInput, match="there are no rows"):
+                session.append(rows(0, 0), wait=False)
+        session.append(rows(0, 0), end_of_run=True)
+    assert session.info().sample_count == 90
+
+
 @pytest.mark.parametrize(("bad", "said"), [
     (1e200, "row 615, column x: 1e\\+200 is more than"),
     (np.inf, r"measurements.channels\[0\].values\[615\]: inf of x must be finite"),
@@ -247,6 +272,11 @@ def test_an_exported_session_has_the_same_estimate(client, problem, rows, tmp_pa
     file.write_bytes(file.read_bytes()[:-3])
     with pytest.raises(polyest.InvalidInput, match="ends in the middle of a record"):
         client.import_session(file, "cut-off")
+    first_line = file.read_bytes().partition(b"\n")[0] + b"\n"
+    for damage in (b"\x05" + b"\xff" * 5, b"\xff" * 30):
+        file.write_bytes(first_line + damage)
+        with pytest.raises(polyest.InvalidInput, match="is damaged"):
+            client.import_session(file, "damaged")
 
 
 def test_an_import_that_is_interrupted_is_cancelled(client, tmp_path, monkeypatch):

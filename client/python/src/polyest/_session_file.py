@@ -8,6 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Optional, Union
 
+from google.protobuf import message
+
 from polyest._proto.v1 import session_service_pb2
 from polyest.errors import InvalidInput
 
@@ -44,7 +46,7 @@ class SessionFileWriter:
 
 
 def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.SessionRecord]:
-    """Yields the records of a file. Raises InvalidInput if it is none or ends too early."""
+    """Yields the records of a file. Raises InvalidInput if it is none, damaged or cut short."""
     # A number is no path: `open` takes it for a descriptor and closes it in the end.
     with open(os.fspath(file), "rb") as source:
         if source.readline(len(_FIRST_LINE)) != _FIRST_LINE:
@@ -56,7 +58,11 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
             encoded = source.read(length)
             if len(encoded) < length:
                 raise InvalidInput(f"{os.fspath(file)}: ends in the middle of a record")
-            yield session_service_pb2.SessionRecord.FromString(encoded)
+            try:
+                record = session_service_pb2.SessionRecord.FromString(encoded)
+            except message.DecodeError as error:
+                raise InvalidInput(f"{os.fspath(file)}: is damaged: {error}") from error
+            yield record
 
 
 def _varint(value: int) -> bytes:
@@ -72,6 +78,8 @@ def _read_varint(source: BinaryIO) -> Optional[int]:
     value, shift = 0, 0
     while byte := source.read(1):
         value |= (byte[0] & 0x7F) << shift
+        if value >> 31:  # no message of protobuf is that long
+            raise InvalidInput("a session file is damaged: it has a record beyond 2 GiB")
         if byte[0] < 0x80:
             return value
         shift += 7

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
+import numpy as np
 from google.protobuf import json_format
 
 from polyest import _strict_json
@@ -210,7 +211,7 @@ class Problem:
 
     def as_json(self) -> str:
         """Returns the text of the problem file."""
-        return json.dumps(self._document, indent=2)
+        return json.dumps(self._document, indent=2, default=_plain)
 
     def save(self, path: Union[str, os.PathLike[str]]) -> None:
         """Writes the problem file, which the command `polyest` also reads."""
@@ -232,6 +233,13 @@ class Problem:
         return (f"<polyest.Problem: {json.dumps(self._document.get('model', {}))[:60]}, "
                 f"uncertain {', '.join(names) or 'none'}, "
                 f"measured {', '.join(measured) or 'none'}>")
+
+
+def _plain(value: Any) -> Any:
+    """Returns a number or an array of numpy as JSON has it."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"{value!r} of the type {type(value).__name__} is nothing that JSON has")
 
 
 #: A problem: built, as a problem file's JSON object, or the path of a problem file.
