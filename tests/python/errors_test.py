@@ -130,6 +130,31 @@ def test_a_watch_that_is_closed_with_its_client(client, problem, rows):
         next(following)
 
 
+def test_a_client_that_is_closed_says_so(client, problem, rows, tmp_path):
+    other = polyest.connect(client.server)
+    session = other.session("closed-client", problem)
+    session.append(rows(0, 10))
+    session.export(tmp_path / "file")
+    other.close()
+    for call in (other.status, lambda: list(session.estimates()), session.close,
+                 lambda: other.import_session(tmp_path / "file"),
+                 lambda: session.append(rows(10, 20)), session.info):
+        with pytest.raises(polyest.FailedPrecondition, match="the client is closed"):
+            call()
+
+    async def asynchronous():
+        other = polyest.aio.connect(client.server)
+        session = await other.session("closed-client")
+        await other.close()
+        for call in (other.status, session.info, lambda: session.append(rows(10, 20)),
+                     lambda: other.import_session(tmp_path / "file"),
+                     lambda: session.estimates(follow=True).__anext__()):
+            with pytest.raises(polyest.FailedPrecondition, match="the client is closed"):
+                await call()
+
+    asyncio.run(asynchronous())
+
+
 def test_a_session_that_is_deleted_ends_its_watches(client, problem, rows):
     with client.session("deleted", problem) as session:
         session.append(rows(0, 100))

@@ -10,6 +10,7 @@ import polyest
 from polyest import aio
 from polyest._proto.v1 import measurements_pb2
 from polyest._resume import BatchQueue, StreamOptions
+from rig import wait_for
 
 FAST = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.1, max_attempts=1000)
 FEW = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.01, max_attempts=2)
@@ -33,6 +34,21 @@ def test_a_daemon_killed_under_append_loses_nothing_and_counts_nothing_twice(
         found = session.estimate()
     expected = client.estimate(problem, record)
     assert found.to_dict()["parameters"] == expected.to_dict()["parameters"]
+
+
+def test_a_long_queue_survives_restarts(restartable, problem, record):
+    daemon = restartable()
+    options = polyest.StreamOptions(batch_rows=1, first_delay_s=0.01, max_attempts=1000)
+    session = polyest.connect(daemon.address).session("queue", problem, options=options)
+    with session, futures.ThreadPoolExecutor(1) as executor:
+        appending = executor.submit(session.append, record)
+        for kept in (100, 400, 700):
+            with polyest.connect(daemon.address) as other:
+                wait_for(lambda: other.session("queue").info().last_sequence >= kept)
+            daemon.kill()
+            daemon = restartable()
+        assert appending.result() == 1000
+        assert session.info().sample_count == 1000
 
 
 def test_append_itself_survives_a_restart(restartable, problem, rows):

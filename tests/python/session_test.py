@@ -308,7 +308,7 @@ def test_a_local_daemon_ends_with_its_client():
         pid = client.daemon.pid
         assert client.status().durable is False and lives(pid)
     assert not lives(pid)
-    with pytest.raises((polyest.PolyestError, ValueError)):
+    with pytest.raises(polyest.FailedPrecondition, match="the client is closed"):
         client.status()
 
 

@@ -12,6 +12,7 @@ import grpc
 from polyest._calls import Call, Result
 from polyest._connection import ConnectionOptions, open_channel
 from polyest._methods import Method, Request, Response
+from polyest.errors import FailedPrecondition
 
 
 class Transport:
@@ -19,27 +20,36 @@ class Transport:
 
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
+        self._closed = False
         #: The last writers of sessions whose streams were cancelled, by session.
         self.left_writers: dict[str, str] = {}
         self._channel = open_channel(options)
 
     def close(self) -> None:
         """Ends all calls."""
+        self._closed = True
         self._channel.close()
 
     def wait_until_connected(self, timeout_s: float) -> None:
         """Waits for a connection, for a while: without a call gRPC seldom looks after its own."""
-        connected = grpc.channel_ready_future(self._channel)
+        connected = grpc.channel_ready_future(self._open)
         with contextlib.suppress(grpc.FutureTimeoutError):
             connected.result(timeout=timeout_s)
         connected.cancel()
+
+    @property
+    def _open(self) -> grpc.Channel:
+        """The channel. Raises FailedPrecondition after the client's end."""
+        if self._closed:
+            raise FailedPrecondition("the client is closed")
+        return self._channel
 
     def unary(self, method: Method[Request, Response], request: Request,
               timeout_s: Optional[float] = None) -> Response:
         """Makes a call. Raises PolyestError."""
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.unary_unary(method.path, encode.SerializeToString, decode.FromString)
+        call = self._open.unary_unary(method.path, encode.SerializeToString, decode.FromString)
         try:
             response: Response = call(request, metadata=self.options.metadata(),
                                       timeout=timeout_s or self.options.timeout_s)
@@ -56,7 +66,7 @@ class Transport:
         """Yields the answers of a call, which ends when the iterator is closed."""
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.unary_stream(method.path, encode.SerializeToString, decode.FromString)(
+        call = self._open.unary_stream(method.path, encode.SerializeToString, decode.FromString)(
             request, metadata=self.options.metadata())
         try:
             yield from call
@@ -85,7 +95,7 @@ class Transport:
 
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.stream_unary(
+        call = self._open.stream_unary(
             method.path, encode.SerializeToString, decode.FromString).future(
                 until_failure(), metadata=self.options.metadata())
         begun.set()
@@ -103,6 +113,5 @@ class Transport:
         """Begins a call in both directions and returns it, an iterator over the answers."""
         encode: Any = method.request
         decode: Any = method.response
-        return self._channel.stream_stream(method.path, encode.SerializeToString,
-                                           decode.FromString)(
+        return self._open.stream_stream(method.path, encode.SerializeToString, decode.FromString)(
             requests, metadata=self.options.metadata())

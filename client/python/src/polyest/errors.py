@@ -80,7 +80,7 @@ class AlreadyExists(PolyestError):
 
 
 class FailedPrecondition(PolyestError):
-    """The state does not allow the call: a batch is missing, or too few trajectories succeed."""
+    """The state does not allow the call: too few trajectories succeed, or the client is closed."""
 
     code = "FAILED_PRECONDITION"
 

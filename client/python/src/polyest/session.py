@@ -73,8 +73,9 @@ class Session(Studies):
             batch by batch. Only the first data need the columns of all streamed inputs, and with a
             `reorder_window_s` none do. end_of_run: these are the last rows of their run.
         wait: return when the daemon keeps the rows. Otherwise return as soon as they are on their
-            way, and wait for room only; then `flush`, `estimate` or the end of the `with` block
-            reports what goes wrong.
+            way, and wait for room only; then the next `append`, `flush`, `estimate` or the end of
+            the `with` block reports what goes wrong. Rows that wait behind refused ones are not
+            kept either; the message counts their batches.
 
         A lost connection is made again, and rows without acknowledgement are sent again: none is
         lost or counted twice. Raises Unavailable if all attempts fail; the rows are still pending

@@ -10,6 +10,7 @@ import grpc
 from polyest._calls import Call, Result
 from polyest._connection import ConnectionOptions
 from polyest._methods import Method, Request, Response
+from polyest.errors import FailedPrecondition
 
 
 class Transport:
@@ -17,6 +18,7 @@ class Transport:
 
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
+        self._closed = False
         #: The last writers of sessions whose streams were cancelled, by session.
         self.left_writers: dict[str, str] = {}
         credentials, arguments = options.credentials(), options.channel_arguments()
@@ -27,13 +29,21 @@ class Transport:
 
     async def close(self) -> None:
         """Ends all calls."""
+        self._closed = True
         await self._channel.close()
+
+    @property
+    def _open(self) -> grpc.aio.Channel:
+        """The channel. Raises FailedPrecondition after the client's end."""
+        if self._closed:
+            raise FailedPrecondition("the client is closed")
+        return self._channel
 
     async def unary(self, method: Method[Request, Response], request: Request) -> Response:
         """Makes a call. Raises PolyestError."""
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.unary_unary(method.path, encode.SerializeToString, decode.FromString)
+        call = self._open.unary_unary(method.path, encode.SerializeToString, decode.FromString)
         try:
             response: Response = await call(request, metadata=self.options.metadata(),
                                             timeout=self.options.timeout_s)
@@ -50,7 +60,7 @@ class Transport:
         """Yields the answers of a call, which ends when the iterator is closed."""
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.unary_stream(method.path, encode.SerializeToString, decode.FromString)(
+        call = self._open.unary_stream(method.path, encode.SerializeToString, decode.FromString)(
             request, metadata=self.options.metadata())
         try:
             async for response in call:
@@ -65,7 +75,7 @@ class Transport:
         """Sends requests and returns the one answer. Raises PolyestError."""
         encode: Any = method.request
         decode: Any = method.response
-        call = self._channel.stream_unary(method.path, encode.SerializeToString, decode.FromString)(
+        call = self._open.stream_unary(method.path, encode.SerializeToString, decode.FromString)(
             metadata=self.options.metadata())
         try:
             for request in requests:
@@ -80,6 +90,6 @@ class Transport:
 
     def open_stream(self, method: Method[Any, Any]) -> Any:
         """Begins a call in both directions and returns it."""
-        return self._channel.stream_stream(
+        return self._open.stream_stream(
             method.path, method.request.SerializeToString, method.response.FromString)(
             metadata=self.options.metadata())
