@@ -41,7 +41,7 @@ def bridged(folder, configuration, *options, stdin=None):
 
 
 def mcap_of(path, seconds=2.0, glitches=None):
-    """Writes x, mm, with some values by their rows, and the force of the rig; returns the columns."""
+    """Writes x, mm, and the force of the rig; returns the columns. Glitches are x by row."""
     fine, x, coarse, force = record(seconds)
     for row, value in (glitches or {}).items():
         x[row] = value

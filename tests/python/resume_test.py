@@ -44,7 +44,7 @@ def test_a_long_queue_survives_restarts(restartable, problem, record):
         appending = executor.submit(session.append, record)
         for kept in (100, 400, 700):
             with polyest.connect(daemon.address) as other:
-                wait_for(lambda: other.session("queue").info().last_sequence >= kept)
+                wait_for(lambda kept=kept: other.session("queue").info().last_sequence >= kept)
             daemon.kill()
             daemon = restartable()
         assert appending.result() == 1000
