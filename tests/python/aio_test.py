@@ -137,13 +137,16 @@ def test_an_exception_of_on_estimate_is_raised_by_a_later_call(client, problem, 
 def test_a_session_that_is_dropped_is_left_to_the_next_writer(client, problem, rows):
     async def run():
         async with aio.connect(client.server) as other:
-            await (await other.session("dropped-aio", problem)).append(rows(0, 100))
+            session = await other.session("dropped-aio", problem)
+            for first in range(0, 100, 10):
+                await session.append(rows(first, first + 10), wait=False)
+            del session
             await (await other.session("dropped-aio")).append(rows(100, 200))
             while (await (await other.session("dropped-aio")).info()).has_writer:
                 await asyncio.sleep(0.01)
 
     asyncio.run(run())
-    assert client.session("dropped-aio").append(rows(200, 300)) == 3
+    assert client.session("dropped-aio").append(rows(200, 300)) == 12
 
 
 def test_sessions_are_exported_imported_and_deleted(client, problem, rows, tmp_path):

@@ -178,11 +178,14 @@ def test_an_exception_leaves_the_session_to_the_next_writer(client, problem, row
 
 def test_a_session_that_is_dropped_is_left_to_the_next_writer(client, problem, rows):
     told = []
-    client.session("dropped", problem, on_estimate=told.append).append(rows(0, 100))
-    assert client.session("dropped").append(rows(100, 200)) == 2
+    session = client.session("dropped", problem, on_estimate=told.append)
+    for first in range(0, 100, 10):
+        session.append(rows(first, first + 10), wait=False)
+    del session
+    assert client.session("dropped").append(rows(100, 200)) == 11
     with polyest.connect(client.server) as other:
         wait_for(lambda: not client.session("dropped").info().has_writer)
-        assert other.session("dropped").append(rows(200, 300)) == 3
+        assert other.session("dropped").append(rows(200, 300)) == 12
 
 
 def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem, rows):

@@ -75,7 +75,10 @@ class MeasurementStream:
         This thread takes acknowledgements, too, so that `on_estimate` must not wait for them.
         """
         self.transport = transport
-        self.queue = BatchQueue(session, options, transport.left_writers.pop(session, None))
+        before = transport.left_streams.pop(session, None)
+        self._before: Optional[MeasurementStream] = before
+        writer = before.queue.writer if before is not None else None
+        self.queue: BatchQueue = BatchQueue(session, options, writer)
         self.changed = threading.Condition()
         self.connection: Optional[_Connection] = None
         self.finishing = False
@@ -156,12 +159,21 @@ class MeasurementStream:
                 raise
 
     def leave(self) -> None:
-        """Ends the stream without waiting. The next one of this program takes over from it."""
+        """Ends the stream without waiting.
+
+        The next one of this program takes over from it, once all batches are acknowledged.
+        """
         with self.changed:
             if self.connection is not None and not self.connection.done:
-                self.transport.left_writers[self.queue.session] = self.queue.writer
+                self.transport.left_streams[self.queue.session] = self
                 self.finishing = True
                 self.changed.notify_all()
+
+    def _wait_until_sent(self) -> None:
+        """Waits until all batches of a stream that was left are acknowledged, or it has ended."""
+        with self.changed:
+            while self.connection is not None and not self.connection.done and len(self.queue):
+                self.changed.wait()
 
     def cancel(self) -> None:
         """Ends the stream at once; batches without acknowledgement may be lost."""
@@ -170,7 +182,7 @@ class MeasurementStream:
             connection, self.finishing = self.connection, True
             if connection is not None:
                 # The daemon may hold the connection for a while: the next stream takes over.
-                self.transport.left_writers[self.queue.session] = self.queue.writer
+                self.transport.left_streams[self.queue.session] = self
                 connection.cancel()
                 while not connection.done:
                     self.changed.wait()
@@ -236,6 +248,9 @@ class MeasurementStream:
     def _connect(self, *, again: bool) -> None:
         self.changed.release()
         try:
+            if self._before is not None:
+                self._before._wait_until_sent()
+                self._before = None
             if again:
                 self.transport.wait_until_connected(_READY_S)
             found = self.transport.unary(_methods.GET_SESSION,

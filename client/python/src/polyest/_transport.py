@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterator
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
 
@@ -14,6 +14,9 @@ from polyest._connection import ConnectionOptions, open_channel
 from polyest._methods import Method, Request, Response
 from polyest.errors import FailedPrecondition
 
+if TYPE_CHECKING:
+    from polyest._stream import MeasurementStream
+
 
 class Transport:
     """A channel to one daemon. Any thread may use it."""
@@ -21,8 +24,8 @@ class Transport:
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
         self._closed = False
-        #: The last writers of sessions whose streams were cancelled, by session.
-        self.left_writers: dict[str, str] = {}
+        #: Streams that were left or cancelled, by session: the next one takes over.
+        self.left_streams: dict[str, MeasurementStream] = {}
         self._channel = open_channel(options)
 
     def close(self) -> None:

@@ -74,7 +74,7 @@ class NotFound(PolyestError, LookupError):
 
 
 class AlreadyExists(PolyestError):
-    """The name of the session is taken, or the batch's number belongs to other measurements."""
+    """The name of the session is taken, by one with another problem or window."""
 
     code = "ALREADY_EXISTS"
 
@@ -86,7 +86,7 @@ class FailedPrecondition(PolyestError):
 
 
 class Aborted(PolyestError):
-    """The session has another writer, or the writer went on with another connection."""
+    """Another program writes to the session, or has written the batches whose numbers come next."""
 
     code = "ABORTED"
 

@@ -68,7 +68,10 @@ class MeasurementStream:
     def __init__(self, transport: Transport, session: str, options: StreamOptions,
                  on_estimate: Optional[Callable[[estimate_pb2.Estimate], None]] = None) -> None:
         self.transport = transport
-        self.queue = BatchQueue(session, options, transport.left_writers.pop(session, None))
+        before = transport.left_streams.pop(session, None)
+        self._before: Optional[MeasurementStream] = before
+        writer = before.queue.writer if before is not None else None
+        self.queue: BatchQueue = BatchQueue(session, options, writer)
         self.finishing = False
         #: Whether gRPC has hidden why the daemon ended the last connection.
         self.reason_is_hidden = False
@@ -155,23 +158,29 @@ class MeasurementStream:
                 await self._connect_again(self._failure(connection))
 
     def leave(self) -> None:
-        """Ends the stream without waiting. The next one of this program takes over from it.
+        """Ends the stream without waiting.
 
-        Any thread may call it, since objects may be dropped in any.
+        The next one of this program takes over from it, once all batches are acknowledged. Any
+        thread may call it, since objects may be dropped in any.
         """
         connection = self._connection
         if connection is None or connection.done or self._loop.is_closed():
             return
-        self.transport.left_writers[self.queue.session] = self.queue.writer
+        self.transport.left_streams[self.queue.session] = self
         self.finishing = True
         self._loop.call_soon_threadsafe(lambda: self._loop.create_task(self.notify()))
+
+    async def _wait_until_sent(self) -> None:
+        """Waits until all batches of a stream that was left are acknowledged, or it has ended."""
+        connection = self._connection
+        await self.wait_for(lambda: connection is None or connection.done or not len(self.queue))
 
     async def cancel(self) -> None:
         """Ends the stream at once; batches without acknowledgement may be lost."""
         connection, self.finishing = self._connection, True
         if connection is not None:
             # The daemon may hold the connection for a while: the next stream takes over from it.
-            self.transport.left_writers[self.queue.session] = self.queue.writer
+            self.transport.left_streams[self.queue.session] = self
             connection.cancel()
             await asyncio.gather(connection.reading, connection.writing)
 
@@ -228,6 +237,9 @@ class MeasurementStream:
         raise final
 
     async def _connect(self) -> None:
+        if self._before is not None:
+            await self._before._wait_until_sent()
+            self._before = None
         found = await self.transport.unary(
             _methods.GET_SESSION, session_service_pb2.GetSessionRequest(name=self.queue.session))
         self.queue.connected(found.last_sequence)

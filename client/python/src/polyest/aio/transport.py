@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import grpc
 
@@ -12,6 +12,9 @@ from polyest._connection import ConnectionOptions
 from polyest._methods import Method, Request, Response
 from polyest.errors import FailedPrecondition
 
+if TYPE_CHECKING:
+    from polyest.aio.stream import MeasurementStream
+
 
 class Transport:
     """A channel to one daemon, for the coroutines of one event loop."""
@@ -19,8 +22,8 @@ class Transport:
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
         self._closed = False
-        #: The last writers of sessions whose streams were cancelled, by session.
-        self.left_writers: dict[str, str] = {}
+        #: Streams that were left or cancelled, by session: the next one takes over.
+        self.left_streams: dict[str, MeasurementStream] = {}
         credentials, arguments = options.credentials(), options.channel_arguments()
         if credentials is None:
             self._channel = grpc.aio.insecure_channel(options.server, options=arguments)
