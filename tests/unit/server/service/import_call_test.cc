@@ -9,6 +9,7 @@
 
 #include "server/digest/digest.h"
 #include "server/service/export_call.h"
+#include "server/sessions/session_import.h"
 #include "tests/testing/faulty_journal.h"
 #include "tests/testing/problem_json.h"
 #include "tests/testing/test_folder.h"
@@ -122,19 +123,14 @@ TEST_F(ImportCallTest, RefusesATimeThatNoListCouldShow) {
                                        {-62'135'596'801, 0},
                                        {0, 1'000'000'000},
                                        {0, -1}}) {
-    ServiceContext context = Context();
-    auto* const import = new ImportCall(context, call_, &imported_);
-    std::promise<grpc::Status> finished;
-    Reader reader(*import, [&](const grpc::Status& status) { finished.set_value(status); });
-    v1::SessionRecord head = Head();
-    head.mutable_head()->mutable_create_time()->set_seconds(seconds);
-    head.mutable_head()->mutable_create_time()->set_nanos(nanos);
-    reader.Give(head);
-    const grpc::Status refused = finished.get_future().get();
-    EXPECT_EQ(refused.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-    EXPECT_EQ(refused.error_message().find("record.head.createTime: "), 0u)
-        << refused.error_message();
-    import->OnDone();
+    v1::ImportSessionRequest request;
+    *request.mutable_record() = Head();
+    v1::SessionRecord::Head& head = *request.mutable_record()->mutable_head();
+    head.mutable_create_time()->set_seconds(seconds);
+    head.mutable_create_time()->set_nanos(nanos);
+    const absl::Status refused = SessionImport(*sessions_, "t").Take(request, {});
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(refused.message().find("record.head.createTime: "), 0u) << refused;
   }
 }
 
