@@ -112,9 +112,9 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.own_error, absorbed.log_noise, absorbed.log_variance, absorbed.outliers,
           absorbed.summed_run, absorbed.previous_coefficients, absorbed.previous_error,
           absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
-          absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.largest,
-          absorbed.control_scores, absorbed.control_valid, absorbed.point_log_variance,
-          absorbed.carried_error, absorbed.carried_rate);
+          absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.blocks,
+          absorbed.largest, absorbed.control_scores, absorbed.control_valid,
+          absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate);
 }
 
 template <class Archive>

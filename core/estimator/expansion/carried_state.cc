@@ -71,6 +71,7 @@ class Substitution {
     AbsorbedRows absorbed = old;
     absorbed.own_error = absorbed.carried_error = error;
     absorbed.windows.Substitute(transfer_, shift_);
+    for (ResidualBlocks& blocks : absorbed.blocks) blocks = blocks.Renewed();
     absorbed.previous_coefficients = transfer_ * old.previous_coefficients;
     absorbed.previous_error -= old.previous_coefficients.transpose() * shift_;
     const Eigen::Index points = design.points.rows(), checks = design.check_points.rows();

@@ -90,9 +90,13 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
   const auto same = [](const CorrelationProfile& a, const CorrelationProfile& b) {
     return a.HasSizesOf(b);
   };
+  const auto alike = [](const ResidualBlocks& a, const ResidualBlocks& b) {
+    return a.HasSizesOf(b);
+  };
   return state.sums.size() == fresh.sums.size() &&
          state.windows.Suits(fresh.sums, has_windows ? state.rows : 0) &&
          std::ranges::equal(state.profiles, fresh.profiles, same) &&
+         std::ranges::equal(state.blocks, fresh.blocks, alike) &&
          IsVector(state.discount, channels) && std::ssize(state.outliers) == channels &&
          IsMatrix(state.previous_coefficients, terms, channels) &&
          IsVector(state.previous_error, channels) && IsVector(state.largest, channels) &&

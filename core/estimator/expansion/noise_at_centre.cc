@@ -15,6 +15,7 @@ void RegionalExpansion::Linearize() {
   linearized_gradient_.resize(design_.basis->size(), n);
   slope_.resize(n);
   design_.basis->EvaluateWithGradient(linearized_at_, linearized_phi_, linearized_gradient_);
+  absorbed_.blocks.assign(noise_.channels.size(), ResidualBlocks(n));
   for (size_t c = 0; c < noise_.channels.size(); ++c) {
     const ChannelNoise& noise = noise_.channels[c];
     if (noise.grid.empty()) continue;
@@ -58,6 +59,16 @@ ScoredSample RegionalExpansion::Scored(int channel, const ConstVectorRef& coeffi
   const bool flat = variance <= model.least * model.least;
   const double slope = flat ? 0 : std::copysign(model.relative, y) / std::sqrt(variance);
   return Score(z, y, variance, slope, own_error);
+}
+
+// What filters predict is not linear enough in the parameters of its variance.
+void RegionalExpansion::AddToBlocks(int channel, const ConstVectorRef& coefficients, double z,
+                                    double variance) {
+  if (filters_) return;
+  const double unit = 1 / std::sqrt(variance);
+  slope_.noalias() = unit * (linearized_gradient_.transpose() * coefficients);
+  absorbed_.blocks[static_cast<size_t>(channel)].Add(
+      slope_, unit * (z - coefficients.dot(linearized_phi_)));
 }
 
 // Adds a sample to the channel's likelihood for other time constants, if there is one.

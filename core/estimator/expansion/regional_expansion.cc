@@ -316,6 +316,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
   AddDifference(c, coefficients, error, variance);
   AddToProfile(row, c, coefficients, z, variance);
+  AddToBlocks(c, coefficients, z, variance);
   absorbed_.discount[c] += own_error / variance;
   absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
@@ -360,6 +361,7 @@ void RegionalExpansion::EndRunOfSums() {
   absorbed_.previous_coefficients.setZero();
   absorbed_.previous_error.setZero();
   for (CorrelationProfile& profile : absorbed_.profiles) profile.BeginRun();
+  for (ResidualBlocks& blocks : absorbed_.blocks) blocks.BeginRun();
 }
 
 // Adds u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.

@@ -32,6 +32,7 @@
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
+#include "core/estimator/record/residual_blocks.h"
 #include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/whitening.h"
 #include "core/propagation/filter_bank.h"
@@ -73,6 +74,7 @@ struct AbsorbedRows {
   Matrix previous_coefficients;  // S × m
   Vector previous_error;
   std::vector<CorrelationProfile> profiles;  // per channel; empty unless its correlation is learned
+  std::vector<ResidualBlocks> blocks;  // per channel; since sums were carried over, if they were
   Vector largest;  // per channel: largest |z| of the rows propagated, for relative noise
   // Sums at the check points.
   Matrix check_chi_squared;       // C × m
@@ -183,6 +185,10 @@ class RegionalExpansion {
   // filters or before the first row.
   std::optional<FilteredStates> Filtered() const;
   // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
+  // Of residuals linearized at LinearizedAt(); without any block where filters predict.
+  const ResidualBlocks& Blocks(int channel) const {
+    return absorbed_.blocks[static_cast<size_t>(channel)];
+  }
   const CorrelationProfile& Profile(int channel) const {
     return absorbed_.profiles[static_cast<size_t>(channel)];
   }
@@ -257,6 +263,7 @@ class RegionalExpansion {
   void AbsorbSample(int row, int channel);
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                      double variance);
+  void AddToBlocks(int channel, const ConstVectorRef& coefficients, double z, double variance);
   void AddToProfile(int row, int channel, const ConstVectorRef& coefficients, double z,
                     double variance);
   void Normalize(double noise, double own_error, double lack);

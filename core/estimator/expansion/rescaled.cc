@@ -98,6 +98,8 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
     }
   }
   state.absorbed.propagated = 0;
+  // The residuals are linearized about another point from here on.
+  for (ResidualBlocks& blocks : state.absorbed.blocks) blocks = blocks.Renewed();
   state.noise = noise.ForNewExpansion();
   state.design.element =
       present.design().element.bounds();  // it may have been freed from bounds since

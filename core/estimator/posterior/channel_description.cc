@@ -10,12 +10,15 @@
 
 #include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/noise_learning.h"
+#include "core/estimator/posterior/residual_tests.h"
 #include "core/estimator/problem/settable_quantities.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kDrawsForNoise = 200;
+constexpr int64_t kLeastSums = 8;         // of successive residuals
+constexpr double kAlike = 1.5;            // largest ratio of mean squares that are much the same
 constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
 
 // Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
@@ -31,8 +34,23 @@ double MeanChiSquared(const Cost& cost, const ChannelSums& sums, const Posterior
   return sum / weights;
 }
 
-void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& d,
-                     const PosteriorDraws& posterior, double fitted, int c,
+// Describes the sums of successive residuals, if there are enough and the linearized model, of
+// which they are, has residuals as large as the expansion's own.
+void DescribeSums(const RegionalExpansion& expansion, const Vector& eta, const Vector& d, int c,
+                  ChannelEstimate& channel) {
+  const ResidualBlocks& blocks = expansion.Blocks(c);
+  if (blocks.count() < kLeastSums) return;
+  const ChannelSums& sums = expansion.sums()[static_cast<size_t>(c)];
+  const Vector delta = eta - expansion.LinearizedAt();
+  const double of_all = sums.samples.ChiSquared(d) / static_cast<double>(sums.samples.count());
+  const double ratio = blocks.MeanSquare(delta) / of_all;
+  if (!(ratio > 1 / kAlike && ratio < kAlike)) return;
+  channel.variance_ratio = blocks.VarianceRatio(delta);
+  channel.residual_sums = blocks.count();
+}
+
+void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& eta,
+                     const Vector& d, const PosteriorDraws& posterior, double fitted, int c,
                      ChannelEstimate& channel) {
   const RecordSummary::Channel& summary = request.record->channels()[static_cast<size_t>(c)];
   const ChannelSums& sums = request.expansion->sums()[static_cast<size_t>(c)];
@@ -51,14 +69,14 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
   channel.lag1_correlation =
       std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
+  DescribeSums(*request.expansion, eta, d, c, channel);
   channel.noise_time_constant_s = noise.time_constant_s;
   channel.noise_white_share = noise.white_share;
   channel.outliers = request.expansion->Outliers(c);
-  const double a = std::max(0.0, channel.lag1_correlation);
   channel.effective_samples =
       samples * (noise.time_constant_s > 0
                      ? IndependentShare(request.record->beginning(), c, noise.shape())
-                     : (1 - a) / (1 + a));
+                     : 1 / VarianceOfMeans(channel));
 }
 
 // Returns the uncertain parameter that is the output's noise, if there is one.
@@ -80,7 +98,7 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
     ChannelEstimate channel;
     channel.output = request.problem->problem().measured[static_cast<size_t>(c)].output;
     if (!request.record->channels().empty()) {
-      DescribeChannel(request, cost, d, posterior, fitted, c, channel);
+      DescribeChannel(request, cost, eta, d, posterior, fitted, c, channel);
     }
     const std::map<std::string, double>& fixed = request.problem->problem().fixed;
     if (const auto noise = fixed.find(NoiseName(channel.output)); noise != fixed.end()) {

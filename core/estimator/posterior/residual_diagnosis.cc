@@ -74,6 +74,24 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
   }
 }
 
+// Reports errors that last for many samples, where successive residuals hardly show them.
+void AddSlowCorrelation(const Findings& findings, size_t c, const ChannelEstimate& channel,
+                        std::vector<Diagnostic>& diagnostics) {
+  const bool white =
+      findings.problem->problem().measured[c].noise.correlation == NoiseCorrelation::kWhite;
+  diagnostics.push_back(
+      {white ? DiagnosticCode::kCorrelatedResiduals : DiagnosticCode::kModelMisfit,
+       absl::StrFormat(
+           "output %s: sums of %d successive residuals vary %.2g times as much as those "
+           "of independent ones%s, so that errors last for many samples; %s; %s",
+           channel.output, ResidualBlocks::kLength, channel.variance_ratio,
+           white ? "" : " even after the noise's own correlation is taken out",
+           WideningText(findings),
+           white ? "let the noise have a correlation ({\"auto\": true}), or improve the "
+                   "model"
+                 : "model or noise is wrong")});
+}
+
 // Reports residuals that are correlated in time, if the noise is assumed white or differently
 // correlated.
 void AddCorrelation(const Findings& findings, const Estimate& estimate,
@@ -82,7 +100,10 @@ void AddCorrelation(const Findings& findings, const Estimate& estimate,
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     const ChannelEstimate& channel = estimate.channels[c];
     const double correlation = channel.lag1_correlation;
-    if (!AreCorrelated(channel, findings.record->channels()[c].Runs())) continue;
+    if (!AreCorrelated(channel, findings.record->channels()[c].Runs())) {
+      if (AreSlowlyCorrelated(channel)) AddSlowCorrelation(findings, c, channel, diagnostics);
+      continue;
+    }
     const NoiseModel& noise = findings.problem->problem().measured[c].noise;
     if (noise.correlation != NoiseCorrelation::kWhite) {
       diagnostics.push_back(

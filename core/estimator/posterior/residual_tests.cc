@@ -12,6 +12,7 @@ constexpr double kExcessRatioWithOutliers = 1.5;
 constexpr double kExcessRatioWithTails = 2;
 constexpr double kCorrelationDeviations = 4;
 constexpr double kCorrelated = 0.05;
+constexpr double kSlowlyCorrelated = 1.5;
 constexpr int64_t kMinForCorrelation = 20;
 constexpr double kMaxLag1Correlation = 0.99;
 
@@ -34,11 +35,24 @@ bool AreCorrelated(const ChannelEstimate& channel, int64_t runs) {
   return std::abs(channel.lag1_correlation) > by_chance;
 }
 
+bool AreSlowlyCorrelated(const ChannelEstimate& channel) {
+  if (channel.variance_ratio < kSlowlyCorrelated) return false;
+  // χ²/B as a normal deviate, by Wilson and Hilferty (1931).
+  const double variance = 2.0 / (9 * static_cast<double>(channel.residual_sums));
+  const double deviate = (std::cbrt(channel.variance_ratio) - (1 - variance)) / std::sqrt(variance);
+  return deviate > kCorrelationDeviations;
+}
+
+double VarianceOfMeans(const ChannelEstimate& channel) {
+  const double r = std::clamp(channel.lag1_correlation, 0.0, kMaxLag1Correlation);
+  const double ratio = (1 + r) / (1 - r);
+  return AreSlowlyCorrelated(channel) ? std::max(ratio, channel.variance_ratio) : ratio;
+}
+
 double Dispersion(const ChannelEstimate& channel, bool noise_known) {
   if (channel.samples == 0) return 1;
-  const double r = std::clamp(channel.lag1_correlation, 0.0, kMaxLag1Correlation);
   const double ratio = noise_known ? channel.chi_squared / static_cast<double>(channel.samples) : 1;
-  return std::max(1.0, std::max(1.0, ratio) * (1 + r) / (1 - r));
+  return std::max(1.0, ratio) * VarianceOfMeans(channel);
 }
 
 }  // namespace polyest::internal

@@ -20,9 +20,18 @@ bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers, bool
 // by a twentieth. `runs` is the number of runs with samples; each contributes 1/2N by chance.
 bool AreCorrelated(const ChannelEstimate& channel, int64_t runs);
 
+// Returns whether residuals are correlated over many samples, also where successive ones hardly
+// are: the variance ratio of independent ones (record/residual_blocks.h) is χ²/B over B sums. It
+// must be as improbable as four standard deviations of a normal variable, and 1.5.
+bool AreSlowlyCorrelated(const ChannelEstimate& channel);
+
+// Returns the variance of a mean of residuals relative to that of as many independent ones, at
+// least 1: (1 + r)/(1 − r), with r the lag-1 correlation if it is positive, or the variance ratio
+// if they are slowly correlated and it is larger.
+double VarianceOfMeans(const ChannelEstimate& channel);
+
 // Returns the variance of a mean of residuals relative to that of as many independent samples of
-// the noise assumed, at least 1: χ²/N (if the noise was known) times (1 + r)/(1 − r), with r the
-// lag-1 correlation if it is positive.
+// the noise assumed, at least 1: χ²/N (if the noise was known) times VarianceOfMeans.
 double Dispersion(const ChannelEstimate& channel, bool noise_known);
 
 }  // namespace polyest::internal

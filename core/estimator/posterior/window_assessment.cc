@@ -16,12 +16,10 @@ const NoiseModel& NoiseOf(const ResolvedProblem& problem, size_t channel) {
   return problem.problem().measured[channel].noise;
 }
 
-// Whether the residuals, for all their correlation, are still smaller than the noise: χ²/N times
-// the ratio of samples to independent ones.
+// Whether the residuals, for all their correlation, are still smaller than the noise.
 bool AreSmall(const ChannelEstimate& channel, const NoiseModel& noise) {
-  const double r = std::clamp(channel.lag1_correlation, 0.0, 1.0);
   return !noise.unknown &&
-         channel.chi_squared * (1 + r) < static_cast<double>(channel.samples) * (1 - r);
+         channel.chi_squared * VarianceOfMeans(channel) < static_cast<double>(channel.samples);
 }
 
 // Returns whether the residuals of any channel are larger than the noise, or correlated.
@@ -32,10 +30,10 @@ bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& re
     if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers, problem.uses_filters())) {
       return true;
     }
-    if (c < record.channels().size() && AreCorrelated(channels[c], record.channels()[c].Runs()) &&
-        !AreSmall(channels[c], noise)) {
-      return true;
-    }
+    if (c >= record.channels().size()) continue;
+    const bool correlated =
+        AreCorrelated(channels[c], record.channels()[c].Runs()) || AreSlowlyCorrelated(channels[c]);
+    if (correlated && !AreSmall(channels[c], noise)) return true;
   }
   return false;
 }

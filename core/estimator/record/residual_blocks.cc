@@ -1,0 +1,61 @@
+#include "core/estimator/record/residual_blocks.h"
+
+namespace polyest::internal {
+namespace {
+
+// Returns the sum of squares at δ: the quadratic form of (−δ, 1).
+double SquareAt(const Matrix& gram, const ConstVectorRef& delta) {
+  Vector at(delta.size() + 1);
+  at << -delta, 1;
+  return at.dot(gram * at);
+}
+
+bool IsSquare(const Matrix& matrix, Eigen::Index size) {
+  return matrix.rows() == size && matrix.cols() == size && matrix.allFinite();
+}
+
+}  // namespace
+
+ResidualBlocks::ResidualBlocks(Eigen::Index unknowns)
+    : sum_(Vector::Zero(unknowns + 1)),
+      block_(Matrix::Zero(unknowns + 1, unknowns + 1)),
+      samples_(block_),
+      sums_(block_) {}
+
+void ResidualBlocks::BeginRun() {
+  in_block_ = 0;
+  sum_.setZero();
+  block_.setZero();
+}
+
+void ResidualBlocks::Add(const ConstVectorRef& gradient, double residual) {
+  const Eigen::Index n = gradient.size();
+  sum_.head(n) += gradient;
+  sum_[n] += residual;
+  block_.topLeftCorner(n, n).noalias() += gradient * gradient.transpose();
+  block_.col(n).head(n) += residual * gradient;
+  block_.row(n).head(n) += residual * gradient.transpose();
+  block_(n, n) += residual * residual;
+  if (++in_block_ < kLength) return;
+  samples_ += block_;
+  sums_.noalias() += sum_ * sum_.transpose();
+  ++count_;
+  BeginRun();
+}
+
+double ResidualBlocks::VarianceRatio(const ConstVectorRef& delta) const {
+  return SquareAt(sums_, delta) / SquareAt(samples_, delta);
+}
+
+double ResidualBlocks::MeanSquare(const ConstVectorRef& delta) const {
+  return SquareAt(samples_, delta) / static_cast<double>(kLength * count_);
+}
+
+bool ResidualBlocks::HasSizesOf(const ResidualBlocks& other) const {
+  const Eigen::Index size = other.sum_.size();
+  return count_ >= 0 && in_block_ >= 0 && in_block_ < kLength && sum_.size() == size &&
+         sum_.allFinite() && IsSquare(block_, size) && IsSquare(samples_, size) &&
+         IsSquare(sums_, size);
+}
+
+}  // namespace polyest::internal
