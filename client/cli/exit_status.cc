@@ -33,13 +33,13 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
       return kExitBadInput;
     case absl::StatusCode::kResourceExhausted:
       return server.empty() ? kExitBadInput : kExitServer;
-    case absl::StatusCode::kUnavailable:
     case absl::StatusCode::kAborted:
     case absl::StatusCode::kDataLoss:
     case absl::StatusCode::kUnimplemented:
     case absl::StatusCode::kPermissionDenied:
     case absl::StatusCode::kUnauthenticated:
       return kExitServer;
+    case absl::StatusCode::kUnavailable:
     case absl::StatusCode::kDeadlineExceeded:
       return server.empty() ? kExitFailure : kExitServer;
     default:

@@ -19,7 +19,7 @@ enum ExitStatus : int {
 };
 
 // Returns the exit status for an error. `server` is empty for a local computation, for which an
-// exceeded limit is bad input.
+// exceeded limit is bad input, and a model that cannot be asked for now is no fault of a server.
 ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 
 // Prints an error in one line and returns its exit status. `status` must not be OK.

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "core/bayes/domain_cover.h"
 #include "core/chaos/collocation_points.h"
-#include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/population_of_runs.h"
@@ -101,12 +99,12 @@ Region Elimination::JointRegion(const RunPath& path) const {
 LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
   LearnedNoise noise = noise_;
   noise.misfit = noise.misfit_of_weights = 1;
-  for (size_t c = 0; c < noise.channels.size(); ++c) {
-    const auto channel = static_cast<Eigen::Index>(c);
-    noise.channels[c].scale = ended_.noise_scale[channel];
-    noise.channels[c].time_constant_s = ended_.noise_time_constant_s[channel];
-    noise.channels[c].white_share = ended_.noise_white_share[channel];
-    noise.channels[c].grid = {};
+  for (Eigen::Index c = 0; c < ended_.noise_scale.size(); ++c) {
+    ChannelNoise& channel = noise.channels[static_cast<size_t>(c)];
+    channel.scale = ended_.noise_scale[c];
+    channel.time_constant_s = ended_.noise_time_constant_s[c];
+    channel.white_share = ended_.noise_white_share[c];
+    channel.grid = {};
   }
   noise.centre = centre;
   if (noise.posterior.centre.size() == 0) return noise;

@@ -106,8 +106,7 @@ absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const St
   return known < count ? read(known) : absl::OkStatus();
 }
 
-// Replays the record so far with the parameters of the new run, which are as uncertain as their
-// prior.
+// Replays the record so far with the parameters of the new run, as uncertain as their prior.
 absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   if (run >= problem_.max_joint_runs()) return BeginRunAlone(run, stop);
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
@@ -184,7 +183,6 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   }
   if (must_divide()) return true;
   bool settled = false;
-  const int64_t row = taken_;
   if (WindowEnds()) {
     POLYEST_ASSIGN_OR_RETURN(settled, SettleAfterWindow(stop));
   } else if (LooksAtEdges()) {
@@ -192,7 +190,7 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   } else if (LooksAhead()) {
     POLYEST_ASSIGN_OR_RETURN(settled, SettleAhead(stop));
   }
-  ahead_row_ = std::max(ahead_row_, row + 1);  // a row is looked at once, in one of these ways
+  ahead_row_ = std::max(ahead_row_, taken_ + 1);  // a row is looked at once, in one of these ways
   return moved || settled;
 }
 

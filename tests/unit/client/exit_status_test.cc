@@ -17,6 +17,7 @@ TEST(ExitStatusOf, TellsBadInputFromARefusal) {
   EXPECT_EQ(ExitStatusOf(absl::NotFoundError(""), kServer), 2);
   EXPECT_EQ(ExitStatusOf(absl::AlreadyExistsError(""), kServer), 2);
   EXPECT_EQ(ExitStatusOf(absl::UnavailableError(""), kServer), 3);
+  EXPECT_EQ(ExitStatusOf(absl::UnavailableError(""), ""), 1);  // a model cannot be asked
   EXPECT_EQ(ExitStatusOf(absl::AbortedError(""), kServer), 3);
   EXPECT_EQ(ExitStatusOf(absl::DeadlineExceededError(""), kServer), 3);
   EXPECT_EQ(ExitStatusOf(absl::DeadlineExceededError(""), ""), 1);

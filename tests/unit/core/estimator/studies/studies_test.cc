@@ -299,36 +299,6 @@ TEST(CostGrid, TakesStreamedInputsFromTheSamples) {
   EXPECT_NEAR(grid.mismatch(2, 0), 0.5 * (1 + 4) / 0.25, 1e-6);
 }
 
-TEST(CostGrid, TakesStreamedInputsThatLackSamples) {
-  Problem problem = RampProblem();
-  problem.inputs = {{"u", StreamedInput{}}};
-  Samples samples;
-  samples.time_s = {0, 0.7, 1, 2};
-  samples.columns = {{"u", {0, 99, 2, 4}, {false, true, false, false}},
-                     {"x", {0, 99, 3, 8}, {false, true, false, false}}};
-  CostGridOptions options;
-  options.points = 3;
-  const CostGrid grid = EvaluateCostGrid(Resolve(problem), samples, options, {}).value();
-  EXPECT_NEAR(grid.mismatch(1, 0), 0, 1e-8);
-  EXPECT_NEAR(grid.mismatch(2, 0), 0.5 * (1 + 4) / 0.25, 1e-6);
-}
-
-// An input that is early is not known for the last samples, which are left out as in an estimate.
-TEST(CostGrid, LeavesOutSamplesWhoseInputsAreNotKnown) {
-  Problem problem = RampProblem();
-  problem.inputs = {{"u", StreamedInput{}}};
-  problem.fixed["u.delay"] = -0.5;
-  Samples samples;
-  samples.time_s = {0, 1, 2};
-  // u(t + 0.5) = 2t + 1 gives x = (a + 1) t + t²; the last sample, 99, is after t = 1.5.
-  samples.columns = {{"u", {0, 2, 4}, {}}, {"x", {0, 4, 99}, {}}};
-  CostGridOptions options;
-  options.points = 3;
-  const CostGrid grid = EvaluateCostGrid(Resolve(problem), samples, options, {}).value();
-  EXPECT_NEAR(grid.mismatch(1, 0), 0, 1e-8);
-  EXPECT_NEAR(grid.mismatch(2, 0), 0.5 / 0.25, 1e-6);
-}
-
 TEST(CostGrid, OverTwoParametersHasTheFirstDownTheRows) {
   Problem problem = RampProblem();
   problem.uncertain = {UncertainParameter::Uniform("a", 1, 3).value(),
