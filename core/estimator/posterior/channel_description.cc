@@ -35,11 +35,14 @@ double MeanChiSquared(const Cost& cost, const ChannelSums& sums, const Posterior
 }
 
 // Describes the sums of successive residuals, if there are enough and the linearized model, of
-// which they are, has residuals as large as the expansion's own.
-void DescribeSums(const RegionalExpansion& expansion, const Vector& eta, const Vector& d, int c,
+// which they are, has residuals as large as the expansion's own. Outliers, weighed less one by one,
+// leave whitened residuals that do not cancel.
+void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vector& d, int c,
                   ChannelEstimate& channel) {
+  const RegionalExpansion& expansion = *request.expansion;
+  const NoiseModel& model = request.problem->problem().measured[static_cast<size_t>(c)].noise;
   const ResidualBlocks& blocks = expansion.Blocks(c);
-  if (blocks.count() < kLeastSums) return;
+  if (blocks.count() < kLeastSums || model.outliers != OutlierHandling::kNone) return;
   const ChannelSums& sums = expansion.sums()[static_cast<size_t>(c)];
   const Vector delta = eta - expansion.LinearizedAt();
   const double of_all = sums.samples.ChiSquared(d) / static_cast<double>(sums.samples.count());
@@ -69,7 +72,7 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
   channel.lag1_correlation =
       std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
-  DescribeSums(*request.expansion, eta, d, c, channel);
+  DescribeSums(request, eta, d, c, channel);
   channel.noise_time_constant_s = noise.time_constant_s;
   channel.noise_white_share = noise.white_share;
   channel.outliers = request.expansion->Outliers(c);

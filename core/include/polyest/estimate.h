@@ -120,10 +120,10 @@ struct ChannelEstimate {
   double effective_samples = 0;  // number of independent samples that would tell as much
   double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
   int64_t outliers = 0;              // number of samples with less than half their weight
-  // Variance of sums of 16 successive residuals ÷ that of as many independent ones, and over how
-  // many such sums: about 1 if model and noise are right; 0 and 0 if it is not known.
+  // Variance of sums of 16 successive residuals ÷ that of as many independent ones: about 1 if
+  // model and noise are right; 0 if it is not known, as where outliers are handled.
   double variance_ratio = 0;
-  int64_t residual_sums = 0;
+  int64_t residual_sums = 0;  // number of such sums
   // Share of the noise's variance that is uncorrelated where the rest is correlated over
   // noise_time_constant_s, 0 ≤ … < 1; 0 for white noise, too.
   double noise_white_share = 0;
