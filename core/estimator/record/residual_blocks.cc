@@ -48,7 +48,7 @@ double ResidualBlocks::VarianceRatio(const ConstVectorRef& delta) const {
 }
 
 double ResidualBlocks::MeanSquare(const ConstVectorRef& delta) const {
-  return SquareAt(samples_, delta) / static_cast<double>(kLength * count_);
+  return SquareAt(samples_, delta) / (kLength * static_cast<double>(count_));
 }
 
 bool ResidualBlocks::HasSizesOf(const ResidualBlocks& other) const {

@@ -74,17 +74,19 @@ void SignalFaults::AddExtreme(bool is_plateau) {
 }
 
 RecurringValue SignalFaults::Dropouts() const {
-  return 2 * candidate_.count > excursions_ ? candidate_ : RecurringValue();
+  return candidate_.count > excursions_ - candidate_.count ? candidate_ : RecurringValue();
 }
 
 RecurringValue SignalFaults::OfExtremes(const RecurringValue& extreme) const {
-  return 2 * (upper_.count + lower_.count) >= plateaus_ ? extreme : RecurringValue();
+  const auto at_extremes = static_cast<double>(upper_.count) + static_cast<double>(lower_.count);
+  return 2 * at_extremes >= static_cast<double>(plateaus_) ? extreme : RecurringValue();
 }
 
 bool SignalFaults::IsConsistent() const {
   return samples_ >= 0 && length_ >= 0 && excursions_ >= 0 && votes_ >= 0 &&
          candidate_.count >= 0 && candidate_.count <= excursions_ && plateaus_ >= 0 &&
-         upper_.count >= 0 && lower_.count >= 0 && smallest_step_ > 0 && steps_.IsConsistent();
+         upper_.count >= 0 && upper_.count <= plateaus_ && lower_.count >= 0 &&
+         lower_.count <= plateaus_ && smallest_step_ > 0 && steps_.IsConsistent();
 }
 
 }  // namespace polyest::internal
