@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/bayes/chi_squared.h"
 #include "core/common/linear_algebra.h"
 
 namespace polyest::internal {
@@ -31,13 +32,6 @@ Vector Without(const Vector& vector, Eigen::Index i) {
   Vector rest(vector.size() - 1);
   rest << vector.head(i), vector.tail(vector.size() - 1 - i);
   return rest;
-}
-
-// Returns the normal deviate of a χ² variable (E. Wilson and M. Hilferty, "The distribution of
-// chi-square", Proc. National Academy of Sciences 17 (1931)).
-double NormalDeviate(double chi_squared, double degrees) {
-  const double variance = 2 / (9 * degrees);
-  return (std::cbrt(chi_squared / degrees) - (1 - variance)) / std::sqrt(variance);
 }
 
 // The fall of the cost when parameter i may change from window to window.
@@ -101,7 +95,7 @@ Test TestParameter(const std::vector<WindowScore>& windows, Eigen::Index i, cons
   const double t = (changing.fall - constant.fall) / dispersion;
   if (constant.fall < 0 || changing.fall < 0 || !(t > 0) || !std::isfinite(t)) return {};
   Test test;
-  test.deviate = NormalDeviate(t, static_cast<double>(informed.size() - 1));
+  test.deviate = NormalDeviateOfChiSquared(t, static_cast<double>(informed.size() - 1));
   for (size_t w = 0; w < informed.size(); ++w) {
     test.changes.push_back({informed[w].span, changing.changes[w],
                             std::sqrt(dispersion / informed[w].information(i, i))});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/bayes/chi_squared.h"
 #include "core/bayes/weighted_samples.h"
 
 namespace polyest::internal {
@@ -14,13 +15,6 @@ constexpr double kLeastInformed = 0.1;
 // Returns log ρ at its maximum − log ρ(x), the logarithms of the germ's density.
 double BelowMaximum(const Germ& germ, double x) {
   return germ.LogDensity(germ.Mode()) - germ.LogDensity(x);
-}
-
-// Returns the standard normal score of χ² with so many degrees of freedom, by Wilson and Hilferty
-// (1931).
-double NormalScoreOfChiSquared(double chi_squared, int degrees) {
-  const double variance = 2.0 / (9 * degrees);
-  return (std::cbrt(chi_squared / degrees) - (1 - variance)) / std::sqrt(variance);
 }
 
 }  // namespace
@@ -46,7 +40,7 @@ PriorConflict FindPriorConflict(const ResolvedProblem& problem, const PosteriorD
     sum += BelowMaximum(prior.germs()[static_cast<size_t>(i)],
                         WeightedMean(xis.col(i), posterior.weights));
   }
-  found.of_all = NormalScoreOfChiSquared(2 * regularization * sum, prior.dimension());
+  found.of_all = NormalDeviateOfChiSquared(2 * regularization * sum, prior.dimension());
   return found;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/bayes/chi_squared.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -37,10 +39,8 @@ bool AreCorrelated(const ChannelEstimate& channel, int64_t runs) {
 
 bool AreSlowlyCorrelated(const ChannelEstimate& channel) {
   if (channel.variance_ratio < kSlowlyCorrelated) return false;
-  // χ²/B as a normal deviate, by Wilson and Hilferty (1931).
-  const double variance = 2.0 / (9 * static_cast<double>(channel.residual_sums));
-  const double deviate = (std::cbrt(channel.variance_ratio) - (1 - variance)) / std::sqrt(variance);
-  return deviate > kCorrelationDeviations;
+  const auto sums = static_cast<double>(channel.residual_sums);
+  return NormalDeviateOfChiSquared(channel.variance_ratio * sums, sums) > kCorrelationDeviations;
 }
 
 double VarianceOfMeans(const ChannelEstimate& channel) {
