@@ -117,10 +117,11 @@ void AddPriorConflict(const Findings& findings, const Estimate& estimate,
     any = true;
     diagnostics.push_back(
         {DiagnosticCode::kPriorDataConflict,
-         absl::StrFormat("what the data say of %s and what its prior says are %.3g standard "
-                         "deviations of both together apart; check its unit, its prior, and what "
-                         "is wrong in the model that %s may make up for",
-                         findings.NameOf(i), conflict, findings.NameOf(i))});
+         absl::StrFormat(
+             "the data and the prior of %s differ by %.3g combined standard deviations; "
+             "check its unit and its prior, and whether %s makes up for something that "
+             "is wrong in the model",
+             findings.NameOf(i), conflict, findings.NameOf(i))});
   }
   if (any || !(findings.conflict.of_all > kConflict)) return;
   diagnostics.push_back(

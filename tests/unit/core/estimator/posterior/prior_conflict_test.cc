@@ -42,8 +42,8 @@ UncertainParameter StandardNormal() { return UncertainParameter::Normal("a", 0, 
 TEST(PriorConflict, IsTheDistanceOfDataAndPrior) {
   const Problem problem = TextProblem("a + 0*t", {StandardNormal()}, 1);
   EXPECT_THAT(Conflicts(problem, About(5.5)),
-              ElementsAre(AllOf(HasSubstr("say of a"), HasSubstr(" are 5.24 standard"))));
-  EXPECT_THAT(Conflicts(problem, About(-4.5)), ElementsAre(HasSubstr(" are 4.29 standard")));
+              ElementsAre(AllOf(HasSubstr("prior of a differ"), HasSubstr(" by 5.24 combined"))));
+  EXPECT_THAT(Conflicts(problem, About(-4.5)), ElementsAre(HasSubstr(" by 4.29 combined")));
   EXPECT_THAT(Conflicts(problem, About(3.9)), IsEmpty());  // 3.72
 }
 
@@ -53,7 +53,7 @@ TEST(PriorConflict, IsMeasuredInLogarithmsOfALognormalParameter) {
   const double deviation = mean * std::sqrt(std::expm1(0.01));
   const Problem problem = TextProblem(
       "100*log(a) + 0*t", {UncertainParameter::Lognormal("a", mean, deviation).value()}, 1);
-  EXPECT_THAT(Conflicts(problem, About(55)), ElementsAre(HasSubstr(" are 5.5 standard")));
+  EXPECT_THAT(Conflicts(problem, About(55)), ElementsAre(HasSubstr(" by 5.5 combined")));
   EXPECT_THAT(Conflicts(problem, About(35)), IsEmpty());
 }
 
