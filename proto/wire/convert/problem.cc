@@ -332,6 +332,7 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
   problem.integration = ValueOr(ToIntegration(given.integration()), {}, refusals);
   problem.use_when = given.use_when();
   problem.tolerance_follows_noise = !given.integration().has_relative_tolerance();
+  for (absl::Status& refusal : CheckNamesOfRuns(given)) refusals.push_back(std::move(refusal));
   for (absl::Status& refusal : CheckColumns(given, problem.model.get())) {
     refusals.push_back(std::move(refusal));
   }

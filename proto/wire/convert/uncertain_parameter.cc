@@ -1,9 +1,15 @@
 #include "proto/wire/convert/uncertain_parameter.h"
 
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/string_view.h>
+#include <absl/strings/strip.h>
 
 #include <limits>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "core/common/field_error.h"
 
@@ -19,6 +25,18 @@ absl::StatusOr<UncertainParameter> ToTruncatedNormal(
   return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
                                              prior.has_lower() ? prior.lower() : -kInfinity,
                                              prior.has_upper() ? prior.upper() : kInfinity);
+}
+
+// Returns the run of which `name` is the name of `parameter`, as 2 of x_0[2] and x_0; nothing if it
+// is none.
+std::optional<int> RunOfName(absl::string_view name, absl::string_view parameter) {
+  int run = 0;
+  if (!absl::ConsumePrefix(&name, parameter) || !absl::ConsumePrefix(&name, "[") ||
+      !absl::ConsumeSuffix(&name, "]") || !absl::SimpleAtoi(name, &run) || run < 0) {
+    return std::nullopt;
+  }
+  // Other ways to write the number, such as 02, are no name of a run.
+  return absl::StrCat(run) == name ? std::optional(run) : std::nullopt;
 }
 
 }  // namespace
@@ -67,6 +85,25 @@ absl::StatusOr<std::optional<RandomWalk>> ToDrift(const v1::UncertainParameter& 
                     .unknown = walk.unknown(),
                     .lower = walk.lower(),
                     .upper = walk.upper()};
+}
+
+std::vector<absl::Status> CheckNamesOfRuns(const v1::Problem& problem) {
+  std::vector<absl::Status> refusals;
+  for (int i = 0; i < problem.uncertain_size(); ++i) {
+    // Two parameters of each run with different names never share one in a run.
+    if (problem.uncertain(i).per_run()) continue;
+    const std::string& name = problem.uncertain(i).name();
+    for (const v1::UncertainParameter& other : problem.uncertain()) {
+      const auto run = RunOfName(name, other.name());
+      if (!other.per_run() || !run) continue;
+      refusals.push_back(InvalidField(
+          {"uncertain", i},
+          absl::StrFormat("%s is also the name of %s in run %d; one of them must be fixed, or %s "
+                          "must do without perRun",
+                          name, other.name(), *run, other.name())));
+    }
+  }
+  return refusals;
 }
 
 }  // namespace polyest::internal

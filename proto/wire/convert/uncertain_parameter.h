@@ -2,9 +2,11 @@
 
 // Converts what a problem says of an uncertain parameter.
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <optional>
+#include <vector>
 
 #include "polyest/uncertain_parameter.h"
 #include "polyest/v1/problem.pb.h"
@@ -17,5 +19,9 @@ absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& paramet
 // Returns how the parameter changes with time; nothing if it does not. Returns INVALID_ARGUMENT for
 // a drift of no kind.
 absl::StatusOr<std::optional<RandomWalk>> ToDrift(const v1::UncertainParameter& parameter);
+
+// Returns an error for each uncertain parameter whose name is also that of another one in a run:
+// "k[1]" beside "k" with perRun, whose values are called k[0], k[1], … in an estimate.
+std::vector<absl::Status> CheckNamesOfRuns(const v1::Problem& problem);
 
 }  // namespace polyest::internal

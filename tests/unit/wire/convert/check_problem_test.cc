@@ -10,6 +10,7 @@
 namespace polyest::internal {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -88,6 +89,18 @@ TEST(CheckProblem, NamesEveryEquationThatIsWrong) {
   EXPECT_THAT(Messages(problem),
               ElementsAre(StartsWith("model.equations."), StartsWith("model.equations."),
                           StartsWith("uncertain[0].uniform: ")));
+}
+
+TEST(CheckProblem, RefusesANameThatAnotherParameterHasInARun) {
+  v1::Problem problem = ProblemFromJson(R"({
+    "uncertain": [{"name": "k", "perRun": true}, {"name": "k[12]"}, {"name": "k[01]"},
+                  {"name": "k[x]"}, {"name": "c[1]"}, {"name": "c"},
+                  {"name": "k[0]", "perRun": true}]})");
+  for (auto& parameter : *problem.mutable_uncertain()) parameter.mutable_uniform()->set_upper(1);
+  EXPECT_THAT(Messages(problem),
+              Contains("uncertain[1]: k[12] is also the name of k in run 12; one "
+                       "of them must be fixed, or k must do without perRun"));
+  EXPECT_THAT(Messages(problem), Contains(HasSubstr("also the name")).Times(1));
 }
 
 TEST(CheckProblem, TellsOfProcessNoise) {
