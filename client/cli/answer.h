@@ -3,8 +3,10 @@
 // The end of a command: the answer in the format asked for, or the error, and the exit status.
 
 #include <absl/status/statusor.h>
+#include <google/protobuf/message.h>
 
 #include <ostream>
+#include <string>
 #include <type_traits>
 
 #include "client/cli/arguments.h"
@@ -27,6 +29,16 @@ absl::StatusOr<Answer> Plotted(Answer answer,
   return answer;
 }
 
+// Prints an answer as JSON in several lines, or reports that it has a field without a form there.
+// Returns the exit status.
+inline int PrintJson(const google::protobuf::Message& answer, const std::string& server,
+                     std::ostream& out, std::ostream& err) {
+  const absl::StatusOr<std::string> json = TryToJson(answer, /*several_lines=*/true);
+  if (!json.ok()) return Report(json.status(), server, err);
+  out << *json << '\n';
+  return kExitOk;
+}
+
 // Prints the answer as a table, as CSV or as JSON, as `arguments` say, or reports why there is
 // none. Returns the exit status. A printer is null for a command whose options do not offer its
 // format.
@@ -41,7 +53,7 @@ int PrintAnswer(const absl::StatusOr<Answer>& answer, const Arguments& arguments
   } else if (arguments.format == Format::kCsv && print_csv != nullptr) {
     print_csv(*answer, out);
   } else {
-    out << ToJson(*answer, /*several_lines=*/true) << '\n';
+    return PrintJson(*answer, arguments.place.server, out, err);
   }
   return kExitOk;
 }

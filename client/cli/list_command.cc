@@ -1,10 +1,10 @@
 // Runs `polyest list`, which prints the sessions of a daemon.
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/session_list.h"
-#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 
@@ -13,10 +13,9 @@ int RunCommand(const ListArguments& arguments, std::ostream& out, std::ostream& 
   const auto list = ListAllSessions(client);
   if (!list.ok()) return Report(list.status(), arguments.place.server, err);
   if (arguments.format == Format::kJson) {
-    out << ToJson(*list, /*several_lines=*/true) << '\n';
-  } else {
-    PrintSessions(*list, out);
+    return PrintJson(*list, arguments.place.server, out, err);
   }
+  PrintSessions(*list, out);
   return kExitOk;
 }
 

@@ -5,12 +5,12 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/strip.h>
 
+#include "client/cli/answer.h"
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
-#include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
 namespace {
@@ -78,10 +78,9 @@ int RunCommand(const NodesArguments& arguments, std::ostream& out, std::ostream&
     *list.add_nodes() = *std::move(*drained).mutable_node();
   }
   if (arguments.format == Format::kJson) {
-    out << ToJson(list, /*several_lines=*/true) << '\n';
-  } else {
-    PrintNodes(list, out);
+    return PrintJson(list, arguments.place.server, out, err);
   }
+  PrintNodes(list, out);
   return kExitOk;
 }
 

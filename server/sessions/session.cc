@@ -13,6 +13,7 @@
 #include "proto/wire/refusal/refusal.h"
 #include "server/digest/digest.h"
 #include "server/execution/guarded.h"
+#include "server/sessions/create_time.h"
 #include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/structured_log.h"
@@ -59,7 +60,7 @@ Session::~Session() {
 v1::Session Session::Describe() const {
   v1::Session session;
   session.set_name(name());
-  *session.mutable_create_time() = head_.create_time;
+  *session.mutable_create_time() = NearestWithJsonForm(head_.create_time);
   session.set_reorder_window_s(head_.reorder_window_s);
   const SessionPlace place = ledger_.kept();
   session.set_last_sequence(place.sequence);

@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <google/protobuf/util/time_util.h>
 
 #include <future>
 #include <utility>
@@ -10,6 +9,7 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/sessions/create_time.h"
 #include "server/sessions/estimate_history.h"
 #include "server/sessions/row_limits.h"
 
@@ -19,14 +19,6 @@ namespace {
 // Estimates at a thousand a second for 30,000 years.
 constexpr int64_t kMaxOrdinal = int64_t{1} << 50;
 constexpr size_t kMaxPastEstimateBytes = size_t{1} << 16;
-
-// Whether the time has a form in JSON.
-bool IsValid(const google::protobuf::Timestamp& time) {
-  using google::protobuf::util::TimeUtil;
-  return time.seconds() >= TimeUtil::kTimestampMinSeconds &&
-         time.seconds() <= TimeUtil::kTimestampMaxSeconds && time.nanos() >= 0 &&
-         time.nanos() < 1'000'000'000;
-}
 
 }  // namespace
 
@@ -75,7 +67,7 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
       CheckReorderWindow({"record", "head", "reorderWindowS"}, head.reorder_window_s()));
   head_.reorder_window_s = head.reorder_window_s();
   POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
-  if (!IsValid(head.create_time())) {
+  if (!HasJsonForm(head.create_time())) {
     return InvalidField("record.head.createTime",
                         absl::StrFormat("%d s and %d ns must lie in the years 1 to 9999, with 0 to "
                                         "999999999 ns",

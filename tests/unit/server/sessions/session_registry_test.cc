@@ -280,6 +280,17 @@ TEST_F(SessionRegistryTest, FindsWhatTheJournalHas) {
   EXPECT_FALSE(again.activity().loaded());
 }
 
+TEST_F(SessionRegistryTest, ShowsATimeThatJsonDoesNotAllowAsTheNearestThatItDoes) {
+  SessionHead head;
+  head.tenant = "t";
+  head.name = "sessions/a";
+  head.create_time.set_seconds(1'000'000'000'000'000);
+  ASSERT_TRUE(journal_.Create(head, SmallProblem(), /*hidden=*/false).ok());
+  Open();
+  const auto session = *registry_->Get("t", "sessions/a");
+  EXPECT_EQ(session->Describe().create_time().seconds(), 253'402'300'799);
+}
+
 TEST_F(SessionRegistryTest, HoldsNoMoreRowsThanATenantMayHaveAlsoAfterARestart) {
   limits_.rows_per_tenant = 3;
   Open();
