@@ -1,13 +1,16 @@
 #include "client/cli/session_file.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/util/delimited_message_util.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "client/cpp/file_kind.h"
+#include "core/common/check.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
@@ -17,34 +20,24 @@ constexpr char kFirstLine[] = "polyest session 1";
 
 }  // namespace
 
-SessionFileWriter::SessionFileWriter(std::string file)
-    : file_(std::move(file)), draft_(file_ + ".part"), out_(draft_, std::ios::binary) {}
-
 absl::StatusOr<std::unique_ptr<SessionFileWriter>> SessionFileWriter::Open(
     const std::string& file) {
-  std::unique_ptr<SessionFileWriter> writer(new SessionFileWriter(file));
-  writer->out_ << kFirstLine << '\n';
-  if (!writer->out_) return writer->Failed();
-  return writer;
-}
-
-SessionFileWriter::~SessionFileWriter() { std::remove(draft_.c_str()); }
-
-absl::Status SessionFileWriter::Failed() const {
-  return absl::InvalidArgumentError(
-      absl::StrFormat("%s: cannot be written: %s", draft_, std::strerror(errno)));
+  constexpr mode_t kAnybody = 0666;
+  POLYEST_ASSIGN_OR_RETURN(auto draft, DraftFile::Open(file, kAnybody));
+  POLYEST_RETURN_IF_ERROR(draft->Write(absl::StrCat(kFirstLine, "\n")));
+  return std::unique_ptr<SessionFileWriter>(new SessionFileWriter(std::move(draft)));
 }
 
 absl::Status SessionFileWriter::Write(const v1::SessionRecord& record) {
-  if (google::protobuf::util::SerializeDelimitedToOstream(record, &out_)) return absl::OkStatus();
-  return Failed();
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    POLYEST_CHECK(google::protobuf::util::SerializeDelimitedToZeroCopyStream(record, &stream));
+  }
+  return draft_->Write(bytes);
 }
 
-absl::Status SessionFileWriter::Finish() {
-  out_.close();
-  if (!out_ || std::rename(draft_.c_str(), file_.c_str()) != 0) return Failed();
-  return absl::OkStatus();
-}
+absl::Status SessionFileWriter::Finish() { return draft_->Replace(); }
 
 absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     const std::string& file) {

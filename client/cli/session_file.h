@@ -11,32 +11,26 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "client/cli/draft_file.h"
 #include "polyest/v1/session_service.pb.h"
 
 namespace polyest::internal {
 
 class SessionFileWriter {
  public:
-  // Opens a draft beside the file, so that a failed export leaves an existing file unchanged.
-  // INVALID_ARGUMENT if the draft cannot be written.
+  // Begins a draft of the file. INVALID_ARGUMENT if it cannot be written.
   static absl::StatusOr<std::unique_ptr<SessionFileWriter>> Open(const std::string& file);
-  // Removes the draft if Finish has not been called.
-  ~SessionFileWriter();
-  SessionFileWriter(const SessionFileWriter&) = delete;
-  SessionFileWriter& operator=(const SessionFileWriter&) = delete;
-
+  // Appends the record. Fails as Open.
   absl::Status Write(const v1::SessionRecord& record);
-  // Replaces the file by the draft.
+  // Replaces the file by the draft, and returns when that is on the disk.
   absl::Status Finish();
 
  private:
-  explicit SessionFileWriter(std::string file);
-  absl::Status Failed() const;
+  explicit SessionFileWriter(std::unique_ptr<DraftFile> draft) : draft_(std::move(draft)) {}
 
-  const std::string file_;
-  const std::string draft_;
-  std::ofstream out_;
+  const std::unique_ptr<DraftFile> draft_;
 };
 
 class SessionFileReader {

@@ -282,6 +282,19 @@ def test_an_exported_session_has_the_same_estimate(client, problem, rows, tmp_pa
             client.import_session(file, "damaged")
 
 
+def test_an_exported_file_is_on_the_disk_before_it_has_its_name(
+        client, problem, rows, tmp_path, monkeypatch):
+    file, synced = tmp_path / "run.polyest", []
+    real = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (
+        synced.append((os.readlink(f"/proc/self/fd/{descriptor}"), file.exists())),
+        real(descriptor)))
+    with client.session("synced", problem) as session:
+        session.append(rows(0, 200))
+        session.export(file)
+    assert synced == [(f"{file}.part", False), (str(tmp_path), True)]
+
+
 def test_an_import_that_is_interrupted_is_cancelled(client, tmp_path, monkeypatch):
     done = []
 

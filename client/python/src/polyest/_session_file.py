@@ -19,7 +19,7 @@ _FIRST_LINE = b"polyest session 1\n"
 class SessionFileWriter:
     """Writes records to a draft beside the file, which takes its place at the end.
 
-    A failed export leaves an existing file as it is.
+    A failed export leaves an existing file as it is; one that succeeds is on the disk.
     """
 
     def __init__(self, file: Union[str, os.PathLike[str]]) -> None:
@@ -38,10 +38,14 @@ class SessionFileWriter:
 
     def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
                  traceback: Optional[TracebackType]) -> None:
-        self._out.close()
         if kind is None:
+            self._out.flush()
+            os.fsync(self._out.fileno())
+            self._out.close()
             self._draft.replace(self._file)
+            _sync_folder(self._file.parent)
         else:
+            self._out.close()
             self._draft.unlink()
 
 
@@ -63,6 +67,17 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
             except message.DecodeError as error:
                 raise InvalidInput(f"{os.fspath(file)}: is damaged: {error}") from error
             yield record
+
+
+def _sync_folder(folder: Path) -> None:
+    """Brings the names in a folder to the disk, where the system can do that."""
+    if os.name == "nt":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _varint(value: int) -> bytes:
