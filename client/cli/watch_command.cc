@@ -81,6 +81,10 @@ int RunCommand(const WatchArguments& arguments, std::ostream& out, std::ostream&
     if (!arguments.once) out << '\n';
     PrintEstimate(*last, out);
   }
+  if (arguments.once && last && last->samples() == 0) {
+    err << "polyest: no sample of " << request.session()
+        << " counts yet, and these are the numbers of the prior; rows may wait for later ones\n";
+  }
   return kExitOk;
 }
 

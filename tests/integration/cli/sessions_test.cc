@@ -90,6 +90,25 @@ TEST_F(SessionsTest, HaveNoPresentEstimateBeforeTheFirstSample) {
   EXPECT_EQ(watch.err, "polyest: sessions/rig has no estimate yet: no sample has arrived\n");
 }
 
+TEST_F(SessionsTest, ArePresentedByTheirPriorWhileTheirFirstRowsWait) {
+  // The cubic interpolation of the input waits for its later values.
+  const std::string problem = File("p.json", R"({
+    "model": {"builtin": "linear_two_state"},
+    "uncertain": [{"name": "theta", "normal": {"mean": 1, "stdDev": 0.2}}],
+    "measured": [{"output": "x1_minus_x2", "noise": {"absolute": 0.01}}],
+    "inputs": [{"name": "u1", "streamed": {}}]
+  })");
+  const std::string data = File("d.csv", "t,u1,x1_minus_x2\n0,1,0\n");
+  ASSERT_EQ(Ask({"stream", problem, data, "--session", "rig"}).exit_status, 0);
+  const Finished watch = Ask({"watch", "rig", "--once"});
+  EXPECT_EQ(watch.exit_status, 0);
+  EXPECT_THAT(watch.out, StartsWith("0 samples up to t = 0 s"));
+  EXPECT_EQ(
+      watch.err,
+      "polyest: no sample of sessions/rig counts yet, and these are the numbers of the prior; "
+      "rows may wait for later ones\n");
+}
+
 TEST_F(SessionsTest, EndTheirWatchWhenTheyAreDeleted) {
   ASSERT_EQ(Stream("rig").exit_status, 0);
   Process watch({POLYEST_PROGRAM, "watch", "rig", "--server", daemon_.address()});
