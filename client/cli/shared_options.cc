@@ -1,6 +1,8 @@
 #include "client/cli/shared_options.h"
 
 #include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <arpa/inet.h>
 
 #include <charconv>
 #include <cmath>
@@ -14,8 +16,17 @@ const std::map<std::string, Format> kFormats = {{"table", Format::kTable},
                                                 {"jsonl", Format::kJsonLines},
                                                 {"csv", Format::kCsv}};
 
+// Whether a text is an IPv6 address without brackets, and possibly with the zone of a link, %eth0.
+bool IsIpv6(const std::string& text) {
+  in6_addr address;
+  return inet_pton(AF_INET6, text.substr(0, text.find('%')).c_str(), &address) == 1;
+}
+
 std::string CheckServer(const std::string& server) {
   const size_t colon = server.rfind(':');
+  if (IsIpv6(server) || IsIpv6(server.substr(0, colon))) {
+    return "\"" + server + "\" must be HOST:PORT, an IPv6 address in brackets, as in [::1]:50051";
+  }
   int port = 0;
   if (colon != std::string::npos && colon > 0) {
     const char* const end = server.data() + server.size();

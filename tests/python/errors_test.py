@@ -242,6 +242,14 @@ def test_an_address_is_that_of_a_host_with_a_port(server):
         assert raised.value.field == "server"
 
 
+@pytest.mark.parametrize("server", [
+    "::1", "::1:50051", "2001:db8::1:50051", "fe80::1%eth0:50051",
+])
+def test_an_ipv6_address_needs_brackets(server):
+    with pytest.raises(polyest.InvalidInput, match=r"an IPv6 address in brackets, as in \[::1\]:50051"):
+        polyest.connect(server)
+
+
 @pytest.mark.parametrize("server", ["rig:1", "[::1]:65535", "127.0.0.1:00050051"])
 def test_addresses_that_the_command_takes(server):
     with polyest.connect(server) as client:

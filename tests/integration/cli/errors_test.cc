@@ -306,6 +306,10 @@ TEST_F(ErrorsTest, BadUsage) {
     EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
                 HasSubstr("HOST:PORT"));
   }
+  for (const char* const server : {"::1", "::1:50051", "2001:db8::1:50051", "fe80::1%eth0:50051"}) {
+    EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
+                HasSubstr("an IPv6 address in brackets, as in [::1]:50051"));
+  }
   EXPECT_THAT(OneLine(Run({"stream", problem, data}), 2), HasSubstr("--server"));
   for (const char* const batch : {"0", "-1", "x"}) {
     EXPECT_THAT(OneLine(Run({"stream", problem, data, "--server", "a:1", "--batch", batch}), 2),

@@ -36,6 +36,9 @@ class ConnectionOptions:
     def __post_init__(self) -> None:
         """Raises InvalidInput unless the server is HOST:PORT: gRPC would dial something else."""
         host, _, port = str(self.server).rpartition(":")
+        if _is_ipv6(str(self.server)) or _is_ipv6(host):
+            raise _invalid("server", f'"{self.server}" must be HOST:PORT, an IPv6 address in '
+                           "brackets, as in [::1]:50051")
         if not host or not _PORT.fullmatch(port) or not 1 <= int(port[-5:]) <= 65535:
             raise _invalid("server", f'"{self.server}" must be HOST:PORT, the port from 1 to 65535')
 
@@ -125,6 +128,15 @@ def _pem(what: str, file: File) -> bytes:
     if b"-----BEGIN " not in text:
         raise _invalid(what, f"{file} is not in PEM form")
     return text
+
+
+def _is_ipv6(text: str) -> bool:
+    """Whether a text is an IPv6 address without brackets, and possibly with a zone, %eth0."""
+    try:
+        ipaddress.IPv6Address(text.partition("%")[0])
+    except ValueError:
+        return False
+    return True
 
 
 def _is_loopback(server: str) -> bool:
