@@ -72,8 +72,10 @@ void AddPosterior(CommandRegistry& registry) {
       ->delimiter(',');
   command
       .add_option("--joint", arguments->joints,
-                  "Two parameters whose joint density is wanted, NAME,NAME; may be repeated")
+                  "Two parameters whose joint density is wanted, NAME,NAME; may be repeated;\n"
+                  "a comma within brackets is part of a name, as in K[1,1]")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   AddPlot(command, arguments->plot_file, "the densities of parameters and pairs");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
@@ -116,8 +118,8 @@ void AddFit(CommandRegistry& registry) {
   command.add_option("--validate", arguments->validation_file,
                      "Predict and score this CSV file, whose samples are not used to estimate");
   AddOutputs(command, arguments->outputs,
-             "Outputs to predict, and parameters that drift (default: the measured outputs and\n"
-             "what drifts)");
+             "Outputs to predict, and parameters that drift, comma-separated (default: the\n"
+             "measured outputs and what drifts)");
   command
       .add_option("--quantiles", arguments->probabilities,
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")

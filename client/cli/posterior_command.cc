@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/strings/str_split.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +11,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
+#include "client/cli/name_list.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/study_plots.h"
@@ -29,7 +29,7 @@ absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArgumen
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputePosteriorRequest request;
   for (const std::string& joint : arguments.joints) {
-    const std::vector<std::string> names = absl::StrSplit(joint, ',');
+    const std::vector<std::string> names = SplitNames(joint);
     if (names.size() != 2) {
       return absl::InvalidArgumentError(
           absl::StrCat("--joint: \"", joint, "\" must be two parameters, NAME,NAME"));

@@ -7,6 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <utility>
+
+#include "client/cli/name_list.h"
 
 namespace polyest::internal {
 namespace {
@@ -136,7 +139,20 @@ void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
 }
 
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {
-  command.add_option("--outputs", outputs, help)->allow_extra_args(false)->delimiter(',');
+  const auto add = [&outputs](const std::vector<std::string>& lists) {
+    for (const std::string& list : lists) {
+      for (std::string& name : SplitNames(list)) {
+        if (!name.empty()) outputs.push_back(std::move(name));
+      }
+    }
+  };
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--outputs", add,
+          absl::StrCat(help, ";\na comma within brackets is part of a name, as in K[1,1]"))
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->take_all();
 }
 
 void AddPlot(CLI::App& command, std::string& file, const char* what) {

@@ -35,7 +35,7 @@ void AddStudyInput(CLI::App& command, Arguments& arguments) {
                 arguments.session);
   AddDataOptions(command, arguments.data_options);
 }
-// Adds --outputs, a comma-separated list.
+// Adds --outputs, a comma-separated list, with a help that begins with `help`.
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help);
 // Adds --plot. `what`: what it draws, as in "the fit".
 void AddPlot(CLI::App& command, std::string& file, const char* what);

@@ -262,6 +262,8 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
                 HasSubstr("stepS: -1"));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,q"}), 2),
                 AllOf(HasSubstr("\"q\""), HasSubstr("x, v, a")));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,K[1,1]"}), 2),
+                HasSubstr("\"K[1,1]\""));
   }
   EXPECT_THAT(OneLine(Run({"sensitivity", Example("damper_rig.json"), "--until", "1"}), 2),
               HasSubstr("correlations: m and k1"));
@@ -281,6 +283,10 @@ TEST_F(ErrorsTest, AnOptionThatIsRefusedIsNotBlamedOnAFile) {
   const std::string data = File("d.csv", kData);
   EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--quantiles", "2"}), 2),
               StartsWith("polyest: probabilities[0]: 2 must"));
+  EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--joint", "k,c,d"}), 2),
+              HasSubstr("\"k,c,d\" must be two parameters"));
+  EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--joint", "k,K[1,1]"}), 2),
+              AllOf(StartsWith("polyest: joints[0]"), HasSubstr("K[1,1]")));
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "0"}), 2),
               StartsWith("polyest: untilS: 0 must"));
   DaemonProcess daemon;

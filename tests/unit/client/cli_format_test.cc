@@ -7,6 +7,7 @@
 
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
+#include "client/cli/name_list.h"
 #include "client/cli/number_format.h"
 #include "client/cli/text_table.h"
 #include "polyest/v1/model_service.pb.h"
@@ -16,6 +17,7 @@
 namespace polyest::internal {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -70,6 +72,12 @@ TEST(CsvField, IsQuotedWhereItWouldBeReadAsSeveral) {
   EXPECT_EQ(CsvField("the \"new\" k"), "\"the \"\"new\"\" k\"");
   EXPECT_EQ(CsvField("two\nlines"), "\"two\nlines\"");
   EXPECT_EQ(CsvField(""), "");
+}
+
+TEST(SplitNames, KeepsCommasWithinBrackets) {
+  EXPECT_THAT(SplitNames("k,c"), ElementsAre("k", "c"));
+  EXPECT_THAT(SplitNames("K[1,1],der(x[1,2],2),c"), ElementsAre("K[1,1]", "der(x[1,2],2)", "c"));
+  EXPECT_THAT(SplitNames("k],c,"), ElementsAre("k]", "c", ""));
 }
 
 TEST(FormatValue, KeepsTwoDigitsOfTheUncertainty) {
