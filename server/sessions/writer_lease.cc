@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "proto/wire/refusal/refusal.h"
+
 namespace polyest::internal {
 
 absl::Status WriterLease::Claim(std::shared_ptr<SessionObserver> writer, const std::string& id) {
@@ -12,7 +14,9 @@ absl::Status WriterLease::Claim(std::shared_ptr<SessionObserver> writer, const s
     const std::lock_guard lock(mutex_);
     if (closed_) return absl::NotFoundError(absl::StrCat(session_, " has been deleted"));
     if (writer_ != nullptr && (id.empty() || id != id_)) {
-      return absl::AbortedError(absl::StrCat(session_, " has a writer already; one at a time"));
+      return Refuse(absl::StatusCode::kAborted,
+                    absl::StrCat(session_, " has a writer already; one at a time"),
+                    {.reason = kAnotherWriter});
     }
     replaced = std::exchange(writer_, std::move(writer));
     id_ = id;

@@ -18,9 +18,9 @@ class WriterLease {
   // `session` is the name of the session, for messages.
   explicit WriterLease(std::string session) : session_(std::move(session)) {}
 
-  // Gives the lease to a writer. ABORTED while another writer holds it, unless both have the same
-  // id and it is not empty: then the earlier one is told that it is replaced. NOT_FOUND once the
-  // lease is closed.
+  // Gives the lease to a writer. ABORTED (kAnotherWriter) while another writer holds it, unless
+  // both have the same id and it is not empty: then the earlier one is told that it is replaced.
+  // NOT_FOUND once the lease is closed.
   absl::Status Claim(std::shared_ptr<SessionObserver> writer, const std::string& id);
   // Takes the lease back from a writer. Returns false if this writer does not hold it (any more).
   bool Release(const SessionObserver* writer);

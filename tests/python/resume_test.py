@@ -252,7 +252,29 @@ def test_a_session_with_other_batches_is_not_waited_for():
     assert queue.delay_s(raised.value, new_token=False) is None
 
 
-def test_another_writer_is_waited_for_only_after_a_break():
+def test_a_session_that_another_writer_took_over_during_a_break_is_not_waited_for(
+        restartable, problem, rows):
+    daemon = restartable()
+    patient = polyest.StreamOptions(first_delay_s=0.05, max_delay_s=3600)
+    session = polyest.connect(daemon.address).session("taken", problem, options=patient)
+    session.append(rows(0, 10))
+    daemon.kill()
+    other = polyest.connect(restartable().address).session("taken")
+    other.append(rows(10, 20))
+    with pytest.raises(polyest.Aborted) as raised:
+        session.append(rows(10, 20))
+    assert raised.value.reason == "ANOTHER_WRITER"
+    assert other.append(rows(20, 30)) == 3
+
+
+def test_another_writer_is_not_waited_for_after_a_break():
+    queue = queue_with(0)
+    assert queue.delay_s(polyest.Unavailable("gone"), new_token=False) is not None
+    aborted = polyest.Aborted("another writer", reason="ANOTHER_WRITER")
+    assert queue.delay_s(aborted, new_token=False) is None
+
+
+def test_a_writer_without_a_name_is_waited_for_only_after_a_break():
     queue = queue_with(0)
     aborted = polyest.Aborted("another writer")
     assert queue.delay_s(aborted, new_token=False) is None

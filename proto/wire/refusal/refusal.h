@@ -30,6 +30,7 @@ inline constexpr char kOutOfMemory[] = "OUT_OF_MEMORY";
 inline constexpr char kShuttingDown[] = "SHUTTING_DOWN";
 inline constexpr char kDatabaseAway[] = "DATABASE_AWAY";
 inline constexpr char kOwnedElsewhere[] = "OWNED_ELSEWHERE";
+inline constexpr char kAnotherWriter[] = "ANOTHER_WRITER";
 
 // Returns a status with these details. `code` must not be OK and the reason must not be empty.
 absl::Status Refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);

@@ -205,8 +205,10 @@ class BatchQueue:
             return True
         if isinstance(error, Unauthenticated):
             return new_token
-        # After a break the daemon may still hold the old connection as the session's writer.
-        return isinstance(error, Aborted) and self._attempts > 0 and not self._overtaken
+        # A daemon that does not know writers by their names may, after a break, still hold the old
+        # connection as the session's writer; one that does gives a reason.
+        return (isinstance(error, Aborted) and not error.reason and self._attempts > 0
+                and not self._overtaken)
 
     def final(self, error: PolyestError) -> PolyestError:
         """Returns what to raise after `error`, which no attempt can mend."""

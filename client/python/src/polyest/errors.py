@@ -35,8 +35,8 @@ class PolyestError(Exception):
     field: str
     #: The rule that the field breaks, in one sentence without the field; empty if none is.
     rule: str
-    #: LIMIT_EXCEEDED, DISK_FULL, BUSY, OUT_OF_MEMORY, SHUTTING_DOWN, DATABASE_AWAY or
-    #: OWNED_ELSEWHERE; empty if none applies.
+    #: LIMIT_EXCEEDED, DISK_FULL, BUSY, OUT_OF_MEMORY, SHUTTING_DOWN, DATABASE_AWAY,
+    #: OWNED_ELSEWHERE or ANOTHER_WRITER; empty if none applies.
     reason: str
     #: The daemon's option that sets the limit, such as "--max-sessions"; empty if none does.
     limit: str

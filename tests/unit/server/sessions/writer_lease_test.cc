@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/wire/refusal/refusal.h"
 #include "tests/unit/server/sessions/counting_observer.h"
 
 namespace polyest::internal {
@@ -18,8 +19,10 @@ TEST_F(WriterLeaseTest, IsForOneWriterUntilItGivesItBack) {
   EXPECT_FALSE(lease_.is_held());
   ASSERT_TRUE(lease_.Claim(first_, "").ok());
   EXPECT_TRUE(lease_.is_held());
-  EXPECT_EQ(lease_.Claim(second_, ""),
-            absl::AbortedError("sessions/a has a writer already; one at a time"));
+  const absl::Status refused = lease_.Claim(second_, "");
+  EXPECT_EQ(refused.code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(refused.message(), "sessions/a has a writer already; one at a time");
+  EXPECT_EQ(RefusalOf(refused), Refusal{.reason = kAnotherWriter});
   EXPECT_FALSE(lease_.Release(second_.get()));
   EXPECT_TRUE(lease_.Release(first_.get()));
   EXPECT_FALSE(lease_.Release(first_.get()));
