@@ -12,6 +12,7 @@
 
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "core/propagation/finite_parameters.h"
 #include "core/propagation/output_limit.h"
 #include "core/umbridge/evaluation_requests.h"
 
@@ -60,7 +61,18 @@ class UmBridgeEnsemble final : public TrajectoryEnsemble {
         pool_(std::move(pool)),
         specification_(WithoutModel(std::move(specification))),
         inputs_(inputs),
-        failed_(static_cast<size_t>(points()), false) {}
+        failed_(static_cast<size_t>(points()), false) {
+    for (int q = 0; q < points(); ++q) {
+      if (specification_->parameters.row(q).allFinite() &&
+          specification_->amplitudes.row(q).allFinite()) {
+        continue;
+      }
+      failed_[static_cast<size_t>(q)] = true;
+      PointFailure& failure = failures_.emplace_back();
+      failure.point = q;
+      failure.reason = kParametersNotFinite;
+    }
+  }
 
   int points() const override { return static_cast<int>(specification_->parameters.rows()); }
   absl::Status Advance(std::span<const double> times_s, MatrixRef outputs,

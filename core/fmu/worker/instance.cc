@@ -2,7 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/common/types.h"
+#include "core/propagation/finite_parameters.h"
 
 namespace polyest::internal {
 namespace {
@@ -30,12 +34,20 @@ const char* StatusInWords(int status) {
 Instance::Instance(InstanceFactory* factory, int point, std::span<const double> parameters,
                    std::span<const double> inputs)
     : factory_(*factory), point_(point), next_event_s_(kInfinity) {
-  if (Instantiate()) Initialize(parameters, inputs);
+  if (CheckFinite(parameters) && CheckFinite(inputs) && Instantiate()) {
+    Initialize(parameters, inputs);
+  }
 }
 
 // The FMU instance is not freed here: it ends with the process, and nothing in it needs to be kept.
 Instance::~Instance() {
   if (factory_.active == this) factory_.active = nullptr;
+}
+
+bool Instance::CheckFinite(std::span<const double> values) {
+  factory_.said.clear();
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  return std::ranges::all_of(values, is_finite) || Fail(kError, kParametersNotFinite);
 }
 
 bool Instance::Instantiate() {

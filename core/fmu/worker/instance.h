@@ -37,9 +37,9 @@ struct InstanceFactory {
 
 class Instance {
  public:
-  // Instantiates and initializes the FMU with these values at t = 0. For Model Exchange it also
-  // performs the first event iteration and enters continuous-time mode. If any of this fails,
-  // failure() is not empty.
+  // Instantiates and initializes the FMU with these values at t = 0, if they are finite. For Model
+  // Exchange it also performs the first event iteration and enters continuous-time mode. If any of
+  // this fails, failure() is not empty.
   Instance(InstanceFactory* factory, int point, std::span<const double> parameters,
            std::span<const double> inputs);
   ~Instance();
@@ -73,6 +73,7 @@ class Instance {
   bool DoStep(double time_s, double step_s);
 
  private:
+  bool CheckFinite(std::span<const double> values);
   bool Instantiate();
   bool Activate();
   bool Initialize(std::span<const double> parameters, std::span<const double> inputs);

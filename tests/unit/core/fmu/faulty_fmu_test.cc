@@ -154,6 +154,24 @@ TEST_F(FaultyFmu, ThatFailsToStartAtOnePointLosesThatPointOnly) {
   }
 }
 
+TEST_F(FaultyFmu, IsNotCalledAtAPointWhoseParametersOrInputsAreNotFinite) {
+  for (const char* fmu : {"oscillator_me2", "oscillator_me3", "oscillator_cs2", "oscillator_cs3"}) {
+    FmuEnsemble ensemble(fmu, 3, {"x"});
+    ensemble.Set("x0", 1);
+    ensemble.Set("m", 0, std::nan(""));
+    ensemble.Drive("force", ConstantInput{1}, 0);
+    ensemble.specification.amplitudes(2, 0) = std::nan("");
+    const Matrix x = ensemble.Propagate({0, 1});
+    ASSERT_THAT(ensemble.failures, SizeIs(2)) << fmu;
+    for (const PointFailure& failure : ensemble.failures) {
+      EXPECT_EQ(failure.reason, "a parameter or an input is not finite; the model is not called");
+      EXPECT_TRUE(std::isnan(x(failure.point, 0)) && std::isnan(x(failure.point, 1)));
+    }
+    EXPECT_EQ(x(1, 0), 1);
+    EXPECT_TRUE(std::isfinite(x(1, 1)));
+  }
+}
+
 TEST_F(FaultyFmu, LeavesNothingBehindWhenAllGoesWell) {
   {
     FmuEnsemble ensemble("oscillator_me2", 70, {"x"});

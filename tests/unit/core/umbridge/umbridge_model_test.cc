@@ -103,6 +103,19 @@ TEST(UmBridgeModel, IsAskedOnceIfItsTimesAreListed) {
             "umbridge decay: t = 0.4 s is not among the times of its description (timesS)");
 }
 
+TEST(UmBridgeModel, IsNotAskedForAPointWhoseParametersAreNotFinite) {
+  ModelServer server(Decay);
+  Ensemble ensemble(Description(server), Matrix{{1, 2}, {std::nan(""), 2}});
+  const auto outputs = ensemble.Advance({0.5});
+  ASSERT_TRUE(outputs.ok()) << outputs.status();
+  EXPECT_EQ((*outputs)(0, 1), std::exp(-1.0));
+  EXPECT_TRUE(std::isnan((*outputs)(1, 1)));
+  ASSERT_THAT(ensemble.propagator->failures(), SizeIs(1));
+  EXPECT_EQ(ensemble.propagator->failures()[0].point, 1);
+  EXPECT_THAT(ensemble.propagator->failures()[0].reason, HasSubstr("not finite"));
+  EXPECT_EQ(server.requests(), 1);
+}
+
 TEST(UmBridgeModel, LeavesOutPointsThatFail) {
   ModelServer server(Decay);
   Ensemble ensemble(Description(server), Matrix{{1, 2}, {-1, 2}});
