@@ -40,6 +40,7 @@ class CancelOnInterrupt {
 absl::Status CheckHasSamples(Client& client, const std::string& session) {
   v1::GetSessionRequest get;
   get.set_name(session);
+  get.set_omit_problem(true);
   POLYEST_ASSIGN_OR_RETURN(const v1::Session found, client.GetSession(get));
   if (found.sample_count() > 0) return absl::OkStatus();
   return absl::FailedPreconditionError(

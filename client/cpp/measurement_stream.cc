@@ -211,6 +211,7 @@ absl::Status MeasurementStream::AnotherWrites(absl::string_view how) const {
 absl::Status MeasurementStream::Connect() {
   v1::GetSessionRequest request;
   request.set_name(session_);
+  request.set_omit_problem(true);
   POLYEST_ASSIGN_OR_RETURN(const v1::Session session, client_.GetSession(request));
   const Lock lock(mutex_);
   if (!connection_) {

@@ -135,6 +135,7 @@ SessionService::Unary* SessionService::GetSession(Context* call,
                          const auto session,
                          FindSession(context_, caller, "name", request->name()));
                      *response = session->Describe();
+                     if (request->omit_problem()) return absl::OkStatus();
                      POLYEST_ASSIGN_OR_RETURN(*response->mutable_problem(), session->ReadProblem());
                      return absl::OkStatus();
                    });

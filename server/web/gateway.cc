@@ -183,6 +183,7 @@ std::optional<v1::Session> Gateway::SessionOf(const HttpRequest& request,
   if (!watched.ParseFromString(watch.message)) return std::nullopt;
   v1::GetSessionRequest get;
   get.set_name(watched.session());
+  get.set_omit_problem(true);
   WebCall call(channel_, CallFor(watch, PathOf("GetSession"), get.SerializeAsString()));
   std::string bytes;
   const std::optional<grpc::Status> status = call.AwaitOnly(request.client, bytes);

@@ -40,6 +40,20 @@ TEST_F(SessionRpcTest, CreatesGetsAndDeletesSessions) {
   EXPECT_EQ(Get("rig", &session).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
+TEST_F(SessionRpcTest, LeavesTheProblemOutIfItIsAskedTo) {
+  ASSERT_TRUE(Create("rig").ok());
+  v1::Session session, without;
+  ASSERT_TRUE(Get("sessions/rig", &session).ok());
+  grpc::ClientContext context;
+  v1::GetSessionRequest request;
+  request.set_name("sessions/rig");
+  request.set_omit_problem(true);
+  ASSERT_TRUE(sessions_->GetSession(&context, request, &without).ok());
+  EXPECT_FALSE(without.has_problem());
+  EXPECT_EQ(without.name(), session.name());
+  EXPECT_EQ(without.create_time().seconds(), session.create_time().seconds());
+}
+
 TEST_F(SessionRpcTest, RefusesABadProblemByItsField) {
   v1::Problem problem = Oscillator();
   problem.mutable_measured(0)->set_output("z");

@@ -255,7 +255,7 @@ class MeasurementStream:
                 self.transport.wait_until_connected(_READY_S)
             found = self.transport.unary(_methods.GET_SESSION,
                                          session_service_pb2.GetSessionRequest(
-                                             name=self.queue.session))
+                                             name=self.queue.session, omit_problem=True))
         finally:
             self.changed.acquire()
         self.queue.connected(found.last_sequence)

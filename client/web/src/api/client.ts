@@ -58,6 +58,10 @@ export const listSessions = (pageSize: number, pageToken: string, stop?: AbortSi
 export const getSession = (name: string, stop?: AbortSignal) =>
   call('SessionService/GetSession', { name }, messages.readSession, stop);
 
+// Without the problem, which may be large and never changes.
+export const getLoad = (name: string, stop?: AbortSignal) =>
+  call('SessionService/GetSession', { name, omitProblem: true }, messages.readSession, stop);
+
 export const getHistory = (session: string, stop?: AbortSignal) =>
   call('SessionService/GetHistory', { session }, messages.readHistory, stop);
 

@@ -164,7 +164,8 @@ export class SessionMonitor {
       await pause(LOAD_INTERVAL_MS, this.stopping.signal);
       if (this.isStopped || this.connection.kind !== 'open' || document.hidden) continue;
       try {
-        this.session = await client.getSession(this.name, this.stopping.signal);
+        const load = await client.getLoad(this.name, this.stopping.signal);
+        this.session = { ...load, problem: this.session?.problem ?? null };
         this.events.onChange();
       } catch {
         // The stream says what is wrong.

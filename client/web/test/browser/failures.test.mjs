@@ -149,6 +149,18 @@ test('a daemon that is behind is not asked for predictions', options, () => with
   await page.context().close();
 }));
 
+test('the load is asked for without the problem, which the page keeps', options, () => withDaemon(async (daemon) => {
+  daemon.add('monday', { count: 30, hasWriter: true });
+  const page = await open(browser, `${daemon.address}#/monday`);
+  await status(page, 'Live');
+  const asked = () => daemon.requests.filter(({ url }) => url.endsWith('/GetSession')).map(({ body }) => body.omitProblem === true);
+  await until(() => asked().length >= 3, 'the load twice', 20_000);
+  assert.deepEqual(asked().slice(0, 3), [false, true, true]);
+  await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+  assert.match(await page.locator('pre.problem').textContent(), /"model"/);
+  await page.context().close();
+}));
+
 test('a tab that is not seen asks for no predictions, until it is seen', options, () => withDaemon(async (daemon) => {
   daemon.add('monday', { count: 30 });
   const page = await open(browser, 'about:blank');

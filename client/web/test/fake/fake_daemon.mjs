@@ -170,7 +170,8 @@ export class FakeDaemon {
 
   async serve(request, answer) {
     const { method, url, headers } = request;
-    this.requests.push({ method, url, authorization: headers.authorization ?? null, at: performance.now() });
+    const noted = { method, url, authorization: headers.authorization ?? null, at: performance.now(), body: null };
+    this.requests.push(noted);
     if (this.requests.length > 10_000) this.requests.shift();
     answer.setHeader('Content-Security-Policy', POLICY);
     answer.setHeader('X-Content-Type-Options', 'nosniff');
@@ -183,7 +184,8 @@ export class FakeDaemon {
     let body = '';
     for await (const piece of request) body += piece;
     try {
-      this.call(url, headers, body === '' ? {} : JSON.parse(body), answer);
+      noted.body = body === '' ? {} : JSON.parse(body);
+      this.call(url, headers, noted.body, answer);
     } catch (failure) {
       if (!(failure instanceof Failure)) throw failure;
       this.json(answer, HTTP[failure.code] ?? 500, { code: failure.code, message: failure.message });
@@ -224,7 +226,7 @@ export class FakeDaemon {
     };
     switch (method) {
       case 'ListSessions': return this.json(answer, 200, this.list(body));
-      case 'GetSession': return this.json(answer, 200, find(body.name).message(true));
+      case 'GetSession': return this.json(answer, 200, find(body.name).message(!body.omitProblem));
       case 'GetHistory': return this.json(answer, 200, find(body.session).history());
       case 'GetStatus': return this.json(answer, 200, { ...recording.status, sessionCount: String(this.sessions.size) });
       case 'WatchSession': return this.watch(find(body.session), answer);

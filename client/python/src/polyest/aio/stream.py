@@ -241,7 +241,8 @@ class MeasurementStream:
             await self._before._wait_until_sent()
             self._before = None
         found = await self.transport.unary(
-            _methods.GET_SESSION, session_service_pb2.GetSessionRequest(name=self.queue.session))
+            _methods.GET_SESSION, session_service_pb2.GetSessionRequest(
+                name=self.queue.session, omit_problem=True))
         self.queue.connected(found.last_sequence)
         if self.reason_is_hidden:
             if found.activity.has_writer:
