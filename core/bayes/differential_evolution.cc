@@ -76,7 +76,7 @@ void DifferentialEvolution::MoveHalf(double beta, Eigen::Index first, Eigen::Ind
   Evaluate(proposal_, proposal_costs_);
   for (Eigen::Index i = 0; i < count; ++i) {
     const double change = proposal_costs_[i] - particles.costs[first + i];
-    if (std::log(Uniform()) < -beta * change) {
+    if (change <= 0 || std::log(Uniform()) < -beta * change) {
       particles.etas.row(first + i) = proposal_.row(i);
       particles.costs[first + i] = proposal_costs_[i];
     }

@@ -6,6 +6,8 @@
 // to jump between modes, accepted by Metropolis' rule. Differences within one half of a population
 // move the other half, which leaves the density invariant although a whole half moves at once.
 
+#include <absl/random/gaussian_distribution.h>
+
 #include <cstdint>
 #include <random>
 
@@ -44,7 +46,8 @@ class DifferentialEvolution {
   const Vector& upper_;
   std::mt19937_64 generator_;
   std::uniform_real_distribution<double> uniform_{0, 1};
-  std::normal_distribution<double> normal_{0, 1};
+  // By the ziggurat method, in a third of the time of std::normal_distribution.
+  absl::gaussian_distribution<double> normal_{0, 1};
   Matrix proposal_;
   Vector proposal_costs_;
 };

@@ -280,17 +280,8 @@ Minimum MinimizeFrom(const MinimizationProblem& original, const Vector& start,
 
 }  // namespace
 
-std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
-                                const MinimizerOptions& options, const Stop& stop) {
-  POLYEST_CHECK(starts.rows() > 0 && starts.cols() == problem.lower.size());
-  std::vector<Minimum> found(static_cast<size_t>(starts.rows()));
-  ParallelFor(static_cast<int>(starts.rows()), problem.threads, [&](int start) {
-    if (start > 0 && !stop.Check().ok()) return;
-    found[static_cast<size_t>(start)] =
-        MinimizeFrom(problem, starts.row(start).transpose(), options, stop);
-  });
-  // A stop request leaves out starts from which no search had begun.
-  std::erase_if(found, [](const Minimum& minimum) { return minimum.evaluations == 0; });
+std::vector<Minimum> DistinctMinima(std::vector<Minimum> found, const MinimizationProblem& problem,
+                                    const MinimizerOptions& options) {
   std::stable_sort(found.begin(), found.end(),
                    [](const Minimum& a, const Minimum& b) { return a.value < b.value; });
   const Vector tolerance = options.same_point * (problem.upper - problem.lower);
@@ -303,6 +294,20 @@ std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix
     if (!known && (distinct.empty() || minimum.converged)) distinct.push_back(std::move(minimum));
   }
   return distinct;
+}
+
+std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
+                                const MinimizerOptions& options, const Stop& stop) {
+  POLYEST_CHECK(starts.rows() > 0 && starts.cols() == problem.lower.size());
+  std::vector<Minimum> found(static_cast<size_t>(starts.rows()));
+  ParallelFor(static_cast<int>(starts.rows()), problem.threads, [&](int start) {
+    if (start > 0 && !stop.Check().ok()) return;
+    found[static_cast<size_t>(start)] =
+        MinimizeFrom(problem, starts.row(start).transpose(), options, stop);
+  });
+  // A stop request leaves out starts from which no search had begun.
+  std::erase_if(found, [](const Minimum& minimum) { return minimum.evaluations == 0; });
+  return DistinctMinima(std::move(found), problem, options);
 }
 
 }  // namespace polyest::internal

@@ -35,10 +35,15 @@ struct Minimum {
   Vector point;
   double value = 0;
   bool converged = false;
-  int code = 0;        // NLopt's return code
+  int code = 0;        // NLopt's return code; 0 where NLopt was not asked
   std::string reason;  // the code in words
   int evaluations = 0;
 };
+
+// Returns those of the minima that differ in their points, lowest first. One that has not converged
+// is left out unless it is the lowest.
+std::vector<Minimum> DistinctMinima(std::vector<Minimum> found, const MinimizationProblem& problem,
+                                    const MinimizerOptions& options);
 
 // Returns the distinct minima found from the starts (rows of `starts`), lowest first; at least one.
 // A start outside the box or the constraints is moved inside. The result is deterministic. On a

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/differential_evolution.h"
 #include "core/bayes/domain_cover.h"
-#include "core/bayes/newton_starts.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 

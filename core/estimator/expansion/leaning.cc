@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 
@@ -15,7 +16,7 @@ constexpr double kPastEdge = 1.12;  // factor of the half width at which Ω is l
 
 bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& start) {
   const Minimum minimum =
-      FindMinima(SearchOf(cost, design), start.transpose(), MinimizerOptions(), Stop()).front();
+      FindMinimaOf(cost, SearchOf(cost, design), start.transpose(), Stop()).front();
   const CholeskyFactor cholesky(cost.Hessian(minimum.point));
   const Vector middle = 0.5 * (design.lower + design.upper);
   const Vector half = 0.5 * (design.upper - design.lower);

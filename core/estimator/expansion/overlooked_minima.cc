@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/bayes/newton_starts.h"
+#include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
@@ -29,7 +29,8 @@ constexpr double kMostAbove = 12;
 double ModelCost(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta,
                  const Vector& chi_squared) {
   const double model = ModelMismatch(expansion, cost.BasisDifference(eta), chi_squared);
-  return cost.power() * model + cost.regularization() * cost.Evaluate(eta).prior;
+  const double prior = cost.prior().NegativeLogDensity(cost.region().ToGerm(eta));
+  return cost.power() * model + cost.regularization() * prior;
 }
 
 // Returns the rows of `points` with the least of the costs, kMostStarts at most.

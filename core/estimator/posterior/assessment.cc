@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/curvature.h"
 #include "core/bayes/identifiability.h"
-#include "core/bayes/minimizer.h"
 #include "core/bayes/regularization_bias.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
@@ -128,7 +128,7 @@ class Assessment {
     for (size_t i = 0; i < minima.size(); ++i) {
       starts.row(static_cast<Eigen::Index>(i)) = minima[i].point.transpose();
     }
-    return FindMinima(SearchOf(cost, design_), starts, MinimizerOptions(), stop).front().point;
+    return FindMinimaOf(cost, SearchOf(cost, design_), starts, stop).front().point;
   }
 
   void NoteLeaning() {

@@ -16,6 +16,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/new_runs.h"
@@ -99,8 +100,7 @@ std::optional<GermSummary> MixtureComponent::GaussianPosterior(const Stop& stop)
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   const ExpansionDesign& design = expansion_->design();
   const Minimum minimum =
-      FindMinima(SearchOf(cost, design), design.reference.transpose(), MinimizerOptions(), stop)
-          .front();
+      FindMinimaOf(cost, SearchOf(cost, design), design.reference.transpose(), stop).front();
   Vector gradient(minimum.point.size());
   cost.EvaluateWithGradient(minimum.point, gradient);
   const Matrix hessian = cost.Hessian(minimum.point);

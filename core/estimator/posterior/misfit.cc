@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 
@@ -67,7 +68,7 @@ MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& 
   if (!(degrees > 0)) return {};
   const ExpansionDesign& design = expansion.design();
   const Minimum minimum =
-      FindMinima(SearchOf(cost, design), StartsOf(cost, design), MinimizerOptions(), stop).front();
+      FindMinimaOf(cost, SearchOf(cost, design), StartsOf(cost, design), stop).front();
   const Vector d = cost.BasisDifference(minimum.point);
   double chi_squared = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {

@@ -286,9 +286,9 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
 absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    return bisected_ && !expansion_->design().checks_are_draws
-               ? LargestShift(*expansion_, cost.power())
-               : AgreementWithModel(*expansion_, cost).shift;
+    // Check points that are not draws of a posterior need not be where this one is.
+    return expansion_->design().checks_are_draws ? AgreementWithModel(*expansion_, cost).shift
+                                                 : LargestShift(*expansion_, cost.power());
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };
   // Each settlement may raise the order, so several may be needed.

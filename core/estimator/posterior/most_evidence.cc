@@ -5,6 +5,7 @@
 #include <numeric>
 #include <vector>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/differential_evolution.h"
 #include "core/chaos/collocation_points.h"
 #include "core/estimator/expansion/search_domain.h"
@@ -38,8 +39,7 @@ double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const 
   double least = costs[order.front()];
   if (!std::isfinite(least)) return -kInfinity;
   const Matrix starts = etas(order, Eigen::all);
-  for (const Minimum& minimum :
-       FindMinima(SearchOf(cost, design), starts, MinimizerOptions(), Stop())) {
+  for (const Minimum& minimum : FindMinimaOf(cost, SearchOf(cost, design), starts, Stop())) {
     least = std::min(least, minimum.value);
   }
   // ∫ e^{−J} dξ ≤ |box| e^{−min J}

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/noise.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
@@ -110,9 +111,8 @@ class Revision {
     Vector start = design.reference;
     const Vector& known = noise_.posterior.centre;
     if (known.size() > 0) start = design.region.ToLocal(known);
-    eta_ = FindMinima(SearchOf(cost_, design), WithBestParticle(start), MinimizerOptions(), stop)
-               .front()
-               .point;
+    eta_ =
+        FindMinimaOf(cost_, SearchOf(cost_, design), WithBestParticle(start), stop).front().point;
     d_ = cost_.BasisDifference(eta_);
     to_local_ = Inverse(design.region.axes());
     fitted_ = FittedParameters(to_local_.transpose() * cost_.MismatchHessian(eta_) * to_local_,

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/markov_chains.h"
-#include "core/bayes/newton_starts.h"
 #include "core/bayes/posterior.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"

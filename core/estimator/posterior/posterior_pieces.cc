@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/bayes/newton_starts.h"
+#include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cost_slice.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/l_curve.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
@@ -35,7 +36,7 @@ std::optional<RegularizedMinimum> RegularizedMinima::At(double regularization) {
   if (!stop_.Check().ok()) return std::nullopt;  // the caller reports the stop
   const Cost cost = expansion_.MakeCost(regularization);
   const MinimizationProblem search = SearchOf(cost, expansion_.design());
-  const Minimum best = FindMinima(search, starts_, MinimizerOptions(), stop_).front();
+  const Minimum best = FindMinimaOf(cost, search, starts_, stop_).front();
   starts_.row(0) = best.point.transpose();
   if (!std::isfinite(best.value) || HeldByEdge(search, best.point)) return std::nullopt;
   std::optional<RegularizedMinimum> minimum = DescribeMinimum(cost, best.point);

@@ -1,0 +1,154 @@
+#include "core/bayes/cost_minima.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/common/linear_algebra.h"
+
+namespace polyest::internal {
+namespace {
+
+constexpr int kMaxSteps = 25;  // and two more for each parameter, whose bounds may become active
+constexpr int kMaxHalvings = 6;
+constexpr double kSufficient = 1e-4;     // of the predicted decrease: Armijo's condition
+constexpr double kConvergedStep = 1e-9;  // in widths of the box
+// A decrease that the rounding of the cost hides is not tested any more.
+constexpr double kRounding = 1e-12;
+
+// The sides of a search's box and its constraints, as columns a of `normals` with aᵀη ≤ bound.
+struct Limits {
+  explicit Limits(const MinimizationProblem& problem) {
+    const Eigen::Index n = problem.lower.size();
+    normals.resize(n, 2 * n + problem.bound.size());
+    normals << Matrix::Identity(n, n), -Matrix::Identity(n, n), problem.constraint.transpose();
+    bounds.resize(normals.cols());
+    bounds << problem.upper, -problem.lower, problem.bound;
+  }
+
+  bool Allow(const Vector& eta) const {
+    return ((normals.transpose() * eta).array() <= bounds.array()).all();
+  }
+
+  Matrix normals;
+  Vector bounds;
+};
+
+// Newton's method with an active set: steps keep to the limits that have stopped one before, until
+// the cost falls away from such a limit (J. Nocedal, S. Wright, Numerical Optimization, 16.5).
+class NewtonSearch {
+ public:
+  NewtonSearch(const Cost& cost, const MinimizationProblem& problem)
+      : cost_(cost), limits_(problem), same_(kConvergedStep * (problem.upper - problem.lower)) {}
+
+  std::optional<Vector> From(Vector eta) {
+    if (!limits_.Allow(eta)) return std::nullopt;
+    const Eigen::Index most_steps = kMaxSteps + 2 * eta.size();
+    Vector gradient(eta.size());
+    for (Eigen::Index step = 0; step < most_steps; ++step) {
+      const double value = cost_.EvaluateWithGradient(eta, gradient).total;
+      if (!std::isfinite(value) || !gradient.allFinite()) return std::nullopt;
+      const std::optional<Vector> move = Move(eta, gradient);
+      if (!move) return std::nullopt;
+      const double slope = gradient.dot(*move);
+      if ((move->array().abs() <= same_.array()).all() || -slope <= kRounding * std::abs(value)) {
+        if (limits_.Allow(eta + *move)) eta += *move;
+        if (multipliers_.size() == 0 || multipliers_.minCoeff() >= 0) return eta;
+        Eigen::Index falling;
+        multipliers_.minCoeff(&falling);
+        active_.erase(active_.begin() + falling);
+      } else if (!Step(value, slope, *move, eta)) {
+        return std::nullopt;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  // Returns Newton's step in the directions that the active limits leave, and sets their
+  // multipliers, those λ for which gradient + Σ λ a is least; nothing where the Hessian in these
+  // directions is not positive definite.
+  std::optional<Vector> Move(const Vector& eta, const Vector& gradient) {
+    const Matrix hessian = cost_.Hessian(eta);
+    if (!hessian.allFinite()) return std::nullopt;
+    multipliers_.resize(0);
+    if (active_.empty()) return NewtonStep(hessian, gradient);
+    const PivotedQr factors = SolveByPivotedQr(limits_.normals(Eigen::all, active_), -gradient);
+    multipliers_ = factors.solution;
+    const Matrix free = factors.q.rightCols(eta.size() - factors.rank);
+    if (free.cols() == 0) return Vector(Vector::Zero(eta.size()));
+    const std::optional<Vector> step =
+        NewtonStep(free.transpose() * hessian * free, free.transpose() * gradient);
+    return step ? std::optional<Vector>(free * *step) : std::nullopt;
+  }
+
+  static std::optional<Vector> NewtonStep(const Matrix& hessian, const Vector& gradient) {
+    const CholeskyFactor factor(hessian);
+    if (!factor.positive_definite()) return std::nullopt;
+    const Vector step = -factor.Solve(gradient);
+    return step.allFinite() ? std::optional<Vector>(step) : std::nullopt;
+  }
+
+  // Goes along `move` up to a limit, which becomes active, or by as much as the cost falls
+  // sufficiently; returns false where it does not.
+  bool Step(double value, double slope, const Vector& move, Vector& eta) {
+    const Vector room = limits_.bounds - limits_.normals.transpose() * eta;
+    const Vector speed = limits_.normals.transpose() * move;
+    double fraction = 1;
+    std::optional<Eigen::Index> limit;
+    for (Eigen::Index i = 0; i < room.size(); ++i) {
+      if (std::ranges::find(active_, i) != active_.end()) continue;
+      if (speed[i] <= 0 || room[i] >= fraction * speed[i]) continue;
+      fraction = std::max(0.0, room[i] / speed[i]);
+      limit = i;
+    }
+    for (int halving = 0; halving <= kMaxHalvings; ++halving, fraction /= 2) {
+      const Vector next = eta + fraction * move;
+      if (cost_.Evaluate(next).total <= value + kSufficient * fraction * slope) {
+        eta = next;
+        if (limit && halving == 0) active_.push_back(*limit);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const Cost& cost_;
+  const Limits limits_;
+  const Vector same_;
+  std::vector<Eigen::Index> active_;
+  Vector multipliers_;  // of the active limits
+};
+
+}  // namespace
+
+std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProblem& problem,
+                                      const Vector& start) {
+  return NewtonSearch(cost, problem).From(start);
+}
+
+std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& problem,
+                                  const Matrix& starts, const Stop& stop) {
+  const MinimizerOptions options;
+  std::vector<Minimum> found;
+  Matrix others(starts.rows(), starts.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < starts.rows(); ++i) {
+    if (const auto reached = MinimumByNewton(cost, problem, starts.row(i).transpose())) {
+      found.push_back({.point = *reached,
+                       .value = problem.function(*reached, nullptr),
+                       .converged = true,
+                       .reason = "converged"});
+    } else {
+      others.row(count++) = starts.row(i);
+    }
+  }
+  if (count > 0) {
+    for (Minimum& minimum : FindMinima(problem, others.topRows(count), options, stop)) {
+      found.push_back(std::move(minimum));
+    }
+  }
+  return DistinctMinima(std::move(found), problem, options);
+}
+
+}  // namespace polyest::internal
