@@ -55,8 +55,8 @@ CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   value.prior = prior_.NegativeLogDensity(xi);
   value.total =
       Supports(xi) ? Total(power_ * value.mismatch, value.prior, regularization_) : kInfinity;
-  if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
-  if (population_ != nullptr) value.total += population_->Evaluate(xi);
+  if (has_remainder()) value.total += power_ * (remainder_.dot(d) + remainder_constant_);
+  if (population_ != nullptr) value.total += population_->Evaluate(xi, power_);
   return value;
 }
 
@@ -71,8 +71,8 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
   // ∇J = β ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
+  if (has_remainder()) by_d += remainder_;
   gradient = power_ * (phi_gradient.transpose() * by_d);
-  if (has_remainder()) gradient += phi_gradient.transpose() * remainder_;
   value.total = kInfinity;
   if (Supports(xi)) {
     value.total = Total(power_ * value.mismatch, value.prior, regularization_);
@@ -80,9 +80,9 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
       gradient += regularization_ * (region_.axes().transpose() * prior_.Gradient(xi));
     }
   }
-  if (has_remainder()) value.total += remainder_.dot(d) + remainder_constant_;
+  if (has_remainder()) value.total += power_ * (remainder_.dot(d) + remainder_constant_);
   if (population_ != nullptr) {
-    const PopulationCost::Derivatives derivatives = population_->Differentiate(xi);
+    const PopulationCost::Derivatives derivatives = population_->Differentiate(xi, power_);
     value.total += derivatives.value;
     gradient += region_.axes().transpose() * derivatives.gradient;
   }
@@ -105,7 +105,7 @@ Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
 Matrix Cost::InformationHessian(const ConstVectorRef& eta, double spent) const {
   Matrix hessian = MismatchHessian(eta, spent);
   if (population_ != nullptr) {
-    const Matrix of_population = population_->Differentiate(region_.ToGerm(eta)).hessian;
+    const Matrix of_population = population_->Differentiate(region_.ToGerm(eta), power_).hessian;
     hessian += region_.axes().transpose() * of_population * region_.axes();
   }
   return hessian;
@@ -119,7 +119,7 @@ Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
     hessian +=
         regularization_ * (region_.axes().transpose() * curvature.asDiagonal() * region_.axes());
   }
-  if (has_remainder()) hessian += basis_->WeightedHessian(eta, remainder_);
+  if (has_remainder()) hessian += power_ * basis_->WeightedHessian(eta, remainder_);
   return hessian;
 }
 
@@ -152,8 +152,8 @@ void Cost::EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const {
     xi = xis.row(i).transpose();
     const double prior = prior_.NegativeLogDensity(xi);
     totals[i] = Supports(xi) ? Total(power_ * totals[i], prior, regularization_) : kInfinity;
-    if (has_remainder()) totals[i] += remainders[i] + remainder_constant_;
-    if (population_ != nullptr) totals[i] += population_->Evaluate(xi);
+    if (has_remainder()) totals[i] += power_ * (remainders[i] + remainder_constant_);
+    if (population_ != nullptr) totals[i] += population_->Evaluate(xi, power_);
   }
 }
 

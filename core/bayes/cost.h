@@ -1,11 +1,12 @@
 #pragma once
 
 // The cost (24)–(25) with the regularization weight of (56), on an expansion over a region,
-//   J(η) = β J_mismatch(η) + α² J_apriori(ξ(η)) + J_0(η) + J_P(ξ(η)),   ξ = centre + axes η,
+//   J(η) = β (J_mismatch(η) + J_0(η)) + α² J_apriori(ξ(η)) + J_P(ξ(η)),   ξ = centre + axes η,
 // with the power β = 1 of the likelihood unless the posterior is tempered, a polynomial J_0 that is
 // 0 unless parameters have been eliminated (estimator/problem/ended_runs.h), and J_P that is 0
 // unless runs share a population (population_cost.h), with exact derivatives: J_mismatch is a
-// function of quadratic forms in φ(η) (mismatch.h), φ a polynomial.
+// function of quadratic forms in φ(η) (mismatch.h), φ a polynomial. What J_P has of runs that have
+// ended is part of their likelihood, too, and has the power β: only the sum is bounded below.
 
 #include <memory>
 #include <utility>

@@ -183,26 +183,27 @@ const ScoreMixture* PopulationCost::ShapeOf(Eigen::Index run) const {
   return shape.log_weights.size() > 0 ? &shape : nullptr;
 }
 
-double PopulationCost::Evaluate(const ConstVectorRef& xi) const {
+double PopulationCost::Evaluate(const ConstVectorRef& xi, double power) const {
   const RunScore population = PopulationAt(xi);
   const double mu = population.mean, t = population.variance;
   thread_local Vector scores;  // kept between calls, so that a sampler's sweeps do not allocate
   scores.noalias() = slope_ * xi;
   double sum = 0;
   for (Eigen::Index r = 0; r < base_.size(); ++r) {
-    const double c = base_[r] + scores[r], S = variance_[r];
+    const double c = base_[r] + scores[r], S = variance_[r], share = PowerOf(r, power);
     if (const ScoreMixture* shape = ShapeOf(r)) {
-      sum += 2 * MixtureValue(c, *shape, population);
+      sum += 2 * share * MixtureValue(c, *shape, population);
       continue;
     }
     const double w = S + (1 - S) * t;
     const double square = (1 - S) * (c - mu) * (c - mu) + S * c * (2 * c - 2 * mu - t * c);
-    sum += std::log(w) + square / w - c * c;
+    sum += share * (std::log(w) + square / w - c * c);
   }
   return 0.5 * sum;
 }
 
-PopulationCost::Derivatives PopulationCost::Differentiate(const ConstVectorRef& xi) const {
+PopulationCost::Derivatives PopulationCost::Differentiate(const ConstVectorRef& xi,
+                                                          double power) const {
   const RunScore population = PopulationAt(xi);
   const Vector scores = base_ + slope_ * xi;
   const Eigen::Index runs = base_.size();
@@ -212,8 +213,10 @@ PopulationCost::Derivatives PopulationCost::Differentiate(const ConstVectorRef& 
   sum.hessian.setZero();
   for (Eigen::Index r = 0; r < runs; ++r) {
     const ScoreMixture* shape = ShapeOf(r);
-    const RunTerm term = shape != nullptr ? MixtureTerm(scores[r], *shape, population)
-                                          : GaussianTerm(scores[r], variance_[r], population);
+    RunTerm term = shape != nullptr ? MixtureTerm(scores[r], *shape, population)
+                                    : GaussianTerm(scores[r], variance_[r], population);
+    term.gradient *= PowerOf(r, power);
+    term.hessian *= PowerOf(r, power);
     by_c[r] = term.gradient[0];
     by_cc[r] = term.hessian(0, 0);
     by_cm[r] = term.hessian(0, 1);
@@ -222,7 +225,7 @@ PopulationCost::Derivatives PopulationCost::Differentiate(const ConstVectorRef& 
     sum.hessian += term.hessian;
   }
   Derivatives result;
-  result.value = Evaluate(xi);
+  result.value = Evaluate(xi, power);
   result.gradient = slope_.transpose() * by_c;
   result.gradient[mean_] += sum.gradient[1];
   result.gradient[spread_] += kLogDeviation * sum.gradient[2];

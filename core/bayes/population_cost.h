@@ -16,6 +16,7 @@
 // (S → 1) or everything (S → 0). Among the germs the outputs depend on, only g_r is new; μ and s
 // have no part in the expansion of the outputs, and s may be as small as it likes.
 
+#include <iterator>
 #include <vector>
 
 #include "core/common/types.h"
@@ -63,17 +64,21 @@ class PopulationCost {
 
   // `mean` and `spread` are the indices of their germs. Row r of `slope` (R × n) and `base` are
   // run r's mean base + slope ξ, and `variance` (R) is S of a Gaussian, 0 ≤ S ≤ 1. The first runs
-  // have the given shapes, the others are Gaussians.
+  // have the given shapes, those that have ended; the others are Gaussians.
   PopulationCost(int mean, int spread, Vector base, Matrix slope, Vector variance,
                  std::vector<ScoreMixture> shapes = {});
 
-  double Evaluate(const ConstVectorRef& xi) const;
-  Derivatives Differentiate(const ConstVectorRef& xi) const;
+  // `power` is that of the likelihood, of which the terms of the runs that have ended are a part.
+  double Evaluate(const ConstVectorRef& xi, double power = 1) const;
+  Derivatives Differentiate(const ConstVectorRef& xi, double power = 1) const;
   // Returns N(μ, s²) at germs ξ.
   RunScore PopulationAt(const ConstVectorRef& xi) const;
 
  private:
   const ScoreMixture* ShapeOf(Eigen::Index run) const;
+  double PowerOf(Eigen::Index run, double power) const {
+    return run < std::ssize(shapes_) ? power : 1;
+  }
 
   int mean_;
   int spread_;

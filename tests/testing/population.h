@@ -50,6 +50,22 @@ struct PopulationCampaign {
     }
     return samples;
   }
+
+  // Runs of one sample each, at random times.
+  Samples MakeShortRuns(int runs, uint64_t seed) const {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> time(0.1, 2);
+    Samples samples;
+    samples.columns = {{"y", {}, {}}};
+    for (int run = 0; run < runs; ++run) {
+      const double v = kTrueMean + kTrueSpread * normal(generator), t = time(generator);
+      samples.run.push_back(run);
+      samples.time_s.push_back(t);
+      samples.columns[0].value.push_back(v * t + kTrueOffset + noise * normal(generator));
+    }
+    return samples;
+  }
 };
 
 struct Moments {
@@ -84,41 +100,40 @@ struct PopulationOracle {
  private:
   double AddAt(const PopulationCampaign& campaign, const Samples& samples, double m, double s,
                double greatest, int pass) {
-    constexpr auto& t = PopulationCampaign::kTimes;
     const double noise2 = campaign.noise * campaign.noise;
-    double tt = 0, t1 = 0;
-    for (const double time : t) {
-      tt += time * time;
-      t1 += time;
-    }
-    // C = s² t tᵀ + σ² I of a run's samples; C⁻¹ = (I − k t tᵀ)/σ².
-    const double k = s * s / (noise2 + s * s * tt);
-    const double n = static_cast<double>(t.size());
     double log_density = -0.5 * std::pow(m - PopulationCampaign::kPriorMean, 2) -
                          0.5 * std::pow(std::log(s / 0.5), 2);
-    double A = 1, B = 0, te_last = 0;
-    for (size_t row = 0; row < samples.rows(); row += t.size()) {
-      double ee = 0, te = 0, e1 = 0;
-      for (size_t i = 0; i < t.size(); ++i) {
-        const double e = samples.columns[0].value[row + i] - t[i] * m;
+    double A = 1, B = 0, te_last = 0, t1_last = 0, tt_last = 0;
+    for (size_t row = 0; row < samples.rows();) {
+      double n = 0, tt = 0, t1 = 0, ee = 0, te = 0, e1 = 0;
+      const size_t first = row;
+      for (; row < samples.rows() && samples.run[row] == samples.run[first]; ++row) {
+        const double t = samples.time_s[row], e = samples.columns[0].value[row] - t * m;
+        n += 1;
+        tt += t * t;
+        t1 += t;
         ee += e * e;
-        te += t[i] * e;
+        te += t * e;
         e1 += e;
       }
+      // C = s² t tᵀ + σ² I of a run's samples; C⁻¹ = (I − k t tᵀ)/σ².
+      const double k = s * s / (noise2 + s * s * tt);
       A += (n - k * t1 * t1) / noise2;
       B += (e1 - k * t1 * te) / noise2;
       log_density -= 0.5 * (ee - k * te * te) / noise2 + 0.5 * std::log(1 + s * s * tt / noise2);
       te_last = te;
+      t1_last = t1;
+      tt_last = tt;
     }
     log_density += 0.5 * B * B / A - 0.5 * std::log(A);
     if (pass == 0) return log_density;
     const double density = std::exp(log_density - greatest);
-    const double b = B / A, information = 1 / (s * s) + tt / noise2;
+    const double b = B / A, information = 1 / (s * s) + tt_last / noise2;
     mean.Add(density, m);
     spread.Add(density, s);
     offset.Add(density, b, 1 / A);
-    const double follows = t1 / noise2 / information;
-    last.Add(density, m + (te_last - t1 * b) / noise2 / information,
+    const double follows = t1_last / noise2 / information;
+    last.Add(density, m + (te_last - t1_last * b) / noise2 / information,
              1 / information + follows * follows / A);
     return log_density;
   }

@@ -64,6 +64,22 @@ void ExpectDerivatives(const PopulationCost& cost, const Vector& xi, double erro
   EXPECT_LT((exact.hessian - exact.hessian.transpose()).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+// The second of two runs has not ended; the power is that of the first one's likelihood.
+TEST(PopulationCost, HasThePowerOfTheLikelihoodOfEndedRuns) {
+  const Vector xi{{0.3, -0.8, 1.2}};
+  const auto ended = [&](int runs) {
+    return PopulationCost(0, 1, Vector::Constant(runs, 0.4), Matrix::Zero(runs, 3),
+                          Vector::Constant(runs, 0.2), {ScoreMixture()});
+  };
+  const double one = ended(1).Evaluate(xi);
+  EXPECT_NEAR(ended(1).Evaluate(xi, 0.3), 0.3 * one, 1e-12);
+  EXPECT_NEAR(ended(2).Evaluate(xi, 0.3), 1.3 * one, 1e-12);
+  const auto whole = ended(1).Differentiate(xi), tempered = ended(2).Differentiate(xi, 0.3);
+  EXPECT_NEAR(tempered.value, 1.3 * whole.value, 1e-12);
+  EXPECT_LT((tempered.gradient - 1.3 * whole.gradient).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((tempered.hessian - 1.3 * whole.hessian).cwiseAbs().maxCoeff(), 1e-12);
+}
+
 TEST(PopulationCost, IsTheIntegralOverTheRuns) {
   for (const double variance : {1e-4, 0.1, 0.6, 1.0}) {
     const Vector xi{{0.3, -0.8, 1.2}};

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/chaos/gauss_rule.h"
+#include "core/common/check.h"
 
 namespace polyest::internal {
 namespace {
@@ -365,12 +366,12 @@ TEST(GaussRule, OfThreeLegendreNodesIsTheTextbookOne) {
   EXPECT_NEAR(rule.weights[1], 8.0 / 18, 1e-14);
 }
 
-TEST(GermDeathTest, ShapesBelowOneAndCertainProbabilitiesAreProgrammersErrors) {
-  EXPECT_DEATH(Germ::Beta(0.5, 2), "check failed");
-  EXPECT_DEATH(Germ::Gamma(0.9), "check failed");
-  EXPECT_DEATH(Germ::Uniform().Quantile(0), "check failed");
-  EXPECT_DEATH(Germ::TruncatedNormal(2, 2), "check failed");
-  EXPECT_DEATH(Germ::TruncatedNormal(8, 9), "check failed");
+TEST(GermCheck, ShapesBelowOneAndCertainProbabilitiesAreProgrammersErrors) {
+  EXPECT_THROW(Germ::Beta(0.5, 2), CheckFailure);
+  EXPECT_THROW(Germ::Gamma(0.9), CheckFailure);
+  EXPECT_THROW(Germ::Uniform().Quantile(0), CheckFailure);
+  EXPECT_THROW(Germ::TruncatedNormal(2, 2), CheckFailure);
+  EXPECT_THROW(Germ::TruncatedNormal(8, 9), CheckFailure);
 }
 
 }  // namespace

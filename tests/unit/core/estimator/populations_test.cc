@@ -26,8 +26,8 @@ void ExpectMoments(const ParameterEstimate& parameter, const Moments& exact) {
   EXPECT_NEAR(parameter.posterior_std_dev, exact.deviation(), 0.05 * exact.deviation());
 }
 
-void ExpectAgreement(const PopulationCampaign& campaign, int runs, uint64_t seed) {
-  const Samples samples = campaign.MakeRuns(runs, seed);
+void ExpectAgreement(const PopulationCampaign& campaign, const Samples& samples) {
+  const int runs = samples.run.back() + 1;
   const Estimate estimate = EstimateOf(campaign.MakeProblem(), samples);
   const PopulationOracle exact(campaign, samples);
   SCOPED_TRACE(runs);
@@ -38,12 +38,24 @@ void ExpectAgreement(const PopulationCampaign& campaign, int runs, uint64_t seed
 }
 
 TEST(Populations, OfPreciseRunsAgreeWithTheExactPosterior) {
-  for (const int runs : {1, 2, 3, 10, 40}) ExpectAgreement({.noise = 0.05}, runs, 1);
+  const PopulationCampaign precise{.noise = 0.05};
+  for (const int runs : {1, 2, 3, 10, 40}) ExpectAgreement(precise, precise.MakeRuns(runs, 1));
 }
 
 // Each run alone tells less of its slope than the population does.
 TEST(Populations, OfVagueRunsAgreeWithTheExactPosterior) {
-  for (const int runs : {3, 10, 40}) ExpectAgreement({.noise = 1}, runs, 2);
+  const PopulationCampaign vague{.noise = 1};
+  for (const int runs : {3, 10, 40}) ExpectAgreement(vague, vague.MakeRuns(runs, 2));
+}
+
+// What is known of runs that have ended is tempered together with the rest of the likelihood where
+// there are few samples: without it, the cost would have no lower bound.
+TEST(Populations, OfRunsOfOneSampleAgreeWithTheExactPosterior) {
+  const PopulationCampaign campaign{.noise = 0.3};
+  for (const uint64_t seed : {1, 4, 5, 6}) {
+    SCOPED_TRACE(seed);
+    ExpectAgreement(campaign, campaign.MakeShortRuns(5, seed));
+  }
 }
 
 TEST(Populations, AddTwoParameters) {

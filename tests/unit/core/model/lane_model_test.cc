@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/common/check.h"
 #include "core/model/builtin/bicycle.h"
 #include "core/model/builtin/duffing.h"
 #include "core/model/builtin/linear_two_state.h"
@@ -146,14 +147,14 @@ TYPED_TEST(LaneModelOf, GivesAPointTheSameBitsInAnyLane) {
   }
 }
 
-TEST(LaneModelDeathTest, RefusesBlocksOfTheWrongShape) {
+TEST(LaneModelCheck, RefusesBlocksOfTheWrongShape) {
   const LaneModel<builtin::Pendulum> model;
   const Eigen::ArrayXXd odd = Eigen::ArrayXXd::Ones(kLanes + 1, 5);
   const Eigen::ArrayXXd narrow = Eigen::ArrayXXd::Ones(kLanes, 4);
   Eigen::ArrayXXd states(kLanes + 1, 2);
-  EXPECT_DEATH(model.InitialStates(odd, states), "kLanes");
-  EXPECT_DEATH(model.InitialStates(narrow, states), "kParameters");
-  EXPECT_DEATH(model.InitialStates(Eigen::ArrayXXd::Ones(kLanes, 5), states), "rows");
+  EXPECT_THROW(model.InitialStates(odd, states), CheckFailure);
+  EXPECT_THROW(model.InitialStates(narrow, states), CheckFailure);
+  EXPECT_THROW(model.InitialStates(Eigen::ArrayXXd::Ones(kLanes, 5), states), CheckFailure);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/check.h"
 #include "core/model/builtin/duffing.h"
 #include "core/model/builtin/pendulum.h"
 #include "core/model/lane_model.h"
@@ -268,15 +269,16 @@ TEST(EquationModel, HasAJacobianThatAgreesWithDifferences) {
   }
 }
 
-TEST(EquationModelDeathTest, RefusesBlocksOfTheWrongShape) {
+TEST(EquationModelCheck, RefusesBlocksOfTheWrongShape) {
   const auto model = MakeOrFail(Duffing());
   ASSERT_NE(model, nullptr);
   const Eigen::ArrayXXd states = Varied(kLanes, 2, 0), parameters = Varied(kLanes, 8, 0);
   Eigen::ArrayXXd rates(kLanes, 2);
-  EXPECT_DEATH(model->Derivatives(0, states, parameters, Varied(kLanes, 2, 0), rates), "check");
-  EXPECT_DEATH(model->Derivatives(0, states, Varied(kLanes, 7, 0), Varied(kLanes, 1, 0), rates),
-               "check");
-  EXPECT_DEATH(model->InitialStates(Varied(kLanes + 1, 8, 0), rates), "check");
+  EXPECT_THROW(model->Derivatives(0, states, parameters, Varied(kLanes, 2, 0), rates),
+               CheckFailure);
+  EXPECT_THROW(model->Derivatives(0, states, Varied(kLanes, 7, 0), Varied(kLanes, 1, 0), rates),
+               CheckFailure);
+  EXPECT_THROW(model->InitialStates(Varied(kLanes + 1, 8, 0), rates), CheckFailure);
 }
 
 }  // namespace
