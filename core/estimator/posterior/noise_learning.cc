@@ -43,6 +43,8 @@ constexpr double kMaxNonlinearity = 0.5;
 constexpr double kMaxDiscountOfPrediction = 0.2;
 constexpr double kMaxMisfit = 2;
 constexpr double kMovedPrediction = 1;
+// A noise whose log-likelihood is so much below the best one's may be left out of the grid.
+constexpr double kImprobable = 4;
 // Factor by which the record must exceed the grid before that is extended.
 constexpr double kGridGrowth = 1.3;
 // Changes from which the posterior counts as different: of its centre, in standard deviations, and
@@ -203,7 +205,10 @@ class Revision {
     const ProfileValue& present = values[CorrelationProfile::kPresent];
     LinearizeAgainIfCurved(gram, sums, present.scale);
     const NoiseChoice best = ChooseNoise(profile, values, noise.grid);
-    ExtendGrid(best.step, channel, noise);
+    const ProfileValue& longest = values[CorrelationProfile::kFirstMixed - 1];
+    const bool may_be_longer =
+        longest.negative_log_likelihood < best.negative_log_likelihood + kImprobable;
+    ExtendGrid(best.step, may_be_longer, channel, noise);
     if (IsAbout(best.noise, noise.shape())) return false;
     if (!(best.negative_log_likelihood < present.negative_log_likelihood - kWorthRevision)) {
       return false;
@@ -245,13 +250,14 @@ class Revision {
     changed_ = true;
   }
 
-  // Extends the grid if the best time constant is at an end of it beyond which the record now
-  // reaches.
-  void ExtendGrid(int best, const RecordSummary::Channel& channel, ChannelNoise& noise) {
+  // Extends the grid beyond its longest time constant if that is not improbable, and beyond its
+  // shortest one if that is the best, where the record now reaches farther.
+  void ExtendGrid(int best, bool may_be_longer, const RecordSummary::Channel& channel,
+                  ChannelNoise& noise) {
     const bool longer = channel.longest_run_s > kGridGrowth * noise.grid.longest_s;
     const bool finer = TimeConstantGrid::kShortestInIntervals * channel.least_interval_s <
                        noise.grid.shortest_s / kGridGrowth;
-    if ((best == TimeConstantGrid::kSteps - 1 && longer) || (best <= 0 && finer)) {
+    if ((may_be_longer && longer) || (best <= 0 && finer)) {
       SetGrid(channel, noise);
     }
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/bayes/factored_sums.h"
+#include "core/bayes/pareto_tail.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
@@ -18,10 +19,12 @@ constexpr double kOfWhite = 1.0 / 6;
 constexpr double kOfCorrelated = 4.0 / 6;
 // Members that have less than e^−9 of the best one's probability do not matter.
 constexpr double kNegligibleMember = 9;
-// Share of the effective number of draws that the factors must leave.
-constexpr double kEnough = 0.5;
+// The shape of the weights' tail up to which their variance is finite (pareto_tail.h). The
+// effective number of draws would not tell: where draws are too narrow, it is large until one falls
+// far out.
+constexpr double kMostShape = 0.5;
 // Least power of the likelihood from which is drawn.
-constexpr double kWidestPower = 0.25;
+constexpr double kWidestPower = 1.0 / 16;
 // If the expansion's own error makes up more than this share of χ², the noise is not known.
 constexpr double kMaxOwnError = 0.8;
 // Draws whose matrices are computed together.
@@ -116,10 +119,6 @@ Vector OfMonomials(const Matrix& gram) {
     }
   }
   return coefficients;
-}
-
-double CountIndependent(const Vector& weights) {
-  return weights.sum() * weights.sum() / weights.squaredNorm();
 }
 
 // Returns the width of the central 95 %. Unlike the standard deviation it does not depend on long
@@ -261,6 +260,7 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
   if (marginal.empty()) return widening;
   const ExpansionDesign& design = expansion.design();
   std::optional<PosteriorDraws> best;
+  double least_shape = kInfinity;
   for (double power = 1; power >= kWidestPower; power /= 2) {
     Cost wider = cost;
     wider.set_power(power * cost.power());
@@ -272,19 +272,19 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     Vector present, tempered;
     cost.EvaluateMany(etas, present);
     wider.EvaluateMany(etas, tempered);
-    const double before = CountIndependent(drawn.weights);
     Reweigh(tempered - present, drawn);
     const Vector plain = drawn.weights;
     Reweigh(cost.power() * marginal.LogFactors(etas), drawn);
-    if (best && best->effective_size.minCoeff() >= drawn.effective_size.minCoeff()) continue;
+    const double shape = TailShape(drawn.weights.array().log()).value_or(0);
+    if (best && shape >= least_shape) continue;
     for (Eigen::Index i = 0; i < widening.size(); ++i) {
       const double before_width = IntervalWidth(drawn.scores.col(i), plain);
       const double width = IntervalWidth(drawn.scores.col(i), drawn.weights);
       widening[i] = before_width > 0 ? width / before_width : 1;
     }
-    const bool enough = CountIndependent(drawn.weights) >= kEnough * before;
     best = std::move(drawn);
-    if (enough) break;
+    least_shape = shape;
+    if (shape <= kMostShape) break;
   }
   best->minima = std::move(draws.minima);
   draws = *std::move(best);
