@@ -52,7 +52,10 @@ class NewtonSearch {
       if (!move) return std::nullopt;
       const double slope = gradient.dot(*move);
       if ((move->array().abs() <= same_.array()).all() || -slope <= kRounding * std::abs(value)) {
-        if (limits_.Allow(eta + *move)) eta += *move;
+        // Along a flat direction the last step may be long.
+        const Vector next = eta + *move;
+        const double most = value + kRounding * std::abs(value);
+        if (limits_.Allow(next) && cost_.Evaluate(next).total <= most) eta = next;
         if (multipliers_.size() == 0 || multipliers_.minCoeff() >= 0) return eta;
         Eigen::Index falling;
         multipliers_.minCoeff(&falling);

@@ -7,6 +7,8 @@
 
 #include <stdexcept>
 
+#include "core/common/check.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -21,6 +23,16 @@ TEST(Guarded, TurnsExceptionsIntoStatuses) {
   EXPECT_TRUE(absl::IsResourceExhausted(Guarded(lacks_memory)));
   const auto is_wrong = []() -> absl::StatusOr<int> { throw std::out_of_range("vector::at"); };
   EXPECT_TRUE(absl::IsInternal(Guarded(is_wrong).status()));
+}
+
+// The daemon hosts other sessions than the one in which a check fails.
+TEST(Guarded, TurnsAFailedCheckIntoAFaultOfTheRequest) {
+  const auto checks = [](int count) {
+    POLYEST_CHECK(count > 0);
+    return absl::OkStatus();
+  };
+  EXPECT_TRUE(Guarded([&] { return checks(1); }).ok());
+  EXPECT_TRUE(absl::IsInternal(Guarded([&] { return checks(0); })));
 }
 
 }  // namespace
