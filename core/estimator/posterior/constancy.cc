@@ -40,16 +40,23 @@ struct Fit {
   std::vector<double> changes;  // δ_w
 };
 
-// Returns the fit; `rest` is P plus the information of windows that say nothing about parameter i.
-Fit FitChanges(const std::vector<WindowScore>& windows, Eigen::Index i, const Matrix& rest) {
-  Matrix m = Without(rest, i);
-  Vector v = Vector::Zero(m.rows());
+// What holds the other parameters besides the windows that tell of parameter i: the prior, and the
+// windows that tell nothing of it.
+struct Rest {
+  Vector gradient;
+  Matrix curvature;
+};
+
+// Returns the fall of the cost, and how the parameter then changes.
+Fit FitChanges(const std::vector<WindowScore>& windows, Eigen::Index i, const Rest& rest) {
+  Matrix m = Without(rest.curvature, i);
+  Vector v = Without(rest.gradient, i);
   Fit fit;
   for (const WindowScore& window : windows) {
     const double own = window.information(i, i);
     const Vector column = Without(Vector(window.information.col(i)), i);
     m += Without(window.information, i) - column * column.transpose() / own;
-    v -= column * (window.score[i] / own);
+    v += Without(window.score, i) - column * (window.score[i] / own);
     fit.fall += window.score[i] * window.score[i] / own;
   }
   Vector others = Vector::Zero(m.rows());  // the change of the other parameters
@@ -72,7 +79,7 @@ struct Test {
 };
 
 // Tests parameter i with windows of one length.
-Test TestParameter(const std::vector<WindowScore>& windows, Eigen::Index i, const Matrix& precision,
+Test TestParameter(const std::vector<WindowScore>& windows, Eigen::Index i, Rest rest,
                    double dispersion) {
   double largest = 0, sum = 0;
   for (const WindowScore& window : windows) {
@@ -81,12 +88,12 @@ Test TestParameter(const std::vector<WindowScore>& windows, Eigen::Index i, cons
   }
   if (!(sum >= kMinInformation)) return {};
   std::vector<WindowScore> informed;
-  Matrix rest = precision;
   for (const WindowScore& window : windows) {
     if (window.information(i, i) > kMinShareOfInformation * largest) {
       informed.push_back(window);
     } else {
-      rest += window.information;
+      rest.gradient += window.score;
+      rest.curvature += window.information;
     }
   }
   if (informed.size() < 2) return {};
@@ -122,7 +129,8 @@ Inconsistency Describe(int parameter, const std::vector<WindowChange>& changes) 
 }  // namespace
 
 std::optional<Inconsistency> FindInconsistency(std::vector<WindowScore> windows,
-                                               const Matrix& precision, double dispersion) {
+                                               const Matrix& precision,
+                                               const Vector& prior_gradient, double dispersion) {
   Test best;
   best.deviate = kSignificant;
   int parameter = -1;
@@ -131,7 +139,7 @@ std::optional<Inconsistency> FindInconsistency(std::vector<WindowScore> windows,
   }
   for (; windows.size() > 1; windows = MergePairs(windows)) {
     for (Eigen::Index i = 0; i < precision.rows(); ++i) {
-      Test test = TestParameter(windows, i, precision, dispersion);
+      Test test = TestParameter(windows, i, {prior_gradient, precision}, dispersion);
       if (test.deviate <= best.deviate) continue;
       best = std::move(test);
       parameter = static_cast<int>(i);

@@ -93,12 +93,11 @@ WindowEstimate EstimateOfWindow(const WindowScore& window, const Prior& prior, c
 
 std::vector<WindowEstimate> EstimatesByWindow(std::vector<WindowScore> windows, const Prior& prior,
                                               const Vector& xi, const Matrix& precision,
-                                              double regularization) {
+                                              const Vector& prior_gradient) {
   while (windows.size() > kMaxEstimates) windows = MergePairs(windows);
-  const Vector gradient = PriorGradient(prior, xi, regularization);
   std::vector<WindowEstimate> estimates;
   for (const WindowScore& window : windows) {
-    estimates.push_back(EstimateOfWindow(window, prior, xi, precision, gradient));
+    estimates.push_back(EstimateOfWindow(window, prior, xi, precision, prior_gradient));
   }
   return estimates;
 }
@@ -151,14 +150,15 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
   }
   CompleteInformation(problem, windows);
   const Matrix precision = PriorPrecision(prior);
+  const Vector prior_gradient = PriorGradient(prior, xi, regularization);
   const double dispersion = LargestDispersion(problem, channels);
   assessment.robust = RobustCovarianceOf(windows, precision);
-  assessment.inconsistency = FindInconsistency(windows, precision, dispersion);
+  assessment.inconsistency = FindInconsistency(windows, precision, prior_gradient, dispersion);
   const bool windows_contradict = assessment.Disagree() || assessment.inconsistency.has_value();
   assessment.contradicted = windows_contradict || ResidualsContradict(problem, record, channels);
   if (assessment.contradicted) Widen(dispersion, assessment);
   if (windows_contradict) {
-    assessment.estimates = EstimatesByWindow(windows, prior, xi, precision, regularization);
+    assessment.estimates = EstimatesByWindow(windows, prior, xi, precision, prior_gradient);
   }
   return assessment;
 }

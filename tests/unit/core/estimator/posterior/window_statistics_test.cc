@@ -53,6 +53,8 @@ const Matrix& Precision() {
   return precision;
 }
 
+const Vector kFlat = Vector::Zero(2);  // the gradient of a prior that says nothing
+
 TEST(RobustCovariance, IsTheModelsOwnForWhiteNoise) {
   double mean = 0;
   constexpr int kSeeds = 200;
@@ -111,7 +113,7 @@ TEST(RobustCovariance, IsUnknownIfOneWindowHasAllInformation) {
 
 TEST(Constancy, FindsNothingInWhiteNoise) {
   for (int seed = 0; seed < 200; ++seed) {
-    EXPECT_FALSE(FindInconsistency(ScoresOf(WhiteNoise(seed)), Precision(), 1)) << seed;
+    EXPECT_FALSE(FindInconsistency(ScoresOf(WhiteNoise(seed)), Precision(), kFlat, 1)) << seed;
   }
 }
 
@@ -121,7 +123,8 @@ TEST(Constancy, NamesTheParameterThatChangesAndWhen) {
     constexpr int kFrom = 24 * kRowsOfWindow;
     constexpr double kStep = 1;
     for (int k = kFrom; k < kRows; ++k) error[k] += kStep * Regressor(k)[changing];
-    const std::optional<Inconsistency> found = FindInconsistency(ScoresOf(error), Precision(), 1);
+    const std::optional<Inconsistency> found =
+        FindInconsistency(ScoresOf(error), Precision(), kFlat, 1);
     ASSERT_TRUE(found);
     EXPECT_EQ(found->parameter, changing);
     EXPECT_LT(found->first.span.end_s, 24);
@@ -139,8 +142,8 @@ TEST(Constancy, DividesByTheDispersion) {
   int alarms = 0;
   for (int seed = 0; seed < 100; ++seed) {
     const std::vector<WindowScore> windows = ScoresOf(2 * WhiteNoise(seed));
-    alarms += FindInconsistency(windows, Precision(), 1) ? 1 : 0;
-    EXPECT_FALSE(FindInconsistency(windows, Precision(), 4)) << seed;
+    alarms += FindInconsistency(windows, Precision(), kFlat, 1) ? 1 : 0;
+    EXPECT_FALSE(FindInconsistency(windows, Precision(), kFlat, 4)) << seed;
   }
   EXPECT_GT(alarms, 90);
 }
@@ -150,10 +153,38 @@ TEST(Constancy, DoesNotTakeAPriorForAChange) {
   std::vector<WindowScore> windows = ScoresOf(WhiteNoise(5));
   const Vector pull = (Vector(2) << 10 / std::sqrt(kRows), -8 / std::sqrt(kRows)).finished();
   for (WindowScore& window : windows) window.score += window.information * pull;
-  EXPECT_FALSE(FindInconsistency(windows, Precision(), 1));
+  const Vector balance = -SumOf(windows).score;
+  EXPECT_FALSE(FindInconsistency(windows, Precision(), balance, 1));
   const RobustCovariance robust = RobustCovarianceOf(windows, Precision());
   EXPECT_NEAR(robust.disagreement,
               RobustCovarianceOf(ScoresOf(WhiteNoise(5)), Precision()).disagreement, 1e-6);
+}
+
+// An estimate whose second parameter is held on a bound pulls on all windows. The test of the first
+// is, by its invariance, that of the free fit.
+TEST(Constancy, DoesNotTakeABoundForAChange) {
+  const auto hold = [](std::vector<WindowScore>& windows) {
+    constexpr double kHeld = 20;  // how far the bound is from the free fit
+    const Matrix all = SumOf(windows).information;
+    const Vector away = (Vector(2) << -all(0, 1) / all(0, 0) * kHeld, kHeld).finished();
+    for (WindowScore& window : windows) window.score += window.information * away;
+    ASSERT_NEAR(SumOf(windows).score[0], 0, 1e-9);
+  };
+  for (int seed = 0; seed < 100; ++seed) {
+    std::vector<WindowScore> windows = ScoresOf(WhiteNoise(seed));
+    hold(windows);
+    EXPECT_FALSE(FindInconsistency(windows, Precision(), kFlat, 1)) << seed;
+  }
+  Vector error = WhiteNoise(3);
+  for (int k = kRows / 2; k < kRows; ++k) error[k] += Regressor(k)[0];
+  std::vector<WindowScore> windows = ScoresOf(error);
+  const std::optional<Inconsistency> free = FindInconsistency(windows, Precision(), kFlat, 1);
+  hold(windows);
+  const std::optional<Inconsistency> held = FindInconsistency(windows, Precision(), kFlat, 1);
+  ASSERT_TRUE(free && held);
+  EXPECT_EQ(held->parameter, free->parameter);
+  // Up to the relative weight 10⁻⁶ ÷ 800 of the prior.
+  EXPECT_NEAR(held->separation, free->separation, 1e-4 * free->separation);
 }
 
 }  // namespace

@@ -99,6 +99,32 @@ TEST(Windows, StayWithinTheBoundsOfThePrior) {
   EXPECT_LT(last.std_dev, 5 * kByNoise);
 }
 
+// The truth is b = 0, on the bound, and the data often ask for less: y = d + b t/2000, with d
+// larger by `step` in the second half.
+TEST(Windows, SayNothingOfAParameterBesideAnotherOnItsBound) {
+  const Problem problem = TextProblem("d + b*t/2000",
+                                      {UncertainParameter::Normal("d", 0, 1).value(),
+                                       UncertainParameter::Uniform("b", 0, 1).value()},
+                                      kNoise);
+  const auto estimate = [&](int rows, double step, uint64_t seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal(0.3, kNoise);
+    std::vector<double> values;
+    for (int k = 0; k < rows; ++k) values.push_back(normal(generator) + (k < rows / 2 ? 0 : step));
+    return Processed(problem, values)->CurrentEstimate().value();
+  };
+  int on_bound = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    const Estimate constant = estimate(300, 0, seed);
+    EXPECT_FALSE(Has(constant, DiagnosticCode::kInconsistentOverTime)) << seed;
+    if (Has(constant, DiagnosticCode::kAtPriorBound)) ++on_bound;
+  }
+  EXPECT_GE(on_bound, 5);  // half of them, give or take two standard deviations
+  // A trend, which may have b < 0 in this test, leaves a quarter of the fall's sum of squares, 0.14
+  // σ² a row or 2,250 σ². The dispersion is about 10.
+  EXPECT_TRUE(Has(estimate(16'000, -0.15, 1), DiagnosticCode::kInconsistentOverTime));
+}
+
 // Correlated noise of the right size: the spectrum at the signal's frequency replaces σ².
 TEST(Windows, WidenWhatCorrelatedResidualsMakeTooNarrow) {
   constexpr double kA = 0.9;
