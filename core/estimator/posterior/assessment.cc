@@ -71,6 +71,7 @@ class Assessment {
     spent_ = fitted_ + 2;
     WidenForShift();
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
+    findings_.degrees = DegreesOfFreedom(request_, estimate_.channels, fitted_);
     DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);
     DescribeBias(cost, eta, stop);
@@ -118,8 +119,7 @@ class Assessment {
     return cost;
   }
 
-  // Returns the minimum of the cost with the noise as stated, also where the posterior is taken
-  // from a power of the likelihood.
+  // Returns the minimum of the cost with the noise as stated, whatever the likelihood's power.
   Vector MinimumAsStated(Cost cost, const Stop& stop) const {
     const std::vector<Minimum>& minima = posterior_.minima;
     if (cost.power() == 1) return minima.front().point;
@@ -269,7 +269,7 @@ class Assessment {
   // likelihood to a power have been widened already.
   void DescribeWindows(const Cost& cost, const Vector& eta) {
     findings_.windows = AssessWindows(*request_.expansion, problem_, *request_.record,
-                                      estimate_.channels, eta, regularization_);
+                                      estimate_.channels, findings_.degrees, eta, regularization_);
     const double narrower = std::sqrt(cost.power());
     findings_.windows.widening = (narrower * findings_.windows.widening).cwiseMax(1);
     findings_.windows.robust.ratio *= narrower;

@@ -115,4 +115,17 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
   return channels;
 }
 
+std::vector<double> DegreesOfFreedom(const AssessmentRequest& request,
+                                     const std::vector<ChannelEstimate>& channels, double fitted) {
+  const auto all = static_cast<double>(std::max<int64_t>(1, request.record->samples()));
+  std::vector<double> degrees;
+  for (size_t c = 0; c < channels.size(); ++c) {
+    const auto samples = static_cast<double>(channels[c].samples);
+    const ChannelSums& sums = request.expansion->sums()[c];
+    const double used = fitted * samples / all + sums.spent / sums.degrees_factor;
+    degrees.push_back(std::max(0.0, samples - used));
+  }
+  return degrees;
+}
+
 }  // namespace polyest::internal

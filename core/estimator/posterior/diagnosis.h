@@ -48,7 +48,8 @@ struct Findings {
   const ResolvedProblem* problem = nullptr;
   const RegionalExpansion* expansion = nullptr;
   const RecordSummary* record = nullptr;
-  Vector map_xi;  // the minimum, germ coordinates
+  std::vector<double> degrees;  // expected χ² by channel, its degrees of freedom
+  Vector map_xi;                // the minimum, germ coordinates
   bool converged = true;
   std::string minimizer_reason;
   std::vector<Vector> other_minima;  // θ of other minima with comparable cost

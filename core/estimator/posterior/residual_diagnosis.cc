@@ -11,9 +11,9 @@
 namespace polyest::internal {
 namespace {
 
-// For a correct model, χ² has mean N and standard deviation √(2N). Residuals that are too small,
-// which is the less dangerous error, are reported when χ² is below N both by many standard
-// deviations and by a third.
+// For a correct model, χ² has the mean ν, the degrees of freedom, and the standard deviation
+// √(2ν). Residuals that are too small, which is the less dangerous error, are reported when χ²
+// is below ν both by many standard deviations and by a third.
 constexpr double kMisfitDeviations = 6;
 constexpr double kTooSmallRatio = 1.5;
 // As kTooSmallRatio, for Student's t noise of samples that filters take: Gaussian noise of the
@@ -48,27 +48,27 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     const ChannelEstimate& channel = estimate.channels[c];
     if (findings.problem->problem().measured[c].noise.unknown) continue;
-    const auto samples = static_cast<double>(channel.samples);
-    if (ExceedsNoise(channel, findings.problem->problem().measured[c].noise.outliers,
+    const double degrees = findings.degrees[c];
+    if (ExceedsNoise(channel, degrees, findings.problem->problem().measured[c].noise.outliers,
                      findings.problem->uses_filters())) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
                            "prior is wrong; %s%s",
-                           channel.output, std::sqrt(channel.chi_squared / samples),
+                           channel.output, ResidualToNoise(channel, degrees),
                            WideningText(findings), AdviseProcessNoise(*findings.problem))});
     }
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
-    const double expected = samples - findings.expansion->Discount(static_cast<int>(c));
+    const double expected = degrees - findings.expansion->Discount(static_cast<int>(c));
     const double ratio = TooSmallRatio(*findings.problem, c);
     if (channel.chi_squared < expected / ratio &&
-        channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * samples)) {
+        channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * degrees)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat(
                "output %s: residuals are only %.3g times the noise assumed, which makes "
                "the uncertainty reported too large; give the noise its own size%s",
-               channel.output, std::sqrt(channel.chi_squared / samples),
+               channel.output, ResidualToNoise(channel, degrees),
                findings.problem->uses_filters() ? "" : " or let it be unknown")});
     }
   }

@@ -20,13 +20,19 @@ constexpr double kMaxLag1Correlation = 0.99;
 
 }  // namespace
 
-bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers, bool filtered) {
+bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandling outliers,
+                  bool filtered) {
   const auto samples = static_cast<double>(channel.samples);
   const double ratio = outliers == OutlierHandling::kNone ? kExcessRatio
                        : filtered                         ? kExcessRatioWithTails
                                                           : kExcessRatioWithOutliers;
-  return channel.chi_squared > ratio * samples &&
-         channel.chi_squared > samples + kExcessDeviations * std::sqrt(2 * samples);
+  if (!(channel.chi_squared > ratio * degrees)) return false;
+  return channel.chi_squared > degrees + kExcessDeviations * std::sqrt(2 * samples) ||
+         NormalDeviateOfChiSquared(channel.chi_squared, degrees) > kExcessDeviations;
+}
+
+double ResidualToNoise(const ChannelEstimate& channel, double degrees) {
+  return std::sqrt(channel.chi_squared / std::max(1.0, degrees));
 }
 
 bool AreCorrelated(const ChannelEstimate& channel, int64_t runs) {
@@ -49,10 +55,10 @@ double VarianceOfMeans(const ChannelEstimate& channel) {
   return AreSlowlyCorrelated(channel) ? std::max(ratio, channel.variance_ratio) : ratio;
 }
 
-double Dispersion(const ChannelEstimate& channel, bool noise_known) {
+double Dispersion(const ChannelEstimate& channel, double degrees, bool noise_known) {
   if (channel.samples == 0) return 1;
-  const double ratio = noise_known ? channel.chi_squared / static_cast<double>(channel.samples) : 1;
-  return std::max(1.0, ratio) * VarianceOfMeans(channel);
+  const double ratio = noise_known ? ResidualToNoise(channel, degrees) : 1;
+  return std::max(1.0, ratio * ratio) * VarianceOfMeans(channel);
 }
 
 }  // namespace polyest::internal

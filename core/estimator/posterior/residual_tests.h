@@ -1,19 +1,25 @@
 #pragma once
 
 // Tests of a channel's residuals. They grow sharp with the number of samples N, but a deviation
-// that would hardly change the uncertainty is not reported, however significant it is.
+// that would hardly change the uncertainty is not reported, however significant it is. `degrees` is
+// the expected χ² of the channel, its degrees of freedom (channel_description.h).
 
 #include "polyest/estimate.h"
 #include "polyest/noise.h"
 
 namespace polyest::internal {
 
-// Returns whether χ² is too large for the noise assumed: for a right model it has mean N and
-// standard deviation √(2N). It must exceed N by six of them and by a fifth, which is noise that is
-// larger by a tenth; by a half if outliers are handled, because some of them are expected and their
-// weight is small but not 0; to twice N if filters do, whose χ² grows with the logarithm of an
-// outlier (bayes/noise.h).
-bool ExceedsNoise(const ChannelEstimate& channel, OutlierHandling outliers, bool filtered);
+// Returns whether χ² is too large for the noise assumed: for a right model it has the mean ν, the
+// degrees of freedom, and a standard deviation of at most √(2N). It must exceed ν by six of them,
+// or be as improbable as six standard deviations of a normal variable, and exceed ν by a fifth,
+// which is noise that is larger by a tenth; by a half if outliers are handled, because some of them
+// are expected and their weight is small but not 0; to twice ν if filters do, whose χ² grows with
+// the logarithm of an outlier (bayes/noise.h).
+bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandling outliers,
+                  bool filtered);
+// Returns the root mean square of the residuals in units of the noise assumed, √(χ²/ν), with at
+// least one degree of freedom.
+double ResidualToNoise(const ChannelEstimate& channel, double degrees);
 
 // Returns whether successive residuals are correlated: of independent ones the lag-1 correlation
 // has the standard deviation 1/√N. It must be four of them and 0.05, which changes the uncertainty
@@ -31,7 +37,7 @@ bool AreSlowlyCorrelated(const ChannelEstimate& channel);
 double VarianceOfMeans(const ChannelEstimate& channel);
 
 // Returns the variance of a mean of residuals relative to that of as many independent samples of
-// the noise assumed, at least 1: χ²/N (if the noise was known) times VarianceOfMeans.
-double Dispersion(const ChannelEstimate& channel, bool noise_known);
+// the noise assumed, at least 1: χ²/ν (if the noise was known) times VarianceOfMeans.
+double Dispersion(const ChannelEstimate& channel, double degrees, bool noise_known);
 
 }  // namespace polyest::internal

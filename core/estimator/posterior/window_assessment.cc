@@ -17,23 +17,24 @@ const NoiseModel& NoiseOf(const ResolvedProblem& problem, size_t channel) {
 }
 
 // Whether the residuals, for all their correlation, are still smaller than the noise.
-bool AreSmall(const ChannelEstimate& channel, const NoiseModel& noise) {
-  return !noise.unknown &&
-         channel.chi_squared * VarianceOfMeans(channel) < static_cast<double>(channel.samples);
+bool AreSmall(const ChannelEstimate& channel, double degrees, const NoiseModel& noise) {
+  return !noise.unknown && channel.chi_squared * VarianceOfMeans(channel) < degrees;
 }
 
 // Returns whether the residuals of any channel are larger than the noise, or correlated.
 bool ResidualsContradict(const ResolvedProblem& problem, const RecordSummary& record,
-                         const std::vector<ChannelEstimate>& channels) {
+                         const std::vector<ChannelEstimate>& channels,
+                         const std::vector<double>& degrees) {
   for (size_t c = 0; c < channels.size(); ++c) {
     const NoiseModel& noise = NoiseOf(problem, c);
-    if (!noise.unknown && ExceedsNoise(channels[c], noise.outliers, problem.uses_filters())) {
+    if (!noise.unknown &&
+        ExceedsNoise(channels[c], degrees[c], noise.outliers, problem.uses_filters())) {
       return true;
     }
     if (c >= record.channels().size()) continue;
     const bool correlated =
         AreCorrelated(channels[c], record.channels()[c].Runs()) || AreSlowlyCorrelated(channels[c]);
-    if (correlated && !AreSmall(channels[c], noise)) return true;
+    if (correlated && !AreSmall(channels[c], degrees[c], noise)) return true;
   }
   return false;
 }
@@ -54,10 +55,11 @@ void CompleteInformation(const ResolvedProblem& problem, std::vector<WindowScore
 }
 
 double LargestDispersion(const ResolvedProblem& problem,
-                         const std::vector<ChannelEstimate>& channels) {
+                         const std::vector<ChannelEstimate>& channels,
+                         const std::vector<double>& degrees) {
   double largest = 1;
   for (size_t c = 0; c < channels.size(); ++c) {
-    largest = std::max(largest, Dispersion(channels[c], !NoiseOf(problem, c).unknown));
+    largest = std::max(largest, Dispersion(channels[c], degrees[c], !NoiseOf(problem, c).unknown));
   }
   return largest;
 }
@@ -132,7 +134,8 @@ WindowParameter ChangedParameter(const Prior& prior, const Vector& xi, int i, do
 
 WindowAssessment AssessWindows(const RegionalExpansion& expansion, const ResolvedProblem& problem,
                                const RecordSummary& record,
-                               const std::vector<ChannelEstimate>& channels, const Vector& eta,
+                               const std::vector<ChannelEstimate>& channels,
+                               const std::vector<double>& degrees, const Vector& eta,
                                double regularization) {
   const Prior& prior = problem.prior();
   WindowAssessment assessment;
@@ -144,18 +147,19 @@ WindowAssessment AssessWindows(const RegionalExpansion& expansion, const Resolve
       has_ended ? ScoresByEndedRuns(problem, xi) : ScoresByWindow(expansion, prior, eta);
   if (windows.empty()) {
     // Runs that share a population have no windows, and the residuals alone tell of a wrong model.
-    assessment.contradicted = has_ended && ResidualsContradict(problem, record, channels);
-    if (assessment.contradicted) Widen(LargestDispersion(problem, channels), assessment);
+    assessment.contradicted = has_ended && ResidualsContradict(problem, record, channels, degrees);
+    if (assessment.contradicted) Widen(LargestDispersion(problem, channels, degrees), assessment);
     return assessment;
   }
   CompleteInformation(problem, windows);
   const Matrix precision = PriorPrecision(prior);
   const Vector prior_gradient = PriorGradient(prior, xi, regularization);
-  const double dispersion = LargestDispersion(problem, channels);
+  const double dispersion = LargestDispersion(problem, channels, degrees);
   assessment.robust = RobustCovarianceOf(windows, precision);
   assessment.inconsistency = FindInconsistency(windows, precision, prior_gradient, dispersion);
   const bool windows_contradict = assessment.Disagree() || assessment.inconsistency.has_value();
-  assessment.contradicted = windows_contradict || ResidualsContradict(problem, record, channels);
+  assessment.contradicted =
+      windows_contradict || ResidualsContradict(problem, record, channels, degrees);
   if (assessment.contradicted) Widen(dispersion, assessment);
   if (windows_contradict) {
     assessment.estimates = EstimatesByWindow(windows, prior, xi, precision, prior_gradient);

@@ -35,11 +35,12 @@ struct WindowAssessment {
   bool Disagree() const { return robust.significant && robust.disagreement > kDisagreement; }
 };
 
-// Assesses the windows at `eta` (local coordinates). `channels` are those of the estimate, `record`
-// is the record's summary.
+// Assesses the windows at `eta` (local coordinates). `channels` are those of the estimate,
+// `degrees` are their degrees of freedom, `record` is the record's summary.
 WindowAssessment AssessWindows(const RegionalExpansion& expansion, const ResolvedProblem& problem,
                                const RecordSummary& record,
-                               const std::vector<ChannelEstimate>& channels, const Vector& eta,
+                               const std::vector<ChannelEstimate>& channels,
+                               const std::vector<double>& degrees, const Vector& eta,
                                double regularization);
 
 // Returns parameter i when its score has changed from that at `xi` by `change` ± `std_dev` prior

@@ -52,6 +52,44 @@ TEST(ManyRuns, AgreeWithTheExactPosterior) {
   EXPECT_THAT(estimate.diagnostics, ::testing::IsEmpty());
 }
 
+// Runs of four samples, y = a + d t + b t², with a and d of their own: of 600 samples half the
+// degrees of freedom are left. The residuals of linear least squares are the oracle: χ² is s² times
+// one of 299 degrees of freedom where the noise is s times as large as assumed.
+TEST(ManyRuns, AreJudgedByTheDegreesOfFreedomThatTheirOwnParametersLeave) {
+  constexpr int kCount = 150, kRows = 4;
+  constexpr double kAssumed = 0.05;
+  UncertainParameter level = UncertainParameter::Normal("a", 0, 1).value();
+  UncertainParameter slope = UncertainParameter::Normal("d", 0, 1).value();
+  level.per_run = slope.per_run = true;
+  const Problem problem = TextProblem(
+      "a + d*t + b*t^2", {UncertainParameter::Normal("b", 0, 1).value(), level, slope}, kAssumed);
+  const auto estimate = [&](double ratio) {
+    std::mt19937_64 generator(5);
+    std::normal_distribution<double> normal;
+    Samples samples;
+    samples.columns = {{"y", {}, {}}};
+    for (int run = 0; run < kCount; ++run) {
+      const double a = normal(generator), d = normal(generator);
+      for (int i = 0; i < kRows; ++i) {
+        const double t = 0.5 * i;
+        samples.run.push_back(run);
+        samples.time_s.push_back(t);
+        samples.columns[0].value.push_back(a + d * t + 0.3 * t * t +
+                                           ratio * kAssumed * normal(generator));
+      }
+    }
+    return EstimateOf(problem, samples);
+  };
+  EXPECT_THAT(estimate(1).diagnostics, ::testing::IsEmpty());
+  // χ² of about 2.1 ν = 630 is beyond chance, and would not be if ν were N = 600.
+  const Estimate noisy = estimate(1.45);
+  EXPECT_LT(noisy.channels[0].chi_squared, 1.2 * kCount * kRows);
+  EXPECT_THAT(Message(noisy, DiagnosticCode::kModelMisfit),
+              ::testing::HasSubstr("residuals are 1.4"));
+  EXPECT_THAT(Message(estimate(0.4), DiagnosticCode::kModelMisfit),
+              ::testing::HasSubstr("residuals are only 0.39"));
+}
+
 // The scale's posterior has a standard deviation of 1/√(2N) of it; the standard deviations of k and
 // c are in proportion to the scale.
 TEST(ManyRuns, TeachTheNoise) {
