@@ -358,7 +358,8 @@ std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estim
   AddMinima(findings, diagnostics);
   AddRegularization(findings, diagnostics);
   AddFailures(findings, diagnostics);
-  for (std::string& warning : WarnOfSuspiciousData(*findings.problem, findings.record->facts())) {
+  for (std::string& warning : WarnOfSuspiciousData(*findings.problem, findings.record->facts(),
+                                                   FitsOf(findings, estimate))) {
     diagnostics.push_back({DiagnosticCode::kSuspiciousData, std::move(warning)});
   }
   return diagnostics;

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/estimator/posterior/noise_learning.h"
@@ -42,9 +43,20 @@ double TooSmallRatio(const ResolvedProblem& problem, size_t channel) {
   return problem.uses_filters() && tailed ? kTooSmallRatioWithTails : kTooSmallRatio;
 }
 
+// Whether the channel's samples are rounded to steps beside which their noise is small, also where
+// noise stated of up to a step makes up for that.
+bool IsCoarse(const Findings& findings, const std::vector<ChannelFit>& fits, size_t c) {
+  if (c >= fits.size()) return false;
+  const double smaller = std::min(fits[c].noise, fits[c].residual);
+  const auto coarse =
+      FindCoarseSteps(findings.record->facts().columns()[c], {smaller, true, fits[c].residual});
+  return coarse && fits[c].noise < coarse->step;
+}
+
 // A learned scale is skipped: it was learned from χ², which is therefore no test of it.
 void AddMisfit(const Findings& findings, const Estimate& estimate,
                std::vector<Diagnostic>& diagnostics) {
+  const std::vector<ChannelFit> fits = FitsOf(findings, estimate);
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     const ChannelEstimate& channel = estimate.channels[c];
     if (findings.problem->problem().measured[c].noise.unknown) continue;
@@ -58,6 +70,8 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
                            channel.output, ResidualToNoise(channel, degrees),
                            WideningText(findings), AdviseProcessNoise(*findings.problem))});
     }
+    // Residuals of a signal that stays within one step are small, but tell nothing of the noise.
+    if (IsCoarse(findings, fits, c)) continue;
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = degrees - findings.expansion->Discount(static_cast<int>(c));
     const double ratio = TooSmallRatio(*findings.problem, c);
@@ -222,6 +236,19 @@ void AddDisagreement(const Findings& findings, std::vector<Diagnostic>& diagnost
 }
 
 }  // namespace
+
+std::vector<ChannelFit> FitsOf(const Findings& findings, const Estimate& estimate) {
+  std::vector<ChannelFit> fits;
+  if (findings.record->channels().empty()) return fits;
+  for (size_t c = 0; c < estimate.channels.size(); ++c) {
+    const ChannelEstimate& channel = estimate.channels[c];
+    const double mean_square =
+        channel.chi_squared / static_cast<double>(std::max<int64_t>(1, channel.samples));
+    fits.push_back({.noise = channel.noise_std_dev,
+                    .residual = channel.noise_std_dev * std::sqrt(mean_square)});
+  }
+  return fits;
+}
 
 void DiagnoseResiduals(const Findings& findings, const Estimate& estimate,
                        std::vector<Diagnostic>& diagnostics) {

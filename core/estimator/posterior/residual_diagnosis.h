@@ -6,8 +6,12 @@
 #include <vector>
 
 #include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/record/suspicious_data.h"
 
 namespace polyest::internal {
+
+// Returns what the estimate says of each output's samples; nothing before the first row.
+std::vector<ChannelFit> FitsOf(const Findings& findings, const Estimate& estimate);
 
 // Appends the warnings about residuals to `diagnostics`.
 void DiagnoseResiduals(const Findings& findings, const Estimate& estimate,

@@ -7,7 +7,6 @@
 namespace polyest::internal {
 namespace {
 
-constexpr size_t kMinDistinct = 4;          // for a resolution: fewer are multiples by chance
 constexpr double kMultiple = 1e-3;          // how far from a multiple of the step a value may be
 constexpr double kIntegrationError = 1e-5;  // relative error of a prediction that means nothing
 
@@ -88,8 +87,8 @@ double ColumnFacts::Spread() const {
   return samples == 0 ? 0 : std::sqrt(square_sum / static_cast<double>(samples));
 }
 
-double ColumnFacts::Resolution() const {
-  if (distinct.size() < kMinDistinct) return 0;
+double ColumnFacts::Resolution(size_t least) const {
+  if (distinct.size() < least) return 0;
   double step = std::numeric_limits<double>::infinity();
   for (size_t i = 1; i < distinct.size(); ++i) step = std::min(step, distinct[i] - distinct[i - 1]);
   for (const double value : distinct) {

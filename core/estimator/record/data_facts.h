@@ -76,8 +76,8 @@ struct ColumnFacts {
   bool IsConsistent() const;  // false after reading what was never written
   double Spread() const;      // the standard deviation of the values
   // Returns the step of which all differences between the distinct values are multiples, such as
-  // that of an analogue-to-digital converter; 0 if there is none or there are fewer than four.
-  double Resolution() const;
+  // that of an analogue-to-digital converter; 0 if there is none or there are fewer than `least`.
+  double Resolution(size_t least = 4) const;
 
   template <class Archive>
   void serialize(Archive& archive) {

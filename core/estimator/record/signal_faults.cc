@@ -82,6 +82,11 @@ RecurringValue SignalFaults::OfExtremes(const RecurringValue& extreme) const {
   return 2 * at_extremes >= static_cast<double>(plateaus_) ? extreme : RecurringValue();
 }
 
+double SignalFaults::ShareOfChanges() const {
+  const int64_t all = steps_.count();
+  return all == 0 ? 1 : static_cast<double>(steps_.CountAbove(0)) / static_cast<double>(all);
+}
+
 bool SignalFaults::IsConsistent() const {
   return samples_ >= 0 && length_ >= 0 && excursions_ >= 0 && votes_ >= 0 &&
          candidate_.count >= 0 && candidate_.count <= excursions_ && plateaus_ >= 0 &&

@@ -37,6 +37,9 @@ class SignalFaults {
   RecurringValue UpperPlateaus() const { return OfExtremes(upper_); }
   RecurringValue LowerPlateaus() const { return OfExtremes(lower_); }
 
+  // Returns the share of successive samples that differ; 1 if there are none.
+  double ShareOfChanges() const;
+
   bool IsConsistent() const;  // false after reading what was never written
 
   template <class Archive>

@@ -44,14 +44,24 @@ std::vector<std::string> InitialStates(const ModelDescription& model) {
   return names;
 }
 
+// Whether the noise of an output is a fixed or an uncertain parameter and not what is stated.
+bool IsNoiseSet(const ResolvedProblem& problem, const std::string& output) {
+  const std::string name = NoiseName(output);
+  const std::vector<std::string> uncertain = problem.prior().Names();
+  return problem.problem().fixed.contains(name) ||
+         std::ranges::find(uncertain, name) != uncertain.end();
+}
+
 class Warnings {
  public:
-  Warnings(const ResolvedProblem& problem, const DataFacts& facts)
+  Warnings(const ResolvedProblem& problem, const DataFacts& facts,
+           const std::vector<ChannelFit>& fits)
       : problem_(problem),
         model_(problem.problem().model->description()),
         intervals_(facts.intervals()),
         columns_(facts.columns()),
-        inputs_(facts.inputs()) {}
+        inputs_(facts.inputs()),
+        fits_(fits) {}
 
   std::vector<std::string> Run() {
     if (columns_.empty()) return {};
@@ -66,8 +76,8 @@ class Warnings {
       AddConstant(NameOf(i), columns_[i], i < channels);
       if (i >= channels) continue;
       samples += columns_[i].samples;
-      AddFaults(problem_.problem().measured[i], columns_[i].faults);
-      AddNoise(problem_.problem().measured[i], columns_[i]);
+      AddFaults(i);
+      AddNoise(i);
       AddPrediction(problem_.problem().measured[i], columns_[i]);
     }
     if (samples < problem_.dimension()) {
@@ -126,6 +136,10 @@ class Warnings {
         name, input.longest_end_s, input.end_from_s);
   }
 
+  const ChannelFit* FitOf(size_t channel) const {
+    return channel < fits_.size() ? &fits_[channel] : nullptr;
+  }
+
   void AddLateStart() {
     if (!StartsLate()) return;
     Add("t does not begin near 0: a run's first row is at t = %g s, but the model starts from its "
@@ -146,13 +160,18 @@ class Warnings {
   }
 
   // Where gross errors are expected, dropouts are taken care of.
-  void AddFaults(const MeasuredOutput& measured, const SignalFaults& faults) {
+  void AddFaults(size_t channel) {
+    const MeasuredOutput& measured = problem_.problem().measured[channel];
+    const ChannelFit* fit = FitOf(channel);
+    const SignalFaults& faults = columns_[channel].faults;
     const RecurringValue dropouts = faults.Dropouts();
     if (measured.noise.outliers == OutlierHandling::kNone && dropouts.count >= kMinDropouts) {
       Add("%s: it jumps to %g and back at least %d times, as when a signal drops out; leave these "
           "cells empty, or give its noise outliers",
           measured.output, dropouts.value, dropouts.count);
     }
+    // Coarse steps are flat.
+    if (CoarseStepsOf(problem_, channel, columns_[channel], fit)) return;
     for (const RecurringValue& end : {faults.UpperPlateaus(), faults.LowerPlateaus()}) {
       if (end.count < kMinPlateaus) continue;
       Add("%s: it stops at %g %d times, for three samples or more each, as at the end of a "
@@ -161,10 +180,36 @@ class Warnings {
     }
   }
 
-  void AddNoise(const MeasuredOutput& measured, const ColumnFacts& column) {
-    if (measured.noise.unknown || column.samples < 3 || column.smallest == column.largest) return;
+  void AddCoarseSteps(const std::string& name, const CoarseSteps& coarse) {
+    Add("%s: its samples come in steps of %.3g, beside which their noise of about %.2g is small: "
+        "errors of up to half a step last as long as the signal stays within one and come back "
+        "with "
+        "it, so that the uncertainty may be far too small; measure with a finer range, add dither, "
+        "or state noise of half a step that is correlated for as long",
+        name, coarse.step, coarse.noise);
+  }
+
+  void AddNoise(size_t channel) {
+    const MeasuredOutput& measured = problem_.problem().measured[channel];
+    const ColumnFacts& column = columns_[channel];
     const std::string& name = measured.output;
-    if (IsNoiseSet(name)) return;
+    if (column.samples < 3 || column.smallest == column.largest) return;
+    if (const auto coarse = CoarseStepsOf(problem_, channel, column, FitOf(channel))) {
+      AddCoarseSteps(name, *coarse);
+    } else if (!measured.noise.unknown && !IsNoiseSet(problem_, name)) {
+      AddSizeOfNoise(name, column);
+    }
+    if (measured.noise.unknown || IsNoiseSet(problem_, name)) return;
+    // Noise with a part relative to the largest value so far is that small only during rest.
+    if (measured.noise.relative_to_max == 0 && column.min_noise < kNoiseRange * column.max_noise) {
+      Add("%s: its noise goes down to %g, so that the samples near 0 outweigh all others; give it "
+          "an absolute part",
+          name, column.min_noise);
+    }
+    AddRunningMaximum(measured, column);
+  }
+
+  void AddSizeOfNoise(const std::string& name, const ColumnFacts& column) {
     const double chi_squared = column.square_sum / (column.min_noise * column.min_noise);
     if (ProbabilityOfLess(chi_squared, static_cast<double>(column.samples - 1)) < kUnlikely) {
       Add("%s: its noise of %g is larger than the spread of its samples, %g; check its size and "
@@ -177,21 +222,6 @@ class Warnings {
           "noise as well",
           name, column.max_noise, rounding);
     }
-    // Noise with a part relative to the largest value so far is that small only during rest.
-    if (measured.noise.relative_to_max == 0 && column.min_noise < kNoiseRange * column.max_noise) {
-      Add("%s: its noise goes down to %g, so that the samples near 0 outweigh all others; give it "
-          "an absolute part",
-          name, column.min_noise);
-    }
-    AddRunningMaximum(measured, column);
-  }
-
-  // Whether the noise of an output is a fixed or an uncertain parameter and not what is stated.
-  bool IsNoiseSet(const std::string& output) const {
-    const std::string name = NoiseName(output);
-    const std::vector<std::string> uncertain = problem_.prior().Names();
-    return problem_.problem().fixed.contains(name) ||
-           std::ranges::find(uncertain, name) != uncertain.end();
   }
 
   // Noise relative to the largest value so far is small during rest, and rises with the signal.
@@ -230,14 +260,30 @@ class Warnings {
   const IntervalFacts& intervals_;
   const std::vector<ColumnFacts>& columns_;
   const std::vector<InputFacts>& inputs_;
+  const std::vector<ChannelFit>& fits_;
   std::vector<std::string> warnings_;
 };
 
 }  // namespace
 
+std::optional<CoarseSteps> CoarseStepsOf(const ResolvedProblem& problem, size_t channel,
+                                         const ColumnFacts& column, const ChannelFit* fit) {
+  const MeasuredOutput& measured = problem.problem().measured[channel];
+  if (fit != nullptr) {
+    if (measured.noise.correlation == NoiseCorrelation::kKnown) return std::nullopt;
+    return FindCoarseSteps(column, {fit->noise, measured.noise.unknown, fit->residual});
+  }
+  const bool stated = !measured.noise.unknown &&
+                      measured.noise.correlation == NoiseCorrelation::kWhite &&
+                      !IsNoiseSet(problem, measured.output);
+  if (!stated) return std::nullopt;
+  return FindCoarseSteps(column, {.std_dev = column.max_noise});
+}
+
 std::vector<std::string> WarnOfSuspiciousData(const ResolvedProblem& problem,
-                                              const DataFacts& facts) {
-  return Warnings(problem, facts).Run();
+                                              const DataFacts& facts,
+                                              const std::vector<ChannelFit>& fits) {
+  return Warnings(problem, facts, fits).Run();
 }
 
 }  // namespace polyest::internal

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "tests/unit/core/estimator/snapshot_session.h"
 #include "tests/unit/core/estimator/text_problem.h"
@@ -16,6 +17,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 std::vector<std::string> Warnings(const Estimate& estimate) {
   std::vector<std::string> messages;
@@ -117,6 +119,51 @@ TEST(SuspiciousData, AreSensorsThatNeverChange) {
       TextProblem("a + 0*t", {UncertainParameter::Normal("a", 0, 1).value()}, 1);
   EXPECT_THAT(Warnings(Processed(problem, {2, 2, 2, 2})->CurrentEstimate().value()),
               ElementsAre(HasSubstr("y never changes: it is 2 in every row")));
+}
+
+// Makes the problem of y as an expression of the parameters a and b and of t.
+Problem SignalProblem(const std::string& output, double noise) {
+  return TextProblem(output,
+                     {UncertainParameter::Normal("a", 1, 0.2).value(),
+                      UncertainParameter::Normal("b", 0, 0.2).value()},
+                     noise);
+}
+
+// Returns 600 samples of signal(t) with normal noise at 0.02, 0.04, … s, rounded to `step`.
+Samples RoundedRecord(const std::function<double(double)>& signal, double noise, double step) {
+  std::mt19937_64 generator(4);
+  std::normal_distribution<double> normal(0, noise);
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  for (int k = 1; k <= 600; ++k) {
+    const double t = 0.02 * k;
+    samples.time_s.push_back(t);
+    samples.columns[0].value.push_back(std::round((signal(t) + normal(generator)) / step) * step);
+  }
+  return samples;
+}
+
+// At rest, then slow to rise. Residuals of a rest within one step are small, but not because the
+// noise stated is too large.
+TEST(SuspiciousData, AreStepsBesideWhichTheNoiseIsSmall) {
+  const auto signal = [](double t) { return t < 6 ? 0 : 0.86 * (1 - std::exp(6 - t)); };
+  const std::string output = "b + a*if(t < 6, 0, 1 - exp(6 - t))";
+  const auto message = AllOf(HasSubstr("steps of 0.1, beside which their noise of about 0.0"),
+                             HasSubstr("the uncertainty may be far too small"));
+  const auto stated = [](double noise, double step) {
+    return std::hypot(noise, step / std::sqrt(12));
+  };
+  const Samples coarse = RoundedRecord(signal, 0.01, 0.1);
+  Problem problem = SignalProblem(output, stated(0.01, 0.1));
+  const Estimate estimate = EstimateOf(problem, coarse);
+  EXPECT_THAT(Warnings(estimate), ElementsAre(message));
+  EXPECT_THAT(Message(estimate, DiagnosticCode::kModelMisfit), Not(HasSubstr("too large")));
+  problem.measured[0].noise = {.unknown = true};
+  EXPECT_THAT(WarningsOf(problem, coarse), ElementsAre(message));
+  // Twice the noise.
+  EXPECT_THAT(
+      WarningsOf(SignalProblem(output, stated(0.05, 0.1)), RoundedRecord(signal, 0.05, 0.1)),
+      IsEmpty());
 }
 
 TEST(SuspiciousData, AreTheSameHoweverTheRowsArrive) {
