@@ -235,6 +235,16 @@ void AddDisagreement(const Findings& findings, std::vector<Diagnostic>& diagnost
                        AdviseProcessNoise(*findings.problem))});
 }
 
+// Returns whether the residuals are too large for the noise, or too much alike.
+bool ContradictNoise(const Findings& findings, const ChannelEstimate& channel, size_t c) {
+  const NoiseModel& noise = findings.problem->problem().measured[c].noise;
+  const bool large = !noise.unknown && ExceedsNoise(channel, findings.degrees[c], noise.outliers,
+                                                    findings.problem->uses_filters());
+  const bool alike =
+      channel.lag1_correlation > 0 && AreCorrelated(channel, findings.record->channels()[c].Runs());
+  return large || alike || AreSlowlyCorrelated(channel);
+}
+
 }  // namespace
 
 std::vector<ChannelFit> FitsOf(const Findings& findings, const Estimate& estimate) {
@@ -245,7 +255,10 @@ std::vector<ChannelFit> FitsOf(const Findings& findings, const Estimate& estimat
     const double mean_square =
         channel.chi_squared / static_cast<double>(std::max<int64_t>(1, channel.samples));
     fits.push_back({.noise = channel.noise_std_dev,
-                    .residual = channel.noise_std_dev * std::sqrt(mean_square)});
+                    .residual = channel.noise_std_dev * std::sqrt(mean_square),
+                    .degrees = findings.degrees[c],
+                    .white = channel.noise_time_constant_s == 0,
+                    .contradicts = ContradictNoise(findings, channel, c)});
   }
   return fits;
 }

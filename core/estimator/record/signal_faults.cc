@@ -44,7 +44,7 @@ void SignalFaults::EndOfEqualSamples(double next) {
   const double smaller = std::min(std::abs(entry_), std::abs(exit));
   // There and back: what remains is small beside either jump.
   if (length_ <= kLongestDropout && 2 * std::abs(entry_ + exit) < smaller &&
-      smaller > kJump * std::max(steps_.Usual(), smallest_step_)) {
+      smaller > SmallestJump()) {
     AddExcursion();
   }
   AddExtreme(length_ >= kShortestPlateau &&

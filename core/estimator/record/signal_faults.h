@@ -3,6 +3,7 @@
 // Faults of a sensor that its samples show without any model: samples that drop out to one value,
 // such as 0, and values that stop at the end of a measuring range. Memory is constant.
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 
@@ -37,6 +38,10 @@ class SignalFaults {
   RecurringValue UpperPlateaus() const { return OfExtremes(upper_); }
   RecurringValue LowerPlateaus() const { return OfExtremes(lower_); }
 
+  // Returns the least size that the jumps of a dropout may have now; ∞ if no step has been seen.
+  double SmallestJump() const { return kJump * UsualStep(); }
+  // Returns the usual step (OctaveSums::Usual) or, where most samples are equal, the smallest.
+  double UsualStep() const { return std::max(steps_.Usual(), smallest_step_); }
   // Returns the share of successive samples that differ; 1 if there are none.
   double ShareOfChanges() const;
 

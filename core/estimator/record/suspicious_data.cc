@@ -24,6 +24,10 @@ constexpr double kRiseOfNoise = 10;
 constexpr int64_t kMinConstant = 3;  // samples of one value before it is said never to change
 constexpr int64_t kMinDropouts = 4;  // to one value before they are mentioned
 constexpr int64_t kMinPlateaus = 4;  // at either end of a range before they are mentioned
+// A fit explains its samples only with so many degrees of freedom left, and noise that is learned
+// from it must be so much smaller than the samples' spread.
+constexpr double kMinDegrees = 8;
+constexpr double kExplained = 0.3;
 
 // Returns an upper bound of the probability that χ² with `degrees` degrees of freedom is at most
 // `chi_squared` (Chernoff): (r e^{1−r})^{degrees/2} with r = χ²/degrees < 1; else 1.
@@ -50,6 +54,27 @@ bool IsNoiseSet(const ResolvedProblem& problem, const std::string& output) {
   const std::vector<std::string> uncertain = problem.prior().Names();
   return problem.problem().fixed.contains(name) ||
          std::ranges::find(uncertain, name) != uncertain.end();
+}
+
+// Whether the fitted model explains all samples of a column.
+bool Explains(const ChannelFit& fit, const NoiseModel& noise, const ColumnFacts& column) {
+  if (fit.contradicts || fit.degrees < kMinDegrees) return false;
+  return !noise.unknown || fit.residual < kExplained * column.Spread();
+}
+
+// Whether the fitted model may explain what looks like dropouts: the squares of the residuals that
+// are beyond the noise do not suffice for half the jumps. Noise that has been learned from these
+// residuals is no larger than the usual step.
+bool MayExplain(const ChannelFit& fit, const NoiseModel& noise, const ColumnFacts& column) {
+  const SignalFaults& faults = column.faults;
+  const RecurringValue dropouts = faults.Dropouts();
+  const auto samples = static_cast<double>(column.samples);
+  const double usual = faults.UsualStep();
+  const double by_noise =
+      noise.unknown ? samples * usual * usual : fit.degrees * fit.noise * fit.noise;
+  const double jump = std::max(faults.SmallestJump(), std::abs(dropouts.value - column.mean));
+  const double half = static_cast<double>(dropouts.count) * jump * jump / 4;
+  return samples * fit.residual * fit.residual - by_noise < half;
 }
 
 class Warnings {
@@ -140,8 +165,16 @@ class Warnings {
     return channel < fits_.size() ? &fits_[channel] : nullptr;
   }
 
+  bool IsAllExplained() const {
+    for (size_t c = 0; c < fits_.size(); ++c) {
+      if (!Explains(fits_[c], problem_.problem().measured[c].noise, columns_[c])) return false;
+    }
+    return !fits_.empty();
+  }
+
+  // A model that explains what follows was in its initial state at t = 0.
   void AddLateStart() {
-    if (!StartsLate()) return;
+    if (!StartsLate() || IsAllExplained()) return;
     Add("t does not begin near 0: a run's first row is at t = %g s, but the model starts from its "
         "initial state at t = 0; if the record was cut out of a longer one, let its times begin at "
         "0 and make %s uncertain",
@@ -165,12 +198,14 @@ class Warnings {
     const ChannelFit* fit = FitOf(channel);
     const SignalFaults& faults = columns_[channel].faults;
     const RecurringValue dropouts = faults.Dropouts();
-    if (measured.noise.outliers == OutlierHandling::kNone && dropouts.count >= kMinDropouts) {
+    if (measured.noise.outliers == OutlierHandling::kNone && dropouts.count >= kMinDropouts &&
+        !(fit != nullptr && MayExplain(*fit, measured.noise, columns_[channel]))) {
       Add("%s: it jumps to %g and back at least %d times, as when a signal drops out; leave these "
           "cells empty, or give its noise outliers",
           measured.output, dropouts.value, dropouts.count);
     }
-    // Coarse steps are flat.
+    // Correlated noise takes up the residuals that a clipped signal leaves; coarse steps are flat.
+    if (fit != nullptr && fit->white && !fit->contradicts) return;
     if (CoarseStepsOf(problem_, channel, columns_[channel], fit)) return;
     for (const RecurringValue& end : {faults.UpperPlateaus(), faults.LowerPlateaus()}) {
       if (end.count < kMinPlateaus) continue;

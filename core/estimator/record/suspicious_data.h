@@ -17,6 +17,10 @@ namespace polyest::internal {
 struct ChannelFit {
   double noise = 0;     // root mean square of the noise: as assumed or, if unknown, as learned
   double residual = 0;  // root mean square of the residuals
+  double degrees = 0;   // degrees of freedom of the residuals
+  bool white = true;    // whether the noise is taken as uncorrelated
+  // Whether the residuals are too large for the noise, or too much alike for white noise.
+  bool contradicts = false;
 };
 
 // Returns the coarse steps of a measured output (quantization.h), unless the problem states for how
@@ -26,7 +30,8 @@ std::optional<CoarseSteps> CoarseStepsOf(const ResolvedProblem& problem, size_t 
                                          const ColumnFacts& column, const ChannelFit* fit);
 
 // Returns the warnings, each in one sentence with its remedy; none before the first row. The facts
-// must be of a record of this problem. `fits` are those of all outputs, or none.
+// must be of a record of this problem. `fits` are those of all outputs, or none: what the fitted
+// model explains is not suspicious.
 std::vector<std::string> WarnOfSuspiciousData(const ResolvedProblem& problem,
                                               const DataFacts& facts,
                                               const std::vector<ChannelFit>& fits = {});

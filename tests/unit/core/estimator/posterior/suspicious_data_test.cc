@@ -65,9 +65,19 @@ TEST(SuspiciousData, AreNoneInAGoodRecord) {
   EXPECT_THAT(WarningsOf(ForcedProblem(), ForcedRecord(TimesFrom(0, 60))), IsEmpty());
 }
 
-TEST(SuspiciousData, AreTimesThatDoNotBeginNearZero) {
-  const Samples samples = InitialVelocityRecord(TimesFrom(12.345, 60), 1.1, 0.01);
-  EXPECT_THAT(WarningsOf(VelocityProblem(), samples),
+// Returns a record of a motion that began at 12 s, with the times of the logger.
+Samples CutOutRecord(int rows) {
+  Samples samples = InitialVelocityRecord(TimesFrom(0.595, rows), 1.1, 0.01);
+  samples.time_s = TimesFrom(12.345, rows);
+  return samples;
+}
+
+// The motion itself is right if it began at 0 indeed.
+TEST(SuspiciousData, AreTimesThatDoNotBeginNearZeroWhereTheModelDoesNotExplainTheSamples) {
+  EXPECT_THAT(
+      WarningsOf(VelocityProblem(), InitialVelocityRecord(TimesFrom(12.345, 60), 1.1, 0.01)),
+      IsEmpty());
+  EXPECT_THAT(WarningsOf(VelocityProblem(), CutOutRecord(60)),
               ElementsAre(AllOf(HasSubstr("t does not begin near 0"), HasSubstr("t = 12.345 s"),
                                 HasSubstr("(x0, v0)"))));
 }
@@ -166,8 +176,36 @@ TEST(SuspiciousData, AreStepsBesideWhichTheNoiseIsSmall) {
       IsEmpty());
 }
 
+TEST(SuspiciousData, AreJumpsThatTheModelDoesNotExplain) {
+  const auto signal = [](double t) {
+    return std::fmod(t + 0.51, 1) < 0.1 ? 0 : 0.9 + 0.3 * std::sin(t);
+  };
+  const Samples record = RoundedRecord(signal, 0, 1e-3);
+  for (const bool unknown : {false, true}) {
+    Problem right = SignalProblem("if(mod(t + 0.51, 1) < 0.1, 0, a + b*sin(t))", 0.006);
+    right.measured[0].noise.unknown = unknown;
+    EXPECT_THAT(WarningsOf(right, record), IsEmpty()) << unknown;
+    Problem wrong = SignalProblem("a + b*sin(t)", 0.006);
+    wrong.measured[0].noise.unknown = unknown;
+    EXPECT_THAT(WarningsOf(wrong, record), Contains(HasSubstr("as when a signal drops out")))
+        << unknown;
+  }
+}
+
+TEST(SuspiciousData, AreFlatTopsThatTheModelDoesNotExplain) {
+  const auto clipped = [](double t) { return std::min(1.1 * std::sin(3 * t), 0.8); };
+  const Samples record = RoundedRecord(clipped, 0, 1e-4);
+  const Problem right = SignalProblem("b + min(a*sin(3*t), 0.8)", 0.01);
+  EXPECT_THAT(WarningsOf(right, record), IsEmpty());
+  for (const bool unknown : {false, true}) {
+    Problem wrong = SignalProblem("b + a*sin(3*t)", 0.01);
+    wrong.measured[0].noise.unknown = unknown;
+    EXPECT_THAT(WarningsOf(wrong, record), Contains(HasSubstr("it stops at 0.8"))) << unknown;
+  }
+}
+
 TEST(SuspiciousData, AreTheSameHoweverTheRowsArrive) {
-  const Samples all = InitialVelocityRecord(TimesFrom(12.345, 80), 1.1, 0.01);
+  const Samples all = CutOutRecord(80);
   const std::vector<std::string> expected = WarningsOf(VelocityProblem(), all);
   for (const size_t batch : {1, 7}) {
     const auto estimator = MakeEstimator(VelocityProblem());
