@@ -28,7 +28,7 @@ bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandlin
                                                           : kExcessRatioWithOutliers;
   if (!(channel.chi_squared > ratio * degrees)) return false;
   return channel.chi_squared > degrees + kExcessDeviations * std::sqrt(2 * samples) ||
-         NormalDeviateOfChiSquared(channel.chi_squared, degrees) > kExcessDeviations;
+         NormalDeviateOfChiSquared(channel.chi_squared, std::max(1.0, degrees)) > kExcessDeviations;
 }
 
 double ResidualToNoise(const ChannelEstimate& channel, double degrees) {
