@@ -207,6 +207,7 @@ class Revision {
     const NoiseChoice best = ChooseNoise(profile, values, noise.grid);
     const ProfileValue& longest = values[CorrelationProfile::kFirstMixed - 1];
     const bool may_be_longer =
+        best.step == TimeConstantGrid::kSteps - 1 ||
         longest.negative_log_likelihood < best.negative_log_likelihood + kImprobable;
     ExtendGrid(best.step, may_be_longer, channel, noise);
     if (IsAbout(best.noise, noise.shape())) return false;

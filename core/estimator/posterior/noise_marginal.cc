@@ -19,9 +19,10 @@ constexpr double kOfWhite = 1.0 / 6;
 constexpr double kOfCorrelated = 4.0 / 6;
 // Members that have less than e^−9 of the best one's probability do not matter.
 constexpr double kNegligibleMember = 9;
-// The shape of the weights' tail up to which their variance is finite (pareto_tail.h). The
-// effective number of draws would not tell: where draws are too narrow, it is large until one falls
-// far out.
+// Share of the effective number of draws that the factors must leave, and the shape of the weights'
+// tail up to which their variance is finite (pareto_tail.h). The number alone would not tell: where
+// draws are too narrow, it is large until one falls far out.
+constexpr double kEnough = 0.5;
 constexpr double kMostShape = 0.5;
 // Least power of the likelihood from which is drawn.
 constexpr double kWidestPower = 1.0 / 16;
@@ -119,6 +120,10 @@ Vector OfMonomials(const Matrix& gram) {
     }
   }
   return coefficients;
+}
+
+double CountIndependent(const Vector& weights) {
+  return weights.sum() * weights.sum() / weights.squaredNorm();
 }
 
 // Returns the width of the central 95 %. Unlike the standard deviation it does not depend on long
@@ -260,7 +265,7 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
   if (marginal.empty()) return widening;
   const ExpansionDesign& design = expansion.design();
   std::optional<PosteriorDraws> best;
-  double least_shape = kInfinity;
+  double least_shape = kInfinity, most = 0;  // of the best, and its number of independent draws
   for (double power = 1; power >= kWidestPower; power /= 2) {
     Cost wider = cost;
     wider.set_power(power * cost.power());
@@ -272,11 +277,14 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     Vector present, tempered;
     cost.EvaluateMany(etas, present);
     wider.EvaluateMany(etas, tempered);
+    const double before = CountIndependent(drawn.weights);
     Reweigh(tempered - present, drawn);
     const Vector plain = drawn.weights;
     Reweigh(cost.power() * marginal.LogFactors(etas), drawn);
-    const double shape = TailShape(drawn.weights.array().log()).value_or(0);
-    if (best && shape >= least_shape) continue;
+    const double count = CountIndependent(drawn.weights);
+    const double shape =
+        std::max(kMostShape, TailShape(drawn.weights.array().log()).value_or(kMostShape));
+    if (best && (shape > least_shape || (shape == least_shape && count <= most))) continue;
     for (Eigen::Index i = 0; i < widening.size(); ++i) {
       const double before_width = IntervalWidth(drawn.scores.col(i), plain);
       const double width = IntervalWidth(drawn.scores.col(i), drawn.weights);
@@ -284,7 +292,8 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     }
     best = std::move(drawn);
     least_shape = shape;
-    if (shape <= kMostShape) break;
+    most = count;
+    if (shape == kMostShape && count >= kEnough * before) break;
   }
   best->minima = std::move(draws.minima);
   draws = *std::move(best);
