@@ -77,4 +77,11 @@ double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
   return beta;
 }
 
+double BelievedShift(const RegionalExpansion& expansion, const Cost& cost, bool in_element) {
+  const bool believed =
+      expansion.design().checks_are_draws || (!in_element && !(expansion.LogVarianceError() > 0));
+  return believed ? AgreementWithModel(expansion, cost).shift
+                  : LargestShift(expansion, cost.power());
+}
+
 }  // namespace polyest::internal

@@ -21,4 +21,10 @@ namespace polyest::internal {
 // show it.
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost);
 
+// Returns the shift of AgreementWithModel where its check points can be believed, else the
+// LargestShift. Check points that are no draws of a posterior need not be where this one is. They
+// are not believed in an element, nor with filters: ½ Σ log(S/σ²) is fitted apart from the outputs,
+// and its error may make minima where no check point is.
+double BelievedShift(const RegionalExpansion& expansion, const Cost& cost, bool in_element);
+
 }  // namespace polyest::internal

@@ -286,9 +286,7 @@ absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
 absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-    // Check points that are not draws of a posterior need not be where this one is.
-    return expansion_->design().checks_are_draws ? AgreementWithModel(*expansion_, cost).shift
-                                                 : LargestShift(*expansion_, cost.power());
+    return BelievedShift(*expansion_, cost, bisected_);
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };
   // Each settlement may raise the order, so several may be needed.
