@@ -137,6 +137,7 @@ std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& p
   Matrix others(starts.rows(), starts.cols());
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < starts.rows(); ++i) {
+    if (!stop.Check().ok() && i > 0) break;
     if (const auto reached = MinimumByNewton(cost, problem, starts.row(i).transpose())) {
       found.push_back({.point = *reached,
                        .value = problem.function(*reached, nullptr),

@@ -122,16 +122,16 @@ def test_an_exception_of_on_estimate_is_raised_by_a_later_call(client, problem, 
         async with aio.connect(client.server) as other:
             session = await other.session("raised-aio", problem, on_estimate=broken)
             with pytest.raises(ArithmeticError, match="of the program"):
-                for first in range(0, 900, 20):
-                    await session.append(rows(first, first + 20))
+                for first in range(0, 900, 2):
+                    await session.append(rows(first, first + 2))
             with contextlib.suppress(ArithmeticError):  # of an estimate since
-                await session.append(rows(first + 20, first + 40))
+                await session.append(rows(first + 2, first + 4))
             with pytest.raises(ArithmeticError):
                 await session.close()  # after the last estimate
             await session.close()
             return (await session.info()).sample_count - first
 
-    assert asyncio.run(run()) == 40
+    assert asyncio.run(run()) == 4
 
 
 def test_a_session_that_is_dropped_is_left_to_the_next_writer(client, problem, rows):

@@ -62,7 +62,7 @@ void ExpectNoTraceOfStops(const Problem& problem) {
   int64_t stops = 0;
   const Estimate undisturbed = EstimateWithStops(problem, int64_t{1} << 60, stops);
   EXPECT_EQ(stops, 0);
-  for (int64_t patience = 1; patience < 80; patience += 4) {
+  for (int64_t patience = 1; patience < 80; patience += 2) {
     SCOPED_TRACE(patience);
     ExpectSame(EstimateWithStops(problem, patience, stops), undisturbed);
     if (testing::Test::HasFailure()) return;
