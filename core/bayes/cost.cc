@@ -70,7 +70,7 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   value.mismatch = mismatch_.EvaluateWithGradient(d, by_d);
   const Vector xi = region_.ToGerm(eta);
   value.prior = prior_.NegativeLogDensity(xi);
-  // ∇J = β ∂φᵀ ∂J_mismatch/∂d + α² axesᵀ ∇J_apriori(ξ)
+  // ∇J = β ∂φᵀ (∂J_mismatch/∂d + ∂J_0/∂d) + α² axesᵀ ∇J_apriori(ξ)
   if (has_remainder()) by_d += remainder_;
   gradient = power_ * (phi_gradient.transpose() * by_d);
   value.total = kInfinity;

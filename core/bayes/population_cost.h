@@ -76,6 +76,7 @@ class PopulationCost {
 
  private:
   const ScoreMixture* ShapeOf(Eigen::Index run) const;
+  // Returns the power of a run's term, given that of the likelihood.
   double PowerOf(Eigen::Index run, double power) const {
     return run < std::ssize(shapes_) ? power : 1;
   }

@@ -67,9 +67,9 @@ class NoiseMarginal {
 };
 
 // Gives the draws of the cost's posterior on the expansion the factors of the marginal; draws again
-// from a wider density where too few are left. Returns the factors by which the widths of the
-// scores' 95 % intervals (n) change, 1 where nothing is integrated out. Returns an error only on a
-// stop request.
+// from a wider density where too few are left, or a few weigh too much. Returns the factors by
+// which the widths of the scores' 95 % intervals (n) change, 1 where nothing is integrated out.
+// Returns an error only on a stop request.
 absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
                                         const RegionalExpansion& expansion, const Cost& cost,
                                         const Matrix& guesses, const PosteriorEffort& effort,

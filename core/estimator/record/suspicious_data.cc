@@ -218,9 +218,8 @@ class Warnings {
   void AddCoarseSteps(const std::string& name, const CoarseSteps& coarse) {
     Add("%s: its samples come in steps of %.3g, beside which their noise of about %.2g is small: "
         "errors of up to half a step last as long as the signal stays within one and come back "
-        "with "
-        "it, so that the uncertainty may be far too small; measure with a finer range, add dither, "
-        "or state noise of half a step that is correlated for as long",
+        "with it, so that the uncertainty may be far too small; measure with a finer range, add "
+        "dither, or state noise of half a step that is correlated for as long",
         name, coarse.step, coarse.noise);
   }
 

@@ -73,6 +73,7 @@ class Instance {
   bool DoStep(double time_s, double step_s);
 
  private:
+  // Returns whether the values are finite; fails if not.
   bool CheckFinite(std::span<const double> values);
   bool Instantiate();
   bool Activate();

@@ -110,8 +110,9 @@ struct ComponentEstimate {
 struct ChannelEstimate {
   std::string output;   // its name
   int64_t samples = 0;  // number of them
-  // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples` when
-  // model and noise are right, and by construction when the noise was unknown.
+  // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples`,
+  // less the number of parameters fitted to them, when model and noise are right, and by
+  // construction when the noise was unknown.
   double chi_squared = 0;
   // Root mean square of the noise: as assumed or, where it was unknown, as estimated; in the
   // output's unit.

@@ -81,7 +81,8 @@ class ChannelEstimate:
     output: str
     #: Samples taken into account.
     samples: int
-    #: Σ (z − y)²/R at `map`; about `samples` when model and noise are right.
+    #: Σ (z − y)²/R at `map`; about `samples`, less the number of parameters fitted to them, when
+    #: model and noise are right.
     chi_squared: float
     #: Root mean square of the noise, assumed or estimated, in the output's unit.
     noise_std_dev: float
