@@ -22,15 +22,14 @@ constexpr std::chrono::seconds kBusyDelay{1};
 Executor::Executor(const ExecutorOptions& options) : options_(options) {
   POLYEST_CHECK(options.threads_per_lane >= 1 && options.threads >= options.threads_per_lane &&
                 options.capacity >= 1 && options.capacity_per_lane >= 1 && options.niceness >= 0);
-  for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { Run(); });
+  workers_.resize(static_cast<size_t>(options.threads));
+  for (Worker& worker : workers_) threads_.emplace_back([this, &worker] { Run(worker); });
 }
 
 Executor::~Executor() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  ready_.notify_all();
+  const std::lock_guard lock(mutex_);
+  ending_ = true;
+  WakeAll();
 }
 
 absl::Status Executor::Submit(const std::string& lane, Task task, Admission admission) {
@@ -75,28 +74,61 @@ absl::Status Executor::Reserve(const std::string& lane, Admission admission) {
 }
 
 void Executor::Enqueue(const std::string& lane, Task task) {
+  Worker* woken = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    Lane& own = lanes_[lane];
+    own.queue.push_back(std::move(task));
+    if (GiveTurn(lane, own)) woken = Rouse();
+  }
+  if (woken != nullptr) woken->woken.notify_one();
+}
+
+bool Executor::GoOn(const std::string& lane) {
   const std::lock_guard lock(mutex_);
   Lane& own = lanes_[lane];
-  own.queue.push_back(std::move(task));
-  GiveTurn(lane, own);
+  if (!turns_.empty() || !own.queue.empty()) return false;
+  --own.accepted;
+  --accepted_;
+  return true;
 }
 
-void Executor::GiveTurn(const std::string& name, Lane& lane) {
-  if (lane.in_turn || lane.queue.empty() || lane.running >= options_.threads_per_lane) return;
+bool Executor::GiveTurn(const std::string& name, Lane& lane) {
+  if (lane.in_turn || lane.queue.empty() || lane.running >= options_.threads_per_lane) return false;
   lane.in_turn = true;
   turns_.push_back(name);
-  ready_.notify_one();
+  return true;
 }
 
-void Executor::Run() {
+Executor::Worker* Executor::Rouse() {
+  if (sleeping_.empty()) return nullptr;
+  Worker* const worker = sleeping_.back();
+  sleeping_.pop_back();
+  worker->asleep = false;
+  return worker;
+}
+
+void Executor::WakeAll() {
+  while (Worker* const worker = Rouse()) worker->woken.notify_one();
+}
+
+void Executor::Await(Worker& self, std::unique_lock<std::mutex>& lock) {
+  // A strand's running task may enqueue the next one, so the end waits for every task accepted.
+  while (turns_.empty() && !(ending_ && accepted_ == 0)) {
+    self.asleep = true;
+    sleeping_.push_back(&self);
+    self.woken.wait(lock, [&] { return !self.asleep; });
+  }
+}
+
+void Executor::Run(Worker& self) {
   // On Linux each thread has a priority of its own, and 0 names the calling thread.
   if (options_.niceness > 0) {
     setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + options_.niceness);
   }
   std::unique_lock lock(mutex_);
   while (true) {
-    // A strand's running task may enqueue the next one, so the end waits for every task accepted.
-    ready_.wait(lock, [this] { return !turns_.empty() || (ending_ && accepted_ == 0); });
+    Await(self, lock);
     if (turns_.empty()) return;
     const std::string name = std::move(turns_.front());
     turns_.pop_front();
@@ -105,8 +137,9 @@ void Executor::Run() {
     Task task = std::move(lane.queue.front());
     lane.queue.pop_front();
     ++lane.running;
-    GiveTurn(name, lane);
+    Worker* const woken = GiveTurn(name, lane) ? Rouse() : nullptr;
     lock.unlock();
+    if (woken != nullptr) woken->woken.notify_one();
     {
       const Computing here;
       task();
@@ -116,11 +149,11 @@ void Executor::Run() {
     --lane.running;
     --lane.accepted;
     --accepted_;
-    GiveTurn(name, lane);
+    GiveTurn(name, lane);  // this thread is there for it
     if (lane.accepted == 0) lanes_.erase(name);
     if (accepted_ > 0) continue;
     idle_.notify_all();
-    if (ending_) ready_.notify_all();
+    if (ending_) WakeAll();
   }
 }
 
@@ -132,27 +165,29 @@ absl::Status Strand::Submit(Task task, Admission admission) {
     idle = tasks_.empty();
     tasks_.push_back(std::move(task));
   }
-  if (idle) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
+  if (idle) executor_.Enqueue(lane_, [self = shared_from_this()] { self->Run(); });
   return absl::OkStatus();
 }
 
-void Strand::RunOne() {
-  Task task;
-  {
-    const std::lock_guard lock(mutex_);
-    task = std::move(tasks_.front());
+void Strand::Run() {
+  while (true) {
+    Task task;
+    {
+      const std::lock_guard lock(mutex_);
+      task = std::move(tasks_.front());
+    }
+    task();
+    task = nullptr;
+    {
+      const std::lock_guard lock(mutex_);
+      tasks_.pop_front();
+      if (tasks_.empty()) return;
+    }
+    // Where others wait, the next task goes to the end of the queue, so that a busy strand does not
+    // keep them from their turn. Where nobody does, this thread has all at hand.
+    if (!executor_.GoOn(lane_)) break;
   }
-  task();
-  task = nullptr;
-  bool more = false;
-  {
-    const std::lock_guard lock(mutex_);
-    tasks_.pop_front();
-    more = !tasks_.empty();
-  }
-  // The next task goes to the end of the queue, so that a busy strand does not keep others from
-  // their turn.
-  if (more) executor_.Enqueue(lane_, [self = shared_from_this()] { self->RunOne(); });
+  executor_.Enqueue(lane_, [self = shared_from_this()] { self->Run(); });
 }
 
 }  // namespace polyest::internal

@@ -64,23 +64,38 @@ class Executor {
     int running = 0;
     bool in_turn = false;
   };
+  struct Worker {
+    std::condition_variable woken;
+    bool asleep = false;
+  };
 
   // Takes room for one task; RESOURCE_EXHAUSTED when there is none.
   absl::Status Reserve(const std::string& lane, Admission admission);
   // Queues a task whose room has been taken. The room is given back after the task.
   void Enqueue(const std::string& lane, Task task);
-  void Run();
-  // Puts the lane among those that take turns, if it may run a task. Called with the mutex held.
-  void GiveTurn(const std::string& name, Lane& lane);
+  // Gives back the room of a task that has ended, and returns true, if the thread may go on with
+  // another task of the same strand, because nobody waits for the thread or for the lane.
+  bool GoOn(const std::string& lane);
+  void Run(Worker& self);
+  // Waits for a turn, or for the end.
+  void Await(Worker& self, std::unique_lock<std::mutex>& lock);
+  // The following are called with the mutex held. GiveTurn puts the lane among those that take
+  // turns, if it may run a task, and tells whether it did; a thread must be there for that. Rouse
+  // picks one that sleeps, if any; it is then to be notified, best when it finds the mutex free.
+  bool GiveTurn(const std::string& name, Lane& lane);
+  Worker* Rouse();
+  void WakeAll();
 
   const ExecutorOptions options_;
   mutable std::mutex mutex_;
-  std::condition_variable ready_;
   std::condition_variable idle_;
   std::map<std::string, Lane> lanes_;  // lanes that have tasks
   std::deque<std::string> turns_;
   int accepted_ = 0;
   bool ending_ = false;
+  std::deque<Worker> workers_;
+  // Those that sleep. The last one is woken first: its caches are warm.
+  std::vector<Worker*> sleeping_;
   std::vector<std::jthread> threads_;
 };
 
@@ -95,7 +110,7 @@ class Strand : public std::enable_shared_from_this<Strand> {
   absl::Status Submit(Task task, Admission admission = Admission::kIfRoom);
 
  private:
-  void RunOne();
+  void Run();
 
   Executor& executor_;
   const std::string lane_;
