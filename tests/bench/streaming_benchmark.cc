@@ -5,12 +5,14 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "core/common/check.h"
 #include "polyest/v1/session_service.grpc.pb.h"
@@ -94,22 +96,41 @@ std::unique_ptr<v1::SessionService::Stub> Connect(int port) {
       grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials()));
 }
 
-void Compare(v1::SessionService::Stub& daemon, v1::SessionService::Stub& bare, int batches,
-             int rows) {
+// Returns the number of batches per second that a new session of the daemon takes.
+double SessionThroughput(v1::SessionService::Stub& daemon, int batches, int rows) {
   grpc::ClientContext creating, deleting;
   v1::CreateSessionRequest create;
   create.set_session_id("benchmark");
   *create.mutable_session()->mutable_problem() = Oscillator();
   v1::Session session;
   POLYEST_CHECK(daemon.CreateSession(&creating, create, &session).ok());
-  const double echoed = Throughput(bare, batches, rows);
   const double streamed = Throughput(daemon, batches, rows);
-  std::printf("%5d rows a batch: bare %8.0f batches/s, daemon %8.0f batches/s, ratio %.2f\n", rows,
-              echoed, streamed, streamed / echoed);
   v1::DeleteSessionRequest remove;
   remove.set_name("sessions/benchmark");
   google::protobuf::Empty empty;
   POLYEST_CHECK(daemon.DeleteSession(&deleting, remove, &empty).ok());
+  return streamed;
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+// Measures both by turns, because the machine may have other things to do now and then.
+void Compare(v1::SessionService::Stub& daemon, v1::SessionService::Stub& bare, int batches,
+             int rows) {
+  constexpr int kRounds = 7;
+  std::vector<double> echoed, streamed, ratios;
+  for (int round = 0; round < kRounds; ++round) {
+    echoed.push_back(Throughput(bare, batches, rows));
+    streamed.push_back(SessionThroughput(daemon, batches, rows));
+    ratios.push_back(streamed.back() / echoed.back());
+  }
+  const auto [lowest, highest] = std::minmax_element(ratios.begin(), ratios.end());
+  std::printf(
+      "%5d rows a batch: bare %8.0f batches/s, daemon %8.0f batches/s, ratio %.2f (%.2f-%.2f)\n",
+      rows, Median(echoed), Median(streamed), Median(ratios), *lowest, *highest);
 }
 
 void Run() {
