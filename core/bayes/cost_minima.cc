@@ -11,8 +11,12 @@ namespace {
 
 constexpr int kMaxSteps = 25;  // and two more for each parameter, whose bounds may become active
 constexpr int kMaxHalvings = 6;
+// Steps, in widths of the box, at which a search by gradients is so near a minimum that Newton's
+// method takes over.
+constexpr double kNear = 1e-3;
 constexpr double kSufficient = 1e-4;     // of the predicted decrease: Armijo's condition
 constexpr double kConvergedStep = 1e-9;  // in widths of the box
+constexpr double kReached = 1e-12;       // room to a limit, relative to it, that is rounding only
 // A decrease that the rounding of the cost hides is not tested any more.
 constexpr double kRounding = 1e-12;
 
@@ -48,6 +52,7 @@ class NewtonSearch {
     for (Eigen::Index step = 0; step < most_steps; ++step) {
       const double value = cost_.EvaluateWithGradient(eta, gradient).total;
       if (!std::isfinite(value) || !gradient.allFinite()) return std::nullopt;
+      if (step == 0) KeepTo(eta, gradient);
       const std::optional<Vector> move = Move(eta, gradient);
       if (!move) return std::nullopt;
       const double slope = gradient.dot(*move);
@@ -68,6 +73,18 @@ class NewtonSearch {
   }
 
  private:
+  // Makes those limits active that the start has reached and beyond which the cost falls: without
+  // them the Hessian need not be positive definite at a minimum.
+  void KeepTo(const Vector& eta, const Vector& gradient) {
+    const Vector room = limits_.bounds - limits_.normals.transpose() * eta;
+    const Vector slope = limits_.normals.transpose() * gradient;
+    for (Eigen::Index i = 0; i < room.size(); ++i) {
+      if (room[i] <= kReached * (1 + std::abs(limits_.bounds[i])) && slope[i] < 0) {
+        active_.push_back(i);
+      }
+    }
+  }
+
   // Returns Newton's step in the directions that the active limits leave, and sets their
   // multipliers, those λ for which gradient + Σ λ a is least; nothing where the Hessian in these
   // directions is not positive definite.
@@ -138,13 +155,19 @@ std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& p
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < starts.rows(); ++i) {
     if (!stop.Check().ok() && i > 0) break;
-    if (const auto reached = MinimumByNewton(cost, problem, starts.row(i).transpose())) {
+    Vector start = starts.row(i).transpose();
+    std::optional<Vector> reached = MinimumByNewton(cost, problem, start);
+    if (!reached) {
+      start = DescendFrom(problem, start, {.relative_step = kNear}, stop);
+      reached = MinimumByNewton(cost, problem, start);
+    }
+    if (reached) {
       found.push_back({.point = *reached,
                        .value = problem.function(*reached, nullptr),
                        .converged = true,
                        .reason = "converged"});
     } else {
-      others.row(count++) = starts.row(i);
+      others.row(count++) = start.transpose();
     }
   }
   if (count > 0) {

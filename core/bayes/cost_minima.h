@@ -21,8 +21,8 @@ std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProble
 
 // Returns the distinct minima of the cost, which is the function of `problem`, in local
 // coordinates, lowest first, at least one: those to which Newton's method leads from the starts
-// (rows of `starts`), and those that FindMinima finds from the other starts. On a stop request
-// returns those found so far.
+// (rows of `starts`) or from where a descent by gradients ends, and those that FindMinima finds
+// from there otherwise. On a stop request returns those found so far.
 std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& problem,
                                   const Matrix& starts, const Stop& stop);
 

@@ -296,6 +296,15 @@ std::vector<Minimum> DistinctMinima(std::vector<Minimum> found, const Minimizati
   return distinct;
 }
 
+Vector DescendFrom(const MinimizationProblem& original, const Vector& start,
+                   const MinimizerOptions& options, const Stop& stop) {
+  UnitProblem problem(original, stop);
+  const Vector u = PrepareStart(problem, problem.Project(problem.ToUnit(start)));
+  const Vector end = RunSolver(problem, u, options).point;
+  const bool lower = problem.Value(end, nullptr) <= problem.Value(u, nullptr);
+  return problem.ToPoint(problem.Project(lower ? end : u));
+}
+
 std::vector<Minimum> FindMinima(const MinimizationProblem& problem, const Matrix& starts,
                                 const MinimizerOptions& options, const Stop& stop) {
   POLYEST_CHECK(starts.rows() > 0 && starts.cols() == problem.lower.size());

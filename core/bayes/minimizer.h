@@ -45,6 +45,12 @@ struct Minimum {
 std::vector<Minimum> DistinctMinima(std::vector<Minimum> found, const MinimizationProblem& problem,
                                     const MinimizerOptions& options);
 
+// Returns where SLSQP gets from `start`, moved inside, until its steps are within
+// options.relative_step. The point is lower than the start, and near a minimum, but need not be
+// one.
+Vector DescendFrom(const MinimizationProblem& problem, const Vector& start,
+                   const MinimizerOptions& options, const Stop& stop);
+
 // Returns the distinct minima found from the starts (rows of `starts`), lowest first; at least one.
 // A start outside the box or the constraints is moved inside. The result is deterministic. On a
 // stop request returns the minima found so far with converged = false.

@@ -71,6 +71,21 @@ TEST(CostMinima, LieOnTheBoundsThatAreActive) {
   EXPECT_LT((*minimum - Vector::Constant(2, 1.5)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+// Within |a| ≤ ½ the cost of an unobserved sign has its minima on the bounds, where it is concave:
+// where the search is held, the curvature along the way out does not matter.
+TEST(CostMinima, LieOnBoundsWhereTheCostIsConcave) {
+  const Prior prior = ManyNormals(1);
+  const Cost cost = CostOf(prior, {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.1}});
+  const MinimizationProblem search = SearchFor(cost, 0.5);
+  const auto held = MinimumByNewton(cost, search, Vector::Constant(1, 0.5));
+  ASSERT_TRUE(held);
+  EXPECT_EQ((*held)[0], 0.5);
+  const auto minima = FindMinimaOf(cost, search, Matrix{{0.1}, {-0.2}}, Stop());
+  ASSERT_EQ(minima.size(), 2u);
+  EXPECT_EQ(std::abs(minima[0].point[0]), 0.5);
+  EXPECT_EQ(minima[1].point[0], -minima[0].point[0]);
+}
+
 // A limit that stopped a step is left again where the cost falls away from it: Rosenbrock's valley,
 // cut at x ≤ 0.5, ends on that line, at y = x².
 TEST(CostMinima, LieAtTheEndOfAValleyThatIsCutOff) {

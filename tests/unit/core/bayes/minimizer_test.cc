@@ -233,6 +233,16 @@ TEST(Minimizer, AcceptsAFlatFunction) {
   EXPECT_EQ(minima[0].value, 4);
 }
 
+TEST(Minimizer, DescendsNearAMinimum) {
+  const Vector centre{{0.3, -0.4}};
+  const MinimizationProblem problem = InCube(2, 1, Quadratic(IllConditioned(2, 100), centre));
+  const Vector end = DescendFrom(problem, Vector{{5, 1}}, {.relative_step = 1e-3}, Stop());
+  EXPECT_LT((end - centre).cwiseAbs().maxCoeff(), 0.05);
+  MinimizationProblem held = problem;
+  held.upper[0] = 0.1;
+  EXPECT_EQ(DescendFrom(held, Vector{{-0.5, 0.5}}, {.relative_step = 1e-3}, Stop())[0], 0.1);
+}
+
 TEST(Minimizer, GivesUpAfterTheMostEvaluations) {
   MinimizerOptions options;
   options.max_evaluations = 3;
